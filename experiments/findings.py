@@ -1196,8 +1196,21 @@ def posterior(result: Result) -> list[str]:
         f"{count(len(result['draws']))} draws of laws about it, intervals at 95 % hold the truth in "
         f"{result['pooled_percent']:.1f} % of the cases, in {result['least_percent']:.0f} to "
         f"{result['most_percent']:.0f} % by parameter; a draw takes {number(median(seconds))} s in the median and "
-        f"{number(max(seconds))} s at worst.",
+        f"{number(max(seconds))} s at worst.{_not_mixed(result)}",
     ]
+
+
+def _not_mixed(result: Result) -> str:
+    """A sentence on the draws whose steps did not suffice."""
+    seeds = result["seeds_not_mixed"]
+    if not seeds:
+        return ""
+    spans = span(result["draws"][seed]["span"] for seed in seeds)
+    return (
+        f" {len(seeds)} draws (seeds {', '.join(map(str, seeds))}) have fewer than 400 effective samples after 6 000 "
+        f"steps, and count all the same; without them it is {result['pooled_percent_of_mixed']:.1f} %. Their outputs "
+        f"span {spans} µm."
+    )
 
 
 def structure_ensembles(result: Result) -> list[str]:

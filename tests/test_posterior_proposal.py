@@ -4,7 +4,9 @@ import numpy as np
 import pytest
 from scipy import special, stats
 
+from hysim.posterior import _growth, _proposal
 from hysim.posterior._bridge import _error
+from hysim.posterior._growth import grown
 from hysim.posterior._mixture import mixture
 from hysim.posterior._optima import around_optima
 from hysim.posterior._proposal import particles, proposal_for
@@ -113,6 +115,48 @@ def test_a_posterior_in_which_one_draw_of_the_prior_lies_is_an_error():
 
     with pytest.raises(ValueError, match=r"the posterior was not found: 1 of .* pass narrower priors"):
         proposal_for(Known(3, log_likelihood), NOWHERE[:, :3], np.random.default_rng(0))
+
+
+def bent(width):
+    """A target that is normal along a bent line in four numbers and of this width across it; its evidence is one."""
+
+    def log_likelihood(v):
+        line = np.stack([v[:, 0] ** 2, np.sin(2.0 * v[:, 0]), np.cos(3.0 * v[:, 0])], axis=1)
+        across = stats.norm.logpdf(v[:, 1:], line, width).sum(axis=1)
+        return across - stats.norm.logpdf(v[:, 1:]).sum(axis=1)
+
+    return Known(4, log_likelihood)
+
+
+def weights_of(target, proposal):
+    """Weights of new draws from a proposal, and their effective share."""
+    q = proposal.draw(8192, np.random.default_rng(9))
+    weight = np.exp(target.log_posterior(q) - proposal.log_density(q))
+    return weight, weight.sum() ** 2 / np.sum(weight**2) / weight.size
+
+
+def test_a_proposal_grows_along_a_bent_line(monkeypatch):
+    """It starts from one broad normal part, whose draws nearly all miss the line."""
+    monkeypatch.setattr(_growth, "_ROUNDS", 10)  # enough for this line
+    target, rng = bent(0.2), np.random.default_rng(1)
+    start = mixture(3.0 * rng.standard_normal((2000, 4)), np.ones(2000), 0, rng, parts=1)
+    _, before = weights_of(target, start)
+    found, alone = grown(start, target, rng)
+    for proposal in (found, alone):
+        assert proposal.share.sum() == pytest.approx(1.0)
+    weight, share = weights_of(target, found)
+    assert before < 0.01
+    assert share > 0.3
+    assert weight.mean() == pytest.approx(1.0, abs=4.0 * weight.std() / np.sqrt(weight.size))
+
+
+def test_only_a_proposal_that_is_worse_than_asked_for_grows(monkeypatch):
+    calls = []
+    monkeypatch.setattr(_proposal, "grown", lambda base, *_: calls.append(base) or (base, base))
+    target = Known(2, lambda v: np.zeros(len(v)))
+    for least in (0.1, 1.0):
+        proposal_for(target, NOWHERE[:, :2], np.random.default_rng(0), least)
+    assert len(calls) == 1
 
 
 def test_walkers_that_do_not_meet_give_no_evidence():

@@ -16,7 +16,10 @@ from hysim._frozen import FloatArray
 FEWEST_EACH = 4
 """Points for each coordinate and one more: fewer shape no part."""
 
-_PARTS, _STEPS = 32, 12  # at first, and of expectation and maximisation
+PARTS = 32
+"""Parts of a mixture at first."""
+
+_STEPS = 12  # of expectation and maximisation
 _NEIGHBOURS = 0.02  # share of the points that shape a part at first
 _WIDE = 0.1  # share of the part around all
 _FREEDOM = 5  # at least
@@ -96,19 +99,19 @@ def _power(base: FloatArray, exponent: int) -> FloatArray:
     return root * root * base if exponent % 2 else root * root
 
 
-def mixture(v: FloatArray, weight: FloatArray, n_linear: int, rng: np.random.Generator) -> Proposal:
-    """The proposal closest to points (n, n_v) with weights (n,), whose parts begin at some of the points."""
+def mixture(v: FloatArray, weight: FloatArray, n_linear: int, rng: np.random.Generator, parts: int = PARTS) -> Proposal:
+    """The proposal closest to points (n, n_v) with weights (n,), whose `parts` begin at some of the points."""
     weight = weight / weight.sum()
     mean = weight @ v
     covariance = _covariance(v - mean, weight)
     n_x, around = v.shape[1] - 1, np.asarray(np.linalg.cholesky(2.0 * covariance), dtype=np.float64)
     wide = Proposal(mean[np.newaxis], around[np.newaxis], np.ones(1), n_x, n_linear)
-    chosen = rng.choice(len(v), _PARTS, p=weight)
-    share = np.full(_PARTS, 1.0 / _PARTS)
-    parts = Proposal(v[chosen], _shapes(v[chosen], v, covariance), share, n_x, n_linear)
+    chosen = rng.choice(len(v), parts, p=weight)
+    share = np.full(parts, 1.0 / parts)
+    closest = Proposal(v[chosen], _shapes(v[chosen], v, covariance), share, n_x, n_linear)
     for _ in range(_STEPS):
-        parts = _closer(parts, v, weight, covariance)
-    return parts.beside(wide, _WIDE)
+        closest = _closer(closest, v, weight, covariance)
+    return closest.beside(wide, _WIDE)
 
 
 def _closer(parts: Proposal, v: FloatArray, weight: FloatArray, covariance: FloatArray) -> Proposal:

@@ -254,14 +254,13 @@ class Linear:
             w[:, k] = prior.quantile(share[:, k]) / unit[:, k]
         return w
 
-    def inside(self, w: FloatArray, units: tuple[FloatArray, FloatArray, FloatArray]) -> FloatArray:
-        """The nearest values that the prior allows, a little inside of its ends."""
+    def ends(self, units: tuple[FloatArray, FloatArray, FloatArray]) -> tuple[FloatArray, FloatArray]:
+        """The least and the largest values that the prior allows, in units, (n_sets, n_linear)."""
         unit, centre, _ = units
         low, high = centre - self.reach, centre + self.reach
         for k, prior in self.given.items():
             low[:, k], high[:, k] = prior.low / unit[:, k], prior.high / unit[:, k]
-        margin = 1e-3 * (high - low)
-        return np.clip(w, low + margin, high - margin)
+        return low, high
 
 
 def linear(problem: Problem, priors: Mapping[str, Given], factor: float = 1.0) -> Linear:

@@ -10,6 +10,7 @@ taken at the best linear parameters and multiplied by the volume around them, wh
 A narrow optimum has a small share of the prior, and particles may miss it: those around the optima of the fit
 (`hysim.posterior._optima`) stand beside them. A mixture is fitted to all, and anew to its own draws with their weights,
 until these are even enough: what the particles got wrong, such as the shares of separate optima, weights put right.
+What is thin and bent needs more parts than that (`hysim.posterior._growth`).
 """
 
 import math
@@ -18,6 +19,7 @@ import numpy as np
 import numpy.typing as npt
 
 from hysim._frozen import FloatArray
+from hysim.posterior._growth import grown
 from hysim.posterior._mixture import FEWEST_EACH, Proposal, mixture
 from hysim.posterior._target import Target
 
@@ -33,12 +35,17 @@ _MOST_POWERS = 100
 _IMPROVING = 4  # draws that improve a proposal, for each particle
 _ROUNDS = 3
 _EVEN_ENOUGH = 0.45  # effective share of the draws
+POOR, GOOD = 0.1, 0.6
+"""Effective shares of the draws of a proposal: below them it grows, for few samples and for many."""
 
 
-def proposal_for(target: Target, near: FloatArray, rng: np.random.Generator) -> tuple[Proposal, Proposal]:
+def proposal_for(
+    target: Target, near: FloatArray, rng: np.random.Generator, least: float = POOR
+) -> tuple[Proposal, Proposal]:
     """The proposal that the particles, and those `near` optima, shape, improved by draws from itself with weights.
 
-    The second one reaches farther, and is a part of the first. Improvement ends where few draws have all the weight.
+    The second one reaches farther, and is a part of the first. Improvement ends where few draws have all the weight. A
+    proposal whose effective share is below `least` grows (`hysim.posterior._growth`).
     """
     population = particles(target, rng)
     v, early = (np.concatenate([each, near]) for each in population)
@@ -65,7 +72,7 @@ def proposal_for(target: Target, near: FloatArray, rng: np.random.Generator) -> 
         if weights.sum() ** 2 < _fewest(target) * (weights**2).sum():
             break
         proposal = mixture(drawn, weights, target.n_linear, rng).beside(reaching, EARLY_SHARE)
-    return best, reaching
+    return (best, reaching) if best_share > least else grown(best, target, rng)
 
 
 def _of(v: FloatArray, target: Target, rng: np.random.Generator) -> Proposal:

@@ -19,9 +19,10 @@ from hysim._versions import optional
 from hysim.posterior._chains import effective_samples, split_rhat
 from hysim.posterior._mixture import Proposal, mixture
 from hysim.posterior._optima import around_optima
-from hysim.posterior._proposal import EARLY_SHARE, proposal_for
+from hysim.posterior._proposal import EARLY_SHARE, GOOD, POOR, proposal_for
 from hysim.posterior._target import Target
 
+_MANY = 5000  # samples from which on a good proposal saves more time than it takes to grow
 _FIRST = 100  # steps of the first run
 _SHAPING = 4096  # points of the walkers' paths that shape a proposal
 _LONG = 10.0  # correlation times of a run, from which on the ensemble counts as warm
@@ -69,7 +70,8 @@ def sampled(
     """Chains with so many effective samples of each parameter, or with `most_steps` steps if these come first."""
     emcee = optional("emcee", "sampling a posterior", "bayes")
     rng = np.random.default_rng(seed)
-    proposal, reaching = proposal_for(target, around_optima(target, rng), rng)
+    least = GOOD if samples >= _MANY else POOR
+    proposal, reaching = proposal_for(target, around_optima(target, rng), rng, least)
     sampler = _Ensemble(emcee, target, walkers, proposal, reaching)
     state = emcee.State(
         _first(target, proposal, walkers, rng),

@@ -8,10 +8,14 @@ noise, the regression
 
     [C / s; 1 / d] w = [(y - e0) / s; c / d],    [C / s; 1 / d] = Q R,    w_0 = R^-1 (Q^T rhs)
 
-has the best linear parameters w_0 at this x, and w = w_0 + R^-1 e. This is a change of coordinates, |dw/de| =
-1 / |det R|, and no approximation: for normal noise and wide priors e is a standard normal vector whatever x is, so that
-chains need not follow the narrow ridges between linear and other parameters. All parameters are sampled; none is
-integrated out.
+has the best linear parameters w_0 at this x, and R (w - w_0) is about standard normal between the ends of the priors.
+From the last row of R up, each of its numbers is the quantile of the normal distribution that these ends cut off,
+
+    x_k = Phi^-1(Phi(a_k) + Phi(e_k) (Phi(b_k) - Phi(a_k))),    a_k <= x_k <= b_k given the rows below.
+
+This is a change of coordinates whose volume is known (`hysim.posterior._truncated`), and no approximation: for normal
+noise e is about standard normal whatever x is, so that chains need not follow the narrow ridges between linear and
+other parameters, nor the sides of their boxes. All parameters are sampled; none is integrated out.
 """
 
 from collections.abc import Mapping
@@ -26,6 +30,7 @@ from hysim.errors import SimulationError
 from hysim.identification.likelihood.densities import Density
 from hysim.identification.likelihood.refit import Problem
 from hysim.posterior._priors import SIGMA, Given, Linear, Searched, linear, of_sigma, searched
+from hysim.posterior._truncated import solved_within
 
 _SAMPLES_AT_ONCE = 50_000
 _LOG_2PI = float(np.log(2.0 * np.pi))
@@ -128,7 +133,6 @@ class Target:
         for places in self._chunks(np.flatnonzero(np.isfinite(prior))):
             parts, sigma = self._columns(x[places]), np.exp(log_sigma[places])
             w, log_volume = self._from_normal(parts, np.zeros((len(places), self.n_linear)), sigma)
-            w = self.b_prior.inside(w, parts.units)
             density = self.b_prior.log_density(w, parts.units) + log_volume + 0.5 * self.n_linear * _LOG_2PI
             values[places] = np.maximum(self._log_likelihood(parts, w, sigma) + density, _LOWEST)
         return values, prior
@@ -231,9 +235,7 @@ class Target:
         if not self.n_linear:
             return e, np.zeros(len(e))
         triangle, best = self._regression(parts, sigma)
-        w = np.asarray(np.linalg.solve(triangle, (best + e)[..., np.newaxis]), dtype=np.float64)[..., 0]
-        log_volume = -np.log(np.abs(np.diagonal(triangle, axis1=1, axis2=2))).sum(axis=1)
-        return w, log_volume
+        return solved_within(triangle, best, e, *self.b_prior.ends(parts.units))
 
     def _log_sigma_density(self, log_sigma: FloatArray) -> FloatArray:
         low, high = self.sigma_ends
