@@ -48,6 +48,7 @@ extensions = [
     "sphinx.ext.autosummary",
     "numpydoc",
     "mathml",
+    "navigation",
     "notebook_cells",
 ]
 html_math_renderer = "mathml"
