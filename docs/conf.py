@@ -2,8 +2,12 @@
 
 import json
 import sys
+from functools import partial
 from pathlib import Path
 
+from jinja2 import FileSystemBytecodeCache
+from jinja2.sandbox import SandboxedEnvironment
+from numpydoc import docscrape_sphinx
 from sphinx.application import Sphinx
 from sphinx.errors import ExtensionError
 
@@ -48,6 +52,7 @@ extensions = [
     "sphinx.ext.autosummary",
     "numpydoc",
     "mathml",
+    "navigation",
     "notebook_cells",
 ]
 html_math_renderer = "mathml"
@@ -64,6 +69,10 @@ html_static_path = ["_static"]
 html_css_files = ["page.css"]
 
 autodoc_typehints = "none"  # the docstrings say types with shapes and units
+# numpydoc would compile its template anew for each docstring.
+docscrape_sphinx.SandboxedEnvironment = partial(
+    SandboxedEnvironment, bytecode_cache=FileSystemBytecodeCache()
+)
 numpydoc_show_class_members = False  # the class template lists them, inherited ones too
 numpydoc_xref_param_type = False
 # Every check of a docstring but those for sections that only some names need, and for layout that is ours:

@@ -35,6 +35,8 @@ sys.dont_write_bytecode = False
 import hypothesis  # noqa: E402  numba must not be imported before the cache folder is set
 import pytest  # noqa: E402
 
+collect_ignore = ["data", "strangers"]  # scripts, which a search for doctests would run
+
 uncompiled = os.environ.get("NUMBA_DISABLE_JIT", "0") not in ("", "0")  # a hundred times slower
 hypothesis.settings.register_profile("hysim", deadline=None, derandomize=True, max_examples=2 if uncompiled else 30)
 hypothesis.settings.load_profile("hysim")

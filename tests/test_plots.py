@@ -530,6 +530,17 @@ def test_a_picture_of_many_samples_is_small_and_keeps_its_texts():
     assert svg == hs.plot.to_svg(canvas)
 
 
+def test_the_band_about_a_model_is_within_its_axes():
+    record = hs.Record(u=[0.0, 1.0, 2.0, 3.0], y=[0.0, 1.5, 1.5, 3.0])  # two standard errors reach beyond the data
+    (ax, _) = hs.plot.identification(hs.identify(hs.Line, record), record, hs.plot.figure().subplots(1, 2))
+    (band,) = ax.patches
+    low, high = ax.get_ylim()
+    assert band.get_xy()[:, 1].min() < 0.0
+    assert band.get_xy()[:, 1].max() > 3.0
+    assert low < band.get_xy()[:, 1].min()
+    assert high > band.get_xy()[:, 1].max()
+
+
 def test_residuals_of_many_samples_are_dots_of_two_colours_with_a_legend_that_is_seen(comparison):
     record = noisy(1000)
     (ax,) = hs.plot.residuals(hs.compare({"line": hs.Line}, record), [hs.plot.figure().add_subplot()])

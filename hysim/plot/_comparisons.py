@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.patches import Polygon
 from numpy.typing import NDArray
 
 from hysim import metrics
@@ -164,7 +165,9 @@ def _draw_fit(ax: Axes, u: FloatArray, y: FloatArray, fit: Identification, parts
             reach = 2.0 * fit.response_stderr[part]
             corners = np.concatenate([model[part] + reach, (model[part] - reach)[::-1]])
             style = {"color": line(0)["color"], "alpha": 0.25, "linewidth": 0, **grid_of(part.size)}
-            ax.fill(np.concatenate([u[part], u[part][::-1]]), corners, **style)
+            band = Polygon(np.column_stack([np.concatenate([u[part], u[part][::-1]]), corners]), **style)
+            ax.add_artist(band)  # a patch would be searched for extremes side by side, which takes seconds
+            ax.update_datalim(band.get_xy())
     ax.legend(loc="best")
 
 
