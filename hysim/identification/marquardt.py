@@ -14,6 +14,7 @@ import numpy as np
 import numpy.typing as npt
 
 from hysim._frozen import FloatArray
+from hysim.identification._regression import triangle
 
 Flags = npt.NDArray[np.bool_]
 Sets = npt.NDArray[np.intp]
@@ -161,12 +162,14 @@ def bounded_steps(
 ) -> FloatArray:
     """Damped steps (n_sets, n_x) between `lower` and `upper`, except for numbers that are free of bounds.
 
-    A step beyond a bound ends there, and the others make the best of it. The first `n_damped` numbers are damped.
+    A step beyond a bound ends there, and the others make the best of it. The first `n_damped` numbers are damped. All
+    of this is done on a triangle with the same sums of squares, so that samples count once.
     """
     at_bound, steps = np.zeros(lower.shape, dtype=bool), np.zeros(lower.shape)
+    rows, goals = triangle(jacobian, goal)
     for _ in range(_PASSES):
-        short = goal - (jacobian @ np.where(at_bound, steps, 0.0)[..., np.newaxis])[..., 0]
-        others = _regressed(np.where(at_bound[:, np.newaxis], 0.0, jacobian), short, damping, n_damped)
+        short = goals - (rows @ np.where(at_bound, steps, 0.0)[..., np.newaxis])[..., 0]
+        others = _regressed(np.where(at_bound[:, np.newaxis], 0.0, rows), short, damping, n_damped)
         steps = np.where(at_bound, steps, others)
         beyond = ((steps < lower) | (steps > upper)) & ~at_bound
         if is_free is not None:
