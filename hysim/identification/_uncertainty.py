@@ -45,6 +45,7 @@ class Uncertainty:
     condition: float
     redundant: tuple[tuple[str, ...], ...]
     reasons: tuple[str, ...]
+    slopes: FloatArray | None = None  # dm/dtheta (n_samples, n_theta), where it was computed
 
 
 def uncertainty(problem: Problem, theta: FloatArray, curvature: FloatArray) -> Uncertainty:
@@ -54,6 +55,7 @@ def uncertainty(problem: Problem, theta: FloatArray, curvature: FloatArray) -> U
     if n_samples <= n_names:
         return _unknown(problem, theta, f"no standard errors: {n_samples} samples for {n_names} parameters")
     slopes, way_back = output_slopes(problem, theta), named_slopes(problem, theta[np.newaxis])[0]
+    computed = slopes.copy()
     if not np.isfinite(slopes).all():
         return _unknown(problem, theta, "no standard errors: the output is not finite beside the optimum")
     x, linear = np.split(theta, [problem.n_x])
@@ -88,7 +90,7 @@ def uncertainty(problem: Problem, theta: FloatArray, curvature: FloatArray) -> U
     condition = float(free[0] / free[-1]) if free.size and free[-1] > 0.0 else np.inf
     output = np.linalg.norm(slopes @ spread, axis=1)
     together = spread @ (way_back @ spread).T
-    return Uncertainty(covariance, spread @ spread.T, together, output, condition, redundant, tuple(reasons))
+    return Uncertainty(covariance, spread @ spread.T, together, output, condition, redundant, tuple(reasons), computed)
 
 
 def output_slopes(problem: Problem, theta: FloatArray, *, refined: bool = True) -> FloatArray:
