@@ -25,6 +25,7 @@ REDUCTIONS = ("sse", "max_width", "area", "final")
 Sets = slice | npt.NDArray[np.intp]
 """Which of the sets: a stretch of them, or their places."""
 
+_SETS_A_THREAD = 64
 _BLOCK = 32_768  # samples: a quarter of a megabyte
 
 
@@ -33,13 +34,14 @@ class Batch(NamedTuple):
 
     `compute(sets, u, y)` fills `y`, shape (n, n_samples), with the outputs of n sets for the inputs `u`, shape
     (1 or n, n_samples); a law that diverges is a row of inf. `order`, shape (n_sets,), is the order in which
-    neighbours share work; None is that of the sets.
+    neighbours share work; None is that of the sets. `samples_a_thread` is that of `hysim.models.law.Law`.
     """
 
     compute: Callable[[Sets, FloatArray, FloatArray], None]
     n_sets: int
     u: FloatArray
     order: npt.NDArray[np.intp] | None = None
+    samples_a_thread: int | None = None
 
     def result(self, reduce: Reduction | None, target: npt.ArrayLike | None, workers: int | None) -> FloatArray:
         """Rows, or one number of each where `reduce` names it."""
@@ -53,7 +55,7 @@ class Batch(NamedTuple):
             self.compute(slice(start, stop), self._inputs(slice(start, stop)), y[start:stop])
 
         if self.order is None:
-            in_chunks(work, self.n_sets, workers=workers, n_samples=self.u.shape[1])
+            self._in_chunks(work, workers)
         else:
             self._in_blocks(y.__setitem__, workers)
         return y
@@ -108,7 +110,14 @@ class Batch(NamedTuple):
                 self.compute(sets, self._inputs(sets), part)
                 keep(sets, part)
 
-        in_chunks(work, self.n_sets, workers=workers, n_samples=self.u.shape[1])
+        self._in_chunks(work, workers)
+
+    def _in_chunks(self, work: Callable[[int, int], None], workers: int | None) -> None:
+        n_samples = self.u.shape[1]
+        few = _SETS_A_THREAD
+        if self.samples_a_thread is not None:
+            few = max(1, min(few, self.samples_a_thread // max(1, n_samples)))
+        in_chunks(work, self.n_sets, workers=workers, minimum=few, n_samples=n_samples)
 
     def _inputs(self, sets: Sets) -> FloatArray:
         return self.u if len(self.u) == 1 else part_of(self.u, sets)

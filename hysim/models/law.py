@@ -86,6 +86,9 @@ class Law(Composable, ABC):
         Points from which a search begins beside the law's own, in the units of `searched`.
     screened : int, optional
         Random points that a search tries at first; by default `hysim.identify` chooses.
+    samples_a_thread : int, optional
+        Fewest samples for which many laws at once begin another thread; by default those of 64 sets. It is for steps
+        that take much longer than those of most laws.
     contains : Subset, optional
         A simpler family that this one contains, whose optimum starts the search.
     stages : tuple of Stage
@@ -107,6 +110,7 @@ class Law(Composable, ABC):
     searched: ClassVar[tuple[Parameter, ...]] = ()
     starts: ClassVar[tuple[Mapping[str, float], ...]] = ()
     screened: ClassVar[int | None] = None
+    samples_a_thread: ClassVar[int | None] = None
     contains: ClassVar[Subset | None] = None
     stages: ClassVar[tuple[Stage, ...]] = ()
     workspace: ClassVar[int] = 0
@@ -591,7 +595,7 @@ class Law(Composable, ABC):
         """As `outputs`, not computed yet; parameters that the constructor would refuse are not refused."""
         tables, inputs = tables_of(type(self).__name__, self.arguments, parameters, u)
         tables = self.completed(tables)
-        return _batch(self.rows, tables, inputs, self.order(tables))
+        return _batch(self.rows, tables, inputs, self.order(tables), self.samples_a_thread)
 
     @classmethod
     def batch(cls, defaults: Mapping[str, Any], parameters: Parameters, u: npt.ArrayLike) -> Batch:
@@ -599,7 +603,7 @@ class Law(Composable, ABC):
         tables, inputs = tables_of(cls.__name__, defaults, parameters, u)
         tables = cls.completed(tables)
         cls.check(tables)
-        return _batch(cls.rows, tables, inputs, cls.order(tables))
+        return _batch(cls.rows, tables, inputs, cls.order(tables), cls.samples_a_thread)
 
     @classmethod
     def completed(cls, tables: dict[str, FloatArray]) -> dict[str, FloatArray]:
@@ -645,11 +649,12 @@ def _batch(
     tables: Tables,
     u: FloatArray,
     order: npt.NDArray[np.intp] | None,
+    samples_a_thread: int | None,
 ) -> Batch:
     def compute(sets: Sets, inputs: FloatArray, y: FloatArray) -> None:
         rows({name: table[sets] for name, table in tables.items()}, inputs, y)
 
-    return Batch(compute, len(next(iter(tables.values()))), u, order)
+    return Batch(compute, len(next(iter(tables.values()))), u, order, samples_a_thread)
 
 
 def rows_by_step(step: Step, start: Start, laws: Packed, workspace: int, u: FloatArray, y: FloatArray) -> None:
