@@ -108,8 +108,18 @@ class Problem:
         It is None where that saves less than half, or where the family depends on time. A rate-independent law passes
         through the same memories at the samples that remain, except for reversals of less than 1 % of the span.
         """
-        parts = tuple(_thinned(part, samples) for part in self.parts)
-        short = replace(self, parts=parts, simpler=self.simpler and self.simpler.thinned(samples), settled=None)
+        return self._shortened(lambda part: _thinned(part, samples))
+
+    def beginning(self, samples: int) -> "Problem | None":
+        """This problem on so many first samples of each record, or more, up to where the input has had its span.
+
+        It is None as of `thinned`, which saves nothing where a record turns at most of its samples.
+        """
+        return self._shortened(lambda part: _beginning(part, samples))
+
+    def _shortened(self, shortened: Callable[[Part], Part]) -> "Problem | None":
+        parts = tuple(shortened(part) for part in self.parts)
+        short = replace(self, parts=parts, simpler=self.simpler and self.simpler._shortened(shortened), settled=None)
         if 2 * sum(len(part.record) for part in parts) > self.y.size:
             return None
         try:
@@ -337,10 +347,20 @@ class Problem:
 
 
 def _thinned(part: Part, samples: int) -> Part:
-    """Ends, reversals and about `samples` others, without the times."""
+    """Ends, reversals and about `samples` others."""
     record = part.record
     evenly = np.linspace(0, len(record) - 1, min(samples, len(record))).round().astype(np.intp)
-    chosen = np.union1d(evenly, record.reversals(tolerance=_TURN))
+    return _at(part, np.union1d(evenly, record.reversals(tolerance=_TURN)))
+
+
+def _beginning(part: Part, samples: int) -> Part:
+    u = part.record.u
+    return _at(part, np.arange(min(u.size, max(samples, 1 + int(u.argmin()), 1 + int(u.argmax())))))
+
+
+def _at(part: Part, chosen: npt.NDArray[np.intp]) -> Part:
+    """The chosen samples, without the times."""
+    record = part.record
     short = Record(
         u=record.u[chosen],
         y=record.y[chosen],
