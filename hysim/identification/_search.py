@@ -36,6 +36,7 @@ N_BRIEF_DESCENDING = 12
 N_BRIEF_WHOLE = 4  # steps on all samples
 _LONG = 512  # samples beyond which fewer points are tried: each costs more, and longer records have fewer optima
 _SHORT = 250  # samples of a thinned record beside its reversals
+_FIRST = 1000  # samples of the beginning of a record that turns at most of its samples
 _APART = 0.05  # distance of two starts, in units of the box, under which the better one stands for both
 _SAME = 0.01  # likewise of two points after the descent
 _GAIN = 1e-5  # share of the sum of squares: a descent that gains less rests
@@ -135,7 +136,7 @@ def _found(
         return _distinct(
             polish(condensed, apart(space, problem.ends, condensed.costs(problem.ends), _SAME, N_POLISHED_WHOLE))
         )
-    if problem.y.size > _LONG and (short := problem.thinned(_SHORT)) is not None:
+    if problem.y.size > _LONG and (short := problem.thinned(_SHORT) or problem.beginning(_FIRST)) is not None:
         likely = optima(short, seed=seed, progress=progress, known=known, may_end=may_end, to=BRIEFLY)[
             :N_POLISHED_WHOLE
         ]
@@ -158,10 +159,11 @@ def _found(
     n_starts = max(16, round(N_DESCENDING * share))
     if begun.size and space.screened is not None and problem.y.size >= _SHORT:
         n_starts = N_DESCENDING_BESIDE
-    starts = _starts(problem, screened, seed, n_starts, np.concatenate([space.starts, begun]))
+    close = problem.close()
+    starts = _starts(close, screened, seed, n_starts, np.concatenate([space.starts, begun]))
     if not len(starts):
         return []
-    reached = descended(problem, starts, exact=False)
+    reached = descended(close, starts, exact=False)
     best = apart(space, reached.theta[:, : problem.n_x], reached.loss, _SAME, N_POLISHED)
     report = progress or (lambda done, total: None)
     report(1, 2)
@@ -200,9 +202,9 @@ def brief_optima(problem: Problem) -> tuple[FloatArray, FloatArray]:
         reached = descended(condensed, ends[:1], exact=False, steps=N_BRIEF_WHOLE)
         ends[0] = reached.theta[0, : condensed.n_x]
         return ends, condensed.costs(ends)
-    problem = condensed
+    problem = condensed.close()
     if not space.coordinates:
-        return np.empty((1, 0)), problem.costs(np.empty((1, 0)))
+        return np.empty((1, 0)), condensed.costs(np.empty((1, 0)))
     screened = N_BRIEF_SCREENED if space.screened is None else min(space.screened, N_BRIEF_SCREENED)
     best = _starts(problem, screened, 0, N_BRIEF_DESCENDING, space.starts, are_kept=False)
     if not len(best):
@@ -217,11 +219,7 @@ def polish(problem: Problem, starts: FloatArray, to: int = FULLY) -> list[Optimu
     problem = problem.condensed()
     rough = problem.rough()
     if rough is problem or not len(starts):
-        reached = descended(problem, starts, exact=True)
-        if len(starts) and not reached.at_rest[best := int(reached.loss.argmin())]:
-            alone = reached.theta[[best], : problem.n_x]
-            _replace(reached, [best], descended(problem, alone, exact=True, steps=N_POLISHING_ALONE))
-        return _optima(problem, reached)
+        return _closely(problem, starts, _polished)
     gain, steps = (_GAIN, _BRIEF) if to == BRIEFLY else (_PASSED, _PASS)
 
     def ends(law: Problem, x: FloatArray) -> Reached:
@@ -229,6 +227,14 @@ def polish(problem: Problem, starts: FloatArray, to: int = FULLY) -> list[Optimu
         return _amended(law, rough, reached.theta) if to == FULLY else reached
 
     return _closely(problem, starts, ends)
+
+
+def _polished(problem: Problem, starts: FloatArray) -> Reached:
+    reached = descended(problem, starts, exact=True)
+    if len(starts) and not reached.at_rest[best := int(reached.loss.argmin())]:
+        alone = reached.theta[[best], : problem.n_x]
+        _replace(reached, [best], descended(problem, alone, exact=True, steps=N_POLISHING_ALONE))
+    return reached
 
 
 def polish_on(problem: Problem, optima: Sequence[Optimum]) -> list[Optimum]:

@@ -9,6 +9,7 @@ import numpy.typing as npt
 from hysim._frozen import FloatArray
 from hysim.kernels import baber_noori as kernels
 from hysim.kernels.remainder import ROUNDING
+from hysim.kernels.search.baber_noori import close_step
 from hysim.laws.differential import _boucwen_conversions, _boucwen_search, _power_units, _wear_search
 from hysim.laws.differential._memory_law import MemoryLaw
 from hysim.laws.differential.boucwen import BoucWen
@@ -135,6 +136,7 @@ class BoucWenBaberNoori(MemoryLaw):
     stages = (_WEAR, _PINCHING, _SPREAD)
     step = staticmethod(kernels.step)
     workspace: ClassVar[int] = kernels.N_STATE - 3
+    samples_a_thread = 2_000
     tolerance: ClassVar[float] = ROUNDING  # of what the series leave out, beside the memory
 
     @classmethod
@@ -278,7 +280,7 @@ class BoucWenBaberNoori(MemoryLaw):
         return _RoughBaberNoori(**self.arguments)
 
     def close(self) -> MemoryLaw:
-        """The law with shorter series, good to 1e-9 of the range."""
+        """The law with shorter series, and few evaluations near a memory of zero, good to 1e-8 of the range."""
         return _CloseBaberNoori(**self.arguments)
 
     def steady(self, parameters: Parameters, record: Record) -> dict[str, FloatArray]:
@@ -314,4 +316,5 @@ class _RoughBaberNoori(BoucWenBaberNoori):
 class _CloseBaberNoori(BoucWenBaberNoori):
     """The law as the later steps of a search take it: its differences over 1e-6 of the box are still good slopes."""
 
+    step = staticmethod(close_step)
     tolerance: ClassVar[float] = 2.0**-30

@@ -12,6 +12,7 @@ import numpy as np
 
 from hysim._frozen import FloatArray
 from hysim.kernels import zhu_wang as kernels
+from hysim.kernels.search import zhu_wang as search_kernels
 from hysim.laws.differential import _power_units
 from hysim.laws.differential._memory_law import MemoryLaw
 from hysim.laws.differential.boucwen import BoucWen
@@ -69,6 +70,7 @@ class ZhuWangBoucWen(MemoryLaw):
     z0: float = 0.0
     input_coefficients: tuple[float, ...] = (0.0,)
 
+    samples_a_thread = 2_000
     screened = 1024  # a step costs twenty times that of the Bouc-Wen law
     contains = Subset(
         BoucWen,
@@ -96,6 +98,17 @@ class ZhuWangBoucWen(MemoryLaw):
         """The exponent where it has a step of its own."""
         return ("n",) if self.n == 1.0 else ()
 
+    def close(self) -> MemoryLaw:
+        """The law with few evaluations near a memory of zero, good to 1e-8 of the range."""
+        return _CloseZhuWang(**self.arguments)
+
     def _memory_slope(self, direction: FloatArray, z: FloatArray, u: FloatArray, *_: FloatArray) -> FloatArray:
         bend = np.abs(z) ** self.n * (self.gamma + self.beta * np.sign(z * direction))
         return np.asarray(self.A - bend + self.delta * u * direction)
+
+
+class _CloseZhuWang(ZhuWangBoucWen):
+    """The law as a search takes it."""
+
+    step = staticmethod(search_kernels.close_step)
+    workspace: ClassVar[int] = search_kernels.N_STATE - 2
