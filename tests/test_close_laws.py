@@ -49,6 +49,16 @@ def test_near_zero_the_close_law_has_the_output_of_the_law(of):
     assert np.median(error) < 1e-8
 
 
+def test_the_rough_law_with_a_ramp_is_near_the_law():
+    law, sets = LAWS["ramp"]
+    y, rough = (type(each).responses(sets, strokes(), workers=1) for each in (law, law.rough()))
+    both = np.isfinite(y).all(axis=1) & np.isfinite(rough).all(axis=1)
+    assert both.sum() > N_LAWS // 2
+    error = np.abs(rough[both] - y[both]).max(axis=1) / np.ptp(y[both], axis=1)
+    # third-order steps of a quarter of the yield memory: a hundredth of it where most strokes cross zero
+    assert 0.0 < np.median(error) < 0.03
+
+
 def test_a_record_that_turns_at_most_samples_is_searched_on_its_beginning():
     rng = np.random.default_rng(4)
     u = rng.uniform(-1.0, 1.0, 2500)
@@ -58,7 +68,7 @@ def test_a_record_that_turns_at_most_samples_is_searched_on_its_beginning():
     short = whole.beginning(1000)
     assert short is not None
     assert np.array_equal(short.parts[0].record.u, u[:1041])
-    grown = u * np.linspace(0.1, 1.0, u.size)  # has its span at its end only
+    grown = u * np.linspace(0.1, 1.0, u.size)  # has most of its span near its end only
     assert problem(hs.BoucWen(), [hs.Record(u=grown, y=u)], Freedom(), None).beginning(1000) is None
 
 

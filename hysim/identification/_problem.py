@@ -34,6 +34,7 @@ from hysim.records import Record
 _CHUNK = 50_000
 _LARGEST = 1e150  # beyond it squares overflow: such a set counts as one that has diverged
 _FEWEST = 2  # samples of a record
+_MOST_OF_SPAN = 0.8
 _TURN = 0.01  # of the span: smaller reversals are noise, or change little
 _CLOSE = 1e-8  # accuracy of a close law, at worst
 _DIFFERENCE = 1e-6  # step of a central difference in units of the box: truncation and rounding both ~1e-10
@@ -111,7 +112,7 @@ class Problem:
         return self._shortened(lambda part: _thinned(part, samples))
 
     def beginning(self, samples: int) -> "Problem | None":
-        """This problem on so many first samples of each record, or more, up to where the input has had its span.
+        """This problem on so many first samples of each record, or up to where the input has had most of its span.
 
         It is None as of `thinned`, which saves nothing where a record turns at most of its samples.
         """
@@ -197,6 +198,11 @@ class Problem:
         """This problem with the same outputs to what a search can tell, cheaper to compute."""
         family = self.family.close() if isinstance(self.family, Staged) else self.family
         return self if family is self.family else replace(self, family=family, accuracy=_CLOSE)
+
+    def quick(self) -> "Problem":
+        """The rough problem, or the close one where the law has no rough one."""
+        rough = self.rough()
+        return self.close() if rough is self else rough
 
     def completed(self, x: FloatArray) -> FloatArray:
         """Theta (n_sets, n_theta): the coordinates `x` and the best linear parameters."""
@@ -355,7 +361,9 @@ def _thinned(part: Part, samples: int) -> Part:
 
 def _beginning(part: Part, samples: int) -> Part:
     u = part.record.u
-    return _at(part, np.arange(min(u.size, max(samples, 1 + int(u.argmin()), 1 + int(u.argmax())))))
+    spans = np.maximum.accumulate(u) - np.minimum.accumulate(u)
+    whole = 1 + int(np.argmax(spans >= _MOST_OF_SPAN * spans[-1]))
+    return _at(part, np.arange(min(u.size, max(samples, whole))))
 
 
 def _at(part: Part, chosen: npt.NDArray[np.intp]) -> Part:

@@ -140,7 +140,7 @@ def _found(
         likely = optima(short, seed=seed, progress=progress, known=known, may_end=may_end, to=BRIEFLY)[
             :N_POLISHED_WHOLE
         ]
-        if problem.rough() is not problem:  # each costs much to polish
+        if problem.stage is not None and problem.rough() is not problem:  # each costs much to polish
             likely = [each for each in likely if each.cost <= _HOPELESS * likely[0].cost]
         if likely and likely[0].is_simpler:
             return _as_they_are(problem, np.array([each.x for each in likely]))
@@ -159,11 +159,10 @@ def _found(
     n_starts = max(16, round(N_DESCENDING * share))
     if begun.size and space.screened is not None and problem.y.size >= _SHORT:
         n_starts = N_DESCENDING_BESIDE
-    close = problem.close()
-    starts = _starts(close, screened, seed, n_starts, np.concatenate([space.starts, begun]))
+    starts = _starts(problem.quick(), screened, seed, n_starts, np.concatenate([space.starts, begun]))
     if not len(starts):
         return []
-    reached = descended(close, starts, exact=False)
+    reached = descended(problem.close(), starts, exact=False)
     best = apart(space, reached.theta[:, : problem.n_x], reached.loss, _SAME, N_POLISHED)
     report = progress or (lambda done, total: None)
     report(1, 2)
@@ -206,7 +205,7 @@ def brief_optima(problem: Problem) -> tuple[FloatArray, FloatArray]:
     if not space.coordinates:
         return np.empty((1, 0)), condensed.costs(np.empty((1, 0)))
     screened = N_BRIEF_SCREENED if space.screened is None else min(space.screened, N_BRIEF_SCREENED)
-    best = _starts(problem, screened, 0, N_BRIEF_DESCENDING, space.starts, are_kept=False)
+    best = _starts(condensed.quick(), screened, 0, N_BRIEF_DESCENDING, space.starts, are_kept=False)
     if not len(best):
         return 0.5 * (space.lower + space.upper)[np.newaxis], np.array([math.inf])
     reached = descended(problem, best, exact=False)
@@ -215,10 +214,10 @@ def brief_optima(problem: Problem) -> tuple[FloatArray, FloatArray]:
 
 
 def polish(problem: Problem, starts: FloatArray, to: int = FULLY) -> list[Optimum]:
-    """The ends of descents from `starts` (n_sets, n_x); where the law has a rough one, `to` says how far they go."""
+    """The ends of descents from `starts` (n_sets, n_x); in stages with a rough law, `to` says how far they go."""
     problem = problem.condensed()
     rough = problem.rough()
-    if rough is problem or not len(starts):
+    if rough is problem or problem.stage is None or not len(starts):
         return _closely(problem, starts, _polished)
     gain, steps = (_GAIN, _BRIEF) if to == BRIEFLY else (_PASSED, _PASS)
 
@@ -240,7 +239,7 @@ def _polished(problem: Problem, starts: FloatArray) -> Reached:
 def polish_on(problem: Problem, optima: Sequence[Optimum]) -> list[Optimum]:
     """The optima that were polished nearly, now fully."""
     rough = problem.rough()
-    if rough is problem or not optima:
+    if rough is problem or problem.stage is None or not optima:
         return list(optima)
     starts = np.array([each.x for each in optima])
     return _distinct(_closely(problem, starts, lambda law, x: _amended(law, rough, law.completed(x))))

@@ -1,6 +1,7 @@
-"""The law of Zhu and Wang as a search takes it: near a memory of zero without the law's many short series.
+"""The law of Zhu and Wang as a search takes it: roughly, or without the law's many short series near zero.
 
-It is `hysim.kernels.zhu_wang`, and there `hysim.kernels.search.near_zero` with the ramp as the forcing.
+The rough law goes by exponential Rosenbrock steps, as that of `hysim.kernels.baber_noori`. The close one is
+`hysim.kernels.zhu_wang`, and near zero `hysim.kernels.search.near_zero` with the ramp as the forcing.
 """
 
 import math
@@ -9,6 +10,7 @@ from hysim._frozen import FloatArray
 from hysim.kernels import boucwen
 from hysim.kernels import zhu_wang as law
 from hysim.kernels._compile import inner, kernel
+from hysim.kernels.baber_noori import phi
 from hysim.kernels.baber_noori_series import BETA, EXPONENT, GAMMA, N_OWN, SCALE
 from hysim.kernels.remainder import ROUNDING
 from hysim.kernels.search.near_zero import N_WORK, stretch
@@ -21,6 +23,11 @@ _STRETCHES = 64
 _ZONE = 0.6  # of the memory at which the term of ``|w|^n`` cancels the forcing
 _EDGE = 1.01  # of the zone
 _TURNS = 3.0  # times the memory: a length on which it moves less needs few series
+
+_MOST_ROUGH = 4_000
+_STRIDE = 0.25  # of the yield memory, that w moves in one rough step
+_NEAR_ZERO = 0.05  # likewise: below, a rough step may cross zero
+_BEYOND = 1e100
 
 
 @kernel
@@ -66,3 +73,58 @@ def advance(u: float, z: float, du: float, parameters: FloatArray, state: FloatA
         left -= gone
     at = u + direction * (length - left)
     return law.advance(at, direction * w, direction * left, parameters, series)
+
+
+# ------------------------------------------------------------------------- a few parts in a thousand, for a search
+
+
+@kernel
+def rough_step(parameters: FloatArray, state: FloatArray, u: float) -> float:
+    """As `close_step`, good to a few parts in a thousand; the lengths of its steps are continuous in all parameters."""
+    last, z, of_z, of_u = state[0], state[1], parameters[_SCALE], parameters[_SCALE + 1]
+    if u != last and math.isfinite(z):
+        direction, length = 1.0 if u > last else -1.0, abs(u - last) * of_u
+        ramp = parameters[4]
+        forcing = parameters[0] + direction * ramp * last * of_u
+        w = rough_advance(direction * z * of_z, forcing, ramp, length, parameters)
+        state[1] = direction * w / of_z
+    state[0] = u
+    gain, offset = parameters[_OUTPUT], parameters[_OUTPUT + 1]
+    return float(offset + boucwen.polynomial(u, parameters, _OUTPUT + 2) + gain * state[1])
+
+
+@inner
+def rough_advance(w: float, forcing: float, ramp: float, length: float, parameters: FloatArray) -> float:
+    """w after the input has moved by `length`, roughly: in each step the forcing is that of its middle."""
+    beta, gamma, n = parameters[1], parameters[2], parameters[3]
+    bend, left = max(abs(beta + gamma), abs(gamma - beta)), length
+    most = abs(forcing) + abs(ramp) * length
+    bent = (most / bend) ** (1.0 / n) if bend > 0.0 else math.inf
+    for _ in range(_MOST_ROUGH):
+        if not left > 1e-12 * length:
+            return w
+        term, slope = rough_term(w, beta, gamma, n)
+        f = forcing - term
+        size = min(max(bent, abs(w)), abs(w) + most * length)
+        room = _STRIDE * size
+        if w * f < 0.0:
+            room = min(room, max(abs(w), _NEAR_ZERO * size))
+        t = min(left, room / max(abs(f), math.sqrt(room * abs(ramp)), 1e-300), 1.0 / max(slope, 1e-300))
+        first, third = phi(slope * t)
+        f += 0.5 * ramp * t
+        middle = w + t * first * f
+        there, _ = rough_term(middle, beta, gamma, n)
+        w = middle + 2.0 * t * third * (term - there - slope * (middle - w))
+        if not abs(w) < _BEYOND:
+            return math.copysign(math.inf, w)
+        forcing += ramp * t
+        left -= t
+    return math.nan
+
+
+@inner
+def rough_term(w: float, beta: float, gamma: float, n: float) -> tuple[float, float]:
+    """The term of ``|w|^n``, and the derivative of minus it by w."""
+    power = abs(w) if n == 1.0 else abs(w) ** n
+    term = (gamma + (beta if w > 0.0 else -beta)) * power
+    return term, -n * term / w if w != 0.0 and n >= 1.0 else 0.0

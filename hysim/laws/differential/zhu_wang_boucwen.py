@@ -98,6 +98,10 @@ class ZhuWangBoucWen(MemoryLaw):
         """The exponent where it has a step of its own."""
         return ("n",) if self.n == 1.0 else ()
 
+    def rough(self) -> MemoryLaw:
+        """The law by Rosenbrock steps, good to a few parts in a thousand."""
+        return _RoughZhuWang(**self.arguments)
+
     def close(self) -> MemoryLaw:
         """The law with few evaluations near a memory of zero, good to 1e-8 of the range."""
         return _CloseZhuWang(**self.arguments)
@@ -107,8 +111,15 @@ class ZhuWangBoucWen(MemoryLaw):
         return np.asarray(self.A - bend + self.delta * u * direction)
 
 
+class _RoughZhuWang(ZhuWangBoucWen):
+    """The law as the first steps of a search take it."""
+
+    step = staticmethod(search_kernels.rough_step)
+    workspace: ClassVar[int] = 0
+
+
 class _CloseZhuWang(ZhuWangBoucWen):
-    """The law as a search takes it."""
+    """The law as the later steps of a search take it."""
 
     step = staticmethod(search_kernels.close_step)
     workspace: ClassVar[int] = search_kernels.N_STATE - 2
