@@ -81,6 +81,13 @@ def test_a_page_that_would_be_too_large_says_what_to_do(tmp_path):
     assert not list(tmp_path.iterdir())
 
 
+def test_a_page_is_a_file_that_a_browser_opens_as_one(tmp_path):
+    for write in (explorer, lambda path: to_page(LAW, path)):
+        with pytest.raises(ValueError, match=r"a page is a file \.html, got .*law\.txt"):
+            write(tmp_path / "law.txt")
+    assert not list(tmp_path.iterdir())
+
+
 def test_what_is_no_law_is_refused_with_what_takes_it(tmp_path):
     with pytest.raises(TypeError, match=r"a page takes a law, .* got TransferFunction: plants .* by hysim.to_c"):
         to_page(hs.TransferFunction(num=(1.0,), den=(1.0, 1.0)), tmp_path / "plant.html")

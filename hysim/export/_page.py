@@ -71,7 +71,7 @@ def to_page(
     thing : law, sum or cascade of laws
         The model with which the page begins. A law that is not hysim's own needs the extra `export`.
     path : path
-        The file to write.
+        The file to write, which ends in ``.html`` or ``.htm``.
     record : Record, optional
         Measured samples to show and to compare with; they become part of the file.
     between : (float, float), optional
@@ -92,7 +92,7 @@ def to_page(
     TypeError
         If the thing is no law, and no sum or cascade of laws.
     ValueError
-        If the page would be larger than 300 KB; the message says what to do.
+        If the page would be larger than 300 KB; the message says what to do. For another ending of the path.
     ImportError
         If the law's step must be compiled and the extra `export` is missing.
 
@@ -105,14 +105,23 @@ def to_page(
     ...     page.read_text()[:15]
     '<!DOCTYPE html>'
     """
+    page = checked_path(path)
     name = heading(thing) if title is None else title
     text = page_text({name: Shown(thing, between, units or {})}, record)
     size = len(text.encode())
     if size > LARGEST:
         samples = "" if record is None else f": give a record of fewer than {len(record)} samples, such as record[::2]"
         raise ValueError(f"the page would have {size} bytes, more than {LARGEST}{samples}")
-    write_text(path, text)
-    return Path(path)
+    write_text(page, text)
+    return page
+
+
+def checked_path(path: str | Path) -> Path:
+    """The path of a page; ValueError for one that a browser would not open as a page."""
+    page = Path(path)
+    if page.suffix.lower() not in (".html", ".htm"):
+        raise ValueError(f"a page is a file .html, got {str(path)!r}")
+    return page
 
 
 def page_text(models: Mapping[str, Shown], record: Record | None = None, *, title: str = "") -> str:

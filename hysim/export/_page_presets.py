@@ -10,7 +10,7 @@ import hysim as hs
 from hysim._atomic import write_text
 from hysim._frozen import FloatArray
 from hysim.benchmarks import noel_schoukens_plant
-from hysim.export._page import Shown, page_text
+from hysim.export._page import Shown, checked_path, page_text
 
 _DAMPER = {"u": "mm", "y": "kN"}
 _CONTACT = {"u": "mm", "y": "N"}
@@ -31,17 +31,24 @@ def presets() -> dict[str, Shown]:
 
 
 def explorer(path: str | Path) -> Path:
-    """Write the page with a choice of families and devices; OSError if it cannot be written.
+    """Write the page with a choice of families and devices.
 
     Parameters
     ----------
     path : path
-        The file to write.
+        The file to write, which ends in ``.html`` or ``.htm``.
 
     Returns
     -------
     Path
         The file.
+
+    Raises
+    ------
+    OSError
+        If it cannot be written.
+    ValueError
+        For another ending of the path.
 
     Examples
     --------
@@ -51,8 +58,9 @@ def explorer(path: str | Path) -> Path:
     ...     "Loop explorer" in explorer(pathlib.Path(folder, "explorer.html")).read_text()
     True
     """
-    write_text(path, _text())
-    return Path(path)
+    page = checked_path(path)
+    write_text(page, _text())
+    return page
 
 
 @lru_cache(maxsize=1)
