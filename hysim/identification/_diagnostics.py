@@ -8,7 +8,7 @@ from hysim import metrics
 from hysim._frozen import FloatArray
 from hysim.identification._descent import Descent
 from hysim.identification._problem import Problem
-from hysim.identification._uncertainty import Uncertainty, output_slopes
+from hysim.identification._uncertainty import output_slopes
 from hysim.metrics.rows import LoopRows
 
 _MOST_LAGS = 20
@@ -64,12 +64,15 @@ def loop_widths(descent: Descent, theta: FloatArray) -> FloatArray:
         return np.empty(0)
 
 
-def width_stderr(problem: Problem, theta: FloatArray, known: Uncertainty) -> float:
-    """Standard error of the largest width, by the linearised model; nan where there is no loop."""
+def width_stderr(problem: Problem, theta: FloatArray, of_theta: FloatArray, slopes: FloatArray | None = None) -> float:
+    """Standard error of the largest width, by the linearised model; nan where there is no loop.
+
+    `slopes` are those of the output by theta, where they are known.
+    """
     record = problem.parts[0].record
-    slopes = (output_slopes(problem, theta) if known.slopes is None else known.slopes)[: len(record)]
+    slopes = (output_slopes(problem, theta) if slopes is None else slopes)[: len(record)]
     output = problem.model(theta[np.newaxis])[0, : len(record)]
     if not (np.isfinite(slopes).all() and np.isfinite(output).all()):
         return float("nan")
     slope = LoopRows(record.u).max_width_slopes(output, slopes.T)
-    return float(np.sqrt(np.maximum(slope @ known.of_theta @ slope, 0.0)))
+    return float(np.sqrt(np.maximum(slope @ of_theta @ slope, 0.0)))

@@ -220,7 +220,7 @@ class Search:
         if len(draws):
             lower, upper = np.quantile(loop_widths(self.descent, draws), TAILS).tolist()
         else:
-            reach = self._quantile() * width_stderr(self.problem, theta, known)
+            reach = self._quantile() * width_stderr(self.problem, theta, known.of_theta, known.slopes)
             lower, upper = width - reach, width + reach
         return Width(value=width, lower=lower, upper=upper)
 
