@@ -165,3 +165,13 @@ def test_walkers_that_do_not_meet_give_no_evidence():
     of_proposal = np.zeros(1000)
     assert np.isfinite(_error(together.ravel(), of_proposal, 0.5, (100, 8)))
     assert _error(apart.ravel(), of_proposal, 0.5, (100, 8)) == np.inf
+
+
+@pytest.mark.parametrize("thickness", [1e-8, 1e-12, 0.0])
+def test_points_on_a_line_have_a_mixture(thickness):
+    rng = np.random.default_rng(0)
+    v = rng.standard_normal((500, 1)) * [1.0, 2.0, -1.0, 0.5] + thickness * rng.standard_normal((500, 4))
+    proposal = mixture(v, np.ones(500), 1, rng)
+    assert np.isfinite(proposal.log_density_of_v(v)).all()
+    beside = v + np.array([0.0, 0.1, 0.0, 0.0])
+    assert proposal.log_density_of_v(beside).max() < proposal.log_density_of_v(v).min()

@@ -128,8 +128,20 @@ def _closer(parts: Proposal, v: FloatArray, weight: FloatArray, covariance: Floa
     centres = (near / near.sum(axis=0)).T @ v
     off = v[np.newaxis] - centres[:, np.newaxis]
     local = np.swapaxes(off, 1, 2) @ (off * near.T[..., np.newaxis]) / share[:, np.newaxis, np.newaxis]
-    roots = np.linalg.cholesky(local + _RIDGE * covariance)
+    roots = _roots(local + _RIDGE * covariance, covariance)
     return Proposal(centres, roots, share / share.sum(), parts.n_x, parts.n_linear)
+
+
+def _roots(local: FloatArray, covariance: FloatArray) -> FloatArray:
+    """Lower triangles of covariances (n_parts, n_v, n_v); those that rounding has made flat get the least variance."""
+    try:
+        return np.asarray(np.linalg.cholesky(local))
+    except np.linalg.LinAlgError:
+        root = np.linalg.cholesky(covariance)
+        half = np.linalg.solve(root, local)
+        size, axes = np.linalg.eigh(np.linalg.solve(root, np.swapaxes(half, 1, 2)))
+        white = (axes * np.maximum(size, _RIDGE)[:, np.newaxis]) @ np.swapaxes(axes, 1, 2)
+        return np.asarray(root @ np.linalg.cholesky(white))
 
 
 def _shapes(centres: FloatArray, v: FloatArray, covariance: FloatArray) -> FloatArray:
