@@ -208,7 +208,7 @@ def _behind_inputs(plant: Any, law: Any, setting: _Setting) -> tuple[Any, list[C
 
 
 def _all_at_once(plant: Any, known: Sequence[Coordinates], setting: _Setting, spread_laws: bool = False) -> _End:
-    """Where the search for all parts ends that begins at these coordinates, and at laws all over their box if asked."""
+    """End of a search for all parts from these coordinates, and if asked from laws all over their box."""
     whole = setting.problem(plant.begun(known))
     if not whole.n_x:
         return _End(plant, whole, np.empty((1, 0)))
