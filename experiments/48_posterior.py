@@ -110,8 +110,8 @@ def region(fit: hs.Identification) -> dict[str, tuple[float, float]]:
 def draw_of(seed: int, rec: hs.Record, fit: hs.Identification, samples: int) -> dict[str, Any]:
     """Whether the interval of each parameter holds the truth of one draw, and the seconds of the processor.
 
-    The identification begins at the truth to save time; the posterior does not depend on where it ends. Its seed is not
-    that of the draw, whose first numbers are the truth.
+    The identification begins at the truth to save time; the posterior does not depend on where it ends. The seed of
+    the posterior is not that of the draw, whose first numbers are the truth.
     """
     rng, box = np.random.default_rng(seed), region(fit)
     law, sigma, y = drawn_law(rng, rec, fit, box)
@@ -186,6 +186,8 @@ def _write(speeds: list[Row], draws: list[dict[str, Any]]) -> list[Row]:
     document = {
         "speeds": speeds,
         "draws": draws,
+        "asked_effective": EFFECTIVE,
+        "most_steps": MOST_STEPS,
         "pooled_percent": _pooled(draws),
         "pooled_percent_of_mixed": _pooled([each for each in draws if each["effective_samples"] >= EFFECTIVE]),
         "seeds_not_mixed": [k for k, each in enumerate(draws) if each["effective_samples"] < EFFECTIVE],

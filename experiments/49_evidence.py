@@ -53,13 +53,13 @@ def models() -> dict[str, tuple[Any, dict[str, float]]]:
     }
 
 
-def measured(name: str, factor: float, method: str) -> Row:
+def measured(name: str, factor: float, method: str, live_points: int = LIVE_POINTS) -> Row:
     """One evidence."""
     rec = hs.datasets.table1()
     family, held = models()[name]
     fit = hs.identify(family, rec, fixed=held)
     began = time.process_time()
-    found = log_evidence(fit, rec, noise="quantised", factor=factor, method=method, live_points=LIVE_POINTS)
+    found = log_evidence(fit, rec, noise="quantised", factor=factor, method=method, live_points=live_points)
     return {
         "model": name,
         "n_parameters": fit.n_parameters,
@@ -104,7 +104,7 @@ def as_evidence(rows: list[Row]) -> Evidence:
 def main(smoke: bool = False, resume: bool = False) -> list[Row]:
     """Measure, print and write table, figure and result."""
     if smoke:
-        return [measured("line", 1.0, "bridge")]
+        return [measured("line", 1.0, "bridge"), measured("line", 1.0, "nested", live_points=40)]
     rows = _stored() if resume else []
     done = {(row["model"], row["factor"], row["method"]) for row in rows}
     for task in tasks():

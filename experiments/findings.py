@@ -1207,9 +1207,9 @@ def _not_mixed(result: Result) -> str:
         return ""
     spans = span(result["draws"][seed]["span"] for seed in seeds)
     return (
-        f" {len(seeds)} draws (seeds {', '.join(map(str, seeds))}) have fewer than 400 effective samples after 6 000 "
-        f"steps, and count all the same; without them it is {result['pooled_percent_of_mixed']:.1f} %. Their outputs "
-        f"span {spans} µm."
+        f" {len(seeds)} draws (seeds {', '.join(map(str, seeds))}) have fewer than {count(result['asked_effective'])} "
+        f"effective samples after {count(result['most_steps'])} steps, and count all the same; without them it is "
+        f"{result['pooled_percent_of_mixed']:.1f} %. Their outputs span {spans} µm."
     )
 
 
