@@ -3,6 +3,7 @@
 from dataclasses import replace
 from itertools import pairwise
 
+import mpmath
 import numba
 import numpy as np
 import pytest
@@ -141,6 +142,33 @@ def test_chan_translates_its_branches(law):
     np.testing.assert_allclose(u - law.gap * (law.response(u) - law.offset), fields, atol=1e-12 * law.gap * 1e3 + 1e-12)
 
 
+@pytest.mark.parametrize(("squareness", "gap"), [(0.99996, 2.9), (1.0 - 1e-9, 3e-3), (0.7, 40.0)])
+def test_a_steep_branch_behind_a_gap_has_all_digits(squareness, gap):
+    law = hs.Chan(saturation=3.4, coercivity=0.146, squareness=squareness, gap=gap, z0=1.0)
+    u = np.array([-8.3e-7, -7.1e-7, 8.6e-7, 1e-3])  # the first is left along the lower branch, moved up
+    expected = []
+    with mpmath.workdps(60):
+        saturation, coercivity, knee = (mpmath.mpf(each) for each in (law.saturation, law.coercivity, law.bend))
+        drop, distance = mpmath.mpf(gap) * saturation, None
+        for value in map(mpmath.mpf, u):
+            if distance is None:
+                x = root(value + coercivity, drop, knee)
+                below = x - 2 * coercivity
+                distance = x / (abs(x) + knee) - below / (abs(below) + knee)
+                expected.append(float(saturation * x / (abs(x) + knee)))
+            else:
+                x = root(value - coercivity - drop * distance, drop, knee)
+                expected.append(float(saturation * (x / (abs(x) + knee) + distance)))
+    # roundings of the saturation; the field's own rounding times the slope of the branch is up to 1e-7 of it
+    np.testing.assert_allclose(law.response(u), expected, rtol=0.0, atol=2e-15 * law.saturation)
+
+
+def root(v, drop, knee):
+    """Solution x of x + drop x / (|x| + knee) = v."""
+    half = (abs(v) - knee - drop) / 2
+    return mpmath.sign(v) * (half + mpmath.sqrt(half**2 + knee * abs(v)))
+
+
 def test_energy_plays_are_plays_behind_langevins_curve():
     u = walk(3)
     r, w, z = np.array(CELLS.thresholds), np.array(CELLS.weights), np.array(CELLS.z0)
@@ -155,7 +183,6 @@ def test_energy_plays_are_plays_behind_langevins_curve():
 
 @pytest.mark.parametrize("x", [1e-300, 1e-9, 1e-3, 0.5, 0.999999, 1.000001, 3.0, 40.0, 1e9])
 def test_langevins_curve_has_all_digits(x):
-    mpmath = pytest.importorskip("mpmath")
     with mpmath.workdps(700 if x < 1e-20 else 50):
         expected = float(mpmath.coth(x) - 1 / mpmath.mpf(x))
     law = hs.EnergyPlays(thresholds=(0.0,), weights=(1.0,))

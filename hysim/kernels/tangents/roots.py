@@ -109,13 +109,14 @@ def arrival(t: float, u: float, rate: float, x: float, time: float, side: float,
     return t - (u + rate * t - carried - side) / slope if slope != 0.0 else t
 
 
-def field_inside(h: float, parameters: FloatArray, z: float, u: float) -> float:
-    """The field in a core behind an air gap, between the branches."""
+def excess_inside(excess: float, parameters: FloatArray, side: float, z: float, u: float) -> float:
+    """The field in a core behind an air gap, between the branches: its size over the coercivity."""
     gap, coercivity, knee = parameters[3], parameters[4], parameters[5]
     stiffness, drop = 1.0 + gap * parameters[2], gap * parameters[1]
-    below, above = abs(h - coercivity) + knee, abs(h + coercivity) + knee
-    slope = stiffness + drop * knee * ((0.5 - 0.5 * z) / (below * below) + (0.5 + 0.5 * z) / (above * above))
-    return float(h - (stiffness * h + drop * chan.inside(h, z, coercivity, knee) - u) / slope)
+    near, far = abs(excess) + knee, excess + 2.0 * coercivity + knee
+    shares = (0.5 - 0.5 * side * z) / (near * near) + (0.5 + 0.5 * side * z) / (far * far)
+    left = stiffness * (coercivity + excess) + side * drop * chan.inside(side, excess, z, coercivity, knee) - side * u
+    return float(excess - left / (stiffness + drop * knee * shares))
 
 
 def field_of(x: float, m: float, p: float) -> float:

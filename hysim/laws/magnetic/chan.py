@@ -104,10 +104,10 @@ class Chan(BranchLaw):
 
     @classmethod
     def pack(cls, tables: Tables) -> Packed:
-        """Parameters as `hysim.kernels.magnetics.chan` has them, and the memory (u, z, h, turn)."""
+        """Parameters as `hysim.kernels.magnetics.chan` has them, and the memory (u, z, excess, turn, h)."""
         head = [tables[name] for name in ("offset", "saturation", "feedthrough", "gap", "coercivity")]
         knee = tables["coercivity"] * (1.0 / tables["squareness"] - 1.0)
-        return Packed(np.concatenate([*head, knee], axis=1), cls.initial_memory(tables, further=2))
+        return Packed(np.concatenate([*head, knee], axis=1), cls.initial_memory(tables, further=3))
 
     @property
     def bend(self) -> float:

@@ -30,6 +30,7 @@ _GENERAL = frozenset(
         ("hysim.kernels.magnetics.jiles_atherton.first_place", "coupling"),
         ("hysim.kernels.magnetics.chan.abscissa", "drop"),
         ("hysim.kernels.magnetics.chan.follow", "drop"),
+        ("hysim.kernels.magnetics.chan.stay", "drop"),
     }
 )
 """Functions and names of which zero is a special case that the general one covers, but for rounding."""
@@ -39,7 +40,7 @@ _AGAIN = {
     "hysim.kernels.duhem.zero": "series_zero",
     "hysim.kernels.zhu_wang.ramp_zero": "ramp_zero",
     "hysim.kernels.zhu_wang.take_off": "take_off",
-    "hysim.kernels.magnetics.chan.field_inside": "field_inside",
+    "hysim.kernels.magnetics.chan.excess_inside": "excess_inside",
     "hysim.kernels.magnetics.anhysteretic.field_of": "field_of",
     "hysim.kernels.magnetics.jiles_atherton.reversible": "reversible",
     "hysim.kernels.magnetics.jiles_atherton.solve": "solve",
