@@ -7,11 +7,12 @@ A module holds one step, for parameters and states of any size; it imports nothi
     run(parameters, n_parameters, state, n_state, u, y, n)                            n outputs, the state moves along
 
 where all but the sizes and `u0` are addresses of doubles. The modules of hysim's own laws are files of the package,
-compressed; ``python -m hysim.export.build_pages`` writes them anew. A step of the user is compiled when a page is
-written, which needs the extra `export`.
+compressed, and each says of which C text it was made; ``python -m hysim.export.build_pages`` writes them anew. A step
+of the user is compiled when a page is written, which needs the extra `export`.
 """
 
 import gzip
+import hashlib
 from collections.abc import Callable
 from functools import lru_cache
 from importlib.resources import files
@@ -98,5 +99,11 @@ def c_source(kernels: Kernels) -> str:
 
 @lru_cache(maxsize=32)
 def compiled(source: str) -> bytes:
-    """The module of a C99 text; errors as of `hysim.export._compilers.web_module`."""
-    return web_module(source)
+    """The module of a C99 text, which ends with its `mark`; errors as of `hysim.export._compilers.web_module`."""
+    return web_module(source) + mark(source)
+
+
+def mark(source: str) -> bytes:
+    """Section of a module that tells of which text it was made: a custom one, that a browser passes over."""
+    content = b"\x06source" + hashlib.sha256(source.encode()).digest()
+    return bytes([0, len(content)]) + content
