@@ -168,3 +168,19 @@ def test_a_sum_of_short_laws_is_inverted():
     law = hs.BoucWen(beta=-3e8, gamma=4e8, n=1.5, gain=1e3, feedthrough=1e4) + hs.Line(slope=1.0)
     u = 1e-9 * np.array([0.0, 1.0, -0.5])
     assert law.inverse_response(law.response(u), u0=0.0) == pytest.approx(u, abs=1e-23)  # roundings of u
+
+
+def test_an_output_that_moves_by_less_than_a_rounding_tells_no_inverse():
+    """Beside its offset this Duhem law stands still for longer than the stride, and then turns."""
+    wanted = experiment.wanted_case("Duhem", experiment.generator("Duhem", 222))
+    assert (wanted.y == wanted.y0).all()
+    assert experiment.inverse_verdict(wanted, experiment.inputs_for).end == "edge"
+
+
+def test_a_law_that_refuses_what_it_could_invert_is_wrong():
+    wanted = experiment.wanted_case("Duhem", experiment.generator("Duhem", 1))
+
+    def refuse(wanted, y):
+        raise ValueError("the law has no inverse")
+
+    assert experiment.inverse_verdict(wanted, refuse).ratio == np.inf
