@@ -12,13 +12,9 @@ from hysim.kernels import boucwen
 from hysim.kernels._compile import inner, kernel
 from hysim.kernels.baber_noori_series import EXPONENT, N_ROWS, SCALE, SLOPE, STRENGTH, TOLERANCE, begin
 from hysim.kernels.remainder import N_TERMS, ROUNDING
-from hysim.kernels.search.near_zero import stretch
+from hysim.kernels.search.near_zero import EDGE, STRETCHES, ZONE, pays, stretch
 
 _FIRST, _LAST = 3, 3 + N_ROWS * (N_TERMS + 1)
-_STRETCHES = 64
-_ZONE = 0.6  # of the memory at which the term of ``|w|^n`` cancels the slope
-_EDGE = 1.01  # of the zone
-_TURNS = 3.0  # times the memory: a length on which it moves less needs few series
 
 
 @kernel
@@ -43,15 +39,14 @@ def advance(w: float, e: float, length: float, parameters: FloatArray, room: Flo
     """w and e after the input has moved by `length`; `room` is for the series, or for stretches near zero."""
     n, left = parameters[EXPONENT], length
     series = room.reshape((N_ROWS, N_TERMS + 1))
-    for _ in range(0 if n == 1.0 or n == 2.0 else _STRETCHES):
+    for _ in range(0 if n == 1.0 or n == 2.0 else STRETCHES):
         if left <= ROUNDING * length:
             return w, e
         begin(w, e, True, parameters, series)
-        forcing, zone = series[SLOPE, 0], _ZONE * law.nearness(e, length, parameters, series)[2]
-        is_inward = w * forcing < 0.0
-        if not zone > 0.0 or not (is_inward or abs(w) < zone) or _TURNS * abs(forcing) * left < abs(w):
+        forcing, zone = series[SLOPE, 0], ZONE * law.nearness(e, length, parameters, series)[2]
+        if not pays(w, forcing, zone, left):
             break
-        if abs(w) <= _EDGE * zone:
+        if abs(w) <= EDGE * zone:
             w, e, gone = stretch(w, e, left, forcing, zone, parameters[STRENGTH], 0.0, parameters, room)
         else:
             begin(w, e, False, parameters, series)

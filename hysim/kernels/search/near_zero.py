@@ -21,7 +21,10 @@ from hysim.kernels._compile import inner
 from hysim.kernels.baber_noori_series import BETA, EXPONENT, GAMMA
 
 N_NODES = 8
+STRETCHES = 64  # between two samples at most
+ZONE, EDGE = 0.6, 1.01  # of the memory at which the term of ``|w|^n`` cancels the forcing; of the zone
 N_WORK = 5 * N_NODES  # rates, energies, lengths, memories and their powers n at the nodes
+_TURNS = 3.0  # times the memory: a length on which it moves less needs few series
 _ENERGY, _LENGTH, _PLACE, _POWER = N_NODES, 2 * N_NODES, 3 * N_NODES, 4 * N_NODES
 _SWEEPS = 10
 _HALVINGS = 6
@@ -48,6 +51,12 @@ def _collocation() -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
 
 
 _NODES, _TO_NODES, _WEIGHTS, _DOUBT = _collocation()
+
+
+@inner
+def pays(w: float, forcing: float, zone: float, left: float) -> bool:
+    """Whether a memory on its way to the `zone`, or in it, would need many series on the length that is left."""
+    return bool(zone > 0.0 and (w * forcing < 0.0 or abs(w) < zone) and _TURNS * abs(forcing) * left >= abs(w))
 
 
 @inner

@@ -13,16 +13,12 @@ from hysim.kernels._compile import inner, kernel
 from hysim.kernels.baber_noori import phi
 from hysim.kernels.baber_noori_series import BETA, EXPONENT, GAMMA, N_OWN, SCALE
 from hysim.kernels.remainder import ROUNDING
-from hysim.kernels.search.near_zero import N_WORK, stretch
+from hysim.kernels.search.near_zero import EDGE, N_WORK, STRETCHES, ZONE, pays, stretch
 
 N_STATE = law.N_STATE + N_WORK + SCALE
 _WORK = law.N_STATE
 _PARAMETERS = _WORK + N_WORK  # those of `near_zero`: zeros, beta, gamma and n
 _SCALE, _OUTPUT = 5, 7  # places in the parameters
-_STRETCHES = 64
-_ZONE = 0.6  # of the memory at which the term of ``|w|^n`` cancels the forcing
-_EDGE = 1.01  # of the zone
-_TURNS = 3.0  # times the memory: a length on which it moves less needs few series
 
 _MOST_ROUGH = 4_000
 _STRIDE = 0.25  # of the yield memory, that w moves in one rough step
@@ -51,16 +47,15 @@ def advance(u: float, z: float, du: float, parameters: FloatArray, state: FloatA
         own[k] = 0.0
     own[BETA], own[GAMMA], own[EXPONENT] = beta, gamma, n
     w, left, bend = direction * z, length, abs(beta) + abs(gamma)
-    for _ in range(0 if n == 1.0 or bend == 0.0 else _STRETCHES):
+    for _ in range(0 if n == 1.0 or bend == 0.0 else STRETCHES):
         if left <= ROUNDING * length:
             return direction * w
         at = u + direction * (length - left)
         forcing = A + direction * delta * at
-        zone = _ZONE * (abs(forcing) / bend) ** (1.0 / n)
-        is_inward = w * forcing < 0.0
-        if not zone > 0.0 or not (is_inward or abs(w) < zone) or _TURNS * abs(forcing) * left < abs(w):
+        zone = ZONE * (abs(forcing) / bend) ** (1.0 / n)
+        if not pays(w, forcing, zone, left):
             break
-        if abs(w) <= _EDGE * zone:
+        if abs(w) <= EDGE * zone:
             w, _, gone = stretch(w, 0.0, left, forcing, zone, forcing, delta, own, work)
         else:
             side = math.copysign(1.0, w)
