@@ -223,27 +223,39 @@ def check_whole(value: Any, name: str, *, least: int = 1) -> None:
 
 def items(value: Any) -> dict[str, Any]:
     """Fields of a frozen value by name."""
-    return {field.name: vars(value)[field.name] for field in dataclasses.fields(value)}
+    values = vars(value)
+    return {name: values[name] for name in _field_names(type(value))[0]}  # type: ignore[arg-type]
+
+
+@functools.cache
+def _field_names(cls: type) -> tuple[tuple[str, ...], tuple[str, ...]]:
+    """Names of all fields, and of those that count in comparisons."""
+    fields = dataclasses.fields(cls)
+    return tuple(field.name for field in fields), tuple(field.name for field in fields if field.compare)
 
 
 def _compared(value: Any) -> tuple[Any, ...]:
-    return tuple(vars(value)[field.name] for field in dataclasses.fields(value) if field.compare)
+    values = vars(value)
+    return tuple(values[name] for name in _field_names(type(value))[1])  # type: ignore[arg-type]
 
 
 def _key(value: Any) -> Any:
+    if type(value) is float:  # nearly every one
+        return "nan" if math.isnan(value) else value
     if isinstance(value, np.ndarray):
         return value.shape, (value + 0.0 if value.dtype.kind == "f" else value).tobytes()
-    if isinstance(value, Mapping):
-        return tuple((name, _key(item)) for name, item in sorted(value.items()))
     if isinstance(value, (tuple, list)):
         return tuple(_key(item) for item in value)
+    if isinstance(value, Mapping):
+        return tuple((name, _key(item)) for name, item in sorted(value.items()))
     return "nan" if isinstance(value, float) and math.isnan(value) else value
 
 
 def _equal(self: Any, other: object) -> Any:
     if type(self) is not type(other):
         return NotImplemented
-    return _key(_compared(self)) == _key(_compared(other))
+    pairs = zip(_compared(self), _compared(other), strict=True)
+    return all(one is another or _key(one) == _key(another) for one, another in pairs)
 
 
 def _hash(self: Any) -> int:

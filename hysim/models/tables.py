@@ -1,5 +1,6 @@
 """The numbers of laws: one name for each, and tables of every field over sets of laws."""
 
+import math
 from collections.abc import Mapping
 from typing import Any
 
@@ -58,7 +59,10 @@ def tables_of(
     if len(set(lengths.values())) > 1:
         raise ValueError(f"parameters and inputs must have one length or length 1, got {lengths}")
     n_sets = next(iter(lengths.values()), 1)
-    tables = {name: np.broadcast_to(table, (n_sets, *table.shape[1:])) for name, table in tables.items()}
+    tables = {
+        name: table if len(table) == n_sets else np.broadcast_to(table, (n_sets, *table.shape[1:]))
+        for name, table in tables.items()
+    }
     for name, column in columns.items():
         field, _, place = name.partition("[")
         tables[field] = np.where(np.arange(tables[field].shape[1]) == int(place[:-1]), column, tables[field])
@@ -70,8 +74,12 @@ def table_of_one(value: Any) -> FloatArray:
     return np.array([[value]]) if isinstance(value, float) else np.array([value], dtype=float)
 
 
-def _table(name: str, values: npt.ArrayLike, ndim: int) -> FloatArray:
+def _table(name: str, values: Any, ndim: int) -> FloatArray:
     """Values over sets, of a number (n_sets, 1), of a field with `ndim` axes (n_sets, ...)."""
+    if ndim == 0 and type(values) is float and math.isfinite(values):  # most of them: checks take most of the time
+        number = table_of_one(values)
+        number.setflags(write=False)
+        return number
     array = read_only(values, name)
     if array.ndim > ndim + 1:
         raise ValueError(f"{name} has too many axes: got shape {array.shape}")
