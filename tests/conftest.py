@@ -68,13 +68,16 @@ def pytest_collection(session):
     """Load kernels and tests in every second worker from the last to the first, when the whole suite is collected.
 
     All workers load all of them, and what is compiled while they are loaded comes from a cache where another worker
-    has compiled it. From both ends each compiles a half; in the same order all would compile everything.
+    has compiled it. From both ends each compiles a half; in the same order all would compile everything. The kernels of
+    closed loops, to which both ends lead soon, are left to the second worker, which begins with them.
     """
     number = os.environ.get("PYTEST_XDIST_WORKER", "").removeprefix("gw")
     if number.isdigit() and session.config.args_source is session.config.ArgsSource.TESTPATHS:
         step = -1 if int(number) % 2 else 1
-        for kernel in sorted((ROOT / "hysim" / "kernels").glob("[a-z]*.py"))[::step]:
-            importlib.import_module(f"hysim.kernels.{kernel.stem}")
+        paths = sorted((ROOT / "hysim" / "kernels").rglob("[a-z]*.py"))[::step]
+        kernels = [".".join(path.relative_to(ROOT).with_suffix("").parts) for path in paths]
+        for kernel in (["hysim.kernels.loop"] if step < 0 else []) + kernels:
+            importlib.import_module(kernel)
         if step < 0:
             for file in sorted((ROOT / "tests").glob("test_*.py"), reverse=True):
                 with contextlib.suppress(Exception, pytest.skip.Exception):  # the collection reports them
@@ -84,10 +87,12 @@ def pytest_collection(session):
 def pytest_collection_finish():
     """Take what is loaded out of the collector's sight: each full collection would go through all kernels and tests.
 
-    The reader of films asks for one at the end of each file, and took seconds for it.
+    The reader of films asks for one at the end of each file, and took seconds for it. What the tests make is collected
+    less often than is usual, too.
     """
     gc.collect()
     gc.freeze()
+    gc.set_threshold(20_000, 20, 20)
 
 
 def pytest_collection_modifyitems(items):
