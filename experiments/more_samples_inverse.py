@@ -40,6 +40,8 @@ import hysim as hs
 
 SOLVED = 64.0
 """Roundings of the terms of an output that the searches leave: 32 in `BoucWenInverse`, fewer in the others."""
+NEAR = 10.0 ** np.arange(-14.0, -5.0)  # parts of the first input, or of one, at which it may turn
+SEEN = 3  # of them beyond roundings
 FAR = 0.125  # of its range: a memory that moves further between two samples is looked at between them
 PLAYS = ("PrandtlIshlinskii", "ModifiedPrandtlIshlinskii", "GeneralizedPrandtlIshlinskii", "Preisach")
 TIMED = "RateDependentPrandtlIshlinskii"
@@ -232,12 +234,15 @@ def stepped_inputs_for(wanted: Wanted, y: Array) -> Array:
 def inverse_verdict(wanted: Wanted, inverse: Callable[[Wanted, Array], Array]) -> Verdict:
     """Compare the inputs for the last output alone, for some, and for all.
 
-    A law that refuses where all wanted outputs are that of the beginning, to the bit, is undecided.
+    A law that refuses where all wanted outputs are that of the beginning, to the bit, is undecided; one whose output
+    turns at the beginning, and goes the same way to both sides, may refuse.
     """
     try:
         coarse, some, fine = (inverse(wanted, y) for y in (wanted.y[-1:], wanted.y[wanted.kept], wanted.y))
-    except (hs.SimulationError, ValueError):  # beside its offset a memory may move by less than a rounding
-        return Verdict(0.0, "edge") if (wanted.y == wanted.y0).all() else Verdict(np.inf, "refused")
+    except (hs.SimulationError, ValueError):
+        if (wanted.y == wanted.y0).all():  # beside its offset a memory may move by less than a rounding
+            return Verdict(0.0, "edge")
+        return Verdict(0.0 if turns(wanted) else np.inf, "refused")
     if not all(np.isfinite(u).all() for u in (coarse, some, fine)):
         return Verdict(np.inf, "refused")
     ratio = distance(wanted, (coarse, some, fine), allowed(wanted, fine, NOTHING))
@@ -246,6 +251,20 @@ def inverse_verdict(wanted: Wanted, inverse: Callable[[Wanted, Array], Array]) -
         if ratio > enough:
             ratio = min(ratio, distance(wanted, (coarse, some, fine), allowed(wanted, fine, errors(case))))
     return Verdict(ratio, "compared")
+
+
+def turns(wanted: Wanted) -> bool:
+    """Whether the output goes the same way to both sides of the first input, however short the way is."""
+    lengths = NEAR * (1.0 + abs(wanted.u0))
+    ahead, back = (
+        np.array(
+            [float(forward(wanted.law, wanted.u0, np.array([wanted.u0 + side * length]))[0]) for length in lengths]
+        )
+        - wanted.y0
+        for side in (1.0, -1.0)
+    )
+    seen = np.minimum(np.abs(ahead), np.abs(back)) > SOLVED * UNIT * abs(wanted.y0)
+    return bool(np.sum(seen) >= SEEN and (ahead[seen] * back[seen] > 0.0).all())
 
 
 def nearest_spread(case: Case) -> Spread:

@@ -177,10 +177,31 @@ def test_an_output_that_moves_by_less_than_a_rounding_tells_no_inverse():
     assert experiment.inverse_verdict(wanted, experiment.inputs_for).end == "edge"
 
 
+def test_an_output_that_turns_where_it_begins_may_be_refused():
+    """Its memory, nearly zero, grows both ways, and on one side by far more than the input's own slope takes back."""
+    wanted = experiment.wanted_case("GeneralizedBoucWen", experiment.generator("GeneralizedBoucWen", 9980))
+    for side in (1.0, -1.0):
+        assert wanted.law.advance([wanted.u0 + side * 1e-8], wanted.law.advance([wanted.u0])[1])[0] > wanted.y0
+    assert experiment.inverse_verdict(wanted, experiment.inputs_for) == (0.0, "refused")
+
+
 def test_a_law_that_refuses_what_it_could_invert_is_wrong():
     wanted = experiment.wanted_case("Duhem", experiment.generator("Duhem", 1))
+    assert (wanted.y != wanted.y0).any()
 
     def refuse(wanted, y):
         raise ValueError("the law has no inverse")
 
     assert experiment.inverse_verdict(wanted, refuse).ratio == np.inf
+
+
+@pytest.mark.parametrize("seed", [3542, 3889])
+def test_a_memory_of_next_to_nothing_may_grow_by_hundreds_of_decades(seed):
+    """Without A, and with n < 1; the wear that goes with its energy is next to nothing all the way."""
+    case = experiment.draw_case("BoucWenBaberNoori", experiment.generator("BoucWenBaberNoori", seed))
+    law, u = case.law, np.concatenate([case.before, case.u])
+    plain = hs.PolynomialBoucWen(**{name: law.arguments[name] for name in hs.PolynomialBoucWen.defaults()})
+    np.testing.assert_allclose(law.response(u), plain.response(u), rtol=1e-12)
+    found = experiment.chunk("BoucWenBaberNoori", seed, 1)
+    assert found["wrong"] == []
+    assert found["ends"]["response"] == {"compared": 1}

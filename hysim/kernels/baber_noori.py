@@ -56,7 +56,8 @@ N_STATE = _PLAIN + N_WORK + 1
 MAX_STEPS = 5_000
 _COMMON = TOLERANCE + 1
 _SMALLEST = 2.0**-1022
-_BEYOND, _BEYOND_POWER = 1e100, 1e200  # a memory, or its power n, that grows from there on has escaped
+_BEYOND, _BEYOND_POWER = 1e100, 1e200  # a memory, or its power n, that grows from there on has escaped,
+_SLOW_BEYOND = 1e150  # and for n < 1 one that grows from there on
 _GROWTH = 4.0  # of the length tried, over the last one that served
 _VANISHED = 1e-3  # of eta: what is lost beside it did not escape
 _RETREAT = 2.0**-10  # of a length at which a term overflows
@@ -99,6 +100,7 @@ def step(parameters: FloatArray, state: FloatArray, u: float) -> float:
 def advance(w: float, e: float, length: float, parameters: FloatArray, series: FloatArray) -> tuple[float, float]:
     """w and e after the input has moved by `length`; `series` is (N_ROWS, N_TERMS + 1)."""
     n = parameters[EXPONENT]
+    beyond = _BEYOND if n >= 1.0 else _SLOW_BEYOND
     left = t = length
     lost = 0.0
     for _ in range(MAX_STEPS):
@@ -119,7 +121,7 @@ def advance(w: float, e: float, length: float, parameters: FloatArray, series: F
                 elif free:
                     t = min(t, 2.0 * abs(w / forcing) if w * forcing < 0.0 else near / abs(forcing))
         last, fraction = expand(w, e, t, free, size, parameters, series)
-        if w * series[SLOPE, 0] > 0.0 and (abs(w) > _BEYOND or series[POWER, 0] > _BEYOND_POWER):
+        if w * series[SLOPE, 0] > 0.0 and (abs(w) > beyond or series[POWER, 0] > _BEYOND_POWER):
             return math.copysign(math.inf, w), e
         if fraction == 0.0:
             if not math.isfinite(series[MEMORY, 1]):

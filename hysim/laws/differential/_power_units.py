@@ -13,7 +13,8 @@ an energy e goes over by 2^-(k + m), and q, which multiplies (1 / (beta + gamma)
 laws keep their units, and so their bits.
 
 The order of the memory is that of the balance (A / c)^(1/n) with c the larger of beta and gamma, and the order of the
-input that of balance / A. Where A is zero or negligible, z0 or the forcing delta u gives both.
+input that of balance / A. Where A is zero or negligible, z0 or the forcing delta u gives both. A small z0 gives half
+of its order if n < 1: a memory that grows then comes far away from there on any way.
 """
 
 from typing import NamedTuple
@@ -100,8 +101,9 @@ def _of_balance(
     """Orders of memory and input where A and c w^n balance, or where A is negligible and z0 decays, and where it is."""
     memory = (force - bend) / n
     started = ~(start <= memory + _NEGLIGIBLE / n) & np.isfinite(start) & np.isfinite(bend)
-    input_ = np.where(started, start - (bend + n * start), memory - force)
-    return np.where(started, start, memory), input_, started
+    begun = np.where((n < 1.0) & (start < 0.0), 0.5 * start, start)
+    input_ = np.where(started, begun - (bend + n * begun), memory - force)
+    return np.where(started, begun, memory), input_, started
 
 
 def _units(n: FloatArray, memory: FloatArray, input_: FloatArray) -> Units:
