@@ -205,3 +205,13 @@ def test_a_memory_of_next_to_nothing_may_grow_by_hundreds_of_decades(seed):
     found = experiment.chunk("BoucWenBaberNoori", seed, 1)
     assert found["wrong"] == []
     assert found["ends"]["response"] == {"compared": 1}
+
+
+@pytest.mark.parametrize("share", [0.1, 0.5, 1.0])
+def test_branches_that_touch_leave_no_memory(share):
+    """How far they are apart just there was a rounding or nothing, as the sample before happened to lie."""
+    inputs = (-0.4980768759266577, 0.3758447403404119, 0.5333721856568212)
+    law = hs.TellinenTable(inputs=inputs, lower=(0.00173, 0.00195, 0.0112), upper=(0.00173, 0.003, 0.0112), z0=-share)
+    for u in np.random.default_rng(0).uniform(*inputs[:2], 50):
+        assert law.advance([u, inputs[0] - 1.0])[1][1] == 1.0
+        assert law.advance([u, inputs[0]])[1][1] == 1.0

@@ -18,6 +18,7 @@ from hysim.kernels._compile import inlined, inner, signed_kernel
 from hysim.kernels.stepping import STEP
 
 N_HEAD = 2
+_NEARLY_TOUCHED = -0.5  # x, from which on the distance that is left tells the logarithm better
 _STRAIGHT = 1e-8  # x for which log(1 + x) / x is 1 - x / 2 to rounding
 
 
@@ -43,6 +44,12 @@ def branch(parameters: FloatArray, first: int, n: int, k: int, u: float) -> floa
 
 
 @inlined
+def width_at(parameters: FloatArray, n: int, k: int, u: float) -> float:
+    """Distance of the branches, in the piece k or level beyond it."""
+    return float(branch(parameters, N_HEAD + 2 * n, n, k, u) - branch(parameters, N_HEAD + n, n, k, u))
+
+
+@inlined
 def decay(parameters: FloatArray, n: int, k: int, u: float, end: float) -> float:
     """Logarithm of what is left of the distance to the branch along which a stroke goes, after its part in piece k."""
     lower, upper = N_HEAD + n + k, N_HEAD + 2 * n + k
@@ -52,13 +59,14 @@ def decay(parameters: FloatArray, n: int, k: int, u: float, end: float) -> float
     behind = abs(length) * (climb if end > u else rise)
     if behind <= 0.0:
         return 0.0
-    width = branch(parameters, N_HEAD + 2 * n, n, k, u) - branch(parameters, N_HEAD + n, n, k, u)
-    if width <= 0.0:
+    width = width_at(parameters, n, k, u)
+    after = width_at(parameters, n, k, end)
+    if width <= 0.0 or after <= 0.0:  # where the branches touch, nothing is left
         return -math.inf
     x = (climb - rise) * length / width
-    if x <= -1.0:
-        return -math.inf
-    return float(-(behind / width) * (1.0 - 0.5 * x + x * x / 3.0 if abs(x) < _STRAIGHT else math.log1p(x) / x))
+    if abs(x) < _STRAIGHT:
+        return float(-(behind / width) * (1.0 - 0.5 * x + x * x / 3.0))
+    return float(-(behind / width) * (math.log1p(x) if x > _NEARLY_TOUCHED else math.log(after / width)) / x)
 
 
 @inner
