@@ -10,7 +10,7 @@ A `BoucWenOscillator` and all else that depends on time is left out: its samples
 between them it is held, or goes on a line, so that more of them are another input.
 
 Cases are worked on in chunks on all cores; finished chunks are kept in the folder ``--chunks``, if one is given, where
-a second call finds them. 10 000 cases take half an hour of one core.
+a second call finds them. 10 000 cases of each family take about an hour of one core.
 """
 
 import argparse
