@@ -19,6 +19,7 @@ import numpy.typing as npt
 from hysim._names import among, meant
 
 FloatArray = npt.NDArray[np.float64]
+LAST = {"last": True}  # metadata of a field of a base class that stands behind those of its families
 T = TypeVar("T")
 
 _TOO_LARGE = f"a number beyond {sys.float_info.max:.2g}"
@@ -141,7 +142,14 @@ def _freeze(cls: type[T], *, finite: bool) -> type[T]:
     cls.__eq__ = _equal  # type: ignore[method-assign]
     cls.__hash__ = _hash  # type: ignore[method-assign]
     cls.__reduce__ = _reduce  # type: ignore[method-assign]
-    return _with_advice(dataclasses.dataclass(frozen=True, kw_only=True, eq=False)(cls))
+    made = dataclasses.dataclass(frozen=True, kw_only=True, eq=False)(cls)
+    if last_names(made):
+        made.__repr__ = _repr_without_none  # type: ignore[method-assign]
+    return _with_advice(made)
+
+
+def _repr_without_none(self: Any) -> str:
+    return f"{type(self).__qualname__}({', '.join(f'{name}={value!r}' for name, value in given_items(self).items())})"
 
 
 def _with_advice(cls: type[T]) -> type[T]:
@@ -154,7 +162,7 @@ def _with_advice(cls: type[T]) -> type[T]:
             generated(self, *arguments, **values)
         except TypeError:
             fields = dataclasses.fields(cls)  # type: ignore[arg-type]
-            known, by_place = [field.name for field in fields], sum(not field.kw_only for field in fields)
+            known, by_place = [*_field_names(cls)[0]], sum(not field.kw_only for field in fields)
             unknown = next((name for name in values if name not in known), None)
             if unknown is None and len(arguments) <= by_place:
                 raise
@@ -227,10 +235,27 @@ def items(value: Any) -> dict[str, Any]:
     return {name: values[name] for name in _field_names(type(value))[0]}  # type: ignore[arg-type]
 
 
+def own_items(value: Any) -> dict[str, Any]:
+    """Fields of a frozen value by name, without those that are `LAST`."""
+    return {name: item for name, item in items(value).items() if name not in last_names(type(value))}
+
+
+def given_items(value: Any) -> dict[str, Any]:
+    """Fields of a frozen value by name, without those that are `LAST` and None."""
+    last = last_names(type(value))
+    return {name: item for name, item in items(value).items() if item is not None or name not in last}
+
+
+@functools.cache
+def last_names(cls: type) -> tuple[str, ...]:
+    """Names of the fields that are `LAST`."""
+    return tuple(field.name for field in dataclasses.fields(cls) if "last" in field.metadata)
+
+
 @functools.cache
 def _field_names(cls: type) -> tuple[tuple[str, ...], tuple[str, ...]]:
     """Names of all fields, and of those that count in comparisons."""
-    fields = dataclasses.fields(cls)
+    fields = sorted(dataclasses.fields(cls), key=lambda field: "last" in field.metadata)
     return tuple(field.name for field in fields), tuple(field.name for field in fields if field.compare)
 
 

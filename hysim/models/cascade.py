@@ -21,7 +21,7 @@ from hysim.models.parts import (
     self_started,
     startable_pair,
 )
-from hysim.models.protocols import CompiledLaw, Startable
+from hysim.models.protocols import CompiledLaw, Placeable, Startable, needs_time, placed
 
 __all__ = ["Cascade", "CascadeStructure"]
 
@@ -90,6 +90,14 @@ class Cascade(Composite):
 
     def with_members(self, members: tuple[Any, ...]) -> "Cascade":
         return Cascade(stages=members)
+
+    def placed(self, u0: float | None, u_range: tuple[float, ...] | None = None) -> "Cascade":
+        stages, level = [], u0
+        for stage in self.stages:
+            stages.append(placed(stage, level, u_range))
+            known = level is not None and isinstance(stage, Placeable) and not needs_time(stage)
+            level, u_range = (float(stages[-1].response([level])[0]) if known else None), None
+        return Cascade(stages=tuple(stages))
 
     def response(self, u: npt.ArrayLike, sample_time: float | None = None) -> FloatArray:
         return reduce(lambda v, stage: response_of(stage, v, sample_time), self.stages, read_only(u, "u", ndim=1))
