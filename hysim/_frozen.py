@@ -143,7 +143,7 @@ def _freeze(cls: type[T], *, finite: bool) -> type[T]:
     cls.__hash__ = _hash  # type: ignore[method-assign]
     cls.__reduce__ = _reduce  # type: ignore[method-assign]
     made = dataclasses.dataclass(frozen=True, kw_only=True, eq=False)(cls)
-    if last_names(made):
+    if _field_names(made)[2]:  # type: ignore[arg-type]
         made.__repr__ = _repr_without_none  # type: ignore[method-assign]
     return _with_advice(made)
 
@@ -162,7 +162,7 @@ def _with_advice(cls: type[T]) -> type[T]:
             generated(self, *arguments, **values)
         except TypeError:
             fields = dataclasses.fields(cls)  # type: ignore[arg-type]
-            known, by_place = [*_field_names(cls)[0]], sum(not field.kw_only for field in fields)
+            known, by_place = [*_field_names(cls)[0]], sum(not field.kw_only for field in fields)  # type: ignore[arg-type]
             unknown = next((name for name in values if name not in known), None)
             if unknown is None and len(arguments) <= by_place:
                 raise
@@ -175,7 +175,7 @@ def _with_advice(cls: type[T]) -> type[T]:
 
 
 @functools.cache
-def _coercions(cls: type, finite: bool) -> dict[str, Callable[[Any, str], Any]]:
+def _coercions(cls: Any, finite: bool) -> dict[str, Callable[[Any, str], Any]]:
     rules: dict[Any, Callable[[Any, str], Any]] = {
         float: functools.partial(_as_float, finite=finite),
         tuple[float, ...]: functools.partial(_as_float_tuple, finite=finite),
@@ -187,7 +187,8 @@ def _coercions(cls: type, finite: bool) -> dict[str, Callable[[Any, str], Any]]:
         float | None: lambda value, name: None if value is None else _as_float(value, name, finite=finite),
     }
     hints = typing.get_type_hints(cls)
-    coercions = {field.name: rules.get(hints[field.name]) for field in dataclasses.fields(cls)}
+    kinds = {field.name: field.metadata.get("kind", hints[field.name]) for field in dataclasses.fields(cls)}
+    coercions = {name: rules.get(kind) for name, kind in kinds.items()}
     coercions |= {name: _as_mapping for name in coercions if typing.get_origin(hints[name]) is Mapping}
     return {name: coerce for name, coerce in coercions.items() if coerce is not None}
 
@@ -246,17 +247,20 @@ def given_items(value: Any) -> dict[str, Any]:
     return {name: item for name, item in items(value).items() if item is not None or name not in last}
 
 
-@functools.cache
-def last_names(cls: type) -> tuple[str, ...]:
+def last_names(cls: Any) -> tuple[str, ...]:
     """Names of the fields that are `LAST`."""
-    return tuple(field.name for field in dataclasses.fields(cls) if "last" in field.metadata)
+    return _field_names(cls)[2]
 
 
 @functools.cache
-def _field_names(cls: type) -> tuple[tuple[str, ...], tuple[str, ...]]:
-    """Names of all fields, and of those that count in comparisons."""
+def _field_names(cls: Any) -> tuple[tuple[str, ...], ...]:
+    """Names of all fields, of those that count in comparisons, and of those that are `LAST`."""
     fields = sorted(dataclasses.fields(cls), key=lambda field: "last" in field.metadata)
-    return tuple(field.name for field in fields), tuple(field.name for field in fields if field.compare)
+    return (
+        tuple(field.name for field in fields),
+        tuple(field.name for field in fields if field.compare),
+        tuple(field.name for field in fields if "last" in field.metadata),
+    )
 
 
 def _compared(value: Any) -> tuple[Any, ...]:

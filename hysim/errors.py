@@ -3,6 +3,7 @@
 import warnings
 from typing import Any
 
+_LIMITED = 0.05  # of the samples: a limit that is touched at the corners of a reference is not worth a word
 _BEYOND = 1e-6  # of the identified range: rounding of an inverse that ends at its edge
 
 
@@ -24,6 +25,17 @@ def warn_beyond(u_range: tuple[float, ...] | None, u: Any, name: str) -> None:
         warnings.warn(
             f"the input goes from {lowest:.4g} to {highest:.4g}, but the {name} was identified from {low:.4g} to "
             f"{high:.4g}: what it says beyond is extrapolated",
+            HysimWarning,
+            stacklevel=3,
+        )
+
+
+def warn_limited(limited: int, samples: int) -> None:
+    """Warn if a command stands at a limit for more than 5 % of its samples."""
+    if limited > _LIMITED * samples:
+        warnings.warn(
+            f"the command is at a limit of the controller or the amplifier in {limited} of {samples} samples: the "
+            "reference is out of reach there",
             HysimWarning,
             stacklevel=3,
         )

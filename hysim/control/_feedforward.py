@@ -78,6 +78,16 @@ class InverseFeedforward(SampledController):
             inverse_step(self.law, 0.0)
 
     @property
+    def u0(self) -> float | None:
+        """Command at which the memory of its law holds; None for the first one."""
+        return self.plant.u0
+
+    @property
+    def plant(self) -> Actuator:
+        """The actuator that it inverts."""
+        return Actuator(amplifier=self.amplifier, hysteresis=self.law, creep=self.creep)
+
+    @property
     def dynamic(self) -> bool:
         """Whether it depends on time: by its creep, or by its law."""
         return self.creep is not None or needs_time(self.law)

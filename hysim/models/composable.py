@@ -59,7 +59,8 @@ class Placed(Composable):
     """
 
     u0: float | None = field(default=None, metadata=LAST)
-    u_range: tuple[float, ...] | None = field(default=None, compare=False, metadata=LAST)
+    # Any, so that type checkers take BoucWen(**parameters) with a dict of floats
+    u_range: Any = field(default=None, compare=False, metadata={**LAST, "kind": tuple[float, ...] | None})
 
     @property
     def arguments(self) -> dict[str, Any]:

@@ -167,6 +167,21 @@ class Placeable(Protocol):
         """The model with the memory at the input `u0`, and this range."""
 
 
+@runtime_checkable
+class Standing(Protocol):
+    """What begins at a command of its own, if any: a model, or a controller around one."""
+
+    @property
+    def u0(self) -> float | None:
+        """The command; None for any."""
+
+
+def standing(thing: Any, u0: float | None = None) -> float:
+    """The command at which something begins: `u0` if it is given, else its own, else zero."""
+    own = thing.u0 if u0 is None and isinstance(thing, Standing) else u0
+    return 0.0 if own is None else own
+
+
 def placed(model: Any, u0: float | None, u_range: tuple[float, ...] | None = None) -> Any:
     """A model with its memory at the input `u0`; itself where it has no such input."""
     return model.placed(u0, u_range) if isinstance(model, Placeable) else model

@@ -97,8 +97,10 @@ class Actuator:
 
     @property
     def u0(self) -> float | None:
-        """Voltage at which the memory of the law holds; None for that of the first command."""
-        return self.hysteresis.u0 if isinstance(self.hysteresis, Placeable) else None
+        """Command at which the memory of the law holds; None for the first one."""
+        if not isinstance(self.hysteresis, Placeable) or self.hysteresis.u0 is None:
+            return None
+        return self.hysteresis.u0 if self.amplifier is None else self.amplifier.command(self.hysteresis.u0)
 
     @property
     def u_range(self) -> tuple[float, ...] | None:

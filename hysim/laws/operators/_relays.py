@@ -13,7 +13,6 @@ extremes; see `hysim.kernels.preisach`.
 """
 
 import math
-from dataclasses import replace
 from typing import Any, ClassVar
 
 import numpy as np
@@ -87,7 +86,7 @@ class RelayLaw(ByStructure, Law):
 
     def remembering(self, u0: float, memory: State) -> Any:
         """The law after these extremes."""
-        return replace(self, z0=memory, u0=u0)
+        return type(self)(**{**self.arguments, "z0": memory}, u0=u0)
 
     @property
     def past(self) -> State:
