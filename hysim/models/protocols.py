@@ -182,6 +182,13 @@ def standing(thing: Any, u0: float | None = None) -> float:
     return 0.0 if own is None else own
 
 
+@runtime_checkable
+class InputFilter(Protocol):
+    """A stage in front of a law for noisy inputs; a command has no noise, so that inverses leave it out."""
+
+    filters_input: ClassVar[bool]
+
+
 def placed(model: Any, u0: float | None, u_range: tuple[float, ...] | None = None) -> Any:
     """A model with its memory at the input `u0`; itself where it has no such input."""
     return model.placed(u0, u_range) if isinstance(model, Placeable) else model
