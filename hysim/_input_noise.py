@@ -42,6 +42,11 @@ def input_noise(u: FloatArray) -> float:
     return noise if inner > _MANY * max(above, 1) else 0.0
 
 
+def reach(noise: float) -> float:
+    """Largest reversal that white noise of this standard deviation makes in a million samples [unit of u]."""
+    return _REACH * noise
+
+
 def quiet_path(u: FloatArray, noise: float) -> FloatArray:
     """The input (n,), monotone between its reversals above the `noise`."""
     from scipy.optimize import isotonic_regression

@@ -1,7 +1,7 @@
 """The verb `simulate`: the output of a plant for an input in time."""
 
 from collections.abc import Mapping
-from dataclasses import field
+from dataclasses import field, replace
 from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
@@ -10,8 +10,11 @@ import numpy.typing as npt
 from hysim._frozen import FloatArray, frozen, vectors
 from hysim._printing import extent, printed, summary_text
 from hysim.interop import dataset, frame
+from hysim.models.channels.dependent import on_record
 from hysim.models.protocols import Remembering, Responding, needs_time
-from hysim.records import check_increasing, even_step
+from hysim.plants.actuator import Actuator
+from hysim.plants.multi_input_actuator import MultiInputActuator
+from hysim.records import Record, check_increasing, even_step
 
 _BY_NODE = frozenset({"displacement", "velocity", "acceleration"})
 """Signals with a column for each mass, as their peaks: masses are nodes 1, 2, ..., because node 0 is the ground."""
@@ -208,6 +211,19 @@ def simulate(
         signals={name: values for name, values in every.items() if values is not None},
         units=units or {},
     )
+
+
+def output_on(model: Any, record: Record) -> FloatArray:
+    """Output (n,) of a model at the samples of a record, with its time and its channels.
+
+    Of an actuator with a sensor it is what this reads, without its noise and its rounding.
+    """
+    if isinstance(model, MultiInputActuator):
+        return model.response_of(record)
+    if isinstance(model, Actuator) and model.sensor is not None:
+        ideal = replace(model, sensor=replace(model.sensor, noise=0.0, quantum=0.0))
+        return ideal.measured(record.u, record.sample_time if model.dynamic or model.sensor.delay else None)
+    return simulate(on_record(model, record), record.t, record.u).y
 
 
 def _signals(plant: Responding, u: FloatArray, times: FloatArray | None) -> Mapping[str, FloatArray]:

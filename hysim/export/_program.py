@@ -5,8 +5,7 @@ from dataclasses import replace
 from typing import Any, NamedTuple
 
 from hysim._frozen import FloatArray, frozen, read_only
-from hysim.control import Controller, InverseFeedforward, TrackingController, preview
-from hysim.control._loop import RestingPlant
+from hysim.control import Controller, InverseFeedforward, RestingPlant, TrackingController, preview
 from hysim.export._packing import packing
 from hysim.export._translate import Function, Translation
 from hysim.export._types import Scalar, Vector

@@ -20,22 +20,27 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from hysim._frozen import FloatArray
-from hysim._input_noise import input_noise, quiet_path
+from hysim._input_noise import input_noise, quiet_path, reach
 from hysim._repeats import repeated_cycle
 from hysim.errors import SimulationError
 from hysim.identification._budget import Budget
 from hysim.identification._problem import Problem, problem, problems
 from hysim.identification._search import brief_optima, brief_optimum, optima
+from hysim.laws.operators.reversal_filter import ReversalFilter
 from hysim.metrics.criteria import information
 from hysim.models.protocols import LongerPast, Rescalable, Undecided, Variant
 from hysim.models.search_space import Freedom, SearchSpace
+from hysim.models.whole.part_by_part import PartByPart
 from hysim.records import Record
+from hysim.simulation import output_on
 
 _STRONG = 10.0  # difference of two BIC
 _IN_VAIN = 2  # longer pasts in a row that are no better: one number more may be of use only with another one
 _ROUNDING = 1e-10  # of the output's size: smaller residuals are those of a perfect fit
 _WEIGHINGS = 4
 _EVEN = 1.25  # largest noise of a sensor over the smallest, in the units of a search: weights cost < 3 % of precision
+_AS_GOOD = 1.05  # times the error of the filtered law: differences below are met by chance on ten simulated records
+_TURN = 0.1  # of the span: a half record without such a reversal shows no loop
 _AT_BOUND = 1e-9  # of the largest linear parameter
 
 _STATES = {
@@ -77,34 +82,81 @@ class _Trial(NamedTuple):
         return self.problem.space.coordinates
 
 
-def quiet_where_better(
-    family: Any, records: Sequence[Record], freedom: Freedom, initial: str | Sequence[str] | None
-) -> tuple[Sequence[Record], str]:
-    """The records, and a sentence where their inputs turn by noise and the family fits better along quiet paths."""
-    noises = [input_noise(record.u) for record in records]
+class Treated(NamedTuple):
+    """Records as a search takes them, and what stands in front of the model for the noise of their inputs.
+
+    `noises` are the standard deviations of the noise [unit of u], and `quiet` the records with inputs that are monotone
+    between the reversals above it; both are empty where no noise was found, or is treated.
+    """
+
+    records: Sequence[Record]
+    front: ReversalFilter | None = None
+    noises: tuple[float, ...] = ()
+    quiet: Sequence[Record] = ()
+
+
+def treated(
+    family: Any, records: Sequence[Record], freedom: Freedom, initial: str | Sequence[str] | None, how: str
+) -> Treated:
+    """How a search takes measured inputs: `how` is "raw", "filtered" or, where the record decides, "auto".
+
+    A law is fitted behind a filter of reversals, and alone, on the first halves of the records; the bare law is taken
+    where it predicts the second halves as well.
+    """
+    if how == "raw" or any(isinstance(record, Rescalable) for record in records):
+        return Treated(records)
+    noises = tuple(input_noise(record.u) for record in records)
     if not any(noises):
-        return records, ""
+        if how == "filtered":
+            raise ValueError("no noise was found in the input, so that there is nothing to filter: leave out input=")
+        return Treated(records)
+    front = ReversalFilter(threshold=reach(max(noises)))
+    filtered = [replace(record, u=front.response(record.u)) for record in records]
     quiet = [
         replace(record, u=quiet_path(record.u, noise)) if noise else record
         for record, noise in zip(records, noises, strict=True)
     ]
+    behind = Treated(filtered, front, noises, quiet)
+    if how == "filtered" or isinstance(family, PartByPart):
+        return behind
+    alone, in_front = (_left_out(family, each, freedom, initial) for each in (records, filtered))
+    if alone <= _AS_GOOD**2 * in_front:
+        return Treated(records, None, noises, quiet)
+    return behind
+
+
+def _left_out(family: Any, records: Sequence[Record], freedom: Freedom, initial: str | Sequence[str] | None) -> float:
+    """Sum of squares on the second halves of the records, of the model that was fitted to the first halves."""
+    halves = [record[: len(record) // 2] for record in records]
+    if not all(half.reversals(_TURN).size for half in halves):
+        halves = [*records]
+    total = 0.0
     try:
-        problem(family, [replace(record, t=None) for record in records], freedom, initial)
-        as_measured, along_path = (
-            brief_optimum(problem(family, each, freedom, initial))[1] for each in (records, quiet)
-        )
-    except (ValueError, ArithmeticError, SimulationError):  # a family that depends on time filters noise itself
-        return records, ""
-    if not along_path < as_measured:
-        return records, ""
-    turns = ", ".join(
-        f"{record.reversals().size} of {raw.reversals().size}" for record, raw in zip(quiet, records, strict=True)
-    )
-    size = ", ".join(f"{noise:.2g}" for noise in noises)
-    return quiet, (
-        f"the input has noise of about {size} rms: only the {turns} reversals above it are used, and the input is "
-        "monotone between them"
-    )
+        attempt = problem(family, halves, freedom, initial)
+        theta = attempt.completed(brief_optimum(attempt)[0][np.newaxis])[0]
+        for k, (record, half) in enumerate(zip(records, halves, strict=True)):
+            model = attempt.family.assemble(attempt.estimates(theta, k))
+            rest = (record.y - output_on(model, record))[len(half) % len(record) :]
+            total += float(rest @ rest)
+    except (ValueError, ArithmeticError, SimulationError):
+        return math.inf
+    return total
+
+
+def quiet_rmse(family: Any, treatment: Treated, freedom: Freedom, initial: str | Sequence[str] | None) -> float:
+    """Error of a short fit along the quiet paths, with what their noise adds through the slope of the record.
+
+    It is infinite where there is no noise, or such a fit.
+    """
+    if not treatment.noises or isinstance(family, PartByPart):
+        return math.inf
+    try:
+        attempt = problem(family, treatment.quiet, freedom, initial)
+        cost = brief_optimum(attempt)[1]
+    except (ValueError, ArithmeticError, SimulationError):
+        return math.inf
+    slope = max(float(np.ptp(record.y)) / float(np.ptp(record.u)) for record in treatment.records)
+    return math.hypot(math.sqrt(cost / attempt.n_samples), slope * max(treatment.noises))
 
 
 def in_units_of_noise(problem: Problem, seed: int) -> Problem:

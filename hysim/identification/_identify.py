@@ -12,8 +12,9 @@ from hysim._blas import one_blas_thread
 from hysim._frozen import FloatArray, check_choice, check_count, read_only
 from hysim._parallel import Progress, at_most
 from hysim.identification import _direct as direct
-from hysim.identification._assumptions import decided, in_units_of_noise, quiet_where_better
+from hysim.identification._assumptions import Treated, decided, in_units_of_noise, quiet_rmse, treated
 from hysim.identification._extrapolation import implausible
+from hysim.identification._measured import as_measured, said_of_noise
 from hysim.identification._noise import Gaussian, Noise, Quantised, Robust
 from hysim.identification._problem import Problem
 from hysim.identification._resampling import left_out_errors, rms_of_known
@@ -27,7 +28,7 @@ from hysim.identification.whole.parts import begun_by_parts
 from hysim.models.candidates import family_named
 from hysim.models.channels.dependent import Dependent, on_record
 from hysim.models.channels.structure import DependentStructure
-from hysim.models.protocols import Direct, Identifiable, Recorded, needs_time
+from hysim.models.protocols import Direct, Identifiable, Recorded, Rescalable, needs_time, placed
 from hysim.models.search_space import Freedom
 from hysim.models.whole.part_by_part import PartByPart
 from hysim.records import Record, several
@@ -42,6 +43,7 @@ def identify(
     bounds: Mapping[str, tuple[float, float]] | None = None,
     depends: Mapping[str, tuple[str, int]] | None = None,
     initial: str | Sequence[str] | None = None,
+    input: str = "auto",
     noise: str | None = None,
     intervals: str = "linear",
     cross_validate: str | int | None = None,
@@ -81,10 +83,14 @@ def identify(
         Whether the state at the first sample is identified, is rest at zero, is that of an input which stood still at
         its first value, or is what the cycle leaves behind with which the record begins. By default a single memory is
         free; for sums of plays, stops or relays and for transfer functions the BIC decides, and `message` says how.
+    input : {"auto", "raw", "filtered"}
+        Whether the model follows the measured input as it is, or behind a `hysim.ReversalFilter`, whose threshold is
+        sized by the noise of the input. By default the filter is there where the input has noise and the law alone
+        predicts parts that it was not fitted to worse. The filter is a part of the model.
     noise : {"gaussian", "quantised", "robust"}, optional
-        Normal noise; normal noise before a sensor that rounds to multiples of `Record.resolution`; or Student's t with
-        4 degrees of freedom, for records with outliers. By default normal noise, or that of the sensor of a
-        `hysim.Actuator.structure`.
+        Noise of the output: normal; normal before a sensor that rounds to multiples of `Record.resolution`; or
+        Student's t with 4 degrees of freedom, for records with outliers. By default normal noise, or that of the sensor
+        of a `hysim.Actuator.structure`.
     intervals : {"linear", "profile", "bootstrap"}
         Intervals at 95 %: from the standard errors, by the profile of the likelihood, or from 500 records drawn anew.
     cross_validate : {None, "loo", "cycles", "records"} or int, optional
@@ -131,6 +137,7 @@ def identify(
     records: Sequence[Record] = several(given, "identify")
     options = _freedom(fixed or {}, free, bounds or {})
     check_choice("intervals", intervals, ("linear", "profile", "bootstrap"))
+    check_choice("input", input, ("auto", "raw", "filtered"))
     if noise is not None:
         check_choice("noise", noise, ("gaussian", "quantised", "robust"))
     if not isinstance(seed, (int, np.integer)) or seed < 0:
@@ -144,22 +151,26 @@ def identify(
             fit = direct.identified(model_or_class, records, left_out(cross_validate, records), seed)
             doubts = [swapped_columns(records)]
         else:
-            family = _family(model_or_class, depends)
+            family = placed(_family(model_or_class, depends), None)
             if isinstance(family, DependentStructure):
                 family = begun(family.over(records), records, options, initial, max_evaluations)
-            ends, is_cut = None, False
+            treatment = treated(family, records, options, initial, input)
+            paths, ends, is_cut = treatment.records, None, False
             if isinstance(family, PartByPart):
-                family, records, ends, is_cut = begun_by_parts(
-                    family, records, options, initial, shares, max_evaluations, seed
+                family, paths, ends, is_cut = begun_by_parts(
+                    family, paths, options, initial, shares, max_evaluations, seed
                 )
                 noise = noise or family.noise
-            paths, noisy = quiet_where_better(family, records, options, initial)
             choice = decided(family, paths, options, initial, shares, max_evaluations)
             if ends is not None:
                 choice = choice._replace(problems=[replace(each, ends=ends) for each in choice.problems])
             searched = [in_units_of_noise(each, seed) for each in choice.problems]
-            fit = _searched(searched, noise or "gaussian", intervals, left_out(cross_validate, records), seed, progress)
-            fit = replace(fit, message="; ".join(filter(None, (fit.message, choice.sentence, noisy))))
+            folds = left_out(cross_validate, records)
+            fit = _searched(searched, noise or "gaussian", intervals, folds, seed, progress, treatment)
+            fit = replace(fit, message="; ".join(filter(None, (fit.message, choice.sentence))))
+            if not any(isinstance(record, Rescalable) for record in records):
+                fit = as_measured(fit, records, shares, treatment)
+                fit = said_of_noise(fit, records, treatment, quiet_rmse(family, treatment, options, initial))
             first, doubts = choice.problems[0], [swapped_columns(records)]
             if is_partial := is_cut or (first.budget is not None and (first.budget.cut or not fit.success)):
                 stopped = f"partial: the search stopped at max_evaluations={max_evaluations}"
@@ -179,6 +190,7 @@ def _searched(
     folds: Sequence[npt.NDArray[np.intp]],
     seed: int,
     progress: Progress | None,
+    treatment: Treated,
 ) -> Identification:
     problem = problems[0]
     n_samples, n_names = problem.n_samples, len(problem.space.names)
@@ -192,7 +204,7 @@ def _searched(
         raise ValueError("every parameter set tried diverged: check the units, or pass bounds=")
     if isinstance(density, Quantised):
         density = density.at_least(squares[0].cost, n_samples - len(problem.space.names))
-    search = Search(problem, density, seed)
+    search = Search(problem, density, seed, treatment)
     result, likely = search.described(search.likely(squares), intervals, squares[0].x)
     if remark := stages_in_words(problems, problem):
         result = replace(result, message=f"{result.message}; {remark}")

@@ -22,8 +22,7 @@ from hysim._frozen import FloatArray
 from hysim._names import meant
 from hysim._repeats import repeated_cycle
 from hysim.identification._budget import Budget
-from hysim.identification._regression import least_squares, triangle
-from hysim.identification._settled import Settled
+from hysim.identification._regression import Settled, least_squares, triangle
 from hysim.models.protocols import Forgetting, Identifiable, Staged
 from hysim.models.search_space import STATES, STATES_IN_WORDS, Freedom, Parameters, SearchSpace
 from hysim.models.stages import BASE, Stage

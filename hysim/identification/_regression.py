@@ -4,6 +4,8 @@ For few columns by singular values. For many by the triangle of [C t] = Q R, whi
 is nearly singular, by its singular values.
 """
 
+from dataclasses import dataclass
+
 import numpy as np
 
 from hysim._frozen import FloatArray
@@ -11,6 +13,25 @@ from hysim._frozen import FloatArray
 _RANK = 1e-11  # singular values of the normalised columns below this are taken as zero
 _MANY = 8  # columns from which on a triangle costs clearly less
 _WELL = 1e9  # norm of an inverse below which no singular value is near `_RANK`
+
+
+@dataclass(frozen=True)
+class Settled:
+    """Rows that stand for the samples of each record from `first` on.
+
+    A sum of plays forgets what was before its record once the input has moved far enough. From there on the columns C
+    and the target t of the regression are the same for every set of parameters. With [C t] = Q R, the triangle R stands
+    for all of these samples: || C b - t || = || R [b, -1] || for all b, to rounding.
+
+    `columns` are (n_rows, n_linear), `target` (n_rows,), `names` those of the linear parameters, and `scale` is the
+    size of all outputs. Weights are taken into account.
+    """
+
+    first: tuple[int, ...]
+    names: tuple[str, ...]
+    columns: FloatArray
+    target: FloatArray
+    scale: float
 
 
 def triangle(columns: FloatArray, target: FloatArray) -> tuple[FloatArray, FloatArray]:

@@ -8,6 +8,7 @@ import numpy as np
 
 from hysim import metrics
 from hysim._frozen import FloatArray
+from hysim.identification._assumptions import Treated
 from hysim.identification._descent import Descent
 from hysim.identification._diagnostics import fit_measures, loop_widths, width_stderr
 from hysim.identification._noise import Gaussian, Noise, Quantised
@@ -18,10 +19,12 @@ from hysim.identification._result import Candidate, Identification, Width
 from hysim.identification._search import PERFECT, Optimum, optima, polish
 from hysim.identification._uncertainty import Uncertainty, uncertainty
 from hysim.identification.sentences import sentences
+from hysim.records import Record
 
 LEVEL = 0.95
 TAILS = (0.025, 0.975)
 N_BOOTSTRAP = 500
+N_DISTURBED = 20  # records with other noise of the input: a spread to a sixth
 _SAME = 1e-6  # relative difference of two costs that are the same
 _FAINT = 0.3  # quanta: noise below does not spread the rounding
 _EXACT = 100.0  # smallest sigmas: below, nothing is left to explain
@@ -41,6 +44,7 @@ class Search:
     problem: Problem
     noise: Noise
     seed: int
+    treatment: Treated
 
     @property
     def descent(self) -> Descent:
@@ -111,7 +115,33 @@ class Search:
 
     def _uncertainty(self, best: LocalOptimum) -> Uncertainty:
         residual, sigma = self.residual(best.theta)[np.newaxis], np.full((1, 1), best.sigma)
-        return uncertainty(self.problem, best.theta, self.noise.terms(residual, sigma).curvature[0])
+        curvature = self.noise.terms(residual, sigma).curvature[0]
+        known = uncertainty(self.problem, best.theta, curvature)
+        if not self.treatment.noises or known.slopes is None:
+            return known
+        return known.with_disturbances(self._by_input_noise(best.theta), curvature * self.problem.weights)
+
+    def _by_input_noise(self, theta: FloatArray) -> FloatArray:
+        """Changes of the output (n_draws, n_samples) by noise of the input that is drawn anew."""
+        rng, treatment = np.random.default_rng(self.seed), self.treatment
+
+        def output(inputs: Sequence[FloatArray]) -> FloatArray:
+            parts = [
+                replace(part, record=replace(part.record, u=u))
+                for part, u in zip(self.problem.parts, inputs, strict=True)
+            ]
+            return np.asarray(replace(self.problem, parts=tuple(parts)).model(theta[np.newaxis])[0])
+
+        def measured(record: Record, noise: float) -> FloatArray:
+            u = record.u + noise * rng.standard_normal(len(record))
+            return u if treatment.front is None else treatment.front.response(u)
+
+        quiet = output([record.u for record in treatment.quiet])
+        draws = [
+            output([measured(*each) for each in zip(treatment.quiet, treatment.noises, strict=True)])
+            for _ in range(N_DISTURBED)
+        ]
+        return np.array(draws) - quiet
 
     def _profiles(self, likely: list[LocalOptimum], known: Uncertainty) -> tuple[dict[str, Profile], FloatArray | None]:
         n_samples, n_names = self.problem.n_samples, len(self.problem.space.names)

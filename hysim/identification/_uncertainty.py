@@ -14,7 +14,7 @@ the output bends within the step, as at a stiff optimum in a wide box: there the
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -46,6 +46,17 @@ class Uncertainty:
     redundant: tuple[tuple[str, ...], ...]
     reasons: tuple[str, ...]
     slopes: FloatArray | None = None  # dm/dtheta (n_samples, n_theta), where it was computed
+
+    def with_disturbances(self, disturbances: FloatArray, curvature: FloatArray) -> "Uncertainty":
+        """The covariance with what disturbances of the output (n_draws, n_samples) add to the estimates.
+
+        Each moves the optimum by (J^T W J)^-1 J^T W d, to first order; the `curvature` W is (n_samples,). Their mean is
+        a bias, and counts as a part of the error.
+        """
+        if self.slopes is None:
+            return self
+        moved = (disturbances * curvature) @ np.nan_to_num(self.slopes) @ self.with_names
+        return replace(self, covariance=self.covariance + moved.T @ moved / len(disturbances))
 
 
 def uncertainty(problem: Problem, theta: FloatArray, curvature: FloatArray) -> Uncertainty:

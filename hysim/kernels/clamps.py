@@ -136,4 +136,4 @@ def extreme(parameters: FloatArray, state: FloatArray, u: float) -> float:
     elif abs(ahead) > parameters[0]:
         state[1] = u
         state[2] = 1.0 if ahead > 0.0 else -1.0
-    return state[1]
+    return float(state[1])

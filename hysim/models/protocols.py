@@ -191,7 +191,7 @@ class InputFilter(Protocol):
 
 def placed(model: Any, u0: float | None, u_range: tuple[float, ...] | None = None) -> Any:
     """A model with its memory at the input `u0`; itself where it has no such input."""
-    return model.placed(u0, u_range) if isinstance(model, Placeable) else model
+    return model.placed(u0, u_range) if isinstance(model, Placeable) and not isinstance(model, type) else model
 
 
 @runtime_checkable

@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 
 from hysim._frozen import FloatArray
-from hysim.identification._assumptions import quiet_where_better
+from hysim.identification._measured import without_filter
 from hysim.identification._problem import Problem, problem
 from hysim.identification._result import Identification
 from hysim.models.protocols import Identifiable
@@ -28,13 +28,12 @@ def again(fit: Identification, records: Sequence[Record], bounds: Bounds, initia
     States at the first sample are those of `initial`; by default they are free if they were, else held at their values.
     A ValueError is raised if the model has no search box, or does not have the residual of the fit on these records.
     """
-    model = fit.model
+    model, paths = without_filter(fit.model, records)
     if not isinstance(model, Identifiable):
         raise ValueError(f"a {type(model).__name__} has no search box of its own: its parameters cannot be sampled")
-    freedom, initial = _freedom(fit, model, records, initial)
-    paths, _ = quiet_where_better(model, records, freedom, initial)
+    freedom, initial = _freedom(fit, model, paths, initial)
     plain = problem(model, paths, freedom, initial)
-    models = fit.models if len(fit.models) == len(records) else (model,)
+    models = [without_filter(each, [])[0] for each in fit.models] if len(fit.models) == len(records) else [model]
     _check_same(fit, plain, [problem(each, paths, freedom, initial).own.starts[0] for each in models])
     inner = _inner(bounds, plain)
     return problem(model, paths, replace(freedom, bounds=inner), initial) if inner else plain
@@ -48,7 +47,7 @@ def optima(fit: Identification, known: Problem, bounds: Bounds, initial: Initial
     paths = [part.record for part in known.parts]
     freedom, initial = _freedom(fit, known.family, paths, initial)
     freedom = replace(freedom, bounds=_inner(bounds, known))
-    models = [fit.model, *(rival.model for rival in fit.rivals)]
+    models = [without_filter(each, [])[0] for each in (fit.model, *(rival.model for rival in fit.rivals))]
     return np.array([problem(model, paths, freedom, initial).space.starts[0] for model in models])
 
 
