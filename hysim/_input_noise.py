@@ -22,6 +22,7 @@ _AGREE = 1.0 / 3.0
 _MOST = 0.05  # of the span
 _REACH = 5.0 * math.sqrt(2.0)  # of the noise: differences of two samples are larger once in a million
 _NORMAL = 1.4826  # standard deviation over the median size, of normal noise
+MOST_IGNORED = 0.4  # of the span: turning points are counted for tolerances below a half
 _MANY = 3.0  # times as many reversals as are above the noise
 
 
@@ -38,7 +39,7 @@ def input_noise(u: FloatArray) -> float:
     if not 0.0 < noise <= _MOST * span or max(levels) - min(levels) > _AGREE * noise:
         return 0.0
     inner = len(turns(u, 0.0).plateaus) - 2
-    above = len(turns(u, min(_REACH * noise / span, 0.4)).plateaus) - 2
+    above = len(turns(u, min(reach(noise) / span, MOST_IGNORED)).plateaus) - 2
     return noise if inner > _MANY * max(above, 1) else 0.0
 
 
@@ -51,7 +52,7 @@ def quiet_path(u: FloatArray, noise: float) -> FloatArray:
     """The input (n,), monotone between its reversals above the `noise`."""
     from scipy.optimize import isotonic_regression
 
-    plateaus = turns(u, min(_REACH * noise / float(np.ptp(u)), 0.4)).plateaus
+    plateaus = turns(u, min(reach(noise) / float(np.ptp(u)), MOST_IGNORED)).plateaus
     corners = [0, *((first + last) // 2 for first, last in plateaus[1:-1]), u.size - 1]
     path = u.copy()
     for begin, end in pairwise(corners):

@@ -14,18 +14,21 @@ import numpy as np
 
 from hysim._cycles import NEAR, ROUNDING, TOLERANCE, turns
 from hysim._frozen import FloatArray
+from hysim._input_noise import MOST_IGNORED, input_noise, reach
 
 _CLOSING = 2.0  # largest steps of the input, by which a record may end before its first input
 
 
-def repeated_cycle(u: FloatArray, tolerance: float = TOLERANCE) -> int | None:
+def repeated_cycle(u: FloatArray, tolerance: float | None = None) -> int | None:
     """Number of samples of the cycle with which the input `u` (n,) begins; None if it does not repeat itself.
 
-    `tolerance` is the largest reversal that is ignored, as a fraction of the span.
+    `tolerance` is the largest reversal that is ignored, as a fraction of the span, by default that of noise.
     """
     span = float(np.ptp(u))
     if span == 0.0:
         return None
+    if tolerance is None:
+        tolerance = max(TOLERANCE, min(reach(input_noise(u)) / span, MOST_IGNORED))
     plateaus = turns(u, tolerance).plateaus
     levels = u[[first for first, _ in plateaus]]
     inner = levels[1:-1]

@@ -8,6 +8,7 @@ import pytest
 
 import hysim as hs
 from hysim._input_noise import input_noise, quiet_path
+from hysim._repeats import repeated_cycle
 from hysim.cli import main
 
 CYCLES = hs.signals.triangle(-1.0, 1.0, cycles=3, samples_per_cycle=200)
@@ -42,19 +43,59 @@ def test_a_signal_is_not_taken_for_noise(u):
 def test_a_law_is_found_behind_a_noisy_input():
     record = hs.Record(u=CYCLES + noise(0.02), y=LAW.response(CYCLES) + noise(1e-3, seed=1))
     fit = hs.identify(hs.BoucWen, record, fixed={"n": 1.0})
-    assert "rms: only the 5 of 271 reversals above it are used" in fit.message
-    assert fit.rmse < 0.03
-    true = {"beta": 1.5, "gain": 2.0}
-    quiet = max(abs(fit.estimates[name] / value - 1.0) for name, value in true.items())
-    assert quiet < 0.1  # 0.4 along the input as measured, and an rmse of 0.046
-    assert "noise" not in hs.identify(hs.BoucWen, hs.Record(u=CYCLES, y=record.y), fixed={"n": 1.0}).message
+    assert "fitted along 5 of 271 reversals, the model includes a filter of reversals up to 0.148" in fit.message
+    assert fit.family == "ReversalFilter >> BoucWen"
+    assert fit.estimates["reversal_filter.threshold"] == fit.model.stages[0].threshold
+    assert fit.success
+    floor = np.std(record.y - (fit.model.stages[0].placed(None) >> LAW).response(record.u))
+    assert fit.rmse < 1.05 * floor  # the true law behind the same filter
+    for name, true in {"beta": 1.5, "gamma": 0.5, "gain": 2.0, "feedthrough": 0.5}.items():
+        assert abs(fit.estimates[name] - true) < 3.0 * fit.stderr[name], name
+    quiet = hs.identify(hs.BoucWen, hs.Record(u=CYCLES, y=record.y), fixed={"n": 1.0})
+    assert "noise" not in quiet.message
+    assert isinstance(quiet.model, hs.BoucWen)
+
+
+def test_the_treatment_of_the_input_can_be_told():
+    record = hs.Record(u=CYCLES + noise(0.01), y=LAW.response(CYCLES) + noise(1e-3, seed=1))
+    fits = {how: hs.identify(hs.BoucWen, record, fixed={"n": 1.0}, input=how) for how in ("raw", "filtered")}
+    assert isinstance(fits["raw"].model, hs.BoucWen)
+    assert isinstance(fits["filtered"].model, hs.Cascade)
+    for fit in fits.values():
+        np.testing.assert_array_equal(fit.residual, record.y - fit.model.response(record.u))
+    with pytest.raises(ValueError, match="input must be one of auto, raw, filtered"):
+        hs.identify(hs.BoucWen, record, input="quiet")
+    with pytest.raises(ValueError, match="no noise was found in the input"):
+        hs.identify(hs.BoucWen, hs.Record(u=CYCLES, y=record.y), input="filtered")
+
+
+def test_plays_need_no_filter():
+    """A play follows each sample and closes the loop of each false reversal."""
+    plays = hs.PrandtlIshlinskii(thresholds=(0.0, 0.3, 0.6), weights=(1.0, 1.0, 0.5))
+    record = hs.Record(u=CYCLES + noise(0.01), y=plays.response(CYCLES))
+    fit = hs.identify(plays, record)
+    assert isinstance(fit.model, hs.PrandtlIshlinskii)
+    assert "follows the input as measured" in fit.message
+
+
+def test_a_law_that_no_filter_saves_is_not_a_success():
+    """The noise of the output is far below what the noise of the input does behind the filter."""
+    rng = np.random.default_rng(3)
+    u = np.repeat(np.linspace(0.0, 1.0, 40), 20)
+    u = np.concatenate([u, u[::-1], u])
+    stiff = hs.BoucWen(A=1.0, beta=200.0, gamma=0.0, n=1.0, gain=400.0)
+    record = hs.Record(u=u + 0.02 * rng.standard_normal(u.size), y=stiff.response(u))
+    fit = hs.identify(hs.BoucWen, record, fixed={"n": 1.0})
+    assert not fit.success
+    assert fit.message.startswith("NOT USABLE on this input")
 
 
 def test_a_cycle_is_found_in_a_noisy_input():
     plays = hs.PrandtlIshlinskii(thresholds=(0.0, 0.3), weights=(1.0, 1.0))
     u = 3.0 + CYCLES
     record = hs.Record(u=(u + noise(0.02))[130:580], y=plays.response(u)[130:580])
-    assert "which the input repeats" in hs.identify(hs.PrandtlIshlinskii, record, initial=None).message
+    assert repeated_cycle(record.u) == pytest.approx(200, abs=5)
+    assert hs.identify(hs.PrandtlIshlinskii, record, initial="periodic").fit_percent > 95.0
 
 
 @pytest.mark.parametrize("family", [hs.BoucWen, hs.PrandtlIshlinskii, hs.Line], ids=lambda each: each.__name__)

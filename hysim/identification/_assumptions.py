@@ -100,8 +100,9 @@ def treated(
 ) -> Treated:
     """How a search takes measured inputs: `how` is "raw", "filtered" or, where the record decides, "auto".
 
-    A law is fitted behind a filter of reversals, and alone, on the first halves of the records; the bare law is taken
-    where it predicts the second halves as well.
+    A law is fitted behind a filter of reversals, and alone, on the first halves of the records. The bare law is taken
+    where it predicts the second halves as well, both along the input as measured and along its quiet path: on the
+    first alone a law whose parameters make up for false reversals may be as good.
     """
     if how == "raw" or any(isinstance(record, Rescalable) for record in records):
         return Treated(records)
@@ -119,25 +120,32 @@ def treated(
     behind = Treated(filtered, front, noises, quiet)
     if how == "filtered" or isinstance(family, PartByPart):
         return behind
-    alone, in_front = (_left_out(family, each, freedom, initial) for each in (records, filtered))
+    alone, in_front = (_left_out(family, each, quiet, freedom, initial) for each in (records, filtered))
     if alone <= _AS_GOOD**2 * in_front:
         return Treated(records, None, noises, quiet)
     return behind
 
 
-def _left_out(family: Any, records: Sequence[Record], freedom: Freedom, initial: str | Sequence[str] | None) -> float:
-    """Sum of squares on the second halves of the records, of the model that was fitted to the first halves."""
-    halves = [record[: len(record) // 2] for record in records]
+def _left_out(
+    family: Any,
+    paths: Sequence[Record],
+    quiet: Sequence[Record],
+    freedom: Freedom,
+    initial: str | Sequence[str] | None,
+) -> float:
+    """Sum of squares on the second halves of these paths and the quiet ones, by a fit to the first halves."""
+    halves = [record[: len(record) // 2] for record in paths]
     if not all(half.reversals(_TURN).size for half in halves):
-        halves = [*records]
+        halves = [*paths]
     total = 0.0
     try:
         attempt = problem(family, halves, freedom, initial)
         theta = attempt.completed(brief_optimum(attempt)[0][np.newaxis])[0]
-        for k, (record, half) in enumerate(zip(records, halves, strict=True)):
+        for k, half in enumerate(halves):
             model = attempt.family.assemble(attempt.estimates(theta, k))
-            rest = (record.y - output_on(model, record))[len(half) % len(record) :]
-            total += float(rest @ rest)
+            for record in (paths[k], quiet[k]):
+                rest = (record.y - output_on(model, record))[len(half) % len(record) :]
+                total += float(rest @ rest)
     except (ValueError, ArithmeticError, SimulationError):
         return math.inf
     return total

@@ -11,6 +11,7 @@ from hysim._printing import bic_in_words, printed, summary_text, wrapped
 from hysim.identification._profile import Profile
 from hysim.identification.json_forms import Stored
 from hysim.interop import frame
+from hysim.models.cascade import Cascade
 
 
 @frozen
@@ -40,9 +41,10 @@ class Identification(Stored):
     Parameters
     ----------
     model : model
-        The identified model, from the state at the first sample of the first record.
+        The identified model, from the state at the first sample of the first record: its `u0` is the input there, and
+        its `u_range` that of the records. Where a noisy input needs it, the law is behind a `hysim.ReversalFilter`.
     models : tuple of model
-        One for each record.
+        One for each record, from the state at its first sample.
     estimates : mapping
         Every parameter by name, the fixed ones included.
     stderr : mapping
@@ -70,7 +72,7 @@ class Identification(Stored):
     least_squares : Candidate or None
         Optimum of the sum of squares, where the noise is not Gaussian.
     residual : array, shape (n,)
-        Measured minus model, one record after the other [unit of y]; of a `hysim.StructureRecord` its sensors one
+        Measured minus model, one record after the other: ``record.y - model.response(record.u)`` [unit of y]. Of a `hysim.StructureRecord` its sensors one
         behind the other, each in units of its noise.
     resolution : float or None
         Quantum of the sensor [unit of y].
@@ -136,6 +138,12 @@ class Identification(Stored):
     warnings: tuple[str, ...] = ()
 
     @property
+    def family(self) -> str:
+        """Name of the model's family; of a law behind a filter of its input both, ``"ReversalFilter >> BoucWen"``."""
+        stages = self.model.stages if isinstance(self.model, Cascade) else (self.model,)
+        return " >> ".join(type(stage).__name__ for stage in stages)
+
+    @property
     def correlation(self) -> FloatArray:
         """Correlation of the free parameters, shape (n_parameters, n_parameters); nan where it is unknown."""
         scale = np.sqrt(np.diag(self.covariance))
@@ -154,7 +162,7 @@ class Identification(Stored):
         width = self.loop_width
         return summary_text(
             [
-                f"Identification of {type(self.model).__name__}: {self._fit_in_words()}, rmse {self.rmse:.4g}, "
+                f"Identification of {self.family}: {self._fit_in_words()}, rmse {self.rmse:.4g}, "
                 f"{self.n_parameters} parameters{state}",
                 wrapped(free, most=4),
                 wrapped(fixed, most=1, first="  held: "),
@@ -170,7 +178,7 @@ class Identification(Stored):
 
     def summary(self) -> str:
         """Report of several lines."""
-        family = type(self.model).__name__
+        family = self.family
         lines = [
             f"{family}: {self._fit_in_words()}, rmse {self.rmse:.4g}, FPE {self.fpe:.4g}, "
             f"{bic_in_words(self.bic)}, {self.n_parameters} parameters from {self.residual.size} samples"
@@ -205,7 +213,7 @@ class Identification(Stored):
                 "free": [name in self.free_names for name in names],
             },
             index=("parameter", names),
-            notes={"family": type(self.model).__name__, "success": self.success, "message": self.message}
+            notes={"family": self.family, "success": self.success, "message": self.message}
             | {name: float(vars(self)[name]) for name in ("fit_percent", "rmse", "cv_rmse", "fpe", "aic", "bic")},
         )
 
