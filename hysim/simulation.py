@@ -1,7 +1,7 @@
 """The verb `simulate`: the output of a plant for an input in time."""
 
-from collections.abc import Mapping
-from dataclasses import field
+from collections.abc import Mapping, Sequence
+from dataclasses import field, replace
 from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
@@ -9,9 +9,11 @@ import numpy.typing as npt
 
 from hysim._frozen import FloatArray, frozen, vectors
 from hysim._printing import extent, printed, summary_text
+from hysim._results import Result, model_of
 from hysim.interop import dataset, frame
+from hysim.models.channels.dependent import on_record
 from hysim.models.protocols import Remembering, Responding, needs_time
-from hysim.records import check_increasing, even_step
+from hysim.records import Record, check_increasing, even_step
 
 _BY_NODE = frozenset({"displacement", "velocity", "acceleration"})
 """Signals with a column for each mass, as their peaks: masses are nodes 1, 2, ..., because node 0 is the ground."""
@@ -39,6 +41,8 @@ class Simulation:
         memories.
     units : mapping
         Labels of the units, by the signals' names.
+    name : str
+        Name in pictures.
     """
 
     u: FloatArray
@@ -47,6 +51,7 @@ class Simulation:
     z: FloatArray | None = None
     signals: Mapping[str, FloatArray] = field(default_factory=dict)
     units: Mapping[str, str] = field(default_factory=dict)
+    name: str = ""
 
     @property
     def peaks(self) -> dict[str, FloatArray]:
@@ -161,7 +166,7 @@ def simulate(
 
     Parameters
     ----------
-    plant : model
+    plant : model or result of a fit
         A law such as `hysim.BoucWen`, whose output does not depend on time, or a plant with dynamics, such as
         a `hysim.TransferFunction` or a `hysim.BoucWenOscillator`.
     t : array, shape (n,), or None
@@ -191,6 +196,7 @@ def simulate(
     >>> sim.y.round(6).tolist()
     [0.0, 0.632121, -0.307799]
     """
+    plant = model_of(plant)
     if not isinstance(plant, Responding):
         raise TypeError(f"simulate takes a model with a response, got {type(plant).__name__}")
     inputs, *clock = vectors(u=u) if t is None else vectors(u=u, t=t)
@@ -208,6 +214,41 @@ def simulate(
         signals={name: values for name, values in every.items() if values is not None},
         units=units or {},
     )
+
+
+@runtime_checkable
+class _Read(Protocol):
+    """A plant whose sensor is late."""
+
+    @property
+    def as_read(self) -> Any: ...
+
+
+@runtime_checkable
+class _OnSeveral(Protocol):
+    """A result of a fit to several records, with a model for each."""
+
+    @property
+    def models(self) -> tuple[Any, ...]: ...
+
+
+def models_on(thing: Any, records: Sequence[Record]) -> list[Any]:
+    """The model of a result, or a model itself, on each record: from its initial state there, at its channels."""
+    has_each = isinstance(thing, Result) and isinstance(thing, _OnSeveral) and len(thing.models) == len(records)
+    models = thing.models if has_each else [model_of(thing)] * len(records)
+    return [on_record(model, record) for model, record in zip(models, records, strict=True)]
+
+
+def free_run(thing: Any, record: Record, units: Mapping[str, str] | None = None) -> Simulation:
+    """The simulation of a model, or of a result's model, on the input of a record as it was measured.
+
+    Every verb that judges or draws a model beside a record takes its output from here: what the model's sensor, if it
+    has one, reads without noise and steps.
+    """
+    (model,) = models_on(thing, [record])
+    plant = model.as_read if isinstance(model, _Read) else model
+    run = simulate(plant, record.t, record.u, units=record.units if units is None else units)
+    return replace(run, name=type(model).__name__)
 
 
 def _signals(plant: Responding, u: FloatArray, times: FloatArray | None) -> Mapping[str, FloatArray]:

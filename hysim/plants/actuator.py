@@ -8,6 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from hysim._frozen import FloatArray, items, read_only
+from hysim._results import model_of
 from hysim.errors import SimulationError
 from hysim.models.cascade import Cascade
 from hysim.models.model import family
@@ -263,13 +264,18 @@ class Actuator:
             return np.append(signals.y, chain.displacement(end))[1:], end
         return chain.after_the_command(signals, begin), end
 
+    @property
+    def as_read(self) -> "Actuator":
+        """The actuator whose displacement is what the sensor of this one reads, without noise and steps."""
+        return self if self.sensor is None else self._late(self.sensor.delay)
+
     def measured(
         self, u: npt.ArrayLike, sample_time: float | None = None, *, substeps: int | None = None
     ) -> FloatArray:
         """Readings (n,) of the sensor for `response`: late, noisy, in steps; arguments and errors as there."""
         if self.sensor is None:
             return self.response(u, sample_time, substeps=substeps)
-        return self.sensor.measure(self._late(self.sensor.delay).response(u, sample_time, substeps=substeps))
+        return self.sensor.measure(self.as_read.response(u, sample_time, substeps=substeps))
 
     def startable(self, sample_time: float | None = None, *, substeps: int | None = None) -> Startable:
         """The actuator as a step from the command to what `measured` reads without noise, for exports.
@@ -277,7 +283,7 @@ class Actuator:
         An actuator that is not `dynamic` needs no `sample_time` [s]. Raises ValueError if one is needed, and TypeError
         if the law has no start.
         """
-        whole = self if self.sensor is None else self._late(self.sensor.delay)
+        whole = self.as_read
         at_end = isinstance(whole.vibration, TransferFunction) and whole.vibration.sample == "end"
         return whole.chain(self._any_time(sample_time), substeps).startable(at_end=at_end)
 
@@ -384,7 +390,8 @@ def as_actuator(plant: Any) -> Actuator:
     """Any plant as an actuator: a law becomes its hysteresis, a linear plant its vibration; others are a TypeError.
 
     Of a cascade of laws that ends with a transfer function the laws become the hysteresis, and the transfer function
-    the vibration, which begins at rest as every actuator does. A creep and an amplifier are taken, too.
+    the vibration, which begins at rest as every actuator does. A creep, an amplifier and the
+    result of a fit are taken, too.
 
     Examples
     --------
@@ -395,6 +402,7 @@ def as_actuator(plant: Any) -> Actuator:
     >>> hs.control.as_actuator(hs.Line(slope=2.0) >> mode) == hs.Actuator(hysteresis=hs.Line(slope=2.0), vibration=mode)
     True
     """
+    plant = model_of(plant)
     if isinstance(plant, Actuator):
         return plant
     if is_law(plant):
