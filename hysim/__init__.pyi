@@ -93,6 +93,7 @@ from hysim.laws.operators.modified_prandtl_ishlinskii import ModifiedPrandtlIshl
 from hysim.laws.operators.generalized_prandtl_ishlinskii import GeneralizedPrandtlIshlinskii as GeneralizedPrandtlIshlinskii
 from hysim.laws.operators.rate_dependent_prandtl_ishlinskii import RateDependentPrandtlIshlinskii as RateDependentPrandtlIshlinskii
 from hysim.laws.operators.parametric_prandtl_ishlinskii import ParametricPrandtlIshlinskii as ParametricPrandtlIshlinskii
+from hysim.laws.operators.reversal_filter import ReversalFilter as ReversalFilter
 from hysim.laws.operators.play import Play as Play
 from hysim.laws.operators.play import Stop as Stop
 from hysim.laws.operators.maxwell_slip import MaxwellSlip as MaxwellSlip
@@ -138,4 +139,5 @@ from hysim.laws.static import SingleValued as SingleValued
 from hysim.models.storage import save as save
 from hysim.models.storage import load_model as load_model
 from hysim.errors import SimulationError as SimulationError
+from hysim.errors import HysimWarning as HysimWarning
 from hysim._versions import show_versions as show_versions

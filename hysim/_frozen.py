@@ -20,6 +20,7 @@ from hysim._names import among, meant
 from hysim._results import model_of
 
 FloatArray = npt.NDArray[np.float64]
+LAST = {"last": True}  # metadata of a field of a base class that stands behind those of its families
 T = TypeVar("T")
 
 _TOO_LARGE = f"a number beyond {sys.float_info.max:.2g}"
@@ -142,7 +143,14 @@ def _freeze(cls: type[T], *, finite: bool) -> type[T]:
     cls.__eq__ = _equal  # type: ignore[method-assign]
     cls.__hash__ = _hash  # type: ignore[method-assign]
     cls.__reduce__ = _reduce  # type: ignore[method-assign]
-    return _with_advice(dataclasses.dataclass(frozen=True, kw_only=True, eq=False)(cls))
+    made = dataclasses.dataclass(frozen=True, kw_only=True, eq=False)(cls)
+    if _field_names(made)[2]:  # type: ignore[arg-type]
+        made.__repr__ = _repr_without_none  # type: ignore[method-assign]
+    return _with_advice(made)
+
+
+def _repr_without_none(self: Any) -> str:
+    return f"{type(self).__qualname__}({', '.join(f'{name}={value!r}' for name, value in given_items(self).items())})"
 
 
 def _with_advice(cls: type[T]) -> type[T]:
@@ -155,7 +163,7 @@ def _with_advice(cls: type[T]) -> type[T]:
             generated(self, *arguments, **values)
         except TypeError:
             fields = dataclasses.fields(cls)  # type: ignore[arg-type]
-            known, by_place = [field.name for field in fields], sum(not field.kw_only for field in fields)
+            known, by_place = [*_field_names(cls)[0]], sum(not field.kw_only for field in fields)  # type: ignore[arg-type]
             unknown = next((name for name in values if name not in known), None)
             if unknown is None and len(arguments) <= by_place:
                 raise
@@ -168,7 +176,7 @@ def _with_advice(cls: type[T]) -> type[T]:
 
 
 @functools.cache
-def _coercions(cls: type, finite: bool) -> dict[str, Callable[[Any, str], Any]]:
+def _coercions(cls: Any, finite: bool) -> dict[str, Callable[[Any, str], Any]]:
     rules: dict[Any, Callable[[Any, str], Any]] = {
         float: functools.partial(_as_float, finite=finite),
         tuple[float, ...]: functools.partial(_as_float_tuple, finite=finite),
@@ -180,7 +188,8 @@ def _coercions(cls: type, finite: bool) -> dict[str, Callable[[Any, str], Any]]:
         float | None: lambda value, name: None if value is None else _as_float(value, name, finite=finite),
     }
     hints = typing.get_type_hints(cls)
-    coercions = {field.name: rules.get(hints[field.name]) for field in dataclasses.fields(cls)}
+    kinds = {field.name: field.metadata.get("kind", hints[field.name]) for field in dataclasses.fields(cls)}
+    coercions = {name: rules.get(kind) for name, kind in kinds.items()}
     mapping = _as_named_parts if finite else _as_mapping
     coercions |= {name: mapping for name in coercions if typing.get_origin(hints[name]) is Mapping}
     if finite:  # the parts of a specification are models, and no results of fits
@@ -239,11 +248,31 @@ def items(value: Any) -> dict[str, Any]:
     return {name: values[name] for name in _field_names(type(value))[0]}  # type: ignore[arg-type]
 
 
+def own_items(value: Any) -> dict[str, Any]:
+    """Fields of a frozen value by name, without those that are `LAST`."""
+    return {name: item for name, item in items(value).items() if name not in last_names(type(value))}
+
+
+def given_items(value: Any) -> dict[str, Any]:
+    """Fields of a frozen value by name, without those that are `LAST` and None."""
+    last = last_names(type(value))
+    return {name: item for name, item in items(value).items() if item is not None or name not in last}
+
+
+def last_names(cls: Any) -> tuple[str, ...]:
+    """Names of the fields that are `LAST`."""
+    return _field_names(cls)[2]
+
+
 @functools.cache
-def _field_names(cls: type) -> tuple[tuple[str, ...], tuple[str, ...]]:
-    """Names of all fields, and of those that count in comparisons."""
-    fields = dataclasses.fields(cls)
-    return tuple(field.name for field in fields), tuple(field.name for field in fields if field.compare)
+def _field_names(cls: Any) -> tuple[tuple[str, ...], ...]:
+    """Names of all fields, of those that count in comparisons, and of those that are `LAST`."""
+    fields = sorted(dataclasses.fields(cls), key=lambda field: "last" in field.metadata)
+    return (
+        tuple(field.name for field in fields),
+        tuple(field.name for field in fields if field.compare),
+        tuple(field.name for field in fields if "last" in field.metadata),
+    )
 
 
 def _compared(value: Any) -> tuple[Any, ...]:

@@ -1,10 +1,44 @@
 """The errors of hysim; wrong arguments raise the built-in `ValueError` or `TypeError`."""
 
+import warnings
 from typing import Any
+
+_LIMITED = 0.05  # of the samples: a limit that is touched at the corners of a reference is not worth a word
+_BEYOND = 1e-6  # of the identified range: rounding of an inverse that ends at its edge
 
 
 class SimulationError(RuntimeError):
     """A simulation diverged; the message names the sample or the time."""
+
+
+class HysimWarning(UserWarning):
+    """A result that is computed as asked, and may not be what the device does."""
+
+
+def warn_beyond(u_range: tuple[float, ...] | None, u: Any, name: str) -> None:
+    """Warn once if an input `u` (n,) leaves the range that a model of this `name` was identified on."""
+    if u_range is None or not u.size:
+        return
+    low, high = u_range
+    lowest, highest = float(u.min()), float(u.max())
+    if max(low - lowest, highest - high) > _BEYOND * (high - low):
+        warnings.warn(
+            f"the input goes from {lowest:.4g} to {highest:.4g}, but the {name} was identified from {low:.4g} to "
+            f"{high:.4g}: what it says beyond is extrapolated",
+            HysimWarning,
+            stacklevel=3,
+        )
+
+
+def warn_limited(limited: int, samples: int) -> None:
+    """Warn if a command stands at a limit for more than 5 % of its samples."""
+    if limited > _LIMITED * samples:
+        warnings.warn(
+            f"the command is at a limit of the controller or the amplifier in {limited} of {samples} samples: the "
+            "reference is out of reach there",
+            HysimWarning,
+            stacklevel=3,
+        )
 
 
 class Interrupted(KeyboardInterrupt):

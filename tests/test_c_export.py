@@ -234,7 +234,7 @@ def test_the_state_of_a_lean_law_is_small():
     [
         (PID, {"sample_time": H, "name": "2axes"}, ValueError, "name must be letters"),
         (PID, {"sample_time": H, "name": "double"}, ValueError, "name must be letters"),
-        (PID, {"sample_time": H, "u0": math.nan}, ValueError, "u0 and y0 must be finite"),
+        (PID, {"sample_time": H, "u0": math.nan}, ValueError, "u0 must be finite, got nan"),
         (PID, {}, ValueError, "give sample_time"),
         (PID, {"sample_time": 0.0}, ValueError, "sample_time must be positive"),
         (hs.TransferFunction(num=(1.0,), den=(1.0, 1.0)), {}, ValueError, "give sample_time"),

@@ -13,7 +13,7 @@ NOISE = 0.005
 
 def moved(law, numbers, inputs):
     """Outputs of a law whose numbers are others at each sample."""
-    state, y = law.first_state(float(inputs[0])), []
+    state, y = law.state_at(float(inputs[0])), []
     for k, u in enumerate(inputs.tolist()):
         own = law.with_scalars({name: float(values[k]) for name, values in numbers.items()})
         output, state = own.advance([u], state)
@@ -166,7 +166,7 @@ T = 0.01 * np.arange(U.size)
 
 def follow(controller, numbers, reference, noise=0.0):
     """The output of the drifting plant under a controller that sees the last one."""
-    state, memory, rng, seen, y = controller.initial(0.01), LOOP_LAW.first_state(0.0), np.random.default_rng(2), 0.0, []
+    state, memory, rng, seen, y = controller.initial(0.01), LOOP_LAW.state_at(0.0), np.random.default_rng(2), 0.0, []
     for k, r in enumerate(reference.tolist()):
         u, state = controller.step(state, r, seen)
         own = LOOP_LAW.with_scalars({name: float(values[k]) for name, values in numbers.items()})

@@ -149,7 +149,9 @@ class AdaptiveInverse(SampledController):
         front = self.law.packed[1]
         state = np.concatenate([front, np.zeros(self.law.workspace)])
         constants = read_only(parameters, finite=False)
-        self.law.start(constants, state, u0)
+        self.law.start(constants, state, u0 if self.law.u0 is None else self.law.u0)
+        if self.law.u0 is not None:
+            self.law.step(constants, state, self.law.u0)
         return float(self.law.step(constants, state, u0)), state
 
     def _own_state(self, law: Any, u0: float) -> FloatArray:

@@ -147,7 +147,7 @@ def assess_step(
     step: float,
     duration: float,
     sample_time: float,
-    u0: float = 0.0,
+    u0: float | None = None,
     hold: float = 0.0,
     known_ahead: bool = False,
 ) -> StepAssessment:
@@ -161,7 +161,7 @@ def assess_step(
         Height from the resting displacement [unit of y].
     duration, sample_time : float
         Duration, long enough for the open loop to come to rest, and sample time of the controller [s].
-    u0 : float
+    u0 : float, optional
         Voltage before the first sample.
     hold : float
         Time before the step, for a controller with a wrong model to come to rest [s].
@@ -198,7 +198,7 @@ def assess_step(
     gain = secant_gain(actuator, cycle)
     loop = judged(actuator, controller, closed, cycle, gain, slice(None))
     waits = np.arange(after) < (ahead if known_ahead else 0)
-    open_y = resting.driven(u0 + np.where(waits, 0.0, step / gain))
+    open_y = resting.driven(resting.u0 + np.where(waits, 0.0, step / gain))
     decay_rate = -_least_damped(actuator).real
     reduction = vibration_reduction(t[:after], open_y, closed.y[before:], decay_rate=decay_rate)
     return StepAssessment(

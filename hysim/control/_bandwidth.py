@@ -37,7 +37,7 @@ def bandwidth(
     amplitude: float,
     lowest: float,
     transient: float,
-    u0: float = 0.0,
+    u0: float | None = None,
 ) -> float:
     """Frequency up to which the true displacement follows a small sine within 3 dB.
 
@@ -55,7 +55,7 @@ def bandwidth(
         First frequency tried [rad/s].
     transient : float
         Time after which the response is periodic [s].
-    u0 : float
+    u0 : float, optional
         Voltage before the first sample.
 
     Returns

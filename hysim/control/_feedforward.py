@@ -14,7 +14,7 @@ from hysim.laws.static import Line
 from hysim.models.inverse_steps import inverse_step
 from hysim.models.model import family
 from hysim.models.protocols import CompiledController, needs_time
-from hysim.plants.actuator import as_actuator, is_law
+from hysim.plants.actuator import Actuator, as_actuator, is_law
 from hysim.plants.amplifier import Amplifier
 from hysim.plants.creep import Creep
 
@@ -76,6 +76,16 @@ class InverseFeedforward(SampledController):
             raise TypeError(f"law must be a law that a loop can step, such as BoucWen, got {type(self.law).__name__}")
         if not needs_time(self.law):
             inverse_step(self.law, 0.0)
+
+    @property
+    def u0(self) -> float | None:
+        """Command at which the memory of its law holds; None for the first one."""
+        return self.plant.u0
+
+    @property
+    def plant(self) -> Actuator:
+        """The actuator that it inverts."""
+        return Actuator(amplifier=self.amplifier, hysteresis=self.law, creep=self.creep)
 
     @property
     def dynamic(self) -> bool:

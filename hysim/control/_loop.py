@@ -13,9 +13,9 @@ from hysim._parallel import Progress
 from hysim._printing import extent, printed, quantity, summary_text
 from hysim._results import model_of
 from hysim.control._protocols import Controller, limits_of, preview
-from hysim.errors import SimulationError
+from hysim.errors import SimulationError, warn_beyond, warn_limited
 from hysim.models.model import in_brief
-from hysim.models.protocols import CompiledController, Remembering, Responding
+from hysim.models.protocols import CompiledController, Remembering, Responding, standing
 from hysim.plants.actuator import Actuator
 from hysim.plants.actuator import as_actuator as as_actuator
 from hysim.plants.chain import Signals
@@ -128,7 +128,7 @@ def close_loop(
     t: npt.ArrayLike,
     reference: npt.ArrayLike,
     *,
-    u0: float = 0.0,
+    u0: float | None = None,
     substeps: int | None = None,
     ground_acceleration: npt.ArrayLike | None = None,
     units: Mapping[str, str] | None = None,
@@ -152,8 +152,9 @@ def close_loop(
         Evenly spaced times [s]; their spacing is the controller's sample time.
     reference : array, shape (n,)
         [unit of y]
-    u0 : float
-        Command before the first sample [unit of u].
+    u0 : float, optional
+        Command before the first sample [unit of u]. By default the one at which the memory of the plant's law holds,
+        which of an identified law is the first input of its record; 0 for a plant without one.
     substeps : int, optional
         Per sample, behind an amplifier that takes time; by default as in `Actuator.response`. A structure has its own.
     ground_acceleration : array, shape (n,), optional
@@ -213,6 +214,12 @@ def close_loop(
     plant_at_rest = RestingPlant(actuator, sample_time_of(times, r), u0, substeps)
     signals = plant_at_rest.run(controller, r, progress, float(times[0]))
     u = plant_at_rest.voltages(signals)
+    conditions = {
+        **_conditions(actuator, controller, plant_at_rest, signals, u),
+        **_voltage_noise(actuator, controller, plant_at_rest, r, u),
+    }
+    warn_beyond(actuator.u_range, u, type(actuator.hysteresis).__name__)
+    warn_limited(conditions["limited_samples"], u.size)
     return ClosedLoop(
         t=times,
         reference=r,
@@ -223,10 +230,7 @@ def close_loop(
         z=plant_at_rest.memory(signals),
         y=signals.y,
         measurement=signals.measurement,
-        conditions={
-            **_conditions(actuator, controller, plant_at_rest, signals, u),
-            **_voltage_noise(actuator, controller, plant_at_rest, r, u),
-        },
+        conditions=conditions,
         units=units or {},
     )
 
@@ -234,10 +238,12 @@ def close_loop(
 class RestingPlant:
     """A sampled actuator at rest at the command `u0`, from which every loop starts."""
 
-    def __init__(self, actuator: Actuator, sample_time: float, u0: float = 0.0, substeps: int | None = None) -> None:
-        self.sample_time, self.u0 = sample_time, u0
+    def __init__(
+        self, actuator: Actuator, sample_time: float, u0: float | None = None, substeps: int | None = None
+    ) -> None:
+        self.sample_time, self.u0 = sample_time, standing(actuator, u0)
         self.chain = actuator.chain(sample_time, substeps)
-        self.state = self.chain.rest(u0)
+        self.state = self.chain.rest(self.u0)
         self.y0 = self.chain.displacement(self.state)
 
     def run(

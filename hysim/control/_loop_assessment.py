@@ -97,7 +97,7 @@ def assess_loop(
     t: npt.ArrayLike,
     reference: npt.ArrayLike,
     *,
-    u0: float = 0.0,
+    u0: float | None = None,
     period: float = math.nan,
 ) -> LoopAssessment:
     """Close a loop, and judge its stability, robustness and error.

@@ -118,7 +118,7 @@ def limit_cycle(
     controller: Controller,
     reference: FloatArray,
     sample_time: float,
-    u0: float = 0.0,
+    u0: float | None = None,
     *,
     decay: float,
     asked: float,

@@ -131,6 +131,16 @@ class TrackingController(SampledController):
             total = total.beside(self.damping.linear(sample_time))
         return total
 
+    @property
+    def u0(self) -> float | None:
+        """Command at which the memory of its law holds; None for the first one."""
+        return None if self.feedforward is None else self.feedforward.u0
+
+    @property
+    def plant(self) -> Actuator | None:
+        """The actuator that its feed-forward inverts."""
+        return None if self.feedforward is None else self.feedforward.plant
+
     def compiled(self, sample_time: float, u0: float = 0.0, y0: float = 0.0) -> CompiledController:
         check_sample_time(sample_time)
         lowest, highest = self.limits or (-math.inf, math.inf)

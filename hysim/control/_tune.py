@@ -59,7 +59,7 @@ def tune(
     max_voltage_noise: float | None = None,
     variations: Sequence[Any] = (),
     transient: float = 0.0,
-    u0: float = 0.0,
+    u0: float | None = None,
 ) -> Tuning:
     """Find the gains that make the simulated loop follow a reference best.
 
@@ -88,7 +88,7 @@ def tune(
         Other plants on which the bounds must hold too.
     transient : float
         Time at the beginning that does not count [s].
-    u0 : float
+    u0 : float, optional
         Voltage before the first sample.
 
     Returns
@@ -131,7 +131,7 @@ class _SimulatedLoop:
         objective: Callable[[FloatArray], float],
         limits: tuple[Limits, ...],
         transient: float,
-        u0: float,
+        u0: float | None,
     ) -> None:
         self.actuator = as_actuator(plant)
         self.reference = read_only(reference, "reference", ndim=1)

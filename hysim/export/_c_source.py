@@ -14,7 +14,7 @@ from hysim._printing import printed, summary_text
 from hysim._release import __version__
 from hysim._results import model_of
 from hysim.export import _c
-from hysim.export._program import Program, program_of
+from hysim.export._program import Program, program_of, start_of
 
 _FEW = 16  # places of a state that are set one by one
 
@@ -134,7 +134,12 @@ class CSource:
 
 
 def to_c(
-    thing: Any, sample_time: float | None = None, *, name: str = "model", u0: float = 0.0, y0: float = 0.0
+    thing: Any,
+    sample_time: float | None = None,
+    *,
+    name: str = "model",
+    u0: float | None = None,
+    y0: float | None = None,
 ) -> CSource:
     """A law, a plant or a controller as C99 without dependencies: one header, one source, and a worked `main`.
 
@@ -147,9 +152,11 @@ def to_c(
         Time between two samples [s]; a law that does not depend on time needs none.
     name : str
         Name of the files, and prefix of every public name in them.
-    u0, y0 : float
-        Command and displacement at which a controller starts, at rest [unit of u], [unit of y]. Laws and plants get
-        their first input where they run.
+    u0, y0 : float, optional
+        Command and displacement at which a controller starts, at rest [unit of u], [unit of y]. By default the command
+        at which the memory of its law holds, which of an identified law is the first input of its record, and the
+        displacement of its model there; else 0. Laws and plants without an input of their own get their first input
+        where they run.
 
     Returns
     -------
@@ -181,7 +188,7 @@ def to_c(
         raise ValueError(f"name must be letters, digits and underscores after a letter, got {name!r}")
     thing = model_of(thing)
     program = program_of(thing, sample_time, u0=u0, y0=y0)
-    texts = _texts(program, name, type(thing).__name__, u0, y0)
+    texts = _texts(program, name, type(thing).__name__, *start_of(thing, sample_time or math.inf, u0, y0))
     header, source, main = (Template(text).substitute(texts) for text in (_HEADER, _SOURCE, _MAIN))
     return CSource(name=name, header=header, source=source, main=main, state_size=program.state.size)
 

@@ -5,7 +5,6 @@ place at which it is written.
 """
 
 import io
-import math
 import re
 import zipfile
 from collections.abc import Mapping, Sequence
@@ -23,6 +22,7 @@ from hysim.export._fmu_variables import build_description, description, variable
 from hysim.export._packing import packing
 from hysim.export._program import Program, program_of
 from hysim.models.law import Law
+from hysim.models.protocols import standing
 
 Version = Literal["2.0", "3.0"]
 Platform = Literal["linux", "windows", "mac"]
@@ -52,8 +52,8 @@ def to_fmu(
     name: str | None = None,
     units: Mapping[str, str] | None = None,
     platforms: Sequence[Platform] | None = None,
-    u0: float = 0.0,
-    y0: float = 0.0,
+    u0: float | None = None,
+    y0: float | None = None,
 ) -> Path:
     """Write a model as a functional mock-up unit (FMU) for co-simulation, with its C sources.
 
@@ -74,9 +74,9 @@ def to_fmu(
     platforms : sequence of "linux", "windows" and "mac", optional
         Systems that find a shared library in the file. By default that of this machine if it has a C compiler (gcc,
         clang, or zig of the extra `export`); an empty sequence writes the sources alone. Zig compiles for all three.
-    u0, y0 : float
-        Input at which a law rests before the simulation, the default of the parameter ``u0``; command and displacement
-        at which a controller starts [unit of u], [unit of y].
+    u0, y0 : float, optional
+        Input at which a law stands before the simulation, the default of the parameter ``u0``; command and displacement
+        at which a controller starts [unit of u], [unit of y]. By default as of `hysim.to_c`.
 
     Returns
     -------
@@ -121,9 +121,8 @@ def to_fmu(
     if not all(isinstance(text, str) for pair in labels.items() for text in pair):
         raise TypeError(f"units must be labels by the names u, y and t, got {units!r}")
     chosen = _checked_name(type(thing).__name__ if name is None else name)
-    if not math.isfinite(u0):
-        raise ValueError(f"u0 must be finite, got {u0}")
     program = program_of(thing, sample_time, u0=u0, y0=y0, tunable=_is_tunable(thing))
+    u0 = standing(thing, u0)
     program = _with_units(program, thing)
     systems = None if platforms is None else tuple(platforms)
     write_all({target: archive(program, Options(chosen, version, systems, labels, u0))})

@@ -105,6 +105,7 @@ def _law(law: Law, parts: Parts, first: int) -> dict[str, Any]:
         "first": first,
         "free": [names.index(name) for name in packed.fields],
         "output": output_of(type(law)),
+        **({} if law.u0 is None else {"u0": law.u0}),
         **_plays(law, kernels.step),
         **_printed(law, first),
     }

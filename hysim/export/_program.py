@@ -5,13 +5,14 @@ from dataclasses import replace
 from typing import Any, NamedTuple
 
 from hysim._frozen import FloatArray, frozen, read_only
-from hysim.control import Controller, InverseFeedforward, preview
+from hysim.control import Controller, InverseFeedforward, TrackingController, preview
+from hysim.control._loop import RestingPlant
 from hysim.export._packing import packing
 from hysim.export._translate import Function, Translation
 from hysim.export._types import Scalar, Vector
 from hysim.kernels.stepping import Start, Step, complete
 from hysim.models.law import Law
-from hysim.models.protocols import Startable, Stepwise, needs_time
+from hysim.models.protocols import Startable, Stepwise, needs_time, standing
 from hysim.plants.actuator import as_stepwise
 from hysim.plants.amplifier import Amplifier
 from hysim.plants.creep import Creep
@@ -85,7 +86,12 @@ class Program:
 
 
 def program_of(
-    thing: Any, sample_time: float | None = None, *, u0: float = 0.0, y0: float = 0.0, tunable: bool = False
+    thing: Any,
+    sample_time: float | None = None,
+    *,
+    u0: float | None = None,
+    y0: float | None = None,
+    tunable: bool = False,
 ) -> Program:
     """The step of a law, a plant or a controller in C99.
 
@@ -95,8 +101,8 @@ def program_of(
         A law, plant, sum or cascade that can be stepped, or a sampled controller.
     sample_time : float, optional
         Time between two samples [s]; a law that does not depend on time needs none.
-    u0, y0 : float
-        Command and displacement at which a controller starts, at rest.
+    u0, y0 : float, optional
+        Command and displacement at which a controller starts, at rest; by default as `start_of` has them.
     tunable : bool
         Whether the numbers of a law may still be changed in the program.
 
@@ -123,13 +129,16 @@ def program_of(
     """
     if sample_time is not None and not 0.0 < sample_time < math.inf:
         raise ValueError(f"sample_time must be positive and finite, got {sample_time}")
-    if not (math.isfinite(u0) and math.isfinite(y0)):
-        raise ValueError(f"u0 and y0 must be finite, got {u0} and {y0}")
+    for name, value in (("u0", u0), ("y0", y0)):
+        if value is not None and not math.isfinite(value):
+            raise ValueError(f"{name} must be finite, got {value}")
     if isinstance(thing, type):
         raise TypeError(f"an instance is expected, got the class {thing.__name__}: give it its parameters first")
     if isinstance(thing, Creep | Amplifier | Vibration):
         thing = as_stepwise(thing)
     if isinstance(thing, Stepwise):
+        if tunable and isinstance(thing, Law):
+            thing = thing.placed(None)  # whose state is completed where the program runs, from its numbers there
         model = thing.startable(sample_time)
         timed = sample_time if needs_time(thing) else None
         if not (tunable and isinstance(thing, Law)):
@@ -145,11 +154,24 @@ def program_of(
         )
     if isinstance(thing, Controller):
         if isinstance(thing, InverseFeedforward) and not thing.dynamic:
-            return replace(_of_controller(thing, math.inf, u0, y0), sample_time=math.nan)
+            begin = start_of(thing, math.inf, u0, y0)
+            return replace(_of_controller(thing, math.inf, *begin), sample_time=math.nan)
         if sample_time is None:
             raise ValueError(f"a {type(thing).__name__} is sampled: give sample_time")
-        return _of_controller(thing, sample_time, u0, y0)
+        return _of_controller(thing, sample_time, *start_of(thing, sample_time, u0, y0))
     raise TypeError(f"a law, a plant or a controller that can be stepped is expected, got {type(thing).__name__}")
+
+
+def start_of(thing: Any, sample_time: float, u0: float | None, y0: float | None) -> tuple[float, float]:
+    """Command and displacement at which a controller starts, as in `hysim.close_loop`.
+
+    By default the command is that at which the memory of its law holds, else 0; the displacement is that of its model
+    there, 0 without a law.
+    """
+    command = standing(thing, u0)
+    if y0 is None and isinstance(thing, InverseFeedforward | TrackingController) and thing.plant is not None:
+        return command, RestingPlant(thing.plant, min(sample_time, 1.0), command).y0
+    return command, y0 or 0.0
 
 
 def _of_model(model: Startable, sample_time: float | None) -> Program:

@@ -21,7 +21,8 @@ depends on the input, beside a polynomial of it (`bent_step`):
 import numpy as np
 
 from hysim._frozen import FloatArray
-from hysim.kernels._compile import inlined, kernel
+from hysim.kernels._compile import inlined, kernel, signed_kernel
+from hysim.kernels.stepping import START, STEP
 
 N_OUTPUT = 3
 N_BENT = 4
@@ -115,3 +116,24 @@ def bent_step(parameters: FloatArray, state: FloatArray, u: float) -> float:
     for k in range(first - 1, N_BENT - 1, -1):
         static = (static + parameters[k]) * u
     return float(parameters[1] + static + (parameters[2] + parameters[3] * u) * lag)
+
+
+@signed_kernel(START.signature)
+def start_extreme(parameters: FloatArray, state: FloatArray, u0: float) -> None:
+    """The running extreme begins at the first input, without a direction."""
+    state[0] = u0
+    state[1] = u0
+    state[2] = 0.0
+
+
+@signed_kernel(STEP.signature)
+def extreme(parameters: FloatArray, state: FloatArray, u: float) -> float:
+    """Running extreme of the input; `parameters` (threshold,), `state` (last u, extreme v, direction 1, -1 or 0)."""
+    ahead = u - state[1]
+    state[0] = u
+    if state[2] * ahead >= 0.0 and state[2] != 0.0:
+        state[1] = u
+    elif abs(ahead) > parameters[0]:
+        state[1] = u
+        state[2] = 1.0 if ahead > 0.0 else -1.0
+    return state[1]

@@ -9,11 +9,21 @@ import numpy as np
 import numpy.typing as npt
 
 from hysim._frozen import FloatArray, read_only
+from hysim.errors import warn_beyond
 from hysim.models.by_structure import ByStructure
 from hysim.models.composable import Composable
 from hysim.models.inverse_search import inverse_at_rest, inverse_response
 from hysim.models.parts import compiled_law, exchanged, labels, own
-from hysim.models.protocols import CompiledLaw, Continuable, Numbered, Startable, Stretched, needed_time, needs_time
+from hysim.models.protocols import (
+    CompiledLaw,
+    Continuable,
+    Numbered,
+    Placeable,
+    Startable,
+    Stretched,
+    needed_time,
+    needs_time,
+)
 
 State = tuple[Any, ...]
 """The state of each member."""
@@ -55,6 +65,20 @@ class Composite(ByStructure, Composable):
     @abstractmethod
     def startable(self, sample_time: float | None = None) -> Startable:
         """As exports take it, from any first input; TypeError if a member cannot be stepped."""
+
+    @property
+    def u0(self) -> float | None:
+        """Input at which the initial memories hold, that of the first member; None for the first sample."""
+        return self.members[0].u0 if isinstance(self.members[0], Placeable) else None
+
+    @property
+    def u_range(self) -> tuple[float, ...] | None:
+        """Lowest and highest input of the record that the composite was identified on; None if unknown."""
+        return self.members[0].u_range if isinstance(self.members[0], Placeable) else None
+
+    @abstractmethod
+    def placed(self, u0: float | None, u_range: tuple[float, ...] | None = None) -> Any:
+        """The composite with the initial memories at the input `u0`, as far as its members have such an input."""
 
     @property
     def dynamic(self) -> bool:
@@ -115,7 +139,11 @@ class Composite(ByStructure, Composable):
         outputs = read_only(y, "y", ndim=1)
         if self.dynamic:
             raise ValueError("what moves in time has no inverse that depends on the output alone")
-        return inverse_response(inverse_at_rest(self, float(outputs[0]), u0), outputs) if outputs.size else outputs
+        if not outputs.size:
+            return outputs
+        u = inverse_response(inverse_at_rest(self, float(outputs[0]), self.u0 if u0 is None else u0), outputs)
+        warn_beyond(self.u_range, u, type(self).__name__)
+        return u
 
 
 def continued(part: Any, u: FloatArray, sample_time: float | None, state: Any) -> tuple[FloatArray, Any]:

@@ -4,6 +4,7 @@ import math
 from functools import reduce
 from typing import Any
 
+import numpy as np
 import numpy.typing as npt
 
 from hysim._frozen import FloatArray, read_only
@@ -11,6 +12,7 @@ from hysim.kernels.stepping import one_behind_the_other
 from hysim.models._cascade_search import CascadeStructure
 from hysim.models._composite import Composite, State, continued, known_slopes
 from hysim.models.compiled_step import startable
+from hysim.models.inverse_search import searched_inverse
 from hysim.models.model import family
 from hysim.models.parts import (
     check_parts,
@@ -21,7 +23,17 @@ from hysim.models.parts import (
     self_started,
     startable_pair,
 )
-from hysim.models.protocols import CompiledLaw, Startable
+from hysim.models.protocols import (
+    UNLIMITED,
+    CompiledLaw,
+    InputFilter,
+    Limits,
+    Placeable,
+    Startable,
+    StepwiseInvertible,
+    needs_time,
+    placed,
+)
 
 __all__ = ["Cascade", "CascadeStructure"]
 
@@ -84,12 +96,40 @@ class Cascade(Composite):
         return CascadeStructure(stages=stages)
 
     @property
+    def behind_filter(self) -> Any:
+        """What an inverse inverts: the cascade without the filters of a noisy input at its front."""
+        first, *others = self.stages
+        if not isinstance(first, InputFilter) or not others:
+            return self
+        return others[0] if len(others) == 1 else Cascade(stages=tuple(others)).behind_filter
+
+    def inverse_response(self, y: npt.ArrayLike, u0: float | None = None) -> FloatArray:
+        """Input that gives the output `y`; see `hysim.Law.inverse_response`. A filter at the front is left out."""
+        model = self.behind_filter
+        return np.asarray(model.inverse_response(y, u0)) if model is not self else super().inverse_response(y, u0)
+
+    def compiled_inverse(self, u0: float, limits: Limits = UNLIMITED, sample_time: float = math.inf) -> CompiledLaw:
+        """The inverse at rest at `u0`, stepped; see `hysim.Law.compiled_inverse`."""
+        model = self.behind_filter
+        if isinstance(model, StepwiseInvertible) and model is not self:
+            return model.compiled_inverse(u0, limits, sample_time)
+        return searched_inverse(model, CompiledLaw(*model.compiled(u0)), limits=limits)
+
+    @property
     def members(self) -> tuple[Any, ...]:
         """The stages."""
         return self.stages
 
     def with_members(self, members: tuple[Any, ...]) -> "Cascade":
         return Cascade(stages=members)
+
+    def placed(self, u0: float | None, u_range: tuple[float, ...] | None = None) -> "Cascade":
+        stages, level = [], u0
+        for stage in self.stages:
+            stages.append(placed(stage, level, u_range))
+            known = level is not None and isinstance(stage, Placeable) and not needs_time(stage)
+            level, u_range = (float(stages[-1].response([level])[0]) if known else None), None
+        return Cascade(stages=tuple(stages))
 
     def response(self, u: npt.ArrayLike, sample_time: float | None = None) -> FloatArray:
         return reduce(lambda v, stage: response_of(stage, v, sample_time), self.stages, read_only(u, "u", ndim=1))

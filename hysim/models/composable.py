@@ -1,8 +1,9 @@
 """Sums and cascades by operators: ``law + law``, ``law >> plant``."""
 
-from typing import Any, NamedTuple
+from dataclasses import dataclass, field, replace
+from typing import Any, NamedTuple, Self
 
-from hysim._frozen import items
+from hysim._frozen import LAST, items, own_items
 from hysim._results import model_of
 from hysim.models.protocols import Responding
 
@@ -50,6 +51,34 @@ class Composable:
     def __rrshift__(self, other: Any) -> Any:
         """This behind a result's model."""
         return _joined(other, self, _KINDS[">>"])
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Placed(Composable):
+    """Base class of laws: where the initial memory holds, and where the law was identified.
+
+    Parameters
+    ----------
+    u0 : float, optional
+        Input at which the initial memory holds [unit of u]. The law first moves from there to the first sample of any
+        input. By default it is that first sample itself.
+    u_range : (float, float), optional
+        Lowest and highest input of the record that the law was identified on [unit of u]; inverses and loops warn
+        beyond it. It does not count in comparisons.
+    """
+
+    u0: float | None = field(default=None, metadata=LAST)
+    # Any, so that type checkers take BoucWen(**parameters) with a dict of floats
+    u_range: Any = field(default=None, compare=False, metadata={**LAST, "kind": tuple[float, ...] | None})
+
+    @property
+    def arguments(self) -> dict[str, Any]:
+        """The fields of the family by name."""
+        return own_items(self)
+
+    def placed(self, u0: float | None, u_range: tuple[float, ...] | None = None) -> Self:
+        """The same numbers with the memory at the input `u0`, and the range of the identified input."""
+        return replace(self, u0=u0, u_range=u_range)
 
 
 def _joined(first: Any, second: Any, kind: _Kind) -> Any:

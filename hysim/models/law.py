@@ -10,7 +10,7 @@ identification, printing and files follow from these. `hysim.laws.differential.d
 import math
 from abc import ABC
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import MISSING, Field, fields
+from dataclasses import MISSING, Field, dataclass, fields
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple, Self
 
@@ -18,14 +18,14 @@ import numpy as np
 import numpy.typing as npt
 
 from hysim._cycles import TOLERANCE
-from hysim._frozen import FloatArray, items, read_only
+from hysim._frozen import FloatArray, items, last_names, read_only
 from hysim._parallel import in_pieces
-from hysim.errors import SimulationError
+from hysim.errors import SimulationError, warn_beyond
 from hysim.kernels import stepping
 from hysim.kernels.stepping import Start, Step, drive
 from hysim.models.batch import Batch, Reduction, Sets
 from hysim.models.compiled_step import compiled_start, compiled_step
-from hysim.models.composable import Composable
+from hysim.models.composable import Placed
 from hysim.models.inverse_search import inverse_at_rest, inverse_response, not_reached, searched_inverse
 from hysim.models.parameters import Parameter, declared_space
 from hysim.models.protocols import UNLIMITED, CompiledLaw, Limits, Startable
@@ -64,7 +64,8 @@ class Stepping(NamedTuple):
     workspace: int
 
 
-class Law(Composable, ABC):
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Law(Placed, ABC):
     """A rate-independent law that is known by its step.
 
     A family is a subclass under the decorator `hysim.family`: its fields, and the class attributes below. A field is
@@ -164,11 +165,6 @@ class Law(Composable, ABC):
 
     def __post_init__(self) -> None:
         self.check(self.tables)
-
-    @property
-    def arguments(self) -> dict[str, Any]:
-        """Every field by name."""
-        return items(self)
 
     @cached_property
     def tables(self) -> dict[str, FloatArray]:
@@ -353,16 +349,63 @@ class Law(Composable, ABC):
         return law
 
     def startable(self, sample_time: float | None = None) -> Startable:
-        """The law as a step that runs from any first input, for exports; it has no use for the sample time."""
+        """The law as a step that runs from any first input; it has no use for the sample time.
+
+        This is the one place where a law begins: with `u0` the state is that at this input.
+        """
         parameters, memory = self.packed
         step, start, workspace = self.stepping
         state = np.zeros(memory.size + workspace)
         state[: memory.size] = memory
-        return Startable(compiled_step(step), parameters, state, compiled_start(start))
+        model = Startable(compiled_step(step), parameters, state, compiled_start(start))
+        return model if self.u0 is None else _standing_at(model, self.u0)
 
-    def first_state(self, u0: float) -> State:
-        """Last input and memory before a first sample at the input `u0`."""
-        return self._begun(u0, None)[1]
+    def state_at(self, u: float) -> State:
+        """Input and memory at the input `u`, to which the law moves from its own `u0` if it has one."""
+        return self._begun(u, None)[1] if self.u0 is None else self.advance([u])[1]
+
+    def after(self, history: npt.ArrayLike) -> Self:
+        """The law as it stands after an input history: the last input is its `u0`, the memory that of this input.
+
+        Parameters
+        ----------
+        history : array, shape (n_samples,)
+            Input [unit of u], such as some cycles, or a decaying sine that demagnetises.
+
+        Returns
+        -------
+        law
+            Its responses continue those of this law. One that begins at rest is ``law.placed(0.0)`` with the memory
+            at rest.
+
+        Raises
+        ------
+        SimulationError, ValueError
+            As `response`.
+        TypeError
+            If the memory is more than the fields of the family say, such as the energy of a law that wears.
+
+        Examples
+        --------
+        >>> import hysim as hs
+        >>> law = hs.Dahl(stiffness=2.0, coulomb=0.5)
+        >>> pressed = law.after([0.0, 1.0])
+        >>> pressed.u0, pressed.response([0.5]) == law.response([0.0, 1.0, 0.5])[-1:]
+        (1.0, array([ True]))
+        """
+        state = self.advance(history)[1]
+        law = self.remembering(state[0], state[1:])
+        if not np.allclose(law.state_at(state[0]), state, rtol=1e-12, atol=0.0):
+            raise TypeError(
+                f"the memory of a {type(self).__name__} after an input is more than its {' and '.join(self.initial)}: "
+                "continue with advance(u, state)"
+            )
+        return law
+
+    def remembering(self, u0: float, memory: State) -> Self:
+        """The law with this memory, the state behind the last input, at the input `u0`."""
+        law = self.with_scalars(dict(zip(self.initial_names, memory, strict=False)))
+        return law.placed(u0, self.u_range)
 
     @classmethod
     def responses(
@@ -421,8 +464,8 @@ class Law(Composable, ABC):
         y : array, shape (n_samples,)
             Wanted output [unit of y].
         u0 : float, optional
-            Input at which the law rests before it moves to the first sample. By default the law begins at the first
-            sample: at the input with the first output, found from u = 0.
+            Input at which the law stands before it moves to the first sample. By default that is the law's own `u0`;
+            a law without one begins at the first sample: at the input with the first output, found from u = 0.
         state : tuple of float, optional
             State to continue from, in place of u0.
 
@@ -444,7 +487,15 @@ class Law(Composable, ABC):
             raise ValueError("give u0 or state, not both: the state has its own input")
         if not outputs.size:
             return outputs
-        return inverse_response(self.inverse_begun(outputs, u0, state), outputs, self.unreached)
+        if self.u0 is not None and state is None:
+            u0, state = None, self.advance([] if u0 is None else [u0])[1]
+        u = self.inverted(outputs, u0, state)
+        warn_beyond(self.u_range, u, type(self).__name__)
+        return u
+
+    def inverted(self, y: FloatArray, u0: float | None, state: State | None) -> FloatArray:
+        """Input for outputs `y` that are not empty; `u0` and `state` as of `inverse_response`."""
+        return inverse_response(self.inverse_begun(y, u0, state), y, self.unreached)
 
     def inverse_begun(self, y: FloatArray, u0: float | None, state: State | None) -> CompiledLaw:
         """The inverse before it moves to the outputs `y`, stepped; `u0` and `state` as of `inverse_response`."""
@@ -582,7 +633,7 @@ class Law(Composable, ABC):
     @classmethod
     def defaults(cls) -> dict[str, Any]:
         """Values of the fields that have one by default."""
-        named: tuple[Field[Any], ...] = fields(cls)  # type: ignore[arg-type]
+        named: list[Field[Any]] = [each for each in fields(cls) if each.name not in last_names(cls)]
         values = {each.name: each.default for each in named if each.default is not MISSING}
         made = {each.name: each.default_factory() for each in named if each.default_factory is not MISSING}
         return {each.name: {**values, **made}[each.name] for each in named if each.name in {**values, **made}}
@@ -593,17 +644,17 @@ class Law(Composable, ABC):
 
     def outputs_of(self, parameters: Parameters, u: npt.ArrayLike) -> Batch:
         """As `outputs`, not computed yet; parameters that the constructor would refuse are not refused."""
-        tables, inputs = tables_of(type(self).__name__, self.arguments, parameters, u)
+        tables, inputs, begin = _tables(type(self).__name__, self.arguments, parameters, u, self.u0)
         tables = self.completed(tables)
-        return _batch(self.rows, tables, inputs, self.order(tables), self.samples_a_thread)
+        return _batch(self.rows, tables, inputs, self.order(tables), self.samples_a_thread, begin)
 
     @classmethod
     def batch(cls, defaults: Mapping[str, Any], parameters: Parameters, u: npt.ArrayLike) -> Batch:
         """Laws by their parameters, those not given by `defaults`, and their inputs."""
-        tables, inputs = tables_of(cls.__name__, defaults, parameters, u)
+        tables, inputs, begin = _tables(cls.__name__, defaults, parameters, u, None)
         tables = cls.completed(tables)
         cls.check(tables)
-        return _batch(cls.rows, tables, inputs, cls.order(tables), cls.samples_a_thread)
+        return _batch(cls.rows, tables, inputs, cls.order(tables), cls.samples_a_thread, begin)
 
     @classmethod
     def completed(cls, tables: dict[str, FloatArray]) -> dict[str, FloatArray]:
@@ -644,15 +695,43 @@ def _corners(record: Record) -> npt.NDArray[np.intp]:
     return np.array([0, *turns.tolist(), len(record)])
 
 
+def _standing_at(model: Startable, u0: float) -> Startable:
+    """The model after a first sample at `u0`, whose state no other first input completes."""
+    law = model.started(u0)
+    with np.errstate(all="ignore"):
+        law.step(law.parameters, law.state, u0)
+    return Startable(*law, stepping.complete)
+
+
+def _tables(
+    family: str, defaults: Mapping[str, Any], parameters: Parameters, u: npt.ArrayLike, u0: float | None
+) -> tuple[dict[str, FloatArray], FloatArray, FloatArray | None]:
+    """As `tables_of`, and the inputs at which the memories hold, (n_sets, 1); None for the first samples."""
+    numbers = {name: value for name, value in parameters.items() if name != "u_range"}
+    if numbers.get("u0", u0) is None:
+        return *tables_of(family, defaults, numbers, u), None
+    tables, inputs = tables_of(family, {**defaults, "u0": 0.0 if u0 is None else u0}, numbers, u)
+    begin = tables.pop("u0")
+    return tables, inputs, begin
+
+
 def _batch(
     rows: Callable[[Tables, FloatArray, FloatArray], None],
     tables: Tables,
     u: FloatArray,
     order: npt.NDArray[np.intp] | None,
     samples_a_thread: int | None,
+    begin: FloatArray | None,
 ) -> Batch:
     def compute(sets: Sets, inputs: FloatArray, y: FloatArray) -> None:
-        rows({name: table[sets] for name, table in tables.items()}, inputs, y)
+        own = {name: table[sets] for name, table in tables.items()}
+        if begin is None:
+            rows(own, inputs, y)
+            return
+        outputs = np.empty((len(y), y.shape[1] + 1))
+        walked = [begin[sets], np.broadcast_to(inputs, y.shape)]
+        rows(own, read_only(np.concatenate(walked, axis=1)), outputs)
+        y[:] = outputs[:, 1:]
 
     return Batch(compute, len(next(iter(tables.values()))), u, order, samples_a_thread)
 

@@ -152,6 +152,49 @@ class Stretched(Protocol):
 
 
 @runtime_checkable
+class Placeable(Protocol):
+    """A model whose initial memory holds at an input, and that knows the range of inputs of its record."""
+
+    @property
+    def u0(self) -> float | None:
+        """Input at which the initial memory holds; None for the first sample of any input."""
+
+    @property
+    def u_range(self) -> tuple[float, ...] | None:
+        """Lowest and highest input that the model was identified on; None if unknown."""
+
+    def placed(self, u0: float | None, u_range: tuple[float, ...] | None = None) -> Any:
+        """The model with the memory at the input `u0`, and this range."""
+
+
+@runtime_checkable
+class Standing(Protocol):
+    """What begins at a command of its own, if any: a model, or a controller around one."""
+
+    @property
+    def u0(self) -> float | None:
+        """The command; None for any."""
+
+
+def standing(thing: Any, u0: float | None = None) -> float:
+    """The command at which something begins: `u0` if it is given, else its own, else zero."""
+    own = thing.u0 if u0 is None and isinstance(thing, Standing) else u0
+    return 0.0 if own is None else own
+
+
+@runtime_checkable
+class InputFilter(Protocol):
+    """A stage in front of a law for noisy inputs; a command has no noise, so that inverses leave it out."""
+
+    filters_input: ClassVar[bool]
+
+
+def placed(model: Any, u0: float | None, u_range: tuple[float, ...] | None = None) -> Any:
+    """A model with its memory at the input `u0`; itself where it has no such input."""
+    return model.placed(u0, u_range) if isinstance(model, Placeable) else model
+
+
+@runtime_checkable
 class Sampled(Protocol):
     """A law that depends on the sample time, and is a `Steppable` law at each."""
 

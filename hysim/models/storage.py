@@ -14,7 +14,7 @@ from typing import Any, Protocol, runtime_checkable
 import numpy as np
 
 from hysim._atomic import write_text
-from hysim._frozen import items
+from hysim._frozen import given_items, last_names
 from hysim._names import MODULE_OF
 from hysim._release import __version__
 from hysim._results import model_of
@@ -161,7 +161,9 @@ def from_document(document: Mapping[str, Any], path: str | Path) -> Any:
         loaded = FAMILIES[family](**parameters)
     except (ArithmeticError, AttributeError, LookupError, TypeError, ValueError) as error:
         raise ValueError(f"{path} does not hold a {family}: {_one_line(error)}") from None
-    if missing := [field.name for field in fields(loaded) if field.name not in parameters]:
+    if missing := [
+        field.name for field in fields(loaded) if field.name not in {*parameters, *last_names(type(loaded))}
+    ]:
         raise ValueError(f"{path} does not hold a whole {family}: {', '.join(missing)} missing")
     return loaded
 
@@ -196,7 +198,7 @@ def is_document(value: Any) -> bool:
 def to_document(value: Any) -> Any:
     """The plain form of a model, or of a value inside one."""
     if is_model(value):
-        parameters = {name: to_document(item) for name, item in items(value).items()}
+        parameters = {name: to_document(item) for name, item in given_items(value).items()}
         return {"family": type(value).__name__, "parameters": parameters}
     if isinstance(value, tuple):
         return [to_document(each) for each in value]

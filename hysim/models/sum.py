@@ -13,7 +13,7 @@ from hysim.models._sum_search import SumStructure
 from hysim.models.compiled_step import startable
 from hysim.models.model import family
 from hysim.models.parts import check_parts, compiled_law, compiled_pair, labels, response_of, startable_pair
-from hysim.models.protocols import CompiledLaw, Startable
+from hysim.models.protocols import CompiledLaw, Startable, placed
 
 __all__ = ["Sum", "SumStructure"]
 
@@ -80,6 +80,9 @@ class Sum(Composite):
 
     def with_members(self, members: tuple[Any, ...]) -> "Sum":
         return Sum(parts=members)
+
+    def placed(self, u0: float | None, u_range: tuple[float, ...] | None = None) -> "Sum":
+        return Sum(parts=tuple(placed(part, u0, u_range) for part in self.parts))
 
     def response(self, u: npt.ArrayLike, sample_time: float | None = None) -> FloatArray:
         inputs = read_only(u, "u", ndim=1)

@@ -41,13 +41,14 @@ def tables_of(
 ) -> tuple[dict[str, FloatArray], FloatArray]:
     """Every field over sets, (n_sets, ...), and the inputs (1 or n_sets, n_samples).
 
-    A parameter is a field, or an element ``name[k]`` of a tuple.
+    A parameter is a field, or an element ``name[k]`` of a tuple; None is the default.
 
     Raises TypeError if a name is unknown, and ValueError if a value has too many axes, or lengths do not fit.
     """
     inputs = np.atleast_2d(read_only(u, "u"))
     if inputs.ndim != 2:
         raise ValueError(f"u must have 1 axis or 2, got shape {inputs.shape}")
+    parameters = {name: value for name, value in parameters.items() if value is not None}
     whole = {**defaults, **{name: value for name, value in parameters.items() if "[" not in name}}
     elements = {name: value for name, value in parameters.items() if "[" in name}
     for name in (*whole, *(name.partition("[")[0] for name in elements)):

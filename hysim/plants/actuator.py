@@ -14,6 +14,7 @@ from hysim.models.cascade import Cascade
 from hysim.models.model import family
 from hysim.models.protocols import (
     CompiledLaw,
+    Placeable,
     Remembering,
     Responding,
     Sampled,
@@ -22,6 +23,7 @@ from hysim.models.protocols import (
     Stepwise,
     law_at,
     needs_time,
+    placed,
 )
 from hysim.plants.amplifier import Amplifier
 from hysim.plants.chain import Chain, ChainState, linear_chain
@@ -93,6 +95,25 @@ class Actuator:
                 f"hysteresis must be a law that a loop can step, such as BoucWen, got {type(self.hysteresis).__name__}"
             )
         object.__setattr__(self, "vibration", as_vibration(self.vibration))
+
+    @property
+    def u0(self) -> float | None:
+        """Command at which the memory of the law holds; None for the first one."""
+        if not isinstance(self.hysteresis, Placeable) or self.hysteresis.u0 is None:
+            return None
+        return self.hysteresis.u0 if self.amplifier is None else self.amplifier.command(self.hysteresis.u0)
+
+    @property
+    def u_range(self) -> tuple[float, ...] | None:
+        """Lowest and highest voltage of the record that the law was identified on; None if unknown."""
+        return self.hysteresis.u_range if isinstance(self.hysteresis, Placeable) else None
+
+    def placed(self, u0: float | None, u_range: tuple[float, ...] | None = None) -> "Actuator":
+        """The actuator with the memory of its law at the command `u0`, and its range from one of commands."""
+        if self.amplifier is not None:
+            u0 = None if u0 is None else float(self.amplifier.voltage(u0))
+            u_range = None if u_range is None else tuple(sorted(self.amplifier.voltage(u_range).tolist()))
+        return replace(self, hysteresis=placed(self.hysteresis, u0, u_range))
 
     @classmethod
     def structure(

@@ -137,6 +137,10 @@ class Amplifier:
         lowest, highest = self.limits or (-math.inf, math.inf)
         return np.clip(self.gain * read_only(u, "u", finite=False) + self.offset, lowest, highest)
 
+    def command(self, voltage: float) -> float:
+        """Command whose held output is this voltage, where no limit holds [unit of the command]; 0 without a gain."""
+        return (voltage - self.offset) / self.gain if self.gain else 0.0
+
     def compiled(self, step: float, u0: float = 0.0) -> CompiledAmplifier:
         """The amplifier as compiled loops take it, for sub-steps of this length [s], at rest at the command `u0`."""
         lowest, highest = self.limits or (-math.inf, math.inf)

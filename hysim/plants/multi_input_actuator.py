@@ -5,6 +5,7 @@
 What is behind the laws is linear, so that parts that the inputs have in common may stand behind each of them.
 """
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -15,6 +16,7 @@ from hysim._frozen import FloatArray, read_only
 from hysim.models.channels.dependent import AlongRecord
 from hysim.models.model import family
 from hysim.models.parts import check_parts, response_of
+from hysim.models.protocols import Placeable, placed
 from hysim.records import Record
 
 _MAIN = "u"
@@ -64,6 +66,24 @@ class MultiInputActuator:
             raise ValueError(f"each input needs an actuator, got {len(names)} inputs and {len(self.actuators)}")
         if len(set(names)) < len(names) or _MAIN not in names:
             raise ValueError(f'inputs must be different names, "u" among them, got {", ".join(names)}')
+
+    @property
+    def u0(self) -> float | None:
+        """Input ``"u"`` at which the memory of its law holds; None for the first sample."""
+        main = self.actuators[self.inputs.index(_MAIN)]
+        return main.u0 if isinstance(main, Placeable) else None
+
+    @property
+    def u_range(self) -> tuple[float, ...] | None:
+        """Lowest and highest input ``"u"`` of the identified record; None if unknown."""
+        main = self.actuators[self.inputs.index(_MAIN)]
+        return main.u_range if isinstance(main, Placeable) else None
+
+    def placed(self, u0: float | None, u_range: tuple[float, ...] | None = None) -> "MultiInputActuator":
+        """The same with the memory of the law of ``"u"`` at the input `u0`."""
+        pairs = zip(self.inputs, self.actuators, strict=True)
+        actuators = [placed(each, u0, u_range) if name == _MAIN else each for name, each in pairs]
+        return replace(self, actuators=tuple(actuators))
 
     @property
     def dynamic(self) -> bool:

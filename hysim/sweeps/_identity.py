@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 
+from hysim._frozen import last_names
 from hysim._release import __version__
 from hysim.sweeps._space import Space
 
@@ -73,7 +74,9 @@ def _members(value: Any) -> list[Any] | None:
         return [value.co_code, value.co_names, value.co_varnames, value.co_consts]
     if dataclasses.is_dataclass(value):
         # a user's dataclass may have slots, so that `vars` would fail
-        return [type(value), *(getattr(value, field.name) for field in dataclasses.fields(value))]
+        values = {field.name: getattr(value, field.name) for field in dataclasses.fields(value)}
+        last = last_names(type(value))
+        return [type(value), *(each for name, each in values.items() if each is not None or name not in last)]
     return None
 
 

@@ -7,7 +7,7 @@ from typing import Any, Literal, Protocol, get_args, runtime_checkable
 import numpy as np
 import numpy.typing as npt
 
-from hysim._frozen import FloatArray, check_choice, checked, items, vectors
+from hysim._frozen import FloatArray, check_choice, checked, given_items, vectors
 from hysim._results import model_of
 
 Measure = Literal["rmse", "sse", "max_width", "area", "final", "response"]
@@ -90,6 +90,6 @@ def response_task(
         raise TypeError(f"{family.__name__} cannot compute many laws at once with the measure {measure!r}")
     if (measure in _WITH_TARGET) != (y is not None):
         raise ValueError(f"y is needed for the measures {' and '.join(_WITH_TARGET)}, and for no other")
-    fixed = {} if isinstance(law, type) else items(law)
+    fixed = {} if isinstance(law, type) else {k: v for k, v in given_items(law).items() if k != "u_range"}
     inputs, *target = vectors(u=u) if y is None else vectors(u=u, y=y)
     return ResponseTask(family=family, fixed=fixed, u=inputs, y=target[0] if target else None, measure=measure)

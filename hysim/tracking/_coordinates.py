@@ -85,7 +85,7 @@ class Copies:
 
     def begun(self, u0: float) -> FloatArray:
         """The memory before a first sample at `u0`."""
-        return np.array(self._law.first_state(u0))
+        return np.array(self._law.state_at(u0))
 
     def moved(self, x: FloatArray, memory: FloatArray, before: float, u: float) -> FloatArray:
         """Outputs (n,) at the input `u` of copies with coordinates `x` (n, n_names); `memory` (n, n_memory) moves."""

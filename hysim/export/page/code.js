@@ -16,6 +16,7 @@ function lawInPython(law, values) {
   const told = fields.filter(([, value, start]) => JSON.stringify(value) !== JSON.stringify(start));
   const texts = told.map(([name, value]) =>
     `${name}=${Array.isArray(value) ? `(${value.map(inPython).join(", ")}${value.length === 1 ? "," : ""})` : inPython(value)}`);
+  if ("u0" in law) texts.push(`u0=${inPython(law.u0)}`);
   const line = `${law.name}(${texts.join(", ")})`;
   return line.length < 80 ? line : `${law.name}(\n${texts.map((text) => wrapped(`    ${text},`)).join("\n")}\n)`;
 }

@@ -60,9 +60,10 @@ function response(node, values, u, steps, sampleTime) {
   const fields = free.map(number);
   const [parameters, memory] = sizes.map((size) => new Float64Array(size));
   node.packed(fields, parameters, memory);
-  const { y, state } = steps[node.module].outputs(parameters, memory, node.work, u);
+  const begun = "u0" in node; // the memory holds at u0, before the first sample
+  const { y, state } = steps[node.module].outputs(parameters, memory, node.work, begun ? [node.u0, ...u] : u);
   node.last = { parameters, state };
-  return y;
+  return begun ? y.slice(1) : y;
 }
 
 function lawsOf(node) {

@@ -41,7 +41,8 @@ class EquivalentBoucWen(BoucWenStep):
     @property
     def bouc_wen(self) -> BoucWen:
         """The `BoucWen` law with the same output."""
-        return BoucWen(**{name: float(table[0, 0]) for name, table in self.equivalent(self.tables).items()})
+        numbers = {name: float(table[0, 0]) for name, table in self.equivalent(self.tables).items()}
+        return BoucWen(**numbers, u0=self.u0, u_range=self.u_range)
 
     @property
     def known_slopes(self) -> tuple[float, float]:

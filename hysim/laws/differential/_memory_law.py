@@ -134,7 +134,7 @@ class MemoryLaw(Law):
         """By a search on the step, from the input that gives the first output with the memory at z0."""
         if state is None:
             first = boucwen_inverse.at_rest(self, float(y[0]))[0] if u0 is None else float(u0)
-            state = self.first_state(first)
+            state = self.state_at(first)
         u, z, *_ = state
         powers = [abs(c * u**k) for k, c in enumerate(self.input_polynomial.tolist(), 1)]
         return self.search_inverse(state, terms=float(abs(self.offset) + sum(powers) + abs(self.gain * z)))

@@ -87,7 +87,7 @@ class BoucWenInverse:
         """
         if y0 is not None and u0 is None:
             return self.begun(at_rest(self.law, float(y0)), limits)
-        return self.begun((float(u0 or 0.0), self.law.z0), limits)
+        return self.begun(self.law.state_at(float(u0 or 0.0))[:2], limits)
 
     def begun(self, state: LawState | InverseState, limits: Limits = UNLIMITED) -> CompiledLaw:
         """The inverse in a state, as compiled loops take it."""

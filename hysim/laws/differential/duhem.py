@@ -209,7 +209,7 @@ class Duhem(Law):
 
     def inverse_begun(self, y: FloatArray, u0: float | None, state: State | None) -> CompiledLaw:
         """By a search on the step; by default from rest at u = 0, the output at y0."""
-        begin = state or self.first_state(float(u0 or 0.0))
+        begin = state or self.state_at(float(u0 or 0.0))
         terms = abs(self.offset) + abs(self.feedthrough * begin[0]) + abs(begin[1])
         return self.search_inverse(begin, terms=terms)
 

@@ -8,17 +8,17 @@ with one field more, from which all else is derived.
 import functools
 from abc import ABC
 from collections.abc import Iterable, Mapping
-from dataclasses import MISSING, fields, replace
+from dataclasses import MISSING, dataclass, fields, replace
 from typing import TYPE_CHECKING, Any, ClassVar, Self, cast
 
 import numpy as np
 import numpy.typing as npt
 
-from hysim._frozen import FloatArray, checked, items, read_only
+from hysim._frozen import FloatArray, checked, items, last_names, read_only
 from hysim.kernels import stepping
 from hysim.kernels.friction.rates import N_RATED
 from hysim.models.batch import Reduction
-from hysim.models.composable import Composable
+from hysim.models.composable import Placed
 from hysim.models.law import Law, State
 from hysim.models.parameters import Parameter, declared_space, rate_spans
 from hysim.models.protocols import CompiledLaw, Identifiable, Startable, needed_time, positive_time
@@ -30,7 +30,8 @@ if TYPE_CHECKING:
     from hysim.models.derivatives.jacobian import Jacobian
 
 
-class RatedLaw(Identifiable, Composable, ABC):
+@dataclass(frozen=True, kw_only=True, eq=False)
+class RatedLaw(Identifiable, Placed, ABC):
     """A law that depends on the rate of its input, and so on time.
 
     A family is a subclass under the decorator `hysim.family`.
@@ -84,7 +85,7 @@ class RatedLaw(Identifiable, Composable, ABC):
     @property
     def scalars(self) -> dict[str, float]:
         """Every number by the name that `hysim.identify` has for it, ``name`` or ``name[k]``."""
-        return scalars_of(items(self))
+        return scalars_of(self.arguments)
 
     def with_scalars(self, scalars: Mapping[str, float]) -> Self:
         """The law with other numbers, by their names in `scalars`; ValueError if the constructor refuses them."""
@@ -226,7 +227,7 @@ class AtSampleTime(Law):
 @functools.cache
 def _kind_at_sample_time(family: type[RatedLaw]) -> type[Law]:
     """The laws of a family at one sample time: its fields behind ``sample_time``."""
-    named: Any = fields(cast(Any, family))
+    named = [each for each in fields(cast(Any, family)) if each.name not in last_names(family)]
     defaults = {each.name: each.default for each in named if each.default is not MISSING}
     body = {
         "__module__": family.__module__,

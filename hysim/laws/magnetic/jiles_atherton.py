@@ -7,7 +7,7 @@ u is the field H, y the flux density B, and the memory z is M_irr, the irreversi
 """
 
 import math
-from typing import ClassVar, Self
+from typing import Any, ClassVar, Self
 
 import numpy as np
 import numpy.typing as npt
@@ -151,7 +151,8 @@ class JilesAtherton(Law):
         >>> hs.JilesAtherton.from_total(Ms=1.6e6, a=1100.0, alpha=1.6e-3, k=320.0, c=0.2).k
         400.0
         """
-        return cls(**conversions.from_total(Ms, a, alpha, k, c))
+        numbers: Any = conversions.from_total(Ms, a, alpha, k, c)
+        return cls(**numbers)
 
     def to_total(self) -> dict[str, float]:
         """The arguments of `from_total`; ValueError if the law is anisotropic, has another He, or begins magnetised."""
@@ -171,7 +172,8 @@ class JilesAtherton(Law):
         >>> law.k, law.c
         (25.0, 0.2)
         """
-        return cls(**conversions.from_circuit(MS, A, K, C))
+        numbers: Any = conversions.from_circuit(MS, A, K, C)
+        return cls(**numbers)
 
     def to_circuit(self) -> dict[str, float]:
         """The arguments of `from_circuit`; ValueError also if the law has a coupling, or c = 1."""
@@ -189,7 +191,8 @@ class JilesAtherton(Law):
         >>> round(hs.JilesAtherton.from_jamodel(a=50.0, k=20.0, c=0.2, Ms=1e6, alpha=1e-5, Kan=100.0).anisotropy, 6)
         1.591549
         """
-        return cls(**conversions.from_jamodel(a, k, c, Ms, alpha, Kan, psi))
+        numbers: Any = conversions.from_jamodel(a, k, c, Ms, alpha, Kan, psi)
+        return cls(**numbers)
 
     def to_jamodel(self) -> dict[str, float]:
         """The arguments of `from_jamodel`, with psi = 0 or pi / 2."""

@@ -13,7 +13,7 @@ extremes; see `hysim.kernels.preisach`.
 """
 
 import math
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 import numpy.typing as npt
@@ -71,7 +71,7 @@ class RelayLaw(ByStructure, Law):
     def advance(self, u: npt.ArrayLike, state: State | None = None) -> tuple[FloatArray, State]:
         """Output and state as of `Law.advance`: the last input and the dominant extremes, the oldest first."""
         inputs = read_only(u, "u", ndim=1)
-        past = self.z0 if state is None else state[1:]
+        past = self.past if state is None else state[1:]
         parameters, x, outputs, d = self._staircase(past, inputs.size)
         y = np.empty(inputs.size)
         before = float(x[d]) if state is None else state[0]
@@ -83,6 +83,15 @@ class RelayLaw(ByStructure, Law):
 
         in_pieces(path, y.size)
         return y, (float(inputs[-1]) if y.size else before, *x[1 : d + 1].tolist())
+
+    def remembering(self, u0: float, memory: State) -> Any:
+        """The law after these extremes."""
+        return type(self)(**{**self.arguments, "z0": memory}, u0=u0)
+
+    @property
+    def past(self) -> State:
+        """The inputs before the first sample."""
+        return self.z0 if self.u0 is None else (*self.z0, self.u0)
 
     def staircase(self, u: npt.ArrayLike) -> FloatArray:
         """The line in the plane of the relays' thresholds that an input (n_samples,) leaves; those below it are up.

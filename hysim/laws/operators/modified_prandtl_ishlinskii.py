@@ -110,22 +110,22 @@ class ModifiedPrandtlIshlinskii(ExtendedPlays):
             dead_zones=() if counted else tuple(read_only(dead_zones, "dead_zones", ndim=1).tolist()),
         )
 
-    def inverse_response(self, y: npt.ArrayLike, u0: float | None = None, state: State | None = None) -> FloatArray:
-        """Input that gives the output `y`, monotone between the samples; see `hysim.Law.inverse_response`.
+    def inverted(self, y: FloatArray, u0: float | None, state: State | None) -> FloatArray:
+        """The inverse of S, then that of the plays, exact to rounding.
 
-        It is the inverse of S, then that of the plays, and exact to rounding. Raises ValueError also if z0 holds
+        Raises ValueError also if z0 holds
         positions that no input leads to; one for a law that is not invertible names the weight.
         """
         if (refusal := self.refusal()) is not None:
             raise ValueError(refusal)
-        wanted = read_only(y, "y", ndim=1) - self.offset
+        wanted = y - self.offset
         slope = self.dead_zone_weights[self.dead_zones.index(0.0)]
         x = wanted / slope
         for side in (1.0, -1.0):
             inverse = self._side(side).inverse()
             for threshold, weight in zip(inverse.thresholds[1:], inverse.weights[1:], strict=True):
                 x += weight * dead_zone(wanted, np.copysign(threshold, side * slope))
-        return self.plays.inverse_response(x, u0, state)
+        return self.plays.inverted(x, u0, state)
 
     @classmethod
     def pack(cls, tables: Tables) -> Packed:

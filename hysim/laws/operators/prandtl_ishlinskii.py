@@ -133,8 +133,9 @@ class PrandtlIshlinskii(ByStructure, ClampLaw):
         )
 
     def compiled_inverse(self, u0: float, limits: Limits = UNLIMITED, sample_time: float = math.inf) -> CompiledLaw:
-        y0 = float(self.response([u0])[0])
-        forward, inverse = self.compiled(u0), self.inverse().compiled(y0)
+        law = self.after([u0])
+        y0 = float(law.response([u0])[0])
+        forward, inverse = law.compiled(u0), law.inverse().compiled(y0)
         return CompiledLaw(
             inverses.plays,
             read_only(np.concatenate([limits, inverse.parameters, forward.parameters]), finite=False),
@@ -154,7 +155,7 @@ class PrandtlIshlinskii(ByStructure, ClampLaw):
         """
         if (refusal := self.refusal()) is not None:
             raise ValueError(refusal)
-        r, w, z = self.elements
+        r, w, z = self.elements if self.u0 is None else self.after([self.u0]).elements
         z = _consistent(r, z)
         sums = np.cumsum(w)
         weights = np.concatenate([1.0 / w[:1], -w[1:] / (sums[1:] * sums[:-1])])
@@ -167,15 +168,10 @@ class PrandtlIshlinskii(ByStructure, ClampLaw):
             z0=tuple((sums * z + later + self.offset).tolist()),
         )
 
-    def inverse_response(self, y: npt.ArrayLike, u0: float | None = None, state: State | None = None) -> FloatArray:
-        """Input that gives the output `y`, monotone between the samples; see `hysim.Law.inverse_response`.
-
-        It is that of `inverse`, exact to rounding, with the errors of `inverse`.
-        """
-        if state is not None and u0 is not None:
-            raise ValueError("give u0 or state, not both: the state has its own input")
+    def inverted(self, y: FloatArray, u0: float | None, state: State | None) -> FloatArray:
+        """The response of `inverse`, exact to rounding, with the errors of `inverse`."""
         start = self.advance([u0])[1] if state is None and u0 is not None else state
-        law = self if start is None else replace(self, z0=start[1:])
+        law = self if start is None else replace(self, z0=start[1:], u0=None)
         return law.inverse().response(y)
 
     def as_structure(self) -> ClampStructure:

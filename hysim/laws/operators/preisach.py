@@ -316,7 +316,7 @@ class Preisach(RelayLaw):
 
     def inverse_begun(self, y: FloatArray, u0: float | None, state: State | None) -> CompiledLaw:
         """In closed form, after the inputs before the first sample."""
-        past = state[1:] if state is not None else self.z0 if u0 is None else (*self.z0, u0)
+        past = state[1:] if state is not None else self.past if u0 is None else (*self.past, u0)
         return self.inverse_from(past, room=y.size)
 
     def unreached(self, sample: int, y: float, inverse: CompiledLaw) -> str:
@@ -328,7 +328,7 @@ class Preisach(RelayLaw):
         )
 
     def compiled_inverse(self, u0: float, limits: Limits = UNLIMITED, sample_time: float = math.inf) -> CompiledLaw:
-        return self.inverse_from((*self.z0, u0), limits, room=_ROOM)
+        return self.inverse_from((*self.past, u0), limits, room=_ROOM)
 
     def inverse_from(self, past: State, limits: Limits = UNLIMITED, *, room: int = 0) -> CompiledLaw:
         """The inverse after the inputs `past`, with room for more extremes; see `hysim.kernels.inverses`."""

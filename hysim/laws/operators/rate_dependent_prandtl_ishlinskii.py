@@ -26,7 +26,7 @@ from hysim.laws.operators._play_sums import ExtendedPlays, kernel_rows, position
 from hysim.laws.operators.prandtl_ishlinskii import PrandtlIshlinskii
 from hysim.models.batch import Reduction
 from hysim.models.by_structure import ByStructure
-from hysim.models.composable import Composable
+from hysim.models.composable import Placed
 from hysim.models.law import Packed, State
 from hysim.models.model import family
 from hysim.models.parameters import spans
@@ -77,6 +77,9 @@ class PlaysAtSampleTime(ExtendedPlays):
     def response_at(self, u: npt.ArrayLike, widening: FloatArray) -> FloatArray:
         """Output at the samples of `u` of plays whose thresholds are wider by `widening`, shape (n_samples,)."""
         inputs = read_only(u, "u", ndim=1)
+        if self.u0 is not None:
+            longer = np.append(self.u0, inputs), np.append(widening[:1], widening)
+            return np.asarray(self.placed(None).response_at(*longer)[1:])
         y = np.empty(inputs.size)
         parameters = read_only(self.pack(self.tables).parameters[0])
         kernels.widened(parameters, np.array([0.0, *self.z0]), inputs, read_only(widening), y)
@@ -84,7 +87,7 @@ class PlaysAtSampleTime(ExtendedPlays):
 
 
 @family
-class RateDependentPrandtlIshlinskii(ByStructure, Composable):
+class RateDependentPrandtlIshlinskii(ByStructure, Placed):
     """Rate-dependent Prandtl-Ishlinskii law, ``y = offset + sum w_i z_i``, thresholds ``r_i + beta |u'|``.
 
     ::
@@ -164,6 +167,8 @@ class RateDependentPrandtlIshlinskii(ByStructure, Composable):
             width=float(_width(np.array(self.beta), sample_time)),
             offset=self.offset,
             z0=self.z0,
+            u0=self.u0,
+            u_range=self.u_range,
         )
 
     def memory(self, u: npt.ArrayLike, sample_time: float) -> FloatArray:

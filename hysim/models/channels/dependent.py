@@ -6,7 +6,7 @@ parameters change from sample to sample (`hysim.models.channels.varying`).
 
 import warnings
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
@@ -19,7 +19,7 @@ from hysim.models.channels.structure import DependentStructure
 from hysim.models.channels.varying import response_along
 from hysim.models.model import family
 from hysim.models.parts import response_of
-from hysim.models.protocols import Numbered, Responding, needs_time
+from hysim.models.protocols import Numbered, Placeable, Responding, needs_time, placed
 from hysim.records import Record
 
 _ROUNDING = 1e-9  # of a sample's number
@@ -117,6 +117,20 @@ class Dependent:
             low, high = ranges.get(each.channel, (-np.inf, np.inf))
             ranges[each.channel] = (max(low, each.span[0]), min(high, each.span[1]))
         return ranges
+
+    @property
+    def u0(self) -> float | None:
+        """Input at which the initial memory holds; None for the first sample of any input."""
+        return self.law.u0 if isinstance(self.law, Placeable) else None
+
+    @property
+    def u_range(self) -> tuple[float, ...] | None:
+        """Lowest and highest input of the record that the law was identified on; None if unknown."""
+        return self.law.u_range if isinstance(self.law, Placeable) else None
+
+    def placed(self, u0: float | None, u_range: tuple[float, ...] | None = None) -> "Dependent":
+        """The same with the memory of the law at the input `u0`."""
+        return replace(self, law=placed(self.law, u0, u_range))
 
     @property
     def scalars(self) -> dict[str, float]:

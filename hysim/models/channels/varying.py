@@ -113,6 +113,9 @@ def paths(law: Law, parameters: Parameters, u: FloatArray) -> FloatArray:
     """
     from hysim.kernels.channels.varying import drive_varying  # compiled where it is needed
 
+    if law.u0 is not None:
+        again = {k: np.insert(v, 0, v[:, 0], axis=1) if np.ndim(v) == 2 else v for k, v in parameters.items()}
+        return paths(law.placed(None), again, np.append(law.u0, u))[:, 1:]
     inputs = read_only(u, "u", ndim=1)
     constants, memory, n_sets = _packed(law, parameters, inputs.size)
     y = np.empty((n_sets, inputs.size))

@@ -73,12 +73,14 @@ class Jacobian:
 
 def response_jacobian(law: Any, u: Any, names: Iterable[str] | None = None) -> Jacobian:
     """See `hysim.Law.response_jacobian`."""
-    inputs = read_only(u, "u", ndim=1)
+    samples = read_only(u, "u", ndim=1)
+    first = 0 if law.u0 is None else 1  # rows of the input at which the memory holds
+    inputs = samples if law.u0 is None else read_only(np.append(law.u0, samples))
     if isinstance(names, str):
         raise TypeError(f"names must be a sequence of names, got the string {names!r}")
     asked, rates = _differentiable(law) if names is None else _chosen(law, tuple(names))
-    if not asked or not inputs.size:
-        return Jacobian(names=asked, matrix=np.zeros((inputs.size, len(asked))), response=law.response(inputs))
+    if not asked or not samples.size:
+        return Jacobian(names=asked, matrix=np.zeros((samples.size, len(asked))), response=law.response(samples))
     build = modules.interpreted if inputs.size * len(asked) <= FEW else modules.compiled
     columns, y = [], np.empty(0)
     for name, of_parameters, of_memory in zip(asked, rates.parameter_rates, rates.memory_rates, strict=True):
@@ -87,9 +89,9 @@ def response_jacobian(law: Any, u: Any, names: Iterable[str] | None = None) -> J
         parameters, slopes = (read_only(each, finite=False) for each in (rates.parameters, of_parameters))
         y, column, lost = modules.rates_along(build(step, start), parameters, slopes, state, moved, inputs)
         if lost >= 0:
-            raise SimulationError(law.divergence(lost, inputs[lost], y[lost]))
+            raise SimulationError(law.divergence(lost - first, inputs[lost], y[lost]))
         columns.append(column)
-    return Jacobian(names=asked, matrix=np.column_stack(columns), response=y)
+    return Jacobian(names=asked, matrix=np.column_stack(columns)[first:], response=y[first:])
 
 
 def _stepping(law: Any, name: str) -> tuple[Any, Any, int]:

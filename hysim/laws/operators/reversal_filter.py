@@ -1,0 +1,69 @@
+"""A filter that ignores small reversals of a measured input.
+
+    rising:   v = max(v, u), until v - u > threshold; then v = u, falling
+    falling:  v = min(v, u), until u - v > threshold; then v = u, rising
+
+The output v follows the running extreme of the input and turns only once the input has retreated by more than the
+threshold. Noise below half the threshold then makes no reversal. It is the turning-point (rainflow) filter of fatigue
+analysis, run causally.
+"""
+
+from typing import Any, ClassVar
+
+import numpy as np
+
+from hysim.kernels import clamps as kernels
+from hysim.models.law import Law, Packed
+from hysim.models.model import family
+from hysim.models.tables import Tables
+
+
+@family
+class ReversalFilter(Law):
+    """Filter of an input, whose output v follows the input's extremes and ignores reversals up to a threshold.
+
+    It stands in front of a law, ``hs.ReversalFilter(threshold=0.1) >> law``, whose measured input has noise: without it
+    each false reversal moves the memory. `hysim.identify` puts it there where the record needs it. A command has no
+    such noise, so that the inverse of a cascade that begins with a filter is the inverse of what stands behind it.
+
+    Parameters
+    ----------
+    threshold : float
+        Largest reversal that is ignored, not negative [unit of u]. For white noise of standard deviation sigma
+        `hysim.identify` takes 5 sqrt(2) sigma.
+
+    Raises
+    ------
+    ValueError
+        If the threshold is negative.
+
+    Examples
+    --------
+    >>> import hysim as hs
+    >>> hs.ReversalFilter(threshold=0.2).response([0.0, 1.0, 0.9, 1.1, 0.8, 0.9, 0.5]).tolist()
+    [0.0, 1.0, 1.0, 1.1, 0.8, 0.8, 0.5]
+    """
+
+    threshold: float = 0.0
+
+    step = staticmethod(kernels.extreme)
+    start = staticmethod(kernels.start_extreme)
+    initial: ClassVar[tuple[str, ...]] = ()
+    filters_input: ClassVar[bool] = True
+    memory = inverse_response = None  # type: ignore[assignment]  # it says nothing that its output does not
+
+    @classmethod
+    def check(cls, tables: Tables) -> None:
+        """Refuse a negative threshold."""
+        if (tables["threshold"] < 0.0).any():
+            raise ValueError(f"threshold must not be negative, got {tables['threshold'].min():g}")
+
+    @classmethod
+    def pack(cls, tables: Tables) -> Packed:
+        """The threshold, and the memory (u, v, direction)."""
+        return Packed(np.asarray(tables["threshold"]), cls.initial_memory(tables, further=2))
+
+    @classmethod
+    def candidates(cls) -> dict[str, Any]:
+        """None for `hysim.compare`: it is no model of a device by itself."""
+        return {}
