@@ -2,7 +2,7 @@
 
 import math
 from dataclasses import replace
-from typing import Any
+from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
 import numpy.typing as npt
@@ -33,12 +33,20 @@ from hysim.plants.sensor import Sensor
 from hysim.plants.state_space import linear_plant
 from hysim.plants.transfer_function import TransferFunction
 from hysim.plants.whole.actuator_structure import ActuatorStructure
+from hysim.records import Record
 
 
 def is_law(value: Any) -> bool:
     """Whether a value has a response and can be stepped in a loop, at a sample time if it needs one."""
     steps = isinstance(value, Responding) and isinstance(value, Steppable)
     return steps and (not needs_time(value) or isinstance(value, Sampled))
+
+
+@runtime_checkable
+class _Resolved(Protocol):
+    """A fit that knows the quantum of its record's sensor."""
+
+    resolution: float | None
 
 
 @family
@@ -114,6 +122,52 @@ class Actuator:
             u0 = None if u0 is None else float(self.amplifier.voltage(u0))
             u_range = None if u_range is None else tuple(sorted(self.amplifier.voltage(u_range).tolist()))
         return replace(self, hysteresis=placed(self.hysteresis, u0, u_range))
+
+    @classmethod
+    def of(cls, fit: Any, record: Record | None = None) -> "Actuator":
+        """The actuator of a fit, kept within the inputs of its record.
+
+        Parameters
+        ----------
+        fit : Identification, Discovery or model
+            A law, or a plant that `hysim.close_loop` takes.
+        record : Record, optional
+            The record of the fit; by default the range is the one that the model was identified on, ``u_range``, and
+            the resolution that of the fit.
+
+        Returns
+        -------
+        Actuator
+            Its amplifier stops at the lowest and the highest voltage of the record, and its sensor reads in steps of
+            the record's resolution, unless the model's own amplifier and sensor have limits and a quantum.
+
+        Raises
+        ------
+        ValueError
+            If the range is not known.
+
+        Examples
+        --------
+        >>> import hysim as hs
+        >>> rec = hs.datasets.table1()
+        >>> stack = hs.Actuator.of(hs.identify(hs.Line, rec), rec)
+        >>> stack.amplifier.limits, stack.sensor.quantum
+        ((0.0, 125.0), 0.0763)
+        """
+        actuator, resolution = as_actuator(fit), fit.resolution if isinstance(fit, _Resolved) else None
+        limits = actuator.u_range
+        if record is not None:
+            extremes, resolution = (float(record.u.min()), float(record.u.max())), record.resolution
+            limits = tuple(sorted(actuator.voltage(extremes).tolist()))
+            actuator = actuator.placed(float(record.u[0]) if actuator.u0 is None else actuator.u0, extremes)
+        if limits is None:
+            raise ValueError("the inputs of the model's record are not known: give Actuator.of(fit, record)")
+        amplifier, sensor = actuator.amplifier or Amplifier(), actuator.sensor or Sensor()
+        return replace(
+            actuator,
+            amplifier=replace(amplifier, limits=limits) if amplifier.limits is None else amplifier,
+            sensor=replace(sensor, quantum=resolution) if resolution and not sensor.quantum else actuator.sensor,
+        )
 
     @classmethod
     def structure(
