@@ -139,4 +139,5 @@ from hysim.laws.static import SingleValued as SingleValued
 from hysim.models.storage import save as save
 from hysim.models.storage import load_model as load_model
 from hysim.errors import SimulationError as SimulationError
+from hysim.errors import HysimWarning as HysimWarning
 from hysim._versions import show_versions as show_versions

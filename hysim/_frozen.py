@@ -17,6 +17,7 @@ import numpy as np
 import numpy.typing as npt
 
 from hysim._names import among, meant
+from hysim._results import model_of
 
 FloatArray = npt.NDArray[np.float64]
 LAST = {"last": True}  # metadata of a field of a base class that stands behind those of its families
@@ -189,7 +190,10 @@ def _coercions(cls: Any, finite: bool) -> dict[str, Callable[[Any, str], Any]]:
     hints = typing.get_type_hints(cls)
     kinds = {field.name: field.metadata.get("kind", hints[field.name]) for field in dataclasses.fields(cls)}
     coercions = {name: rules.get(kind) for name, kind in kinds.items()}
-    coercions |= {name: _as_mapping for name in coercions if typing.get_origin(hints[name]) is Mapping}
+    mapping = _as_named_parts if finite else _as_mapping
+    coercions |= {name: mapping for name in coercions if typing.get_origin(hints[name]) is Mapping}
+    if finite:  # the parts of a specification are models, and no results of fits
+        coercions = {name: _as_parts if coerce is None else coerce for name, coerce in coercions.items()}
     return {name: coerce for name, coerce in coercions.items() if coerce is not None}
 
 
@@ -220,6 +224,14 @@ def _as_mapping(values: Mapping[Any, Any], name: str) -> Mapping[Any, Any]:
     if not isinstance(values, Mapping):
         raise TypeError(f"{name} must be a mapping, got {type(values).__name__}")
     return MappingProxyType(dict(values))
+
+
+def _as_parts(value: Any, name: str) -> Any:
+    return type(value)(map(model_of, value)) if type(value) in (list, tuple) else model_of(value)
+
+
+def _as_named_parts(values: Mapping[str, Any], name: str) -> Mapping[str, Any]:
+    return MappingProxyType({key: model_of(each) for key, each in _as_mapping(values, name).items()})
 
 
 def check_whole(value: Any, name: str, *, least: int = 1) -> None:

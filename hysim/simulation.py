@@ -1,6 +1,6 @@
 """The verb `simulate`: the output of a plant for an input in time."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import field, replace
 from typing import Any, Protocol, runtime_checkable
 
@@ -9,11 +9,10 @@ import numpy.typing as npt
 
 from hysim._frozen import FloatArray, frozen, vectors
 from hysim._printing import extent, printed, summary_text
+from hysim._results import Result, model_of
 from hysim.interop import dataset, frame
 from hysim.models.channels.dependent import on_record
 from hysim.models.protocols import Remembering, Responding, needs_time
-from hysim.plants.actuator import Actuator
-from hysim.plants.multi_input_actuator import MultiInputActuator
 from hysim.records import Record, check_increasing, even_step
 
 _BY_NODE = frozenset({"displacement", "velocity", "acceleration"})
@@ -42,6 +41,8 @@ class Simulation:
         memories.
     units : mapping
         Labels of the units, by the signals' names.
+    name : str
+        Name in pictures.
     """
 
     u: FloatArray
@@ -50,6 +51,7 @@ class Simulation:
     z: FloatArray | None = None
     signals: Mapping[str, FloatArray] = field(default_factory=dict)
     units: Mapping[str, str] = field(default_factory=dict)
+    name: str = ""
 
     @property
     def peaks(self) -> dict[str, FloatArray]:
@@ -164,7 +166,7 @@ def simulate(
 
     Parameters
     ----------
-    plant : model
+    plant : model or result of a fit
         A law such as `hysim.BoucWen`, whose output does not depend on time, or a plant with dynamics, such as
         a `hysim.TransferFunction` or a `hysim.BoucWenOscillator`.
     t : array, shape (n,), or None
@@ -194,6 +196,7 @@ def simulate(
     >>> sim.y.round(6).tolist()
     [0.0, 0.632121, -0.307799]
     """
+    plant = model_of(plant)
     if not isinstance(plant, Responding):
         raise TypeError(f"simulate takes a model with a response, got {type(plant).__name__}")
     inputs, *clock = vectors(u=u) if t is None else vectors(u=u, t=t)
@@ -213,17 +216,39 @@ def simulate(
     )
 
 
-def output_on(model: Any, record: Record) -> FloatArray:
-    """Output (n,) of a model at the samples of a record, with its time and its channels.
+@runtime_checkable
+class _Read(Protocol):
+    """A plant whose sensor is late."""
 
-    Of an actuator with a sensor it is what this reads, without its noise and its rounding.
+    @property
+    def as_read(self) -> Any: ...
+
+
+@runtime_checkable
+class _OnSeveral(Protocol):
+    """A result of a fit to several records, with a model for each."""
+
+    @property
+    def models(self) -> tuple[Any, ...]: ...
+
+
+def models_on(thing: Any, records: Sequence[Record]) -> list[Any]:
+    """The model of a result, or a model itself, on each record: from its initial state there, at its channels."""
+    has_each = isinstance(thing, Result) and isinstance(thing, _OnSeveral) and len(thing.models) == len(records)
+    models = thing.models if has_each else [model_of(thing)] * len(records)
+    return [on_record(model, record) for model, record in zip(models, records, strict=True)]
+
+
+def free_run(thing: Any, record: Record, units: Mapping[str, str] | None = None) -> Simulation:
+    """The simulation of a model, or of a result's model, on the input of a record as it was measured.
+
+    Every verb that judges or draws a model beside a record takes its output from here: what the model's sensor, if it
+    has one, reads without noise and steps.
     """
-    if isinstance(model, MultiInputActuator):
-        return model.response_of(record)
-    if isinstance(model, Actuator) and model.sensor is not None:
-        ideal = replace(model, sensor=replace(model.sensor, noise=0.0, quantum=0.0))
-        return ideal.measured(record.u, record.sample_time if model.dynamic or model.sensor.delay else None)
-    return simulate(on_record(model, record), record.t, record.u).y
+    (model,) = models_on(thing, [record])
+    plant = model.as_read if isinstance(model, _Read) else model
+    run = simulate(plant, record.t, record.u, units=record.units if units is None else units)
+    return replace(run, name=type(model).__name__)
 
 
 def _signals(plant: Responding, u: FloatArray, times: FloatArray | None) -> Mapping[str, FloatArray]:

@@ -159,3 +159,40 @@ def test_wrong_arguments_are_named(call, error, message):
 def test_a_controller_is_no_law():
     with pytest.raises(TypeError, match="hysteresis must be a law"):
         hs.Actuator(hysteresis=hs.PID(kp=1.0))
+
+
+# ---------------------------------------------------------------------------------- of a fit
+
+
+def test_an_actuator_of_a_fit_stays_within_its_record():
+    u = hs.signals.triangle(-1.0, 3.0, cycles=2, samples_per_cycle=60)
+    rec = hs.Record(u=u, y=np.round((0.5 * u + hs.BoucWen(beta=1.0).response(u)) / 0.01) * 0.01, resolution=0.01)
+    fit = hs.identify(hs.BoucWen, rec, fixed={"n": 1.0})
+    stack = hs.Actuator.of(fit, rec)
+    assert (stack.amplifier.limits, stack.sensor.quantum, stack.u_range) == ((-1.0, 3.0), 0.01, (-1.0, 3.0))
+    assert np.array_equal(stack.response(u), fit.model.response(u))
+    t = 0.01 * np.arange(200)
+    with pytest.warns(hs.HysimWarning, match="at a limit of the controller or the amplifier"):
+        run = hs.close_loop(stack, hs.PID(ki=50.0), t, np.full(t.size, 2.0 * rec.y.max()))
+    assert run.u.max() == 3.0
+    assert run.u.min() >= -1.0
+    assert hs.InverseFeedforward.of(stack).amplifier == stack.amplifier
+
+
+def test_an_actuator_of_a_model_takes_the_range_that_this_was_identified_on():
+    law = hs.BoucWen(u0=-2.0, u_range=(-2.0, 4.0))
+    assert hs.Actuator.of(law) == hs.Actuator(hysteresis=law, amplifier=hs.Amplifier(limits=(-2.0, 4.0)))
+    own = hs.Actuator(
+        hysteresis=law, amplifier=hs.Amplifier(gain=2.0, limits=(0.0, 1.0)), sensor=hs.Sensor(quantum=0.5)
+    )
+    assert hs.Actuator.of(own) == own
+    with pytest.raises(ValueError, match=r"are not known: give Actuator.of\(fit, record\)"):
+        hs.Actuator.of(hs.BoucWen())
+
+
+def test_the_range_of_commands_becomes_one_of_voltages():
+    rec = hs.Record(u=[0.0, 5.0, 1.0], y=[0.0, 1.0, 0.5])
+    inverting = hs.Actuator(amplifier=hs.Amplifier(gain=-2.0, offset=1.0), hysteresis=hs.BoucWen())
+    stack = hs.Actuator.of(inverting, rec)
+    assert stack.amplifier.limits == stack.u_range == (-9.0, 1.0)
+    assert stack.u0 == 0.0

@@ -12,7 +12,7 @@ import hysim
 PACKAGE = Path(hysim.__file__).parent
 
 RANKS = (
-    ("_names", "_release"),
+    ("_names", "_release", "_results"),
     ("_frozen", "_atomic", "_blas", "_printing", "_versions", "errors"),  # they know nothing of hysteresis
     (
         "_channels",

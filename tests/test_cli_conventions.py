@@ -313,7 +313,7 @@ def test_a_controller_goes_from_model_to_files_and_does_what_is_printed(run, tmp
     assert controller.limits == (0.0, 100.0)
     assert {path.name for path in tmp_path.iterdir()} == {"c.json", "stage.c", "stage.h", "loop.svg"}
     assert "Reference [µm]" in files[2].read_text()
-    assert "record      the model fits it by 100.00 %" in out
+    assert "record      the model fits the displacement [µm] by 100.00 %" in out
     plant = hs.Actuator(hysteresis=LAW, vibration=hs.mode(10.0 * np.pi, 0.05))
     assert controller.model == plant
     low, high, hertz = map(float, re.search(r"triangle +([\d.]+) to ([\d.]+) um, ([\d.]+) Hz", out).groups())
@@ -345,13 +345,32 @@ def test_gains_are_tuned_within_the_bounds(run):
     assert document["controller"]["parameters"]["feedback"]["parameters"]["ki"] > 0.0
 
 
+def test_control_names_the_quantities_that_drive_and_takes_them_in_the_units_of_the_model(run, tmp_path):
+    u = hs.signals.triangle(0.0, 100.0, cycles=2, samples_per_cycle=100)
+    law = hs.BoucWen(n=1.0, beta=0.02, gamma=0.01, gain=0.01, feedthrough=0.02)
+    hs.save(law, tmp_path / "stack.json", units={"u": "V", "y": "um"})
+    hs.save_record(hs.Record(u=u / 1e3, y=law.response(u), units={"u": "kV", "y": "um"}), tmp_path / "cycle.csv")
+    (tmp_path / "way.csv").write_text("t [s],r [mm]\n0,0.0005\n0.1,0.001\n0.2,0.0005\n")
+    design = ("control", tmp_path / "stack.json", "--record", tmp_path / "cycle.csv", "--sample-time", "1e-3")
+    code, out, _ = run(*design, "--controller", "inverse", "--reference", tmp_path / "way.csv")
+    assert code == 0
+    assert "record      the model fits the displacement [µm] by 100.00 %\n" in out
+    assert "reference   displacement [µm]: way.csv, second column, tracking rms 0." in out
+    assert "command     voltage [V]: 0 to 100 V, the extremes of cycle.csv\n" in out
+    for name, unit in (("way.csv", "V"), ("cycle.csv", "N")):
+        path = tmp_path / name
+        path.write_text(path.read_text().replace("[mm]", f"[{unit}]").replace("[kV]", f"[{unit}]"))
+        code, _, err = run(*design, "--controller", "inverse", "--reference", tmp_path / "way.csv")
+        assert (code, f"{name} is not in the units of the model: '{unit}' cannot become" in err) == (2, True)
+
+
 def test_a_reference_is_a_step_or_a_file_and_the_loop_of_a_linear_plant_is_lag(run, tmp_path):
     (tmp_path / "way.csv").write_text("t,r\n0,0\n1,1\n2,0.5\n")
     slow = ("--range", "0,1", "--frequency", "0.1", "--duration", "5", "--controller", "integral")
     design = ("control", "lag.json", "--sample-time", "0.02", *slow)
     code, out, _ = run(*design, "--reference", tmp_path / "way.csv")
     assert code == 0
-    assert float(re.search(r"reference +tracking rms ([\d.]+)", out)[1]) < 0.5
+    assert float(re.search(r"reference .* tracking rms ([\d.]+)", out)[1]) < 0.5
     assert "lag reduction" in out
     assert "without the memory" not in out
     step = json.loads(run(*design, "--reference", "step", "--step", "-0.25", "--json")[1])

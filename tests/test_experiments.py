@@ -14,7 +14,7 @@ EXPERIMENTS = sorted((Path(__file__).parent.parent / "experiments").glob("[0-9]*
 NEEDS = dict.fromkeys(("29_registration", "30_virtual_rig"), pytest.mark.extra("skimage"))
 NEEDS["48_posterior"] = pytest.mark.extra("emcee")
 NEEDS["49_evidence"] = pytest.mark.extra("emcee", "dynesty")
-NEEDS["52_page_redraw"] = (
+NEEDS["53_page_redraw"] = (
     pytest.mark.extra("websockets"),
     pytest.mark.skipif(BROWSER is None, reason="no chromium is installed"),
 )

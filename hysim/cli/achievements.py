@@ -5,8 +5,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import asdict, is_dataclass
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-import numpy as np
-
+from hysim._prefixes import label
 from hysim._printing import extent, folded, quantity
 from hysim.cli import outputs
 from hysim.cli.designs import CYCLES, Task
@@ -15,6 +14,7 @@ from hysim.metrics import rmse
 from hysim.models.model import in_brief
 from hysim.models.storage import to_document
 from hysim.plants.actuator import Actuator
+from hysim.simulation import Simulation
 
 if TYPE_CHECKING:
     from hysim.plot import Figure
@@ -34,6 +34,8 @@ class Design(NamedTuple):
     file_rms: float
     fit_percent: float
     units: Mapping[str, str]
+    reference: str
+    limits_from: str | None
 
     @property
     def last_cycle(self) -> slice:
@@ -79,14 +81,24 @@ def _head(design: Design) -> Iterator[str]:
     yield f"plant       {in_brief(design.actuator)}"
     yield f"controller  {in_brief(design.controller)}"
     if not math.isnan(design.fit_percent):
-        yield f"record      the model fits it by {design.fit_percent:.2f} %"
+        yield f"record      the model fits the {_signal(design, 'y')} by {design.fit_percent:.2f} %"
     if (tuning := design.tuning) is not None:
         bounds = "within the bounds" if tuning.success else "NOT within the bounds"
         yield f"tuning      {bounds}: {tuning.message}"
         margins = f"gain {tuning.gain_margin:.4g}, phase {tuning.phase_margin:.4g} degrees"
         yield f"margins     {margins}, maximum sensitivity {tuning.max_sensitivity:.4g}"
-    if not math.isnan(design.file_rms):
-        yield f"reference   tracking rms {quantity(design.file_rms, design.units.get('y', ''))}"
+    source = f"{design.reference}, second column" if not math.isnan(design.file_rms) else design.reference
+    rms = f", tracking rms {quantity(design.file_rms, design.units.get('y', ''))}"
+    yield f"reference   {_signal(design, 'y')}: {source}{rms * (not math.isnan(design.file_rms))}"
+    if (limits := design.triangle.closed.conditions["limits"]) is not None:
+        extremes = f", the extremes of {design.limits_from}" * (design.limits_from is not None)
+        yield f"command     {_signal(design, 'u')}: {extent(limits, design.units.get('u', ''))}{extremes}"
+
+
+def _signal(design: Design, name: str) -> str:
+    """The quantity of the input or the output with its unit."""
+    text = label(design.units, name)
+    return text[0].lower() + text[1:]
 
 
 def _triangle(design: Design) -> Iterator[str]:
@@ -157,7 +169,7 @@ def picture(design: Design) -> "Figure":
 
     def draw(canvas: "Figure") -> None:
         upper, lower = canvas.subplots(2)
-        curves = (outputs.Curve(reference, np.asarray(y)[last], None, name, both) for name, y in loops.items())
+        curves = (Simulation(u=reference, y=y[last], units=both, name=name) for name, y in loops.items())
         plot.loop(*curves, ax=upper)
         upper.set_xlabel("Reference" + "".join(upper.get_ylabel().partition(" [")[1:]))
         plot.traces(steps, lower, units=units)

@@ -58,6 +58,10 @@ def _designed(options: argparse.Namespace) -> "Design":
 
     model, units = models.read(options.model)
     record = None if options.record is None else load(options.record, u=options.u, y=options.y)
+    if record is not None:
+        signals = {name: unit for name, unit in units.items() if name in ("u", "y")}
+        record = designs.in_units(record, signals, options.record)
+        units = {**units, **record.units}
     actuator = designs.plant(model, options)
     limits = designs.limits(options, record)
     task = designs.task(actuator, options, limits)
@@ -69,7 +73,7 @@ def _designed(options: argparse.Namespace) -> "Design":
     controller = with_feedback(template or PID(kp=1.0, limits=limits))
     if options.c:
         _c_code(options, controller)  # a controller that cannot be exported is an error before the search
-    reference = designs.reference(task, designs.rest(actuator, task.u0), options.reference)
+    reference = designs.reference(task, designs.rest(actuator, task.u0), options.reference, units.get("y"))
     tuning = None
     if options.controller != "inverse":
         tuning = tune(
@@ -91,7 +95,9 @@ def _designed(options: argparse.Namespace) -> "Design":
         step=assess_step(actuator, controller, step=task.step, duration=task.duration, sample_time=h, u0=task.u0),
         file_rms=designs.file_rms(actuator, controller, reference, options.reference),
         fit_percent=designs.fit_percent(model, record),
-        units={**units, **({} if record is None else record.units)},
+        units=units,
+        reference=Path(options.reference).name,
+        limits_from=Path(options.record).name if options.record and options.limits is None else None,
     )
 
 

@@ -6,6 +6,7 @@ the middle 80 % of the displacements that the plant reaches within the limits.
 
 import argparse
 import math
+from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any, NamedTuple
 
@@ -31,7 +32,8 @@ from hysim.plants.actuator import Actuator
 from hysim.plants.creep import Creep
 from hysim.plants.modes import mode
 from hysim.plants.sensor import Sensor
-from hysim.records import Record
+from hysim.records import Record, step_if_even
+from hysim.simulation import free_run
 
 Pair = tuple[float, float]
 
@@ -133,10 +135,19 @@ def rest(actuator: Actuator, u: float) -> float:
 
 
 def fit_percent(model: Any, record: Record | None) -> float:
-    """Fit of the model's free run to the record; nan without a record, or for a model that depends on time."""
-    if record is None or needs_time(model):
+    """Fit of the model's free run to the record; nan without a record, or without the even times that a model needs."""
+    if record is None or (needs_time(model) and (record.t is None or step_if_even(record.t) is None)):
         return math.nan
-    return metrics.fit_percent(record.y, model.response(record.u))
+    return metrics.fit_percent(record.y, free_run(model, record).y)
+
+
+def in_units(record: Record, units: Mapping[str, str], source: str) -> Record:
+    """The record in these units, where it has others; ValueError if they differ by more than a prefix."""
+    other = {name: unit for name, unit in units.items() if record.units.get(name, unit) != unit}
+    try:
+        return record.convert(other) if other else record
+    except ValueError as error:
+        raise ValueError(f"{source} is not in the units of the model: {error}") from None
 
 
 def file_rms(actuator: Actuator, controller: Any, reference: "Reference", kind: str) -> float:
@@ -160,15 +171,16 @@ class Reference(NamedTuple):
         return read_only(self.sample_time * np.arange(self.values.size))
 
 
-def reference(task: Task, rest: float, kind: str) -> Reference:
-    """The triangle, the step from a displacement at rest, or the reference in a file."""
+def reference(task: Task, rest: float, kind: str, unit: str | None) -> Reference:
+    """The triangle, the step from a displacement at rest, or the reference in a file, in the unit of the output."""
     h = task.sample_time
     if kind == "step":
         return Reference(h, np.full(round(task.duration / h) + 1, rest + task.step), 0.0, "itae")
     if kind == "triangle":
         values = signals.triangle(task.low, task.high, cycles=2, samples_per_cycle=task.samples_per_cycle)
         return Reference(h, values, task.period, "rms")
-    return Reference(h, load(kind, t=0, u=1, y=1).resample(h).u, 0.0, "rms")
+    units = {} if unit is None else {"u": unit}
+    return Reference(h, in_units(load(kind, t=0, u=1, y=1), units, kind).resample(h).u, 0.0, "rms")
 
 
 def feedback(actuator: Actuator, kind: str, within: Pair | None) -> PID | TrackingController | None:

@@ -24,7 +24,7 @@ def run(options: argparse.Namespace) -> int:
     model = discovery.model
     files: outputs.Files = {
         options.out: lambda: to_json(model, units=record.units),
-        options.plot: lambda: outputs.loop_of_model(record, model),
+        options.plot: lambda: outputs.loop(record, model),
     }
     if model is None:
         files = {path: lambda: "" for path in files if path == records.STANDARD}

@@ -15,7 +15,6 @@ SUCCESS, NOT_CONVERGED = 0, 1
 def run(options: argparse.Namespace) -> int:
     """Identify, write the files that are asked for, and print the result."""
     from hysim.identification import identify
-    from hysim.models.channels.dependent import on_record
     from hysim.models.storage import to_json
     from hysim.simulation import simulate
 
@@ -44,10 +43,10 @@ def run(options: argparse.Namespace) -> int:
 
     def picture() -> "Figure":
         if options.sensor:  # the record of one sensor is not the output of the structure
-            return outputs.picture_of(simulate(fit.model, record.t, record.u))
-        return outputs.loop_of_model(record, on_record(fit.model, record))
+            return outputs.picture_of(simulate(fit, record.t, record.u))
+        return outputs.loop(record, fit)
 
-    files: outputs.Files = {options.out: lambda: to_json(fit.model, units=record.units), options.plot: picture}
+    files: outputs.Files = {options.out: lambda: to_json(fit, units=record.units), options.plot: picture}
     family = {"family": type(fit.model).__name__}
     outputs.write(options, files, fit.summary, lambda: family | outputs.fields_of(fit, names))
     return SUCCESS if fit.success else NOT_CONVERGED

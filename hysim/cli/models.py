@@ -248,7 +248,8 @@ def name_of(path: str) -> str:
 def simulated(model: Any, record: "hysim.Record", units: dict[str, str]) -> "hysim.Simulation":
     """The model's free run over the record's input; a ValueError if it has no response, such as a controller."""
     from hysim.models.protocols import Responding
+    from hysim.simulation import free_run
 
     if not isinstance(model, Responding):
         raise ValueError(f"a {type(model).__name__} has no response to simulate: give a law or a plant")
-    return hysim.simulate(model, record.t, record.u, units=units)
+    return free_run(model, record, units)

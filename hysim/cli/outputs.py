@@ -10,8 +10,7 @@ import time
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from datetime import timedelta
 from pathlib import Path
-from types import MappingProxyType
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 from hysim._atomic import write_all
 from hysim.cli.options import INPUT, MODEL, PICTURE, PRINTED, TABLE
@@ -21,7 +20,6 @@ from hysim.cli.shell.words import in_shell_words
 if TYPE_CHECKING:
     from hysim._frozen import FloatArray
     from hysim.plot import Figure
-    from hysim.records import Record
     from hysim.simulation import Simulation
 
 Files = Mapping[str | None, Callable[[], Any]]
@@ -156,16 +154,6 @@ def table(path: str, columns: Mapping[str, "FloatArray"], units: Mapping[str, st
     return packed(columns, "output.csv" if path == STANDARD else path, notes)
 
 
-class Curve(NamedTuple):
-    """A loop to draw: input, output and time, with a name and units."""
-
-    u: "FloatArray"
-    y: "FloatArray"
-    t: "FloatArray | None" = None
-    name: str = ""
-    units: Mapping[str, str] = MappingProxyType({})
-
-
 def drawn(draw: "Callable[[Figure], object]", width: float = 6.0, height: float = 4.0) -> "Figure":
     """A figure in the house style, which a function has drawn on."""
     from hysim import plot
@@ -176,8 +164,8 @@ def drawn(draw: "Callable[[Figure], object]", width: float = 6.0, height: float 
     return canvas
 
 
-def loop(*results: "Record | Simulation | Curve") -> "Figure":
-    """Picture of loops over each other."""
+def loop(*results: Any) -> "Figure":
+    """Picture of loops over each other: of records, simulations, and models and fits on the record before them."""
     from hysim import plot
 
     return drawn(lambda canvas: plot.loop(*results, ax=canvas.add_subplot()))
@@ -197,14 +185,6 @@ def picture_of(run: "Simulation") -> "Figure":
         width=3.0 * min(n, _LOOPS_IN_A_ROW) + 1.0,
         height=3.0 * rows,
     )
-
-
-def loop_of_model(record: "Record", model: Any) -> "Figure":
-    """Picture of a record and of a model's free run over its input, under the name of the model's family."""
-    from hysim.simulation import simulate
-
-    run = simulate(model, record.t, record.u, units=dict(record.units))
-    return loop(record, Curve(run.u, run.y, run.t, type(model).__name__, run.units))
 
 
 class Progress:

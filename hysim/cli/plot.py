@@ -2,11 +2,11 @@
 
 import argparse
 from collections.abc import Callable
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from hysim.cli import models, outputs, records
 from hysim.cli.options import Command
-from hysim.cli.outputs import Curve
 
 if TYPE_CHECKING:
     from hysim.plot import Figure
@@ -26,10 +26,10 @@ class Contents(NamedTuple):
     simulated: "list[Simulation]"
 
     @property
-    def results(self) -> "list[Record | Curve]":
+    def results(self) -> "list[Record | Simulation]":
         """Records, and the runs of models by their names."""
         named = zip(self.laws, self.simulated, strict=True)
-        return [*self.measured, *(Curve(run.u, run.y, run.t, name, run.units) for name, run in named)]
+        return [*self.measured, *(replace(run, name=name) for name, run in named)]
 
 
 class Kind(NamedTuple):

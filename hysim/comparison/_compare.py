@@ -16,7 +16,8 @@ from hysim._cycles import TOLERANCE
 from hysim._excursions import measured_cycles
 from hysim._frozen import FloatArray
 from hysim._parallel import Progress, map_on_threads
-from hysim.comparison._records import OneByOne, Result, model_of, models_on, together
+from hysim._results import Result, model_of
+from hysim.comparison._records import CrossValidated, OneByOne, together
 from hysim.comparison._result import Comparison, ComparisonRow
 from hysim.errors import Interrupted, SimulationError
 from hysim.identification import Identification, identify
@@ -26,7 +27,7 @@ from hysim.models.candidates import candidates, candidates_named, is_identifiabl
 from hysim.models.channels.dependent import on_record
 from hysim.models.protocols import Direct, Responding, needs_time
 from hysim.records import Record, as_record, several
-from hysim.simulation import simulate
+from hysim.simulation import free_run, models_on, simulate
 
 _SHORT = 200  # samples; leaving one out at a time costs as many fits as there are samples
 _BLOCKS = 10
@@ -187,17 +188,22 @@ class _Protocol:
             return " ".join(str(error).split())
 
     def _measured_row(self, name: str, subject: Any, identified_here: bool) -> ComparisonRow:
-        record, measured, own = self.records[-1], self.measured, models_on(subject, self.records)
-        outputs = [simulate(each, rec.t, rec.u).y for each, rec in zip(own, self.records, strict=True)]
+        record, measured = self.records[-1], self.measured
+        if isinstance(subject, list | tuple):
+            own = [models_on(each, [rec])[0] for each, rec in zip(subject, self.records, strict=True)]
+            subject = together(subject)
+        else:
+            own = models_on(subject, self.records)
+        outputs = [free_run(each, rec).y for each, rec in zip(own, self.records, strict=True)]
         model, y, every = own[-1], outputs[-1], np.concatenate([each.y for each in self.records])
         simulated = np.concatenate(outputs)
         loop, residual, rmse = _loop(model, record, y), every - simulated, metrics.rmse(every, simulated)
         fitted: dict[str, Any] = {"n_parameters": 0, "cv_rmse": rmse, "cv_residual": residual}
         fitted |= dict.fromkeys(_CRITERIA, math.nan)
-        subject = together(subject) if isinstance(subject, list | tuple) else subject
         if isinstance(subject, Result):
             d = int(subject.n_parameters)
-            fitted = {"n_parameters": d, "cv_rmse": float(subject.cv_rmse), "cv_residual": np.empty(0)}
+            cv_rmse = float(subject.cv_rmse) if isinstance(subject, CrossValidated) else math.nan
+            fitted = {"n_parameters": d, "cv_rmse": cv_rmse, "cv_residual": np.empty(0)}
             fitted |= {name: criterion(residual, d) for name, criterion in _CRITERIA.items()}
         if isinstance(subject, Identification):
             fitted |= {"cv_residual": subject.cv_residual, "warnings": tuple(subject.warnings)}
@@ -233,8 +239,7 @@ class _Protocol:
         drive, test = self.trial.drive, self.trial.record
         if self.trial.own_state and identified_here:
             model = _with_initial_state(drive, subject, self.seed)
-        model = on_record(model, drive)
-        y = simulate(model, drive.t, drive.u).y[self.trial.begin :]
+        y = free_run(model, drive).y[self.trial.begin :]
         return metrics.fit_percent(test.y, y), metrics.rmse(test.y, y)
 
 

@@ -14,7 +14,7 @@ from hysim.laws.static import Line
 from hysim.models.inverse_steps import inverse_step
 from hysim.models.model import family
 from hysim.models.protocols import CompiledController, needs_time
-from hysim.plants.actuator import Actuator, is_law
+from hysim.plants.actuator import Actuator, as_actuator, is_law
 from hysim.plants.amplifier import Amplifier
 from hysim.plants.creep import Creep
 
@@ -93,9 +93,10 @@ class InverseFeedforward(SampledController):
         return self.creep is not None or needs_time(self.law)
 
     @classmethod
-    def of(cls, plant: Actuator) -> Self:
-        """Inverse of an actuator's amplifier, law and creep; it raises as the constructor does."""
-        return cls(law=plant.hysteresis, creep=plant.creep, amplifier=plant.amplifier)
+    def of(cls, plant: Any) -> Self:
+        """Inverse of the amplifier, law and creep of an actuator, a law or a fit; it raises as the constructor does."""
+        actuator = as_actuator(plant)
+        return cls(law=actuator.hysteresis, creep=actuator.creep, amplifier=actuator.amplifier)
 
     def frequency_response(self, frequency: npt.ArrayLike, sample_time: float) -> npt.NDArray[np.complex128]:
         """Zeros: the measurement is not used."""

@@ -11,6 +11,7 @@ import numpy.typing as npt
 from hysim._frozen import FloatArray, frozen, read_only
 from hysim._parallel import Progress
 from hysim._printing import extent, printed, quantity, summary_text
+from hysim._results import model_of
 from hysim.control._protocols import Controller, limits_of, preview
 from hysim.errors import SimulationError, warn_beyond, warn_limited
 from hysim.models.model import in_brief
@@ -142,8 +143,9 @@ def close_loop(
     Parameters
     ----------
     plant : Actuator, law, linear plant, creep, amplifier, cascade of laws that ends with a TransferFunction, Structure
-        At rest at `u0` before the first sample, creep included. A structure with ``excitation="force"`` begins at its
-        initial state; `influence` says where the controller's force acts, `output` what the controller reads.
+        Or the result of a fit. At rest at `u0` before the first sample, creep included. A structure with
+        ``excitation="force"`` begins at its initial state; `influence` says where the controller's force acts, `output`
+        what the controller reads.
     controller : PID, TrackingController, InverseFeedforward, or anything with their ``compiled``
         At rest too. With a method ``ahead`` it gets the reference so many samples ahead, and at the end its last value.
     t : array, shape (n,)
@@ -201,6 +203,7 @@ def close_loop(
     if not is_controller(controller):
         raise TypeError(f"controller must be a PID or the like, got {type(controller).__name__}")
     r, times = read_only(reference, "reference", ndim=1), read_only(t, "t", ndim=1)
+    plant = model_of(plant)
     if isinstance(plant, Structure):
         if u0 or substeps is not None:
             raise ValueError("a structure has its own initial_state and substeps: leave out u0 and substeps")

@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 
+from hysim._results import model_of
 from hysim.control._io_systems import actuator_system, controller_system, oscillator_system
 from hysim.control._loop import as_actuator, is_controller
 from hysim.control._pid import PID
@@ -19,7 +20,7 @@ def to_control(plant: Any, sample_time: float | None = None) -> Any:
 
     Parameters
     ----------
-    plant : TransferFunction, StateSpace, Modes, Actuator, law, BoucWenOscillator, PID or TrackingController
+    plant : TransferFunction, StateSpace, Modes, Actuator, law, BoucWenOscillator, PID, TrackingController or fit
         A plant without a law becomes a linear system, without the actuator's limits and slewing but with the sensor's
         delay; a PID too, from its error to its command without limits, the derivative acting on the error (this keeps
         the loop's poles). All others become nonlinear systems, memory in the state: an actuator with its limits
@@ -61,6 +62,7 @@ def to_control(plant: Any, sample_time: float | None = None) -> Any:
     """
     if sample_time is not None and not 0.0 < sample_time < math.inf:
         raise ValueError(f"sample_time must be positive and finite, got {sample_time}")
+    plant = model_of(plant)
     if isinstance(plant, PID):
         return _pid(plant, sample_time)
     if isinstance(plant, BoucWenOscillator):

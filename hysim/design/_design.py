@@ -7,6 +7,7 @@ import numpy as np
 import numpy.typing as npt
 
 from hysim._frozen import FloatArray, read_only
+from hysim._results import model_of
 from hysim.design import _search as search
 from hysim.design._candidates import random_segments, random_strokes, through, triangles, usual, usual_of_many_speeds
 from hysim.design._criteria import Criterion, spreads
@@ -23,7 +24,7 @@ _BELOW_NYQUIST = 0.8  # at most, of half the sampling rate
 
 
 def design_input(
-    plant: Law | ActuatorStructure,
+    plant: Any,
     *,
     limits: InputLimits | Mapping[str, float],
     free: Sequence[str] | None = None,
@@ -46,7 +47,7 @@ def design_input(
 
     Parameters
     ----------
-    plant : Law, or structure of an Actuator
+    plant : Law, result of a fit, or structure of an Actuator
         A law as far as it is known, or `hysim.Actuator.structure` with such a law; at rest before the first sample.
     limits : InputLimits or mapping
         amplitude, slew, duration, sample_time, and optionally centre.
@@ -92,6 +93,7 @@ def design_input(
     >>> bool(max(design.efficiency.values()) <= 1.0), bool(abs(design.u).max() <= 2.0)
     (True, True)
     """
+    plant = model_of(plant)
     bounds = limits if isinstance(limits, InputLimits) else InputLimits(**limits)
     subject = _subject(plant, bounds, free, values, noise, criterion)
     rng, in_time = np.random.default_rng(seed), isinstance(plant, ActuatorStructure)

@@ -12,6 +12,7 @@ from hysim._atomic import write_text
 from hysim._frozen import FloatArray, frozen
 from hysim._printing import printed, summary_text
 from hysim._release import __version__
+from hysim._results import model_of
 from hysim.export import _c
 from hysim.export._program import Program, program_of, start_of
 
@@ -144,7 +145,7 @@ def to_c(
 
     Parameters
     ----------
-    thing : model or controller
+    thing : model, result of a fit, or controller
         A law, sum, cascade, plant or actuator, `InverseFeedforward` for the inverse of a law, or another controller.
         Laws of your own take part; their step is translated from its Python source.
     sample_time : float, optional
@@ -185,6 +186,7 @@ def to_c(
     """
     if not re.fullmatch("[A-Za-z][A-Za-z0-9_]*", name) or name in _c.RESERVED:
         raise ValueError(f"name must be letters, digits and underscores after a letter, got {name!r}")
+    thing = model_of(thing)
     program = program_of(thing, sample_time, u0=u0, y0=y0)
     texts = _texts(program, name, type(thing).__name__, *start_of(thing, sample_time or math.inf, u0, y0))
     header, source, main = (Template(text).substitute(texts) for text in (_HEADER, _SOURCE, _MAIN))

@@ -14,6 +14,7 @@ from typing import Any, Literal, NamedTuple
 
 from hysim._atomic import write_all
 from hysim._frozen import check_choice
+from hysim._results import model_of
 from hysim.export._compilers import TARGETS, Target, compiler, host, shared_library, universal
 from hysim.export._field_units import field_unit
 from hysim.export._fmu_source import source_of, token_of
@@ -58,7 +59,7 @@ def to_fmu(
 
     Parameters
     ----------
-    thing : model or controller
+    thing : model, result of a fit, or controller
         A law, sum, cascade, plant or actuator, `InverseFeedforward` for the inverse of a law, or another controller.
     path : str or Path
         The file, which ends in ``.fmu``.
@@ -114,6 +115,7 @@ def to_fmu(
     ...     zipfile.ZipFile(path).namelist()
     ['modelDescription.xml', 'sources/Dahl.c']
     """
+    thing = model_of(thing)
     target = _checked(Path(path), version, platforms)
     labels = dict(units or {})
     if not all(isinstance(text, str) for pair in labels.items() for text in pair):

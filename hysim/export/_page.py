@@ -23,6 +23,7 @@ from hysim._excursions import measured_cycles
 from hysim._frozen import FloatArray
 from hysim._prefixes import label, printed
 from hysim._release import __version__
+from hysim._results import model_of
 from hysim.export._page_model import Parts, about, heading, node_of, plane_of
 from hysim.export._page_modules import compressed
 from hysim.laws.operators.prandtl_ishlinskii import PrandtlIshlinskii
@@ -68,7 +69,7 @@ def to_page(
 
     Parameters
     ----------
-    thing : law, sum or cascade of laws
+    thing : law, sum or cascade of laws, or result of a fit
         The model with which the page begins. A law that is not hysim's own needs the extra `export`.
     path : path
         The file to write, which ends in ``.html`` or ``.htm``.
@@ -105,7 +106,7 @@ def to_page(
     ...     page.read_text()[:15]
     '<!DOCTYPE html>'
     """
-    page = checked_path(path)
+    page, thing = checked_path(path), model_of(thing)
     name = heading(thing) if title is None else title
     text = page_text({name: Shown(thing, between, units or {})}, record)
     size = len(text.encode())

@@ -32,7 +32,7 @@ from hysim.models.protocols import LongerPast, Rescalable, Undecided, Variant
 from hysim.models.search_space import Freedom, SearchSpace
 from hysim.models.whole.part_by_part import PartByPart
 from hysim.records import Record
-from hysim.simulation import output_on
+from hysim.simulation import free_run
 
 _STRONG = 10.0  # difference of two BIC
 _IN_VAIN = 2  # longer pasts in a row that are no better: one number more may be of use only with another one
@@ -144,7 +144,7 @@ def _left_out(
         for k, half in enumerate(halves):
             model = attempt.family.assemble(attempt.estimates(theta, k))
             for record in (paths[k], quiet[k]):
-                rest = (record.y - output_on(model, record))[len(half) % len(record) :]
+                rest = (record.y - free_run(model, record).y)[len(half) % len(record) :]
                 total += float(rest @ rest)
     except (ValueError, ArithmeticError, SimulationError):
         return math.inf

@@ -11,6 +11,7 @@ import numpy.typing as npt
 from hysim._blas import one_blas_thread
 from hysim._frozen import FloatArray, check_choice, check_count, read_only
 from hysim._parallel import Progress, at_most
+from hysim._results import model_of
 from hysim.identification import _direct as direct
 from hysim.identification._assumptions import Treated, decided, in_units_of_noise, quiet_rmse, treated
 from hysim.identification._extrapolation import implausible
@@ -57,7 +58,7 @@ def identify(
 
     Parameters
     ----------
-    model_or_class : model, model class, structure or str
+    model_or_class : model, model class, structure, result of a fit, or str
         `hysim.BoucWen`, `hysim.TransferFunction.structure(poles=4, zeros=1)`, ..., or the name of a family, such as
         ``"bouc-wen"``. The search begins at the defaults of a class, or at the values of an instance, such as a
         `hysim.Structure`.
@@ -133,6 +134,7 @@ def identify(
     """
     if isinstance(model_or_class, str):
         model_or_class = family_named(model_or_class)
+    model_or_class = model_of(model_or_class)
     given = model_or_class.as_records(record_or_records) if isinstance(model_or_class, Recorded) else record_or_records
     records: Sequence[Record] = several(given, "identify")
     options = _freedom(fixed or {}, free, bounds or {})

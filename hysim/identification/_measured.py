@@ -20,7 +20,7 @@ from hysim.models.protocols import placed
 from hysim.plants.actuator import Actuator
 from hysim.plants.multi_input_actuator import MultiInputActuator
 from hysim.records import Record
-from hysim.simulation import output_on
+from hysim.simulation import free_run
 
 _UNUSABLE = 2.0  # times the error along a quiet path: beyond, the noise of the input decides what the model does
 
@@ -39,7 +39,7 @@ def as_measured(
 
     models = tuple(returned(model, record) for model, record in zip(fit.models, records, strict=True))
     y = np.concatenate([record.y for record in records])
-    residual = y - np.concatenate([output_on(model, record) for model, record in zip(models, records, strict=True)])
+    residual = y - np.concatenate([free_run(model, record).y for model, record in zip(models, records, strict=True)])
     kept = np.ones(y.size, dtype=bool) if weights is None else np.concatenate([*weights]) > 0.0
     front = {} if treatment.front is None else {"reversal_filter.threshold": treatment.front.threshold}
     return replace(
@@ -89,7 +89,7 @@ def said_of_noise(
 
 def _alone_in_words(models: Sequence[Any], records: Sequence[Record], spread: float) -> str:
     try:
-        residual = [record.y - output_on(model, record) for model, record in zip(models, records, strict=True)]
+        residual = [record.y - free_run(model, record).y for model, record in zip(models, records, strict=True)]
     except SimulationError:
         return "and it diverges"
     return f"{100.0 * float(np.sqrt(np.mean(np.concatenate(residual) ** 2))) / spread:.3g} %"

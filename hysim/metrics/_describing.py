@@ -21,6 +21,7 @@ import numpy.typing as npt
 
 from hysim._cycles import ROUNDING
 from hysim._frozen import FloatArray, read_only
+from hysim._results import model_of
 from hysim.errors import SimulationError
 
 _BATCHES = tuple(2**k for k in range(4, 18))  # cycles of each of the successive runs
@@ -50,7 +51,7 @@ def describing_function(
 
     Parameters
     ----------
-    law : model
+    law : model or result of a fit
         A rate-independent law, such as `hysim.BoucWen`.
     amplitudes : array, shape (n,)
         Positive amplitudes a of the input [unit of u].
@@ -78,6 +79,7 @@ def describing_function(
     >>> hs.metrics.describing_function(hs.Play(threshold=1.0), [1.0, 2.0, 1e3]).round(3).tolist()
     [0j, (0.5-0.318j), (1-0.001j)]
     """
+    law = model_of(law)
     if not isinstance(law, _Stepped) or (isinstance(law, _Dynamic) and law.dynamic):
         raise TypeError(
             f"a describing function of the amplitude alone needs a law without time, got {type(law).__name__}; "

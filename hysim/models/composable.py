@@ -4,6 +4,7 @@ from dataclasses import dataclass, field, replace
 from typing import Any, NamedTuple, Self
 
 from hysim._frozen import LAST, items, own_items
+from hysim._results import model_of
 from hysim.models.protocols import Responding
 
 
@@ -32,16 +33,24 @@ def composed(operator: str, members: tuple[Any, ...]) -> Any:
 class Composable:
     """Base class of what can be a part of a `hysim.Sum` and a stage of a `hysim.Cascade`.
 
-    An operand that is a structure, or holds one, makes a structure.
+    An operand that is a structure, or holds one, makes a structure. A result of a fit stands for its model.
     """
 
     def __add__(self, other: "Composable") -> Any:
         """Sum of the outputs; a sum among the operands adds its own parts."""
         return _joined(self, other, _KINDS["+"])
 
+    def __radd__(self, other: Any) -> Any:
+        """Sum of a result's model and this."""
+        return _joined(other, self, _KINDS["+"])
+
     def __rshift__(self, other: "Composable") -> Any:
         """`other` behind this; a cascade among the operands adds its own stages."""
         return _joined(self, other, _KINDS[">>"])
+
+    def __rrshift__(self, other: Any) -> Any:
+        """This behind a result's model."""
+        return _joined(other, self, _KINDS[">>"])
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -73,7 +82,8 @@ class Placed(Composable):
 
 
 def _joined(first: Any, second: Any, kind: _Kind) -> Any:
-    if not isinstance(second, Composable):
+    first, second = model_of(first), model_of(second)
+    if not (isinstance(first, Composable) and isinstance(second, Composable)):
         return NotImplemented
     kinds = kind.model, kind.structure
     members = [

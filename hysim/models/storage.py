@@ -17,6 +17,7 @@ from hysim._atomic import write_text
 from hysim._frozen import given_items, last_names
 from hysim._names import MODULE_OF
 from hysim._release import __version__
+from hysim._results import model_of
 from hysim.models.model import FAMILIES, every_family
 
 _DEEPEST = 100  # lists and mappings in each other: a chain of chains takes three for a model
@@ -30,8 +31,8 @@ def save(model: Any, path: str | Path, *, units: Mapping[str, str] | None = None
 
     Parameters
     ----------
-    model : model
-        Of one of hysim's families.
+    model : model, or result of `identify` or `discover`
+        Of one of hysim's families. Of a result its model is written; ``result.to_json()`` is the text of all of it.
     path : path
         The file; it appears whole or not at all.
     units : mapping, optional
@@ -57,19 +58,12 @@ def save(model: Any, path: str | Path, *, units: Mapping[str, str] | None = None
 
 def to_json(model: Any, *, units: Mapping[str, str] | None = None) -> str:
     """The text that `save` writes."""
+    model = model_of(model)
     if not is_model(model):
         raise TypeError(f"save takes a model of hysim, got {type(model).__name__}{_advice(model)}")
     document = {"hysim": __version__, **to_document(model), "units": dict(units or {})}
     _check_depth(document)
     return json.dumps(document, indent=2, allow_nan=False) + "\n"
-
-
-@runtime_checkable
-class _WithModel(Protocol):
-    """A result of `identify` or `discover`."""
-
-    @property
-    def model(self) -> Any: ...
 
 
 @runtime_checkable
@@ -84,8 +78,6 @@ class _InputOutput(Protocol):
 
 def _advice(value: Any) -> str:
     """Name of the function to call for something that is not a model."""
-    if isinstance(value, _WithModel):
-        return ": hs.save(result.model, path) writes its model, result.to_json() is the text of all of it"
     return ": hs.save_record(record, path) writes a record" if isinstance(value, _InputOutput) else ""
 
 

@@ -2,12 +2,13 @@
 
 import math
 from dataclasses import replace
-from typing import Any
+from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
 import numpy.typing as npt
 
 from hysim._frozen import FloatArray, items, read_only
+from hysim._results import model_of
 from hysim.errors import SimulationError
 from hysim.models.cascade import Cascade
 from hysim.models.model import family
@@ -32,12 +33,20 @@ from hysim.plants.sensor import Sensor
 from hysim.plants.state_space import linear_plant
 from hysim.plants.transfer_function import TransferFunction
 from hysim.plants.whole.actuator_structure import ActuatorStructure
+from hysim.records import Record
 
 
 def is_law(value: Any) -> bool:
     """Whether a value has a response and can be stepped in a loop, at a sample time if it needs one."""
     steps = isinstance(value, Responding) and isinstance(value, Steppable)
     return steps and (not needs_time(value) or isinstance(value, Sampled))
+
+
+@runtime_checkable
+class _Resolved(Protocol):
+    """A fit that knows the quantum of its record's sensor."""
+
+    resolution: float | None
 
 
 @family
@@ -113,6 +122,52 @@ class Actuator:
             u0 = None if u0 is None else float(self.amplifier.voltage(u0))
             u_range = None if u_range is None else tuple(sorted(self.amplifier.voltage(u_range).tolist()))
         return replace(self, hysteresis=placed(self.hysteresis, u0, u_range))
+
+    @classmethod
+    def of(cls, fit: Any, record: Record | None = None) -> "Actuator":
+        """The actuator of a fit, kept within the inputs of its record.
+
+        Parameters
+        ----------
+        fit : Identification, Discovery or model
+            A law, or a plant that `hysim.close_loop` takes.
+        record : Record, optional
+            The record of the fit; by default the range is the one that the model was identified on, ``u_range``, and
+            the resolution that of the fit.
+
+        Returns
+        -------
+        Actuator
+            Its amplifier stops at the lowest and the highest voltage of the record, and its sensor reads in steps of
+            the record's resolution, unless the model's own amplifier and sensor have limits and a quantum.
+
+        Raises
+        ------
+        ValueError
+            If the range is not known.
+
+        Examples
+        --------
+        >>> import hysim as hs
+        >>> rec = hs.datasets.table1()
+        >>> stack = hs.Actuator.of(hs.identify(hs.Line, rec), rec)
+        >>> stack.amplifier.limits, stack.sensor.quantum
+        ((0.0, 125.0), 0.0763)
+        """
+        actuator, resolution = as_actuator(fit), fit.resolution if isinstance(fit, _Resolved) else None
+        limits = actuator.u_range
+        if record is not None:
+            extremes, resolution = (float(record.u.min()), float(record.u.max())), record.resolution
+            limits = tuple(sorted(actuator.voltage(extremes).tolist()))
+            actuator = actuator.placed(float(record.u[0]) if actuator.u0 is None else actuator.u0, extremes)
+        if limits is None:
+            raise ValueError("the inputs of the model's record are not known: give Actuator.of(fit, record)")
+        amplifier, sensor = actuator.amplifier or Amplifier(), actuator.sensor or Sensor()
+        return replace(
+            actuator,
+            amplifier=replace(amplifier, limits=limits) if amplifier.limits is None else amplifier,
+            sensor=replace(sensor, quantum=resolution) if resolution and not sensor.quantum else actuator.sensor,
+        )
 
     @classmethod
     def structure(
@@ -284,13 +339,18 @@ class Actuator:
             return np.append(signals.y, chain.displacement(end))[1:], end
         return chain.after_the_command(signals, begin), end
 
+    @property
+    def as_read(self) -> "Actuator":
+        """The actuator whose displacement is what the sensor of this one reads, without noise and steps."""
+        return self if self.sensor is None else self._late(self.sensor.delay)
+
     def measured(
         self, u: npt.ArrayLike, sample_time: float | None = None, *, substeps: int | None = None
     ) -> FloatArray:
         """Readings (n,) of the sensor for `response`: late, noisy, in steps; arguments and errors as there."""
         if self.sensor is None:
             return self.response(u, sample_time, substeps=substeps)
-        return self.sensor.measure(self._late(self.sensor.delay).response(u, sample_time, substeps=substeps))
+        return self.sensor.measure(self.as_read.response(u, sample_time, substeps=substeps))
 
     def startable(self, sample_time: float | None = None, *, substeps: int | None = None) -> Startable:
         """The actuator as a step from the command to what `measured` reads without noise, for exports.
@@ -298,7 +358,7 @@ class Actuator:
         An actuator that is not `dynamic` needs no `sample_time` [s]. Raises ValueError if one is needed, and TypeError
         if the law has no start.
         """
-        whole = self if self.sensor is None else self._late(self.sensor.delay)
+        whole = self.as_read
         at_end = isinstance(whole.vibration, TransferFunction) and whole.vibration.sample == "end"
         return whole.chain(self._any_time(sample_time), substeps).startable(at_end=at_end)
 
@@ -405,7 +465,8 @@ def as_actuator(plant: Any) -> Actuator:
     """Any plant as an actuator: a law becomes its hysteresis, a linear plant its vibration; others are a TypeError.
 
     Of a cascade of laws that ends with a transfer function the laws become the hysteresis, and the transfer function
-    the vibration, which begins at rest as every actuator does. A creep and an amplifier are taken, too.
+    the vibration, which begins at rest as every actuator does. A creep, an amplifier and the
+    result of a fit are taken, too.
 
     Examples
     --------
@@ -416,6 +477,7 @@ def as_actuator(plant: Any) -> Actuator:
     >>> hs.control.as_actuator(hs.Line(slope=2.0) >> mode) == hs.Actuator(hysteresis=hs.Line(slope=2.0), vibration=mode)
     True
     """
+    plant = model_of(plant)
     if isinstance(plant, Actuator):
         return plant
     if is_law(plant):

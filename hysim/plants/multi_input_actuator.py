@@ -13,6 +13,7 @@ import numpy.typing as npt
 
 from hysim._channels import Channels, checked_channels, value_in
 from hysim._frozen import FloatArray, read_only
+from hysim.models.channels.dependent import AlongRecord
 from hysim.models.model import family
 from hysim.models.parts import check_parts, response_of
 from hysim.models.protocols import Placeable, placed
@@ -135,6 +136,10 @@ class MultiInputActuator:
             name: response_of(part, read_only(np.broadcast_to(seen[name], inputs.shape)), sample_time)
             for name, part in zip(self.inputs, self.actuators, strict=True)
         }
+
+    def on(self, record: Record) -> AlongRecord:
+        """The actuator of the record's input alone, its other inputs those of the record."""
+        return AlongRecord(self, record)
 
     def response_of(self, record: Record) -> FloatArray:
         """Displacement (n,) for the inputs of a record, its channels among them; errors as of `response`.

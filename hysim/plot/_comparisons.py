@@ -17,11 +17,13 @@ from hysim.comparison import Comparison, ComparisonRow
 from hysim.identification import Identification
 from hysim.plot._style import GUIDE, MANY, MEASURED, POINTS, AxesArray, grid_of, joined, line, one, scattered, several
 from hysim.records import Record
+from hysim.simulation import free_run, models_on
 
 _FILLED: dict[str, Any] = {"markeredgewidth": 0.8}
 _OPEN = _FILLED | {"markerfacecolor": "white"}
 _UNLOADING = "#56B4E9"  # of many samples, which have no open markers
 _TIGHT: dict[str, Any] = {"borderaxespad": 0.1, "columnspacing": 1.0, "handlelength": 1.2, "handletextpad": 0.3}
+_SAME = 1e-6  # of the output's range: largest difference of two runs of one model
 _SHOWN = 4  # models in a figure, unless names are chosen
 
 
@@ -120,7 +122,8 @@ def identification(
     """Draw the model over the measured loop, the residuals, and the profiles of the likelihood if there are any.
 
     `record` is the Record, or the sequence of them, from which `fit` was identified; another one is a ValueError. The
-    band is two standard errors of the model's output to each side. Residuals are counted in quanta of the sensor if its
+    band is two standard errors of the model's output to each side, and the model's line its free run on the measured
+    input. Residuals are counted in quanta of the sensor if its
     resolution is known, with lines at one quantum. A profile is the signed root of the deviance over the distance from
     the estimate in standard errors, on the diagonal for a normal distribution; the interval at 95 % lies between the
     horizontal lines. The result has shape (2,), or (3,) with profiles.
@@ -137,18 +140,22 @@ def identification(
     u, y = np.concatenate([each.u for each in records]), np.concatenate([each.y for each in records])
     if u.size != fit.residual.size:
         raise ValueError(f"the result is of {fit.residual.size} samples, the record has {u.size}")
-    percent = metrics.fit_percent(y, y - fit.residual)
-    if not np.isclose(percent, fit.fit_percent, rtol=1e-6, equal_nan=True):
+    model = np.concatenate([free_run(own, each).y for own, each in zip(models_on(fit, records), records, strict=True)])
+    percent = metrics.fit_percent(y, y - fit.residual)  # that of all samples: a fit may have left some out
+    if not (
+        np.isclose(percent, fit.fit_percent, rtol=1e-6, equal_nan=True)
+        or np.allclose(y - model, fit.residual, rtol=0.0, atol=_SAME * float(np.ptp(y)))
+    ):
         raise ValueError(f"the result is of another record: its fit is {fit.fit_percent:g} %, not {percent:g} %")
+    residual = (y - model) / (fit.resolution or 1.0)
     ends = np.cumsum([len(each) for each in records])[:-1]
     parts = np.split(np.arange(u.size), ends)
     with several(axes, 3 if fit.profiles else 2, height=3.0, sharex=False) as panels:
-        _draw_fit(panels[0], u, y, fit, parts)
+        _draw_fit(panels[0], u, y, model, fit.response_stderr, parts)
         panels[0].set(xlabel=label(records[0].units, "u"), ylabel=label(records[0].units, "y"))
-        quanta = fit.residual_quanta
-        _draw_guides(panels[1], {} if quanta is None else {1.0: "dashed"})
-        panels[1].plot(u, fit.residual if quanta is None else quanta, color=MEASURED, **scattered(u.size))
-        unit = records[0].units.get("y", "") if quanta is None else "quanta"
+        _draw_guides(panels[1], {1.0: "dashed"} if fit.resolution else {})
+        panels[1].plot(u, residual, color=MEASURED, **scattered(u.size))
+        unit = "quanta" if fit.resolution else records[0].units.get("y", "")
         panels[1].set(xlabel=label(records[0].units, "u"), ylabel=in_unit("Residual", unit))
         panels[1].margins(y=0.15)
         if fit.profiles:
@@ -156,13 +163,15 @@ def identification(
     return panels
 
 
-def _draw_fit(ax: Axes, u: FloatArray, y: FloatArray, fit: Identification, parts: list[NDArray[np.intp]]) -> None:
-    model = y - fit.residual
+def _draw_fit(
+    ax: Axes, u: FloatArray, y: FloatArray, model: FloatArray, stderr: FloatArray, parts: list[NDArray[np.intp]]
+) -> None:
     _draw_measured(ax, u, y, parts)
+    name = f"model, fit {metrics.fit_percent(y, model):.2f} %"
     for k, part in enumerate(parts):
-        ax.plot(u[part], model[part], label=None if k else f"model, fit {fit.fit_percent:.2f} %", **line(0))
-        if np.isfinite(fit.response_stderr[part]).all():
-            reach = 2.0 * fit.response_stderr[part]
+        ax.plot(u[part], model[part], label=None if k else name, **line(0))
+        if np.isfinite(stderr[part]).all():
+            reach = 2.0 * stderr[part]
             corners = np.concatenate([model[part] + reach, (model[part] - reach)[::-1]])
             style = {"color": line(0)["color"], "alpha": 0.25, "linewidth": 0, **grid_of(part.size)}
             band = Polygon(np.column_stack([np.concatenate([u[part], u[part][::-1]]), corners]), **style)

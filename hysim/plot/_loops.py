@@ -2,6 +2,7 @@
 
 import itertools
 from collections.abc import Mapping
+from typing import Any
 
 import numpy as np
 from matplotlib.animation import FuncAnimation
@@ -15,7 +16,7 @@ from hysim._cycles import TOLERANCE, turns
 from hysim._frozen import FloatArray
 from hysim._prefixes import in_unit, label
 from hysim.metrics import LoopMetrics, loop_metrics
-from hysim.plot._records import InputOutput, names_of, times_of, units_of
+from hysim.plot._records import InputOutput, drawable, names_of, times_of, units_of
 from hysim.plot._style import GUIDE, MANY, MARKERS, MEASURED, POINTS, SEQUENTIAL, grid_of, line, one
 from hysim.records import Record
 
@@ -37,6 +38,7 @@ def minor_loops(result: InputOutput, ax: Axes | None = None, *, tolerance: float
     >>> len(hs.plot.minor_loops(sim, hs.plot.figure().add_subplot()).lines)
     5
     """
+    (result,) = drawable((result,), "minor_loops")
     cycles = _cycles_up_and_down(result.u, tolerance)
     if not cycles:
         raise ValueError("the input is constant: there is no loop to draw")
@@ -59,6 +61,7 @@ def cycles(result: InputOutput, ax: Axes | None = None, *, tolerance: float = TO
     >>> len(hs.plot.cycles(sim, hs.plot.figure().add_subplot()).lines)
     3
     """
+    (result,) = drawable((result,), "cycles")
     numbers = {place: float(k) for k, place in enumerate(_cycles_up_and_down(result.u, tolerance), 1)}
     if not numbers:
         raise ValueError("the input is constant: there is no loop to draw")
@@ -80,12 +83,13 @@ def _coloured(
     return axes
 
 
-def width(*results: InputOutput | LoopMetrics, ax: Axes | None = None) -> Axes:
+def width(*results: Any, ax: Axes | None = None) -> Axes:
     """Draw signed loop widths, unloading minus loading, against the input.
 
-    Each of `results` is a Record, a Simulation, a LoopMetrics or anything with arrays `u` and `y`; `hysim.loop_metrics`
-    measures its last complete cycle. A record is drawn as points, anything else as a line. A ValueError is raised if
-    there is no result, or one has no complete cycle.
+    Each of `results` is a Record, a Simulation, a LoopMetrics or anything with arrays `u` and `y`; or a model or the
+    result of a fit, which is simulated on the input of the record before it. `hysim.loop_metrics` measures the last
+    complete cycle. A record is drawn as points, anything else as a line. A ValueError is raised if there is no result,
+    or one has no complete cycle.
 
     Examples
     --------
@@ -96,6 +100,7 @@ def width(*results: InputOutput | LoopMetrics, ax: Axes | None = None) -> Axes:
     """
     if not results:
         raise ValueError("there is nothing to draw: give at least one record, simulation or loop")
+    results = drawable(results, "width")
     units = units_of(*results)
     records = ({"marker": marker, "linestyle": "none", "color": MEASURED} for marker in itertools.cycle(MARKERS))
     lines = map(line, itertools.count())
@@ -133,6 +138,7 @@ def animate(
     """
     if frames < 2:
         raise ValueError(f"an animation needs at least 2 frames, got {frames}")
+    (result,) = drawable((result,), "animate")
     time = times_of(result)
     clock = np.arange(float(result.u.size)) if time is None else time
     moments = np.linspace(clock[0], clock[-1], frames)

@@ -13,11 +13,10 @@ from matplotlib.ticker import MaxNLocator
 from hysim._cycles import TOLERANCE, turns
 from hysim._frozen import FloatArray
 from hysim._prefixes import in_unit, label
-from hysim.identification import Identification
 from hysim.laws.operators.preisach import Preisach, PreisachRelays
 from hysim.plot._style import DIVERGING, GUIDE, AxesArray, one, several
 from hysim.records import Record
-from hysim.simulation import Simulation, simulate
+from hysim.simulation import Simulation, free_run
 
 _MOST_BINS = 40
 _SEAMLESS: dict[str, Any] = {"edgecolors": "face", "linewidth": 0.7, "antialiased": True}
@@ -44,7 +43,7 @@ def residual_map(
     and a change from bottom to top is drift. A cell is the mean over the samples of one branch in one interval of the
     input; grey is zero, lighter is more, darker is less, and white has no samples.
 
-    `model` is a model, a Simulation of the record's input, or an Identification. `bins` is the number of intervals, by
+    `model` is a model, a result of a fit, or a Simulation of the record's input. `bins` is the number of intervals, by
     default half as many as a branch has samples, at most 40. Reversals up to the fraction `tolerance` of the input's
     span do not end a branch. `quanta` is the name of the sensor's quanta, in which residuals are counted if the record
     has a resolution. The result has shape (2,).
@@ -150,8 +149,7 @@ def forc(
 
 def _residual(record: Record, model: Any) -> FloatArray:
     """Measured minus model, of a simulation or of a model to simulate."""
-    plant = model.model if isinstance(model, Identification) else model
-    y = plant.y if isinstance(plant, Simulation) else simulate(plant, record.t, record.u).y
+    y = model.y if isinstance(model, Simulation) else free_run(model, record).y
     if y.shape != record.y.shape:
         raise ValueError(f"the model's output must be as long as the record, {len(record)} samples, got {y.size}")
     return np.asarray(record.y - y)

@@ -8,6 +8,7 @@ import numpy.typing as npt
 from matplotlib.axes import Axes
 
 from hysim._prefixes import in_unit, label
+from hysim._results import model_of
 from hysim.control import Tuning
 from hysim.discovery import Discovery, OscillatorDiscovery
 from hysim.metrics import describing_function as describing_function_of
@@ -130,6 +131,7 @@ def describing_function(
     ('Gain', 'Phase [degrees]')
     """
     labels = units or {}
+    law = model_of(law)
     laws = law if isinstance(law, Mapping) else {type(law).__name__: law}
     with several(axes, 2, height=2.4) as (upper, lower):
         for k, (name, each) in enumerate(laws.items()):

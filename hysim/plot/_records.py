@@ -8,10 +8,12 @@ from matplotlib.axes import Axes
 
 from hysim._frozen import FloatArray
 from hysim._prefixes import in_unit, label
+from hysim._results import model_of
 from hysim.control import ClosedLoop
+from hysim.models.protocols import Responding
 from hysim.plot._style import MANY, MEASURED, POINTS, AxesArray, joined, line, one, several, upright
 from hysim.records import Record, as_record
-from hysim.simulation import Simulation, columns_of, has_elements
+from hysim.simulation import Simulation, columns_of, free_run, has_elements
 
 _DRAWN = {"zoh": "steps-post", "foh": "default"}
 _MOST_NAMED = 8  # lines of a panel that a legend has room for
@@ -63,6 +65,26 @@ def names_of(results: Sequence[Any]) -> list[str]:
     return [name if names.count(name) == 1 else f"{name} {names[:k].count(name) + 1}" for k, name in enumerate(names)]
 
 
+def drawable(results: Sequence[Any], verb: str) -> tuple[Any, ...]:
+    """Records, tables as records, simulations; each model, or result of a fit, as its run on the record before it.
+
+    A ValueError is raised for a model before which there is no record.
+    """
+    drawn: list[Any] = []
+    record: Record | None = None
+    for each in results:
+        model = model_of(each)
+        if (own := as_record(each, verb)) is not None:
+            record = own
+        elif isinstance(model, Responding) and record is None:
+            raise ValueError(
+                f"plot.{verb} cannot draw a {type(model).__name__} without an input: give a record before it, or draw "
+                "hs.simulate(model, t, u)"
+            )
+        drawn.append(own or (free_run(each, record) if record and isinstance(model, Responding) else each))
+    return tuple(drawn)
+
+
 def units_of(*results: Any) -> dict[str, str]:
     """The units of all results; where they differ, those of the first one."""
     units: dict[str, str] = {}
@@ -71,12 +93,13 @@ def units_of(*results: Any) -> dict[str, str]:
     return units
 
 
-def loop(*results: InputOutput, ax: Axes | None = None) -> Axes:
+def loop(*results: Any, ax: Axes | None = None) -> Axes:
     """Draw outputs against inputs, over each other.
 
-    Each of `results` is a Record, drawn as points, a Simulation or anything with arrays `u` and `y`, drawn as a line
-    with an arrow on its last loading and unloading branch. A record of more than 300 samples is a broad grey line
-    under the others, with such arrows where there are only records. Without a result a ValueError is raised.
+    Each of `results` is a Record, drawn as points; a Simulation or anything with arrays `u` and `y`, drawn as a line
+    with an arrow on its last loading and unloading branch; or a model or the result of a fit, which is simulated on the
+    input of the record before it. A record of more than 300 samples is a broad grey line under the others, with such
+    arrows where there are only records. Without a result a ValueError is raised.
 
     Examples
     --------
@@ -87,7 +110,7 @@ def loop(*results: InputOutput, ax: Axes | None = None) -> Axes:
     """
     if not results:
         raise ValueError("there is nothing to draw: give at least one result with u and y")
-    results = tuple(as_record(result, "loop") or result for result in results)
+    results = drawable(results, "loop")
     named = list(zip(results, names_of(results), strict=True))
     records = [(result, name) for result, name in named if isinstance(result, Record)]
     others = [(result, name) for result, name in named if not isinstance(result, Record)]
@@ -123,6 +146,7 @@ def history(result: InputOutput, axes: Sequence[Axes] | AxesArray | None = None,
     """
     if hold not in _DRAWN:
         raise ValueError(f'hold must be "zoh" or "foh", got {hold!r}')
+    (result,) = drawable((result,), "history")
     time, z = times_of(result), result.z if isinstance(result, _WithMemory) else None
     t = np.arange(float(result.u.size)) if time is None else time
     end = 2.0 * t[-1] - t[-2] if t.size > 1 else t[-1]

@@ -8,6 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from hysim._frozen import FloatArray, check_choice, checked, given_items, vectors
+from hysim._results import model_of
 
 Measure = Literal["rmse", "sse", "max_width", "area", "final", "response"]
 _WITH_TARGET = ("rmse", "sse")
@@ -50,7 +51,7 @@ def response_task(
 
     Parameters
     ----------
-    law : law or class
+    law : law, result of a fit, or class
         A law, which gives the values of the parameters that the study does not vary; or its class, for its defaults.
     u : array, shape (n,)
         Input, linear between its samples.
@@ -82,6 +83,7 @@ def response_task(
     (6, (6,))
     """
     check_choice("measure", measure, get_args(Measure))
+    law = model_of(law)
     family = law if isinstance(law, type) else type(law)
     reduces = isinstance(family, _ComputesMany) and "reduce" in inspect.signature(family.responses).parameters
     if not (isinstance(family, _ComputesMany) and (reduces or measure == "response")):

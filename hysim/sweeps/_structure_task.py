@@ -7,6 +7,7 @@ import numpy as np
 import numpy.typing as npt
 
 from hysim._frozen import FloatArray, check_choice, checked, read_only
+from hysim._results import model_of
 from hysim.plants.structures.ensemble import REDUCTIONS
 from hysim.plants.structures.structure import Structure
 
@@ -42,7 +43,7 @@ class StructureTask:
 
 
 def structure_task(
-    structure: Structure,
+    structure: Any,
     ground_accelerations: npt.ArrayLike | Sequence[npt.ArrayLike],
     sample_time: float,
     measures: str | Sequence[str] = "peak_drift",
@@ -54,7 +55,7 @@ def structure_task(
 
     Parameters
     ----------
-    structure : Structure
+    structure : Structure, or result of a fit of one
         Its values are those of the parameters that the study does not vary.
     ground_accelerations : array, shape (n_samples,) or (n_records, n_samples), or sequence of arrays
         Inputs [m/s^2, or N under a force]; shorter ones are continued by zeros.
@@ -87,6 +88,7 @@ def structure_task(
     >>> study["peak_drift"].shape, study["peak_drift_each"].shape
     ((6,), (6, 1))
     """
+    structure = model_of(structure)
     if not isinstance(structure, Structure):
         raise TypeError(f"structure_task takes a Structure, got {type(structure).__name__}")
     names = (measures,) if isinstance(measures, str) else tuple(measures)

@@ -7,6 +7,7 @@ import numpy as np
 import numpy.typing as npt
 
 from hysim._frozen import FloatArray, check_choice
+from hysim._results import model_of
 from hysim.models.law import Law
 from hysim.records import Record
 from hysim.tracking._coordinates import Coordinates, Copies, coordinates_of
@@ -20,7 +21,7 @@ _NORMAL = 1.4826  # standard deviations of the median of the sizes
 
 
 def track_parameters(
-    law: Law,
+    law: Any,
     record: Record,
     free: Sequence[str],
     *,
@@ -38,7 +39,7 @@ def track_parameters(
 
     Parameters
     ----------
-    law : Law
+    law : Law or result of a fit
         A law with the numbers at the first sample, for instance the model of a fit to earlier data.
     record : Record
         Input and measured output.
@@ -79,6 +80,7 @@ def track_parameters(
     >>> bool(abs(track["gain"][-1] - 0.8) < 0.02)
     True
     """
+    law = model_of(law)
     if not isinstance(law, Law):
         raise TypeError(f"law must be a law that a step describes, such as BoucWen, got {type(law).__name__}")
     coordinates, spread = coordinates_of(law, free), _noise_of(record) if noise is None else float(noise)

@@ -12,6 +12,7 @@ import numpy as np
 
 from hysim._channels import value_in
 from hysim._frozen import FloatArray
+from hysim._results import model_of
 from hysim.identification._identify import identify
 from hysim.identification._result import Identification
 from hysim.models.channels.dependent import Dependent
@@ -73,7 +74,7 @@ def estimate_channel(
     >>> round(fit.estimates["T"], 6)
     42.5
     """
-    model = fit_or_model.model if isinstance(fit_or_model, Identification) else fit_or_model
+    model = model_of(fit_or_model)
     if not isinstance(model, Dependent):
         raise TypeError(f"estimate_channel takes a law that depends on channels, got {type(model).__name__}")
     if channel not in model.channels:

@@ -7,7 +7,7 @@ parameters change from sample to sample (`hysim.models.channels.varying`).
 import warnings
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
 import numpy.typing as npt
@@ -269,28 +269,35 @@ class Dependent:
         return response_along(constant, {name: each for name, each in series.items() if each.ndim}, u, sample_time)
 
 
+@runtime_checkable
+class _OnChannels(Protocol):
+    """A model whose output depends on the channels of a record."""
+
+    def on(self, record: Record) -> Any: ...
+
+
 def on_record(model: Any, record: Record) -> Any:
-    """A model as it is on a record: of a `Dependent` the law at its channels."""
-    return model.on(record) if isinstance(model, Dependent) else model
+    """A model as it is on a record, at the channels of this if it depends on such."""
+    return model.on(record) if isinstance(model, _OnChannels) else model
 
 
 @dataclass(frozen=True)
 class AlongRecord:
-    """A law on the channels of a record, which vary along it.
+    """A law, or an actuator of several inputs, on the channels of a record, which vary along it.
 
     Each branch of the record, also one that is cut into several here, has the parameters of the sample at its end.
     """
 
-    model: Dependent
+    model: Any
     record: Record
 
     @property
     def dynamic(self) -> bool:
         """Whether the law depends on time."""
-        return self.model.dynamic
+        return bool(self.model.dynamic)
 
     def response(self, u: npt.ArrayLike, sample_time: float | None = None) -> FloatArray:
         """Output at the samples of an input over the branches of the record, equally many for each."""
         inputs = read_only(u, "u", ndim=1)
         ends = np.ceil(np.linspace(0, len(self.record) - 1, inputs.size) - _ROUNDING).astype(np.intp)
-        return self.model.response(inputs, sample_time, channels=taken(self.record.channels, ends))
+        return np.asarray(self.model.response(inputs, sample_time, channels=taken(self.record.channels, ends)))

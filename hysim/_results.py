@@ -1,0 +1,28 @@
+"""The models in results: what a verb that takes a model does with a fit."""
+
+from typing import Any, Protocol, runtime_checkable
+
+
+@runtime_checkable
+class Result(Protocol):
+    """A result of `identify` or `discover`: a model with its number of parameters."""
+
+    @property
+    def model(self) -> Any: ...
+    @property
+    def n_parameters(self) -> int: ...
+
+
+def model_of(thing: Any) -> Any:
+    """The model of a result, which every verb takes in place of a model; anything else as it is.
+
+    Raises
+    ------
+    ValueError
+        If the result has no model, as that of `discover_oscillator` for a law that hysim lacks.
+    """
+    if not isinstance(thing, Result):
+        return thing
+    if thing.model is None:
+        raise ValueError(f"this {type(thing).__name__} has no model: hysim has no family of its law")
+    return thing.model
