@@ -72,8 +72,8 @@ class Identification(Stored):
     least_squares : Candidate or None
         Optimum of the sum of squares, where the noise is not Gaussian.
     residual : array, shape (n,)
-        Measured minus model, one record after the other: ``record.y - model.response(record.u)`` [unit of y]. Of a `hysim.StructureRecord` its sensors one
-        behind the other, each in units of its noise.
+        Measured minus model, ``record.y - model.response(record.u)``, one record after the other [unit of y]. Of a
+        `hysim.StructureRecord` its sensors one behind the other, each in units of its noise.
     resolution : float or None
         Quantum of the sensor [unit of y].
     response_stderr : array, shape (n,)

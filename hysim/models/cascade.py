@@ -128,7 +128,8 @@ class Cascade(Composite):
         for stage in self.stages:
             stages.append(placed(stage, level, u_range))
             known = level is not None and isinstance(stage, Placeable) and not needs_time(stage)
-            level, u_range = (float(stages[-1].response([level])[0]) if known else None), None
+            level = float(stages[-1].response([level])[0]) if known else None
+            u_range = u_range if isinstance(stage, InputFilter) else None  # what passes a filter keeps its range
         return Cascade(stages=tuple(stages))
 
     def response(self, u: npt.ArrayLike, sample_time: float | None = None) -> FloatArray:
