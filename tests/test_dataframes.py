@@ -344,7 +344,6 @@ def test_without_pandas_the_extra_is_named(monkeypatch):
     ("verb", "value", "message"),
     [
         (hs.save, RECORD, r"save takes a model of hysim, got Record: hs.save_record\(record, path\) writes a record"),
-        (hs.save, hs.identify(hs.Line, RECORD), r"got Identification: hs.save\(result.model, path\) writes its model"),
         (hs.save_record, hs.Line(), r"save_record takes a Record, got Line: hs.save\(model, path\) writes a model"),
         (
             hs.save_record,
