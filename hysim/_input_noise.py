@@ -6,7 +6,8 @@ differences: O. Anderson, Die Korrelationsrechnung in der Konjunkturforschung, 1
 frequency passes for none, since more than 5 % of the span is not taken for noise.
 
 The path turns where it retreats by more than five standard deviations of a difference. Between these reversals it is
-monotone: the monotone path nearest to the samples (isotonic regression).
+monotone: the monotone path nearest to the samples (isotonic regression), which at a turning point goes no further than
+the mean of the samples about it.
 """
 
 import math
@@ -23,6 +24,9 @@ _MOST = 0.05  # of the span
 _REACH = 5.0 * math.sqrt(2.0)  # of the noise: differences of two samples are larger once in a million
 _NORMAL = 1.4826  # standard deviation over the median size, of normal noise
 MOST_IGNORED = 0.4  # of the span: turning points are counted for tolerances below a half
+_CORNER = (
+    4.0  # of the noise: samples so far from a turning point, itself an extreme of noise, are averaged to its level
+)
 _MANY = 3.0  # times as many reversals as are above the noise
 
 
@@ -58,4 +62,11 @@ def quiet_path(u: FloatArray, noise: float) -> FloatArray:
     for begin, end in pairwise(corners):
         rising = bool(u[end] >= u[begin])
         path[begin : end + 1] = isotonic_regression(u[begin : end + 1], increasing=rising).x
+    for before, corner, after in zip(corners, corners[1:], corners[2:], strict=False):
+        beside = path[before : after + 1]
+        near = np.abs(beside - path[corner]) <= _CORNER * noise
+        if u[corner] > u[before]:
+            np.minimum(beside, u[before : after + 1][near].mean(), out=beside)
+        else:
+            np.maximum(beside, u[before : after + 1][near].mean(), out=beside)
     return path

@@ -44,6 +44,7 @@ FIELD_UNITS: Mapping[str, Mapping[str, str]] = MappingProxyType(
             "thresholds": "u", "weights": "y", "field": "u", "feedthrough": "y/u", "offset": "y", "z0": "u",
         },
         "Line": {"offset": "y", "slope": "y/u"},
+        "ReversalFilter": {"threshold": "u"},
     }
 )  # fmt: skip
 """Units by the name of a family and the names of its fields; ``"1"`` is dimensionless."""

@@ -115,6 +115,7 @@ def _operators() -> dict[str, Shown]:
         "Prandtl-Ishlinskii: with the rate": Shown(timed, _UNIT),
         "Play": Shown(hs.Play(threshold=0.25), _UNIT),
         "Stop": Shown(hs.Stop(threshold=0.4), _UNIT),
+        "Filter of small reversals": Shown(hs.ReversalFilter(threshold=0.3), _UNIT),
         "Maxwell slip": Shown(hs.MaxwellSlip(stiffness=(1.0, 1.0, 1.0), slips=(0.2, 0.5, 0.9)), (-1.5, 1.5)),
         "Preisach": Shown(hs.Preisach.from_density(np.linspace(-1.0, 1.0, 11), _density), _UNIT),
         "Preisach relays": Shown(hs.PreisachRelays(levels=(-1.0, -0.5, 0.0, 0.5, 1.0), weights=relays), _UNIT),
