@@ -74,10 +74,11 @@ def _notes(text: str) -> Notes:
             notes[note[1]] = text[note.end() : end].strip()
         start = end + 1
     units = _json(notes.get("units", ""), dict) or {}
+    name = _json(notes.get("name", ""), str)
     return Notes(
         units={str(signal): str(unit) for signal, unit in units.items()},
         resolution=positive(parse(notes.get("resolution", ""), Signs("."))),
-        name=_json(notes.get("name", ""), str) or notes.get("name"),
+        name=notes.get("name") if name is None else name,
         channels=channels_in(notes.get("channels")),
     )
 

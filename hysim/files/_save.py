@@ -136,14 +136,14 @@ def _text(columns: Mapping[str, FloatArray], notes: Notes, *, delimiter: str) ->
     comments["channels"] = dict(notes.channels)
     header = [f"{label} [{plain[label]}]" if label in plain else label for label in columns]
     rows = zip(*(values.tolist() for values in columns.values()), strict=True)
-    lines = "".join(f"# {name}: {json.dumps(value)}\n" for name, value in comments.items() if value)
+    lines = "".join(f"# {name}: {json.dumps(value)}\n" for name, value in comments.items() if value or value == "")
     return (lines + csv_text([header, *rows], delimiter=delimiter, nan="nan")).encode()
 
 
 def _arrays(columns: Mapping[str, FloatArray], notes: Notes) -> dict[str, Any]:
     """The columns, and the notes beside them, by the names that they have in a file."""
     others: dict[str, Any] = {f"{label}_units": unit for label, unit in notes.units.items()}
-    if notes.name:
+    if notes.name is not None:
         others["name"] = notes.name
     if notes.resolution is not None:
         others["resolution"] = np.asarray(notes.resolution)
