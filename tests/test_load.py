@@ -7,6 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import hysim as hs
+from hysim._printing import csv_text
 
 LOOP = "time [s],voltage [V],displacement (um),note\n0,0,0.0,up\n1,5,0.079,\n2,10,0.152,top\n"
 
@@ -316,3 +317,22 @@ def test_a_stream_is_read_from_where_it_stands(tmp_path):
     with write(tmp_path, "title\nu,y\n0,1\n2,3\n").open(encoding="utf-8") as stream:
         stream.readline()
         assert hs.load(stream, u="u", y="y").name == "loop"
+
+
+FORMULAS = ("=1+1", "+a", "@a", "-a", "=A1+B1", "'=b", "''@b", "'c", "--d")
+
+
+@pytest.mark.parametrize("delimiter", [",", "\t"])
+def test_no_text_of_a_csv_file_is_a_formula_and_all_of_them_come_back(delimiter):
+    text = csv_text([FORMULAS, [-1.5] * len(FORMULAS), ["-2"] * len(FORMULAS)], delimiter=delimiter)
+    first, *others = text.splitlines()
+    assert not [cell for cell in first.split(delimiter) if cell[0] in "=+@-"]
+    assert others == [delimiter.join(["-1.5"] * len(FORMULAS)), delimiter.join(["-2"] * len(FORMULAS))]
+    assert [column.name for column in hs.list_columns(io.StringIO(text), delimiter=delimiter)] == [*FORMULAS]
+    assert hs.load(io.StringIO(text), u="=1+1", y="'=b").u.tolist() == [-1.5, -2.0]
+
+
+def test_a_name_that_is_a_formula_is_none_in_the_tables_of_results():
+    rec = hs.Record(u=[0, 1, 2, 1, 0], y=[0, 1, 2, 1, 0])
+    assert "\n'=cmd()," in hs.compare({"=cmd()": hs.Line}, rec, cross_validate=2).to_csv()
+    assert hs.sweep(lambda **named: len(named), {"@a": [0, 1]}).to_csv().startswith("'@obj")

@@ -14,6 +14,7 @@ import re
 from collections import Counter
 from typing import NamedTuple, TypeVar
 
+from hysim._printing import text_in_cell
 from hysim.files._cells import MISSING, Signs, parse
 from hysim.files._table import Column, require
 from hysim.interop import heading
@@ -132,14 +133,15 @@ def _rows(lines: list[str], numbers: list[int], delimiter: str) -> list[list[str
 def _cells(line: str, delimiter: str, *, strict: bool = True) -> list[str]:
     """The cells of a line; one that cannot be split is a csv.Error, or unless `strict` a single cell."""
     if '"' not in line:
-        return line.split() if delimiter == " " else [cell.strip() for cell in line.strip(" ").split(delimiter)]
+        cells = line.split() if delimiter == " " else line.strip(" ").split(delimiter)
+        return [text_in_cell(cell.strip()) for cell in cells]
     try:
         cells = next(csv.reader([line.strip()], delimiter=delimiter, skipinitialspace=True, strict=strict))
     except csv.Error:
         if strict:
             raise
         cells = [line]
-    return [cell.strip() for cell in cells]
+    return [text_in_cell(cell.strip()) for cell in cells]
 
 
 def _names(line: str, delimiter: str) -> list[str]:
