@@ -335,4 +335,4 @@ def test_no_text_of_a_csv_file_is_a_formula_and_all_of_them_come_back(delimiter)
 def test_a_name_that_is_a_formula_is_none_in_the_tables_of_results():
     rec = hs.Record(u=[0, 1, 2, 1, 0], y=[0, 1, 2, 1, 0])
     assert "\n'=cmd()," in hs.compare({"=cmd()": hs.Line}, rec, cross_validate=2).to_csv()
-    assert hs.sweep(lambda **named: len(named), {"@a": [0, 1]}).to_csv().startswith("'@obj")
+    assert hs.sweep(lambda **named: len(named), {"@a": [0, 1]}).to_csv().startswith("task,'@a,")
