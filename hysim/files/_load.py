@@ -23,7 +23,7 @@ from hysim.files._mat import mat
 from hysim.files._npz import npy, npz
 from hysim.files._source import Opened, Source, opened
 from hysim.files._table import Column, Table, shown
-from hysim.files._text import text_of
+from hysim.files._text import Text
 from hysim.records import Record
 
 ON_MISSING = ("error", "drop", "split")
@@ -208,12 +208,12 @@ def file_named(source: Opened) -> Iterator[None]:
 @contextmanager
 def table_of(source: Opened, for_text: Mapping[str, Any]) -> Iterator[Table]:
     """The table that a source holds, open to be read from."""
-    if isinstance(source.content, (str, bytes)):
-        text = text_of(source.content, source.name, for_text["encoding"])
-        rest = text.split("\n")[for_text.get("skip") or 0 :]
-        text = "\n".join([""] * (for_text.get("skip") or 0) + rest)  # the lines keep their numbers
+    if source.format == "text":
+        text = Text(source.content, source.name, for_text["encoding"], for_text.get("skip") or 0)
         yield delimited(text, for_text["delimiter"], for_text["decimal"], for_text.get("thousands"))
         return
+    if source.format == "model":
+        raise ValueError(f"{source.name} is a model: read it with hs.load_model")
     for argument, value in for_text.items():
         if value is not None:
             form = source.name if isinstance(source.content, Frame) else f"a file of the format {source.format}"
