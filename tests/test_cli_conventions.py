@@ -75,6 +75,11 @@ def test_every_option_has_help_and_every_quantity_a_unit(name):
         assert re.search(r"\[(1|s|Hz|%%|units? of .+)\]", action.help), (name, action.help)
 
 
+@pytest.mark.parametrize("name", ["identify", "compare", "simulate", "plot", "control", "page", "c", "fmu"])
+def test_the_help_says_that_a_model_of_ones_own_is_code_that_is_executed(name):
+    assert "module:name of your own, which executes ./module.py" in " ".join(PARSERS[name].format_help().split())
+
+
 def test_options_are_declared_as_their_help_shows_them():
     text = """
 file FILE  an argument

@@ -5,7 +5,7 @@ from collections.abc import Callable
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from hysim.cli import models, outputs, records
-from hysim.cli.options import Command
+from hysim.cli.options import OWN, Command
 from hysim.cli.outputs import Curve
 
 if TYPE_CHECKING:
@@ -132,7 +132,7 @@ COMMAND = Command(
 {records.OPTIONS}
 others FILE...  more files with the same columns
 --kind {"|".join(KINDS)}  {". ".join(f"{name}: {kind.shows}" for name, kind in KINDS.items())} [default: loop]
---model MODEL...  model file as identify writes it, - for the standard input, or module:name; once or more
+--model MODEL...  model file as identify writes it, - for the standard input, or {OWN}; once or more
 --out LOOP.svg  the picture [required]
 """,
     run,

@@ -23,7 +23,7 @@ OF_OTHER_COMMANDS = {
     for name, option in {
         "bounds": "--bounds", "channels": "--channel", "cross_validate": "--cross-validate", "fixed": "--fix",
         "free": "--free", "initial": "--initial", "max_evaluations": "--max-evaluations", "weights": "--weights",
-        "excitation": "--excitation", "resolution": "--resolution",
+        "excitation": "--excitation", "resolution": "--resolution", "t": "--t",
     }.items()
 } | {"priors": "hysim posterior --prior"}  # fmt: skip
 """Arguments that a message names to readers of a command without such an option, and the option that stands for it."""
@@ -32,8 +32,8 @@ _PHRASES = (
     (', on_missing="split" cuts the record there', ""),
     ("hysim.loop_metrics(tolerance=...)", "hysim metrics --tolerance"),
     ("hysim.cycle_metrics", "hysim metrics --cycles"),
-    (": read it with hs.load_model", ", which hysim simulate, control, page and c take, and others as --model"),
-    (": read it with hs.load", ", of which hysim identify --out makes a model"),
+    (": read it with hs.load_model", ", which hysim simulate, control, page and c take, and hysim compare --model"),
+    ("; if it is a record: read it with hs.load", "; hysim identify --out makes a model of a record"),
     ("Record(resolution=...)", "resolution="),
     ("BoucWenOscillator.structure(initial=...)", "initial="),
     ('structure(excitation="force")', 'excitation="force"'),
@@ -91,7 +91,7 @@ def _option(argument: re.Match[str], flag: str) -> str:
     """The option with its value, as it is typed; a signal with a value is no argument, but as in ``--unit u=V``."""
     name, value = argument.groups()
     if len(name) == 1 and value is not None:
-        return "--no-t" if (name, value) == ("t", "False") else argument[0]
+        return flag.replace("--t", "--no-t") if (name, value) == ("t", "False") else argument[0]
     prefix = {"units": "u=", "channels": "CHANNEL="}.get(name, "")
     if value is None:
         return f"{flag} {prefix}{'UNIT' if name == 'units' else 'COLUMN'}" if prefix else flag
