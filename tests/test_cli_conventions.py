@@ -206,19 +206,14 @@ class Terminal(io.StringIO):
         return True
 
 
-def test_a_reproduction_is_told_as_json_and_its_steps_on_a_terminal(run, tmp_path, monkeypatch):
-    def reproduce(out, *, quick, page, progress):
-        if progress is not None:
-            progress(0, 9, "line")
+def test_a_reproduction_is_told_as_json(run, tmp_path, monkeypatch):
+    def reproduce(out, *, quick, page):
         fits = {"model": SimpleNamespace(success=True)}
         return SimpleNamespace(folder=tmp_path, findings=SimpleNamespace(study=SimpleNamespace(fits=fits)))
 
     (tmp_path / "summary.json").write_text("{}\n")
     monkeypatch.setattr("hysim.paper.reproduce", reproduce)
     assert run("reproduce", "--json") == (0, "{}\n", "")
-    monkeypatch.setattr("sys.stderr", terminal := Terminal())
-    assert run("reproduce", "--json") == (0, "{}\n", "")
-    assert terminal.getvalue() == "[1/10] line\n"
 
 
 @pytest.mark.parametrize("kind", KINDS)

@@ -143,7 +143,7 @@ def test_every_option_in_a_message_is_one_of_the_command_or_named_with_another_o
 
 def test_every_option_in_an_error_that_a_command_raises_is_one_of_its_own():
     named = 0
-    for name, own in OPTIONS.items():
+    for name in OPTIONS:
         path = PACKAGE / "cli" / f"{name}.py"
         tree = ast.parse(path.read_text() if path.exists() else "")
         raised = [ast.unparse(node) for node in ast.walk(tree) if isinstance(node, ast.Raise)]

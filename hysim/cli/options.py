@@ -58,6 +58,7 @@ class Command(NamedTuple):
         """Add the command to those of a parser."""
         parser = commands.add_parser(self.name, description=self.description)
         roles = dict(_declare(parser, self.options))
+        parser.add_argument("--quiet", action="store_true", help="report no progress of long calls on standard error")
         flags = {action.dest: action.option_strings[0] for action in parser._actions if action.option_strings}
         parser.set_defaults(command=self, roles=roles, flags=flags)
         return parser

@@ -10,7 +10,8 @@ import numpy.typing as npt
 
 from hysim._blas import one_blas_thread
 from hysim._frozen import FloatArray, check_choice, check_count, read_only
-from hysim._parallel import Progress, at_most
+from hysim._parallel import at_most
+from hysim._progress import Progress, Reports, reports
 from hysim.identification import _direct as direct
 from hysim.identification._assumptions import decided, in_units_of_noise, quiet_where_better
 from hysim.identification._extrapolation import implausible
@@ -33,6 +34,7 @@ from hysim.models.whole.part_by_part import PartByPart
 from hysim.records import Record, several
 
 
+@reports
 def identify(
     model_or_class: Any,
     record_or_records: Record | Sequence[Record],
@@ -49,7 +51,7 @@ def identify(
     max_evaluations: int | None = None,
     seed: int = 0,
     workers: int | None = None,
-    progress: Progress | None = None,
+    progress: Reports = None,
 ) -> Identification:
     """Identify a model's parameters on one or several records, by its error in free run.
 
@@ -100,8 +102,9 @@ def identify(
         Seed of the starts and of random draws. The optimum does not depend on it.
     workers : int, optional
         Number of threads; by default one for each core.
-    progress : callable, optional
+    progress : callable or False, optional
         Called as ``progress(done, total)``.
+        By default calls beyond 2 s report on the standard error; False turns this off.
 
     Returns
     -------
@@ -158,7 +161,9 @@ def identify(
             if ends is not None:
                 choice = choice._replace(problems=[replace(each, ends=ends) for each in choice.problems])
             searched = [in_units_of_noise(each, seed) for each in choice.problems]
-            fit = _searched(searched, noise or "gaussian", intervals, left_out(cross_validate, records), seed, progress)
+            fit = _searched(
+                searched, noise or "gaussian", intervals, left_out(cross_validate, records), seed, progress or None
+            )
             fit = replace(fit, message="; ".join(filter(None, (fit.message, choice.sentence, noisy))))
             first, doubts = choice.problems[0], [swapped_columns(records)]
             if is_partial := is_cut or (first.budget is not None and (first.budget.cut or not fit.success)):

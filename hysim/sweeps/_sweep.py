@@ -16,7 +16,8 @@ from typing import Any
 import numpy as np
 
 from hysim._frozen import check_choice
-from hysim._parallel import GLANCE, Progress
+from hysim._parallel import GLANCE
+from hysim._progress import Progress, Reports, reports
 from hysim.sweeps._chunks import Chunk, Outcome, part_of
 from hysim.sweeps._executors import Workers, workers_of
 from hysim.sweeps._identity import identity
@@ -33,6 +34,7 @@ _GROWTH = 4
 _PATIENCE = 0.6  # seconds to wait after an interrupt for the chunks that are being computed
 
 
+@reports
 def sweep(
     task: Callable[..., Any],
     space: Any,
@@ -42,7 +44,7 @@ def sweep(
     store: str | Path | None = None,
     seed: int = 0,
     on_change: OnChange = "error",
-    progress: Progress | None = None,
+    progress: Reports = None,
 ) -> Sweep:
     """Compute a function for many sets of parameters.
 
@@ -67,8 +69,9 @@ def sweep(
     on_change : {"error", "keep", "restart"}
         If the store holds a study with another task, space, seed or version of hysim: raise; keep the finished rows if
         space and seed are the same; or start again.
-    progress : callable, optional
+    progress : callable or False, optional
         Called as ``progress(done, total)`` when rows are finished and written.
+        By default calls beyond 2 s report on the standard error; False turns this off.
 
     Returns
     -------
@@ -104,7 +107,7 @@ def sweep(
             opened_store.begin(identity(task, tasks, seed), tasks, task_seeds, on_change)
             table.restore(opened_store.layout(), opened_store.finished())
         with workers_of(executor, workers, task) as pool:
-            _Run(everything, table, opened_store, pool, progress).run()
+            _Run(everything, table, opened_store, pool, progress or None).run()
     return result_of(table, tasks.columns, tasks.axes, task_seeds)
 
 
