@@ -236,6 +236,26 @@ def test_a_file_from_a_machine_of_the_other_byte_order_is_read():
     assert load(content, u="u", y="u").u.tolist() == [0.0, 1.0, 4.0]
 
 
+@pytest.mark.parametrize("order", "<>")
+@pytest.mark.parametrize(
+    ("type_", "code"),
+    [(1, "b"), (2, "B"), (3, "h"), (4, "H"), (5, "i"), (6, "I"), (7, "f"), (9, "d"), (12, "q"), (13, "Q")],
+)
+def test_numbers_in_mat_files_are_of_their_type_and_byte_order(order, type_, code):
+    values = [1, 2, -3 if code.islower() else 1 << (8 * struct.calcsize(code) - 1)]  # the largest power without a sign
+    numbers = struct.pack(f"{order}3{code}", *values)
+
+    def matrix(name):
+        inner = struct.pack(f"{order}IIII", 6, 8, 6, 0) + struct.pack(f"{order}IIii", 5, 8, 3, 1)
+        inner += struct.pack(f"{order}II", 1, 1) + name + bytes(7)
+        inner += struct.pack(f"{order}II", type_, len(numbers)) + numbers + bytes(-len(numbers) % 8)
+        return struct.pack(f"{order}II", 14, len(inner)) + inner
+
+    title = b"MATLAB 5.0 MAT-file".ljust(124) + (b"\0\1IM" if order == "<" else b"\1\0MI")
+    rec = load(title + matrix(b"u") + matrix(b"y"))
+    assert rec.u.tolist() == rec.y.tolist() == values
+
+
 def test_missing_values_are_treated_alike_in_every_format():
     u, y = np.arange(6.0), np.array([0.0, 1.0, np.nan, 3.0, 4.0, 5.0])
     text = "u,y\n" + "".join(f"{a},{b}\n" for a, b in zip(u, y, strict=True))
@@ -422,6 +442,13 @@ def test_h5_without_its_library_says_what_to_install(tmp_path, monkeypatch):
     with pytest.raises(ValueError, match=r"needs h5py: pip install 'hysim\[io\]'"):
         hs.save_record(hs.datasets.table1(), tmp_path / "loop.h5")
     assert not list(tmp_path.iterdir())
+
+
+def test_the_shell_asks_for_the_library_of_h5_before_it_computes(tmp_path, monkeypatch, capsys):
+    monkeypatch.setitem(__import__("sys").modules, "h5py", None)
+    arguments = ["simulate", str(tmp_path / "no.json"), str(tmp_path / "no.csv"), "--out", str(tmp_path / "out.h5")]
+    assert main(arguments) == 2  # and not that there is no such model
+    assert "a file of HDF5 needs h5py: pip install 'hysim[io]'" in capsys.readouterr().err
 
 
 def test_the_command_line_takes_and_writes_every_format(tmp_path, capsys):

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 import hysim as hs
 from hysim._printing import csv_text
-from hysim.files import _delimited
+from hysim.files import FileColumn, _delimited
 
 LOOP = "time [s],voltage [V],displacement (um),note\n0,0,0.0,up\n1,5,0.079,\n2,10,0.152,top\n"
 
@@ -368,6 +368,25 @@ def test_columns_are_listed_without_reading_the_text_for_each_of_them(monkeypatc
     columns = hs.list_columns(io.StringIO(noted))
     assert [k for k, column in enumerate(columns) if column.problem] == [0]
     assert len(parsed) < 30  # the text is halved nine times to find the column that holds none
+
+
+def test_a_column_is_listed_with_all_that_is_in_it():
+    text = io.StringIO("t [s],u [V],y [um],note\n0,3,nan,a\n1,,-2,b\n2,5,,c\n3,4,-1,d\n")
+    t, u, y, note = hs.list_columns(text)
+    assert t == FileColumn("t", 0, "s", n_samples=4, n_missing=0, lowest=0.0, highest=3.0, increases=True)
+    assert u == FileColumn("u", 1, "V", n_samples=3, n_missing=1, lowest=3.0, highest=5.0, increases=False)
+    assert y == FileColumn("y", 2, "um", n_samples=2, n_missing=2, lowest=-2.0, highest=-1.0, increases=True)
+    assert (note[:5], note.increases) == (("note", 3, "", 0, 0), False)
+    assert note.problem == "line 2, column 'note': expected a finite number, got 'a'"
+
+
+def test_notes_stand_in_the_comments_at_the_top_alone():
+    top = '# made by a rig\n# name: "hot"\n%resolution: 0.5\n# units: {"u": "V"}\n# channels: {"T": 40}\n'
+    rec = hs.load(io.StringIO(f"{top}u,y\n# name: cold\n0,1\n1,2\n"))
+    assert rec == hs.Record(u=[0, 1], y=[1, 2], units={"u": "V"}, resolution=0.5, name="hot", channels={"T": 40.0})
+    for above in ("\n", "0,0\n"):
+        assert hs.load(io.StringIO(f"{above}{top}0,1\n1,2\n"), u=0, y=1).name == "stream"
+    assert hs.load(io.StringIO("# name: a plain one \n0,1\n1,2\n"), u=0, y=1).name == "a plain one"
 
 
 def test_a_long_text_takes_little_more_memory_than_its_numbers(tmp_path):

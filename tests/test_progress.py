@@ -133,6 +133,15 @@ def test_every_verb_with_progress_reports_by_default():
         assert verb.__code__ is _progress.reports(len).__code__, name
 
 
+def test_a_sweep_says_at_its_start_that_its_table_will_need_pandas(stream, at_once, monkeypatch):
+    monkeypatch.setitem(sys.modules, "pandas", None)
+    hs.sweep(lambda k: k, {"k": [1]}, workers=1)
+    assert stream.getvalue().splitlines()[0] == "sweep: without pandas, which to_frame needs"
+    monkeypatch.setitem(sys.modules, "pandas", SimpleNamespace(__spec__=True))
+    hs.sweep(lambda k: k, {"k": [1]}, workers=1)
+    assert stream.getvalue().splitlines()[-1] == "sweep: 1 of 1"
+
+
 def test_a_simulation_reports_its_samples(monkeypatch):
     monkeypatch.setattr("hysim._parallel._STRETCH", 2)
     calls = []

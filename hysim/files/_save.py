@@ -122,10 +122,12 @@ def packed(columns: Mapping[str, FloatArray], path: str | Path, notes: Notes) ->
 
 
 def ending(path: str | Path) -> str:
-    """The ending of a path, which names a format to save in; ValueError if it names none."""
+    """The ending of a path, which names a format to save in; ValueError if it names none, or its library is missing."""
     suffix = Path(path).suffix.lower()
     if suffix not in _WRITERS:
         raise ValueError(f"{Path(path).name}: the ending must be one of {', '.join(_WRITERS)}, got {suffix!r}")
+    if suffix in (".h5", ".hdf5"):
+        optional("h5py", "a file of HDF5", "io", ValueError)
     return suffix
 
 
@@ -170,7 +172,8 @@ _MAT_TITLE = b"MATLAB 5.0 MAT-file, saved by hysim".ljust(116)
 
 
 def _hdf5(columns: Mapping[str, FloatArray], notes: Notes) -> bytes:
-    h5py = optional("h5py", "a file of HDF5", "io", ValueError)
+    import h5py
+
     buffer = io.BytesIO()
     with h5py.File(buffer, "w") as root:
         for name, value in _arrays(columns, notes).items():
