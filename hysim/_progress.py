@@ -149,6 +149,6 @@ def _listener(event: Any, line: Line) -> Any:
             line.compiling()
 
         def on_end(self, _: Any) -> None:
-            pass
+            line.announce(line.subject)
 
     return Listener()
