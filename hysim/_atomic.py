@@ -5,7 +5,7 @@ import secrets
 import signal
 import threading
 from collections.abc import Iterator, Mapping
-from contextlib import ExitStack, contextmanager
+from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
 from typing import IO, Any
 
@@ -68,6 +68,9 @@ def replacing(path: str | Path, mode: str, **options: Any) -> Iterator[IO[Any]]:
         with open(beside, mode, **options) as file:
             yield file
         os.replace(beside, target)
-    except BaseException:
-        beside.unlink(missing_ok=True)
+    except BaseException as error:
+        with suppress(OSError):
+            beside.unlink()
+        if isinstance(error, OSError) and error.filename == str(beside):  # a name that the user has not given
+            raise OSError(error.errno, error.strerror, str(path)) from None
         raise

@@ -86,8 +86,8 @@ def too_few(u: FloatArray, tolerance: float, wanted: int, present: int) -> str:
     return (
         f"asked for {wanted} complete cycle(s) of the input, found {present}: it turns at {shown}. A cycle goes from "
         f"one extreme to the other and back, each within {NEAR:.0%} of the span, or from a level to one extreme or to "
-        "both and back to the level, such as 0, max, min, 0. Give a longer record, or pass a larger tolerance= if "
-        "noise makes the input turn; hysim.cycle_metrics measures cycles with minor loops and of every amplitude"
+        "both and back to the level, such as 0, max, min, 0. Give a longer record. hysim.loop_metrics(tolerance=...) "
+        "ignores small turns of the input, hysim.cycle_metrics measures cycles with minor loops and of every amplitude"
     )
 
 

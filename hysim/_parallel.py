@@ -25,6 +25,7 @@ from contextvars import ContextVar, copy_context
 from typing import Any, TypeVar
 
 from hysim._frozen import check_count
+from hysim._progress import Progress, followed, silence
 
 T = TypeVar("T")
 
@@ -35,9 +36,6 @@ GLANCE = 0.1  # longest wait without a check for signals [s]
 _PATIENCE = 0.3  # seconds to wait for threads that are being stopped
 
 _most: ContextVar[int | None] = ContextVar("most threads", default=None)
-
-Progress = Callable[[int, int], None]
-"""Called as ``progress(done, total)``."""
 
 
 def cores() -> int:
@@ -83,6 +81,7 @@ def in_pieces(work: Callable[[slice], int], n_samples: int) -> int:
         failed = work(slice(start, min(start + _STRETCH, n_samples)))
         if failed >= 0:
             return start + failed
+        followed(min(start + _STRETCH, n_samples), n_samples)
     return -1
 
 
@@ -305,6 +304,7 @@ def _begin(begin: Callable[..., None], arguments: tuple[Any, ...]) -> None:
         signal.signal(signal.SIGHUP, signal.SIG_DFL)
         signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGINT, signal.SIGTERM})
     threading.Thread(target=_end_with_parent, daemon=True).start()
+    silence()  # the parent reports
     begin(*arguments)
 
 

@@ -7,6 +7,7 @@ import csv
 import importlib
 import io
 import math
+import re
 import textwrap
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any, NoReturn, TypeVar
@@ -15,6 +16,7 @@ import numpy as np
 import numpy.typing as npt
 
 LINES, LETTERS = 10, 100
+_FORMULA = re.compile(r"'*[=+@\t\r-]")
 _NOTEBOOKS = "hysim.notebooks"
 
 _PICTURES = {
@@ -89,11 +91,29 @@ def folded(text: str, width: int = LETTERS, first: str = "", indent: str = "") -
 
 
 def csv_text(rows: Iterable[Iterable[Any]], *, delimiter: str = ",", nan: str = "") -> str:
-    """Rows as comma-separated values; floats with all digits, None as an empty cell."""
+    """Rows as comma-separated values; floats with all digits, None as an empty cell, texts as `text_in_cell` reads."""
     buffer = io.StringIO()
     writer = csv.writer(buffer, delimiter=delimiter, lineterminator="\n")
-    writer.writerows([nan if value != value else value for value in row] for row in rows)
+    writer.writerows([nan if value != value else _cell(value) for value in row] for row in rows)
     return buffer.getvalue()
+
+
+def _cell(value: Any) -> Any:
+    """The value; a text that a spreadsheet would compute as a formula has an apostrophe before it."""
+    return f"'{value}" if isinstance(value, str) and _FORMULA.match(value) and not _is_number(value) else value
+
+
+def _is_number(text: str) -> bool:
+    try:
+        float(text)
+    except ValueError:
+        return False
+    return True
+
+
+def text_in_cell(cell: str) -> str:
+    """The text that `csv_text` has written to a cell."""
+    return cell[1:] if cell.startswith("'") and _FORMULA.match(cell, 1) else cell
 
 
 def listed(names: Sequence[str]) -> str:

@@ -1,6 +1,6 @@
 """The libraries that hysim uses: their versions, for bug reports, and those that are optional."""
 
-import importlib
+import importlib.util
 import platform
 import sys
 from typing import Any
@@ -39,6 +39,11 @@ def optional(library: str, purpose: str, extra: str, error: type[Exception] = Im
         return importlib.import_module(library)
     except ImportError:
         raise error(f"{purpose} needs {library.partition('.')[0]}: pip install 'hysim[{extra}]'") from None
+
+
+def is_installed(library: str) -> bool:
+    """Whether a library can be imported, without importing it."""
+    return importlib.util.find_spec(library) is not None
 
 
 def _version(name: str) -> str:

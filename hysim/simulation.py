@@ -9,6 +9,7 @@ import numpy.typing as npt
 
 from hysim._frozen import FloatArray, frozen, vectors
 from hysim._printing import extent, printed, summary_text
+from hysim._progress import Reports, along, reports
 from hysim._results import Result, model_of
 from hysim.interop import dataset, frame
 from hysim.models.channels.dependent import on_record
@@ -159,8 +160,14 @@ class _HasSignals(Protocol):
     def signals(self, u: FloatArray, /, *time: float) -> Mapping[str, FloatArray]: ...
 
 
+@reports
 def simulate(
-    plant: Any, t: npt.ArrayLike | None, u: npt.ArrayLike, *, units: Mapping[str, str] | None = None
+    plant: Any,
+    t: npt.ArrayLike | None,
+    u: npt.ArrayLike,
+    *,
+    units: Mapping[str, str] | None = None,
+    progress: Reports = None,
 ) -> Simulation:
     """Simulate a law or a plant without feedback.
 
@@ -175,6 +182,9 @@ def simulate(
         Input; between the samples linear for a law, and by its own `hold` for a plant with dynamics.
     units : mapping, optional
         Labels of units for the result.
+    progress : callable or False, optional
+        Called as ``progress(done, total)`` with numbers of samples.
+        By default calls beyond 2 s report on the standard error; False turns this off.
 
     Returns
     -------
@@ -203,8 +213,9 @@ def simulate(
     times = clock[0] if clock else None
     if times is not None:
         check_increasing(times)
-    signals = _signals(plant, inputs, times)
-    memory = plant.memory(inputs) if "z" not in signals and isinstance(plant, Remembering) else signals.get("z")
+    with along(progress):
+        signals = _signals(plant, inputs, times)
+        memory = plant.memory(inputs) if "z" not in signals and isinstance(plant, Remembering) else signals.get("z")
     every = {"t": times, "u": inputs, "z": memory, **signals}
     return Simulation(
         u=inputs,

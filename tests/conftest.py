@@ -111,6 +111,12 @@ def pyplot_keeps_no_figure():
         pyplot.close("all")
 
 
+@pytest.fixture(autouse=True)
+def no_call_is_long_enough_to_report(monkeypatch):
+    """A slow machine would write progress where a test expects nothing on the standard error."""
+    monkeypatch.setattr("hysim._progress._SILENT", float("inf"))
+
+
 def once_for_all_processes(tmp_path_factory, name, compute):
     """The result of `compute`, called with a folder by the first process that asks; the others read a file."""
     folder = tmp_path_factory.getbasetemp()

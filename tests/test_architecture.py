@@ -13,7 +13,7 @@ PACKAGE = Path(hysim.__file__).parent
 
 RANKS = (
     ("_names", "_release", "_results"),
-    ("_frozen", "_atomic", "_blas", "_printing", "_versions", "errors"),  # they know nothing of hysteresis
+    ("_frozen", "_atomic", "_blas", "_printing", "_progress", "_versions", "errors"),  # they know nothing of hysteresis
     (
         "_channels",
         "_cycles",

@@ -75,6 +75,11 @@ def test_every_option_has_help_and_every_quantity_a_unit(name):
         assert re.search(r"\[(1|s|Hz|%%|units? of .+)\]", action.help), (name, action.help)
 
 
+@pytest.mark.parametrize("name", ["identify", "compare", "simulate", "plot", "control", "page", "c", "fmu"])
+def test_the_help_says_that_a_model_of_ones_own_is_code_that_is_executed(name):
+    assert "module:name of your own, which executes ./module.py" in " ".join(PARSERS[name].format_help().split())
+
+
 def test_options_are_declared_as_their_help_shows_them():
     text = """
 file FILE  an argument
@@ -201,19 +206,14 @@ class Terminal(io.StringIO):
         return True
 
 
-def test_a_reproduction_is_told_as_json_and_its_steps_on_a_terminal(run, tmp_path, monkeypatch):
-    def reproduce(out, *, quick, page, progress):
-        if progress is not None:
-            progress(0, 9, "line")
+def test_a_reproduction_is_told_as_json(run, tmp_path, monkeypatch):
+    def reproduce(out, *, quick, page):
         fits = {"model": SimpleNamespace(success=True)}
         return SimpleNamespace(folder=tmp_path, findings=SimpleNamespace(study=SimpleNamespace(fits=fits)))
 
     (tmp_path / "summary.json").write_text("{}\n")
     monkeypatch.setattr("hysim.paper.reproduce", reproduce)
     assert run("reproduce", "--json") == (0, "{}\n", "")
-    monkeypatch.setattr("sys.stderr", terminal := Terminal())
-    assert run("reproduce", "--json") == (0, "{}\n", "")
-    assert terminal.getvalue() == "[1/10] line\n"
 
 
 @pytest.mark.parametrize("kind", KINDS)

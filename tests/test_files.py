@@ -1,6 +1,5 @@
 """Records come from files of every format and go into them to the bit; what is damaged ends in one clear line."""
 
-import dataclasses
 import io
 import struct
 import sys
@@ -75,7 +74,7 @@ def test_a_saved_record_comes_back_to_the_bit(folder, ending, rec):
     path = folder / f"loop{ending}"
     hs.save_record(rec, path)
     back = hs.load(path)
-    assert back == (rec if rec.name else dataclasses.replace(rec, name="loop"))  # a file has a name
+    assert back == rec  # without a name, too: that of the file is none that a record was given
     assert bits(back) == bits(rec)
     path.unlink()
 
@@ -95,6 +94,9 @@ def test_what_cannot_be_saved_leaves_what_was_there(tmp_path, monkeypatch):
     monkeypatch.setattr("os.replace", lambda *_: (_ for _ in ()).throw(OSError(28, "No space left on device")))
     with pytest.raises(OSError, match="No space left"):
         hs.save_record(rec, tmp_path / "loop.npz")
+    with pytest.raises(FileNotFoundError, match="none") as refused:
+        hs.save_record(rec, tmp_path / "none" / "loop.npz")
+    assert refused.value.filename == str(tmp_path / "none" / "loop.npz")  # and not that of the new file beside it
     with pytest.raises(ValueError, match=r"loop\.txt: the ending must be one of \.csv, \.tsv, .* got '\.txt'"):
         hs.save_record(rec, tmp_path / "loop.txt")
     for name in ("a\0", "\ud800"):
@@ -232,6 +234,26 @@ def test_a_file_from_a_machine_of_the_other_byte_order_is_read():
     inner += struct.pack(">II", 9, 24) + numbers
     content = b"MATLAB 5.0 MAT-file".ljust(124) + b"\1\0MI" + struct.pack(">II", 14, len(inner)) + inner
     assert load(content, u="u", y="u").u.tolist() == [0.0, 1.0, 4.0]
+
+
+@pytest.mark.parametrize("order", "<>")
+@pytest.mark.parametrize(
+    ("type_", "code"),
+    [(1, "b"), (2, "B"), (3, "h"), (4, "H"), (5, "i"), (6, "I"), (7, "f"), (9, "d"), (12, "q"), (13, "Q")],
+)
+def test_numbers_in_mat_files_are_of_their_type_and_byte_order(order, type_, code):
+    values = [1, 2, -3 if code.islower() else 1 << (8 * struct.calcsize(code) - 1)]  # the largest power without a sign
+    numbers = struct.pack(f"{order}3{code}", *values)
+
+    def matrix(name):
+        inner = struct.pack(f"{order}IIII", 6, 8, 6, 0) + struct.pack(f"{order}IIii", 5, 8, 3, 1)
+        inner += struct.pack(f"{order}II", 1, 1) + name + bytes(7)
+        inner += struct.pack(f"{order}II", type_, len(numbers)) + numbers + bytes(-len(numbers) % 8)
+        return struct.pack(f"{order}II", 14, len(inner)) + inner
+
+    title = b"MATLAB 5.0 MAT-file".ljust(124) + (b"\0\1IM" if order == "<" else b"\1\0MI")
+    rec = load(title + matrix(b"u") + matrix(b"y"))
+    assert rec.u.tolist() == rec.y.tolist() == values
 
 
 def test_missing_values_are_treated_alike_in_every_format():
@@ -420,6 +442,13 @@ def test_h5_without_its_library_says_what_to_install(tmp_path, monkeypatch):
     with pytest.raises(ValueError, match=r"needs h5py: pip install 'hysim\[io\]'"):
         hs.save_record(hs.datasets.table1(), tmp_path / "loop.h5")
     assert not list(tmp_path.iterdir())
+
+
+def test_the_shell_asks_for_the_library_of_h5_before_it_computes(tmp_path, monkeypatch, capsys):
+    monkeypatch.setitem(__import__("sys").modules, "h5py", None)
+    arguments = ["simulate", str(tmp_path / "no.json"), str(tmp_path / "no.csv"), "--out", str(tmp_path / "out.h5")]
+    assert main(arguments) == 2  # and not that there is no such model
+    assert "a file of HDF5 needs h5py: pip install 'hysim[io]'" in capsys.readouterr().err
 
 
 def test_the_command_line_takes_and_writes_every_format(tmp_path, capsys):

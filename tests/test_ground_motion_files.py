@@ -146,6 +146,16 @@ def test_times_with_few_digits_are_made_even():
     assert acceleration.tolist() == np.sin(exact).tolist()
 
 
+@pytest.mark.parametrize(("begin", "step"), [(0.0, 0.005), (1000.1, 0.02), (0.0, 1 / 3), (1.0, 0.0123456789)])
+def test_the_step_is_the_decimal_that_was_meant_or_that_of_the_times(begin, step):
+    rows = "".join(f"{begin + step * k!r},0.5\n" for k in range(400))
+    t, _ = read(f"t,a\n{rows}")
+    assert t[0] == begin
+    assert np.abs(t - (begin + step * np.arange(400))).max() < 1e-12 * max(1.0, begin)
+    if step in (0.005, 0.02):  # without the rounding of the times
+        assert t.tolist() == (begin + hs.signals.sample_times(400, step)).tolist()
+
+
 @pytest.mark.parametrize("ending", [".npz", ".mat"])
 def test_arrays_with_names_are_read(tmp_path, ending):
     path = tmp_path / f"motion{ending}"

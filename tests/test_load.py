@@ -1,12 +1,15 @@
 """Text files become records, and what cannot is refused with its line."""
 
 import io
+import tracemalloc
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 import hysim as hs
+from hysim._printing import csv_text
+from hysim.files import FileColumn, _delimited
 
 LOOP = "time [s],voltage [V],displacement (um),note\n0,0,0.0,up\n1,5,0.079,\n2,10,0.152,top\n"
 
@@ -316,3 +319,100 @@ def test_a_stream_is_read_from_where_it_stands(tmp_path):
     with write(tmp_path, "title\nu,y\n0,1\n2,3\n").open(encoding="utf-8") as stream:
         stream.readline()
         assert hs.load(stream, u="u", y="y").name == "loop"
+
+
+FORMULAS = ("=1+1", "+a", "@a", "-a", "=A1+B1", "'=b", "''@b", "'c", "--d")
+
+
+@pytest.mark.parametrize("delimiter", [",", "\t"])
+def test_no_text_of_a_csv_file_is_a_formula_and_all_of_them_come_back(delimiter):
+    text = csv_text([FORMULAS, [-1.5] * len(FORMULAS), ["-2"] * len(FORMULAS)], delimiter=delimiter)
+    first, *others = text.splitlines()
+    assert not [cell for cell in first.split(delimiter) if cell[0] in "=+@-"]
+    assert others == [delimiter.join(["-1.5"] * len(FORMULAS)), delimiter.join(["-2"] * len(FORMULAS))]
+    assert [column.name for column in hs.list_columns(io.StringIO(text), delimiter=delimiter)] == [*FORMULAS]
+    assert hs.load(io.StringIO(text), u="=1+1", y="'=b").u.tolist() == [-1.5, -2.0]
+
+
+def test_a_name_that_is_a_formula_is_none_in_the_tables_of_results():
+    rec = hs.Record(u=[0, 1, 2, 1, 0], y=[0, 1, 2, 1, 0])
+    assert "\n'=cmd()," in hs.compare({"=cmd()": hs.Line}, rec, cross_validate=2).to_csv()
+    assert hs.sweep(lambda **named: len(named), {"@a": [0, 1]}).to_csv().startswith("task,'@a,")
+
+
+def test_a_model_is_no_record_and_a_record_no_model(tmp_path):
+    hs.save(hs.Line(slope=0.1), tmp_path / "law.json", units={"u": "V"})
+    for read in (hs.load, hs.list_columns, hs.load_ground_motion):
+        with pytest.raises(ValueError, match=r"^law\.json is a model: read it with hs\.load_model$"):
+            read(tmp_path / "law.json")
+    for stream in (io.StringIO('{"family": "Line"}'), io.BytesIO(b'\n{"hysim": "1", "family" : "Line"}')):
+        with pytest.raises(ValueError, match=r"^stream is a model: read it with hs\.load_model$"):
+            hs.load(stream)
+    rec = hs.Record(u=[0, 1], y=[0, 1], name="family")
+    for ending in (".csv", ".npz", ".mat"):
+        hs.save_record(rec, tmp_path / f"loop{ending}")
+        with pytest.raises(
+            ValueError, match=rf"loop\{ending} does not hold a model .*; if it is a record: read it with"
+        ):
+            hs.load_model(tmp_path / f"loop{ending}")
+
+
+def test_columns_are_listed_without_reading_the_text_for_each_of_them(monkeypatch):
+    parsed, parse = [], _delimited.plain_numbers
+    monkeypatch.setattr(_delimited, "plain_numbers", lambda *given: parsed.append(given[1]) or parse(*given))
+    names = [f"c{k}" for k in range(500)]
+    text = ",".join(names) + "\n" + 3 * (",".join(["1"] * 500) + "\n")
+    assert [column.highest for column in hs.list_columns(io.StringIO(text))] == [1.0] * 500
+    assert len(parsed) == 1
+    noted = text.replace("c137", "note").replace("\n1,", "\na,")
+    columns = hs.list_columns(io.StringIO(noted))
+    assert [k for k, column in enumerate(columns) if column.problem] == [0]
+    assert len(parsed) < 30  # the text is halved nine times to find the column that holds none
+
+
+def test_a_column_is_listed_with_all_that_is_in_it():
+    text = io.StringIO("t [s],u [V],y [um],note\n0,3,nan,a\n1,,-2,b\n2,5,,c\n3,4,-1,d\n")
+    t, u, y, note = hs.list_columns(text)
+    assert t == FileColumn("t", 0, "s", n_samples=4, n_missing=0, lowest=0.0, highest=3.0, increases=True)
+    assert u == FileColumn("u", 1, "V", n_samples=3, n_missing=1, lowest=3.0, highest=5.0, increases=False)
+    assert y == FileColumn("y", 2, "um", n_samples=2, n_missing=2, lowest=-2.0, highest=-1.0, increases=True)
+    assert (note[:5], note.increases) == (("note", 3, "", 0, 0), False)
+    assert note.problem == "line 2, column 'note': expected a finite number, got 'a'"
+
+
+def test_notes_stand_in_the_comments_at_the_top_alone():
+    top = '# made by a rig\n# name: "hot"\n%resolution: 0.5\n# units: {"u": "V"}\n# channels: {"T": 40}\n'
+    rec = hs.load(io.StringIO(f"{top}u,y\n# name: cold\n0,1\n1,2\n"))
+    assert rec == hs.Record(u=[0, 1], y=[1, 2], units={"u": "V"}, resolution=0.5, name="hot", channels={"T": 40.0})
+    for above in ("\n", "0,0\n"):
+        assert hs.load(io.StringIO(f"{above}{top}0,1\n1,2\n"), u=0, y=1).name == "stream"
+    assert hs.load(io.StringIO("# name: a plain one \n0,1\n1,2\n"), u=0, y=1).name == "a plain one"
+
+
+def test_a_long_text_takes_little_more_memory_than_its_numbers(tmp_path):
+    n = 60_000
+    path = write(
+        tmp_path, "t,u,y\n" + "".join(f"{k},{k % 7}.123456789012345,{k % 9}.123456789012345\n" for k in range(n))
+    )
+    tracemalloc.start()
+    try:
+        rec = hs.load(path)
+        peak = tracemalloc.get_traced_memory()[1]
+    finally:
+        tracemalloc.stop()
+    assert (len(rec), rec.y[-1]) == (n, (n - 1) % 9 + 0.123456789012345)
+    assert peak < 150 * n + 5_000_000  # bytes: a record has 24 a sample, and 5 million samples may take a gigabyte
+
+
+def test_lines_far_down_a_long_text_are_counted(tmp_path):
+    lines = [f"{k} {k}" for k in range(100_000)]
+    lines[70_000:70_000] = ["# a comment", "", "  "]
+    lines[90_000] = "1 x"
+    with pytest.raises(ValueError, match="line 90001, column '1': expected a finite number, got 'x'"):
+        hs.load(write(tmp_path, "\n".join(lines)), u=0, y=1)
+    lines[90_000] = "1 nan"
+    with pytest.raises(ValueError, match="line 90001, column '1': the value is missing"):
+        hs.load(write(tmp_path, "\n".join(lines)), u=0, y=1)
+    assert hs.load(write(tmp_path, "\n".join(lines)), u=0, y=1, on_missing="drop").u[-1] == 99_999
+    with pytest.raises(ValueError, match="line 95002: expected 2 cells, got 3"):
+        hs.load(write(tmp_path, "\n".join([*lines[:95_001], "1 2 3", *lines[95_001:]])), u=0, y=1)

@@ -8,7 +8,6 @@ import sys
 import xml.etree.ElementTree as ET
 from itertools import pairwise
 from pathlib import Path
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -16,7 +15,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import hysim as hs
-from hysim.cli import main, models, outputs
+from hysim.cli import main, models
 from hysim.models.candidates import is_identifiable
 
 LAW = hs.BoucWen(beta=0.03, gamma=0.02, gain=0.01, feedthrough=0.015)
@@ -269,29 +268,6 @@ def test_a_search_that_does_not_converge_exits_with_1(run, monkeypatch):
     unfinished = dataclasses.replace(fit, success=False)
     monkeypatch.setattr("hysim.identification.identify", lambda *_, **__: unfinished)
     assert run("identify", "loop.csv", *COLUMNS, "--model", "line")[0] == 1
-
-
-def test_progress_is_shown_on_a_terminal_only(monkeypatch):
-    class Terminal(io.StringIO):
-        def isatty(self):
-            return True
-
-    monkeypatch.setattr("sys.stderr", io.StringIO())
-    assert outputs.progress() is None
-    monkeypatch.setattr("sys.stderr", terminal := Terminal())
-    times = iter([0.0, 0.5, 1.0, 2.0])
-    monkeypatch.setattr("hysim.cli.outputs.time", SimpleNamespace(monotonic=lambda: next(times)))
-    show = outputs.progress("dahl")
-    show(1, 4)
-    show(2, 4)
-    show.announce("Play")
-    show(4, 4)
-    shown = terminal.getvalue().split("\r\x1b[K")[1:]
-    assert shown[:3] == ["dahl: 1 of 4", "dahl: 2 of 4, 0:00:01 left", "Play: 2 of 4, 0:00:01 left"]
-    assert shown[3] == "Play: 4 of 4\n"
-    count = outputs.progress()
-    count(7, 0)  # of an unknown total
-    assert terminal.getvalue().endswith("7")
 
 
 CORPUS = {

@@ -29,6 +29,8 @@ PYTHON_ONLY = (
     "plants",
     "cli",
     "channels",
+    "tracking",
+    "notebooks",
 )
 
 
@@ -111,9 +113,51 @@ def test_no_message_of_the_library_keeps_an_argument_that_is_an_option():
     assert changed > 20
 
 
+READ_BY = {"files": "--encoding", "_load.py": "--on-missing"}
+READ_BY |= dict.fromkeys(("_accelerations.py", "_ground_motion.py", "_number_lists.py", "records.py"), "--sample-time")
+"""Where messages come from that reach the commands with an option alone: those that read texts, records or times."""
+OPTIONS = {name: set(parser._option_string_actions) for name, parser in parsers()[1].items()}
+ADVISED = re.compile(r"(?:hysim (\w+) )?(?<![\w-])(--[a-z][\w-]*)")
+
+
+@pytest.fixture(scope="module")
+def messages():
+    """Literals of the library that may name an argument or an option, with the parts of their module's path."""
+    paths = [(path, path.relative_to(PACKAGE).parts) for path in PACKAGE.rglob("*.py")]
+    every = [(parts, text) for path, parts in paths if not {*parts} & {*PYTHON_ONLY} for text in texts(path)]
+    return [(parts, text) for parts, text in every if " " in text and re.search(r"--|\w=|hs\.|hysim\.", text)]
+
+
+@pytest.mark.parametrize("name", OPTIONS)
+def test_every_option_in_a_message_is_one_of_the_command_or_named_with_another_one(name, messages):
+    flags = {
+        action.dest: action.option_strings[-1] for action in parsers(name)[1][name]._actions if action.option_strings
+    }
+    arguments = re.compile(rf"(?<![\w.\"'-])({'|'.join(each for each in (*FLAGS, *OTHER_NAMES) if len(each) > 2)})=")
+    for parts, text in messages:
+        if all(READ_BY.get(part, "--help") in OPTIONS[name] for part in parts):
+            words = re.sub(r"\w+\([^()]*\)", "", in_shell_words(text, flags))
+            assert not arguments.search(words), (parts, words)
+            assert all(option in OPTIONS[command or name] for command, option in ADVISED.findall(words)), (parts, words)
+
+
+def test_every_option_in_an_error_that_a_command_raises_is_one_of_its_own():
+    named = 0
+    for name in OPTIONS:
+        path = PACKAGE / "cli" / f"{name}.py"
+        tree = ast.parse(path.read_text() if path.exists() else "")
+        raised = [ast.unparse(node) for node in ast.walk(tree) if isinstance(node, ast.Raise)]
+        for command, option in ADVISED.findall("\n".join(raised)):
+            named += 1
+            assert option in OPTIONS[command or name], name
+    assert named > 10
+
+
 def test_errors_of_the_library_name_options(run):
     assert run("metrics", "latin.csv")[2].endswith("for instance --encoding latin-1\n")
-    assert "larger --tolerance if" in run("metrics", "loop.csv", "--cycles", "9")[2]
+    few = "hysim metrics --tolerance ignores small turns of the input, hysim metrics --cycles measures"
+    assert few in run("metrics", "loop.csv", "--cycles", "9")[2]
+    assert few in run("compare", "loop.csv", "--model", "line", "--test-cycles", "3")[2]  # which has no --tolerance
     assert run("identify", "loop.csv", "--model", "line", "--resolution", "0")[2].endswith(
         "loop.csv: --resolution must be positive, got 0.0\n"
     )
@@ -160,6 +204,12 @@ def test_a_typo_is_answered_with_what_was_meant(run, arguments, message):
         ),
         (("simulate", "loop.csv", "law.json"), "the model stands before the record: hysim simulate law.json loop.csv"),
         (("simulate", "law.json", "weg.csv"), "no column is called u, the columns are: Weg, y; name it by --u"),
+        (("identify", "law.json", "--model", "line"), "law.json is a model, which hysim simulate, control, page and"),
+        (("columns", "law.json"), "and c take, and hysim compare --model"),
+        (
+            ("c", "loop.csv", "--out", "a.c"),
+            "not hold a model of hysim: Expecting value: line 1 column 1 (char 0); hysim identify --out makes",
+        ),
         (("simulate", "line", "loop.csv"), "write a model of it by hysim identify --out line.json"),
         (("identify", "loop.csv", "--model", "weg.csv"), "the file weg.csv is no model: give the name of a family"),
         (("identify", "loop.csv", "--model", "line", "--out", "law"), "models are JSON: call the file .json, got law"),

@@ -9,9 +9,10 @@ import os
 import signal
 import sys
 from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, nullcontext
 
 from hysim import __version__
+from hysim._progress import silent
 from hysim.cli import (
     c,
     columns,
@@ -116,7 +117,8 @@ def _run(arguments: list[str]) -> int:
         return BAD_INPUT
     import numpy as np
 
-    with np.errstate(all="ignore"), _told_in_shell_words(options):  # an overflow is inf or nan, and null in JSON
+    reporting = silent() if options.quiet else nullcontext()
+    with np.errstate(all="ignore"), reporting, _told_in_shell_words(options):  # an overflow is inf or nan: null in JSON
         outputs.check(options)
         return int(options.command.run(options))
 

@@ -32,9 +32,7 @@ def run(options: argparse.Namespace) -> int:
             cross_validate=options.cross_validate or "auto",
             test=test,
             seed=options.seed,
-            progress=(shown := outputs.progress()),
             max_evaluations=options.max_evaluations,
-            announce=shown.announce if shown else None,
         )
     except Interrupted as interrupt:
         if not options.json:

@@ -20,7 +20,7 @@ def run(options: argparse.Namespace) -> int:
     is_oscillator, arguments = _arguments(options)
     record = records.read(options)
     verb = discover_oscillator if is_oscillator else discover
-    discovery = verb(record, seed=options.seed, progress=outputs.progress(), **arguments)
+    discovery = verb(record, seed=options.seed, **arguments)
     model = discovery.model
     files: outputs.Files = {
         options.out: lambda: to_json(model, units=record.units),

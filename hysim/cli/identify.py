@@ -32,7 +32,6 @@ def run(options: argparse.Namespace) -> int:
         bounds=dict(options.bounds),
         depends=dict(options.depends) or None,
         weights=weights,
-        progress=outputs.progress(models.name_of(options.model)),
         **outputs.fields_of(options, ("initial", "noise", "intervals", "cross_validate", "max_evaluations", "seed")),
     )
     names = (

@@ -21,7 +21,6 @@ def run(options: argparse.Namespace) -> int:
     motion = displacement(
         options.frames,
         options.scale,
-        progress=outputs.progress(),
         **outputs.fields_of(options, ("region", "direction", "reference", "method", "unit")),
     )
     columns, units = _table(options, motion, log)

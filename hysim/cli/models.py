@@ -10,10 +10,11 @@ from pathlib import Path
 from typing import Any, Protocol, runtime_checkable
 
 import hysim
+from hysim.cli.options import OWN
 from hysim.cli.records import STANDARD
 from hysim.cli.shell.words import suggestion
 
-FORMS = "name of a family, such as bouc-wen; MODEL.json; or module:name of your own"
+FORMS = f"name of a family, such as bouc-wen; MODEL.json; or {OWN}"
 """Values of an option for models."""
 
 OPTIONS = f"""

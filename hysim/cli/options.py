@@ -34,7 +34,8 @@ _FORMS = {
 _OPTION = re.compile(r"(either |or |)(-{0,2}[a-z][\w-]*)(?: (\S+))?  +(.*?)(?: \[default: (\S+)\]| (\[required\]))?")
 _TITLE = re.compile(r"([a-z ]+):(?: (.*))?")
 
-MODEL_IN = "model MODEL  model file as identify writes it, - for the standard input, or module:name of your own"
+OWN = "module:name of your own, which executes ./module.py or an installed module"
+MODEL_IN = f"model MODEL  model file as identify writes it, - for the standard input, or {OWN}"
 MODEL_OUT = "--out MODEL.json  write the model; - writes it to the standard output"
 SEED = "--seed NUMBER  seed of the random starts [default: 0]"
 JSON = "--json  print the result as JSON"
@@ -57,6 +58,7 @@ class Command(NamedTuple):
         """Add the command to those of a parser."""
         parser = commands.add_parser(self.name, description=self.description)
         roles = dict(_declare(parser, self.options))
+        parser.add_argument("--quiet", action="store_true", help="report no progress of long calls on standard error")
         flags = {action.dest: action.option_strings[0] for action in parser._actions if action.option_strings}
         parser.set_defaults(command=self, roles=roles, flags=flags)
         return parser

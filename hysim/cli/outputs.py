@@ -1,4 +1,4 @@
-"""Writing of results: whole files, text on the standard output, progress on a terminal."""
+"""Writing of results: whole files, and text on the standard output."""
 
 import argparse
 import contextlib
@@ -6,9 +6,7 @@ import json
 import math
 import os
 import sys
-import time
 from collections.abc import Callable, Iterable, Iterator, Mapping
-from datetime import timedelta
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -185,37 +183,3 @@ def picture_of(run: "Simulation") -> "Figure":
         width=3.0 * min(n, _LOOPS_IN_A_ROW) + 1.0,
         height=3.0 * rows,
     )
-
-
-class Progress:
-    """One line on the standard error: what is at work, how much is done, and how long the rest may take.
-
-    A total of 0 stands for an unknown total.
-    """
-
-    def __init__(self, name: str = "") -> None:
-        self.name, self.counted = name, ""
-        self.begin: tuple[float, int] | None = None
-
-    def __call__(self, done: int, total: int) -> None:
-        now = time.monotonic()
-        first, before = self.begin = self.begin or (now, done)
-        rate = (done - before) / max(now - first, 1e-9)
-        self.counted = f"{done} of {total}" if total else f"{done}"
-        if total and rate > 0 and done < total:
-            self.counted += f", {timedelta(seconds=round((total - done) / rate))} left"
-        self._show(end="\n" if 0 < total <= done else "")
-
-    def announce(self, name: str) -> None:
-        """Name the model whose turn begins; those done are not counted anew."""
-        self.name = name
-        self._show()
-
-    def _show(self, end: str = "") -> None:
-        text = ": ".join(filter(None, (self.name, self.counted)))
-        print(f"\r\x1b[K{text}", end=end, file=sys.stderr, flush=True)
-
-
-def progress(name: str = "") -> Progress | None:
-    """Progress of work on a model or a file of this name if the standard error is a terminal, else None."""
-    return Progress(name) if sys.stderr.isatty() else None

@@ -6,7 +6,7 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from hysim.cli import models, outputs, records
-from hysim.cli.options import Command
+from hysim.cli.options import OWN, Command
 
 if TYPE_CHECKING:
     from hysim.plot import Figure
@@ -132,7 +132,7 @@ COMMAND = Command(
 {records.OPTIONS}
 others FILE...  more files with the same columns
 --kind {"|".join(KINDS)}  {". ".join(f"{name}: {kind.shows}" for name, kind in KINDS.items())} [default: loop]
---model MODEL...  model file as identify writes it, - for the standard input, or module:name; once or more
+--model MODEL...  model file as identify writes it, - for the standard input, or {OWN}; once or more
 --out LOOP.svg  the picture [required]
 """,
     run,

@@ -36,14 +36,12 @@ def run(options: argparse.Namespace) -> int:
         measured,
         fixed=dict(options.fix),
         free=tuple(options.free),
-        progress=outputs.progress(models.name_of(options.model)),
         **outputs.fields_of(options, ("initial", "noise", "seed")),
     )
     posterior = sample_posterior(
         fit,
         measured,
         priors=dict(options.prior),
-        progress=outputs.progress("posterior"),
         **outputs.fields_of(options, ("initial", "noise", "samples", "seed")),
     )
     outputs.write(options, _files(options.out, posterior), posterior.summary, lambda: _document(posterior))

@@ -1,7 +1,6 @@
 """`hysim reproduce`: the paper's 52 points, every model side by side, as a report."""
 
 import argparse
-import sys
 from collections import Counter
 from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING
@@ -19,9 +18,7 @@ def run(options: argparse.Namespace) -> int:
     """Reproduce, and print the short table."""
     from hysim.paper import reproduce
 
-    result = reproduce(
-        options.out, quick=options.quick, page=options.page, progress=_progress if sys.stderr.isatty() else None
-    )
+    result = reproduce(options.out, quick=options.quick, page=options.page)
     study = result.findings.study
     if options.json:
         print((result.folder / "summary.json").read_text(encoding="utf-8"), end="")
@@ -50,10 +47,6 @@ def _verdicts(claims: "Sequence[Claim]") -> Iterator[str]:
     for claim in claims:
         if claim.id.startswith(("hysteresis-90", "vibration-97")):
             yield f"{claim.id}: {claim.recomputed:.1f} % where the paper says {claim.printed:g} %, {claim.verdict}"
-
-
-def _progress(done: int, total: int, step: str) -> None:
-    print(f"[{done + 1}/{total + 1}] {step}", file=sys.stderr, flush=True)
 
 
 COMMAND = Command(

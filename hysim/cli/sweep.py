@@ -84,7 +84,7 @@ def _computed(options: argparse.Namespace) -> Any:
     outputs.keep(files, [options.out, options.csv, options.plot])
     with _executor(options) as executor:
         how = outputs.fields_of(options, ("workers", "on_change"))
-        return sweep(task, space, executor=executor, store=options.out, seed=seed, progress=outputs.progress(), **how)
+        return sweep(task, space, executor=executor, store=options.out, seed=seed, **how)
 
 
 @contextmanager

@@ -15,7 +15,8 @@ from hysim import metrics
 from hysim._cycles import TOLERANCE
 from hysim._excursions import measured_cycles
 from hysim._frozen import FloatArray
-from hysim._parallel import Progress, map_on_threads
+from hysim._parallel import map_on_threads
+from hysim._progress import Reports, announced_by, reports
 from hysim._results import Result, model_of
 from hysim.comparison._records import CrossValidated, OneByOne, together
 from hysim.comparison._result import Comparison, ComparisonRow
@@ -36,6 +37,7 @@ _CRITERIA = {"fpe": metrics.fpe, "aic": metrics.aic, "bic": metrics.bic}
 _FAILURES = (ValueError, TypeError, ArithmeticError, SimulationError)
 
 
+@reports
 def compare(
     models: Mapping[str, Any] | Sequence[Any] | str | None,
     record_or_records: Record | Sequence[Record],
@@ -45,7 +47,7 @@ def compare(
     max_evaluations: int | None = None,
     seed: int = 0,
     workers: int | None = None,
-    progress: Progress | None = None,
+    progress: Reports = None,
     announce: Callable[[str], None] | None = None,
 ) -> Comparison:
     """Compare models on a record, or on several.
@@ -74,8 +76,9 @@ def compare(
         Seed of the random starts of the searches.
     workers : int, optional
         Number of threads; by default one for each core. The result does not depend on it.
-    progress : callable, optional
+    progress : callable or False, optional
         Called as ``progress(done, total)`` after each model.
+        By default calls beyond 2 s report on the standard error; False turns this off.
     announce : callable, optional
         Called as ``announce(name)`` when a model's turn begins, on the thread that works on it.
 
@@ -108,7 +111,9 @@ def compare(
     training = records[-1]
     if cross_validate == "auto":
         cross_validate = "loo" if sum(map(len, records)) <= _SHORT else _BLOCKS
-    protocol = _Protocol(records, _last_loop(training), cross_validate, seed, trial, max_evaluations, announce)
+    protocol = _Protocol(
+        records, _last_loop(training), cross_validate, seed, trial, max_evaluations, announce or announced_by(progress)
+    )
     names = list(subjects)
     done: dict[str, ComparisonRow | str] = {}
 
@@ -127,7 +132,7 @@ def compare(
 
     try:
         with sharing():
-            map_on_threads(compared, len(names), workers=workers, progress=progress)
+            map_on_threads(compared, len(names), workers=workers, progress=progress or None)
     except KeyboardInterrupt:
         if not done:
             raise

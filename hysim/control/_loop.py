@@ -9,8 +9,8 @@ import numpy as np
 import numpy.typing as npt
 
 from hysim._frozen import FloatArray, frozen, read_only
-from hysim._parallel import Progress
 from hysim._printing import extent, printed, quantity, summary_text
+from hysim._progress import Progress, Reports, reports
 from hysim._results import model_of
 from hysim.control._protocols import Controller, limits_of, preview
 from hysim.errors import SimulationError, warn_beyond, warn_limited
@@ -122,6 +122,7 @@ class ClosedLoop:
         return {name: self.units[signal] for name, signal in like.items() if signal in self.units} | dict(self.units)
 
 
+@reports
 def close_loop(
     plant: Any,
     controller: Controller,
@@ -132,7 +133,7 @@ def close_loop(
     substeps: int | None = None,
     ground_acceleration: npt.ArrayLike | None = None,
     units: Mapping[str, str] | None = None,
-    progress: Progress | None = None,
+    progress: Reports = None,
 ) -> ClosedLoop:
     """Run a sampled controller around an actuator or a structure.
 
@@ -162,8 +163,9 @@ def close_loop(
         [m/s^2].
     units : mapping, optional
         Labels of the units.
-    progress : callable, optional
+    progress : callable or False, optional
         Called as ``progress(done, total)`` with numbers of samples, in long runs.
+        By default calls beyond 2 s report on the standard error; False turns this off.
 
     Returns
     -------
@@ -207,12 +209,12 @@ def close_loop(
     if isinstance(plant, Structure):
         if u0 or substeps is not None:
             raise ValueError("a structure has its own initial_state and substeps: leave out u0 and substeps")
-        return _around_structure(plant, controller, times, r, ground_acceleration, units or {}, progress)
+        return _around_structure(plant, controller, times, r, ground_acceleration, units or {}, progress or None)
     actuator = as_actuator(plant)
     if ground_acceleration is not None:
         raise ValueError(f"only a Structure stands on the ground, got {type(plant).__name__} and ground_acceleration")
     plant_at_rest = RestingPlant(actuator, sample_time_of(times, r), u0, substeps)
-    signals = plant_at_rest.run(controller, r, progress, float(times[0]))
+    signals = plant_at_rest.run(controller, r, progress or None, float(times[0]))
     u = plant_at_rest.voltages(signals)
     conditions = {
         **_conditions(actuator, controller, plant_at_rest, signals, u),

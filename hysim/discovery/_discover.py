@@ -18,7 +18,7 @@ import numpy as np
 from hysim import metrics
 from hysim._blas import one_blas_thread
 from hysim._frozen import FloatArray, check_choice
-from hysim._parallel import Progress
+from hysim._progress import Progress, Reports, reports
 from hysim.discovery import _laws, _pysindy
 from hysim.discovery._judgement import HYSTERESIS, LAG, NO_STRUCTURE, Competitors, Judgement, competitors, doubts, judge
 from hysim.discovery._refinement import DIVERGED, Candidate, FreeRun, Samples
@@ -40,6 +40,7 @@ _OSCILLATOR = (
 _STAGES = 3  # library of z, other libraries, judgement
 
 
+@reports
 @one_blas_thread()
 def discover(
     record_or_records: Record | Sequence[Record],
@@ -54,7 +55,7 @@ def discover(
     initial: str = "auto",
     cross_validate: str | int | None = None,
     seed: int = 0,
-    progress: Progress | None = None,
+    progress: Reports = None,
 ) -> Discovery:
     """Discover the law of a memory in one or several records.
 
@@ -93,8 +94,9 @@ def discover(
         whole search is repeated for each fold: minutes for ``"loo"`` on 50 samples. Fills `Discovery.cv_rmse`.
     seed : int
         Seed of random restarts, and of the ensemble.
-    progress : callable, optional
+    progress : callable or False, optional
         Called as ``progress(done, total)``; each fold of the cross-validation is one step.
+        By default calls beyond 2 s report on the standard error; False turns this off.
 
     Returns
     -------

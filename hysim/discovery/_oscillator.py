@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 
 from hysim._frozen import FloatArray, check_positive
-from hysim._parallel import Progress
+from hysim._progress import Reports, reports
 from hysim.discovery._oscillator_response import Response
 from hysim.discovery._oscillator_search import Search
 from hysim.discovery._result import OscillatorDiscovery
@@ -19,6 +19,7 @@ _REPEATS = 1e-3  # of the input's rms: largest difference of two periods that co
 _TRANSIENT = 1.5  # rms of what changes from period to period, early in the period over late
 
 
+@reports
 def discover_oscillator(
     record_or_records: Record | Sequence[Record],
     *,
@@ -29,7 +30,7 @@ def discover_oscillator(
     degree: int = 3,
     symmetry: str | None = None,
     seed: int = 0,
-    progress: Progress | None = None,
+    progress: Reports = None,
 ) -> OscillatorDiscovery:
     """Discover the law of the memory in a mass on a hysteretic spring, ``m y'' + c y' + k y + z = u``.
 
@@ -52,8 +53,9 @@ def discover_oscillator(
         ``"odd"`` leaves out terms that do not change their sign with u and z.
     seed : int
         Seed of the resampling behind `OscillatorDiscovery.inclusion`.
-    progress : callable, optional
+    progress : callable or False, optional
         Called as ``progress(done, total)``.
+        By default calls beyond 2 s report on the standard error; False turns this off.
 
     Returns
     -------

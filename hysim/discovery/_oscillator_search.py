@@ -21,7 +21,7 @@ import numpy as np
 
 from hysim import metrics
 from hysim._frozen import FloatArray
-from hysim._parallel import Progress
+from hysim._progress import Progress
 from hysim.discovery._hidden_memory import PLANT, HiddenMemory, Regressed
 from hysim.discovery._judgement import NO_STRUCTURE
 from hysim.discovery._oscillator_models import RATE_DEPENDENT, SPRING, State, diverges, model, steady_loop, verdict

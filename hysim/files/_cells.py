@@ -6,6 +6,7 @@ can mean nothing else: ``1.000,5`` and ``1.000.000``, but not ``1.000``, unless 
 
 import math
 import re
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -76,7 +77,7 @@ def plain_numbers(lines: list[str], places: list[int], delimiter: str, signs: Si
     return np.ascontiguousarray(values.T) if np.isfinite(values).all() else None
 
 
-def numbers(cells: list[str], lines: list[int], label: str, signs: Signs) -> FloatArray:
+def numbers(cells: list[str], lines: Sequence[int], label: str, signs: Signs) -> FloatArray:
     """The numbers of a column, nan where one is missing; `lines` are the numbers of the cells' lines for messages."""
     return np.array([_number(cell, line, label, signs) for cell, line in zip(cells, lines, strict=True)])
 

@@ -6,12 +6,17 @@ from typing import NamedTuple
 
 import numpy as np
 
+from hysim._frozen import FloatArray
 from hysim.files._arrays import NUMBERS, Array, Arrays
+from hysim.files._delimited import Delimited
 from hysim.files._load import file_named, options_of_a_text, table_of
 from hysim.files._source import Source, opened
-from hysim.files._table import Table
+from hysim.files._table import Column, Table
 
 _MOST_OF_AN_ARRAY = 100  # columns
+_AT_ONCE = 5_000_000  # numbers of a text
+
+_Key = tuple[str, int | None]
 
 
 class FileColumn(NamedTuple):
@@ -70,10 +75,10 @@ def list_columns(
     """
     for_text = options_of_a_text(delimiter, decimal, thousands, skip, encoding)
     with opened(path) as source, file_named(source), table_of(source, for_text) as table:
-        return tuple(_column(table, name, number) for name, number in _keys(table))
+        return tuple(_listed(table, list(_keys(table))))
 
 
-def _keys(table: Table) -> Iterator[tuple[str, int | None]]:
+def _keys(table: Table) -> Iterator[_Key]:
     """Name and number of each column, None for one of several axes."""
     if not isinstance(table, Arrays):
         yield from zip(table.labels, range(len(table.labels)), strict=True)
@@ -92,12 +97,28 @@ def _names(array: Array) -> Iterator[str]:
         yield f"{array.label}[{','.join(map(str, index))}]"
 
 
-def _column(table: Table, name: str, number: int | None) -> FileColumn:
+def _listed(table: Table, keys: list[_Key]) -> Iterator[FileColumn]:
+    """The columns, read together as far as they can be: a text is split into all of its cells each time."""
+    size = max(1, _AT_ONCE // table.layout.n_samples) if isinstance(table, Delimited) else 1
+    for start in range(0, len(keys), size):
+        yield from _together(table, keys[start : start + size])
+
+
+def _together(table: Table, keys: list[_Key]) -> list[FileColumn]:
+    """Columns that are read at once; where one of them cannot be read, each half of them is."""
     try:
-        column = table.column(name if number is None else number)
-        values = table.values([column])[0]
+        columns = [table.column(name if number is None else number) for name, number in keys]
+        values = table.values(columns)
     except ValueError as error:
-        return FileColumn(name, number, "", 0, 0, np.nan, np.nan, False, " ".join(str(error).split()))
+        if len(keys) > 1:
+            half = len(keys) // 2
+            return _together(table, keys[:half]) + _together(table, keys[half:])
+        return [FileColumn(*keys[0], "", 0, 0, np.nan, np.nan, False, " ".join(str(error).split()))]
+    return [_column(table, key, *column) for key, *column in zip(keys, columns, values, strict=True)]
+
+
+def _column(table: Table, key: _Key, column: Column, values: FloatArray) -> FileColumn:
+    name, number = key
     known = values[~np.isnan(values)]
     low, high = (float(known.min()), float(known.max())) if known.size else (np.nan, np.nan)
     unit = table.notes.units.get(name, column.unit)

@@ -1,5 +1,6 @@
 """A text with one sample a line, as a table."""
 
+import itertools
 import json
 import operator
 import re
@@ -11,8 +12,9 @@ import numpy as np
 
 from hysim._frozen import FloatArray
 from hysim.files._cells import Signs, numbers, parse, plain_numbers
-from hysim.files._layout import COMMENTS, Layout, layout
+from hysim.files._layout import Layout, layout
 from hysim.files._table import Column, Notes, channels_in, listed, nearest, number_of, positive
+from hysim.files._text import COMMENTS, Lines, Text
 
 T = TypeVar("T")
 
@@ -47,37 +49,43 @@ class Delimited:
 
     def values(self, columns: list[Column]) -> FloatArray:
         """The numbers of the columns, shape (n_columns, n_samples), nan where one is missing."""
-        lines, delimiter, signs = self.layout.lines, self.layout.delimiter, self.layout.signs
-        values = plain_numbers(lines, [column.place for column in columns], delimiter, signs)
+        values, at = np.empty((len(columns), self.layout.n_samples)), 0
+        for lines in self.layout.samples():
+            values[:, at : at + len(lines.texts)] = self._values(lines, columns)
+            at += len(lines.texts)
+        return values
+
+    def _values(self, lines: Lines, columns: list[Column]) -> FloatArray:
+        delimiter, signs = self.layout.delimiter, self.layout.signs
+        values = plain_numbers(lines.texts, [column.place for column in columns], delimiter, signs)
         if values is not None:
             return values
-        rows = self.layout.rows()
-        return np.stack([numbers([row[c.place] for row in rows], self.layout.numbers, c.label, signs) for c in columns])
+        rows = self.layout.rows(lines)
+        return np.stack([numbers([row[c.place] for row in rows], lines.numbers, c.label, signs) for c in columns])
 
     def place(self, sample: int) -> str:
         """The sample's line."""
-        return f"line {self.layout.numbers[sample]}"
+        numbers = itertools.chain.from_iterable(lines.numbers for lines in self.layout.samples())
+        return f"line {next(itertools.islice(numbers, sample, None))}"
 
 
-def delimited(text: str, delimiter: str | None, decimal: str | None, thousands: str | None = None) -> Delimited:
+def delimited(text: Text, delimiter: str | None, decimal: str | None, thousands: str | None = None) -> Delimited:
     """The table that a text holds; ValueError with the number of the line if it holds none."""
     return Delimited(layout(text, delimiter, decimal, thousands), _notes(text))
 
 
-def _notes(text: str) -> Notes:
+def _notes(text: Text) -> Notes:
     """The name, resolution, units and channels in the comments above a text, as `hysim.save_record` writes them."""
     notes: dict[str, str] = {}
-    start = 0
-    while text.startswith(COMMENTS, start):
-        end = text.find("\n", start) % (len(text) + 1)
-        if note := _NOTE.match(text, start, end):
-            notes[note[1]] = text[note.end() : end].strip()
-        start = end + 1
+    for line in itertools.takewhile(lambda line: line.startswith(COMMENTS), text.top()):
+        if note := _NOTE.match(line):
+            notes[note[1]] = line[note.end() :].strip()
     units = _json(notes.get("units", ""), dict) or {}
+    name = _json(notes.get("name", ""), str)
     return Notes(
         units={str(signal): str(unit) for signal, unit in units.items()},
         resolution=positive(parse(notes.get("resolution", ""), Signs("."))),
-        name=_json(notes.get("name", ""), str) or notes.get("name"),
+        name=notes.get("name") if name is None else name,
         channels=channels_in(notes.get("channels")),
     )
 

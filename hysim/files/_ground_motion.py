@@ -6,6 +6,7 @@ order; else it is a table with a column of times.
 """
 
 import re
+from itertools import islice
 from typing import Any, Literal, NamedTuple
 
 import numpy as np
@@ -14,13 +15,13 @@ from hysim._frozen import FloatArray
 from hysim._prefixes import power_of_ten
 from hysim.files._accelerations import check_unit, in_si, stated_unit, unit_of_column
 from hysim.files._delimited import delimited
-from hysim.files._layout import COMMENTS, DECIMALS
+from hysim.files._layout import DECIMALS
 from hysim.files._load import file_named, table_of
 from hysim.files._number_lists import NumberList, number_list
 from hysim.files._source import Source, opened
 from hysim.files._stated_values import TOP, StatedValues, block_below, check_quantity, cosmos_blocks, peer_header
 from hysim.files._table import Column, Table, UnreadableError, listed, require, shown
-from hysim.files._text import text_of
+from hysim.files._text import COMMENTS, Text
 from hysim.records import step_if_even
 from hysim.signals import sample_times
 
@@ -121,8 +122,8 @@ def load_ground_motion(
     choice = _Choice(t, acceleration, sample_time, units)
     for_text = {"delimiter": delimiter, "decimal": decimal, "encoding": encoding}
     with opened(path) as source, file_named(source):
-        if isinstance(source.content, (str, bytes)):
-            text = text_of(source.content, source.name, encoding)
+        if source.format == "text":
+            text = Text(source.content, source.name, encoding).whole()
             step, values = _of_text(text, choice, skip, delimiter, decimal)
         else:
             require(not skip, f"skip is for text, this is a file of the format {source.format}: leave it out")
@@ -137,9 +138,9 @@ def load_ground_motion(
 def is_at2(path: Source, encoding: str | None = None) -> bool:
     """Whether a file is a text whose header states NPTS and DT; errors as `hysim.load` has them."""
     with opened(path) as source, file_named(source):
-        if not isinstance(source.content, (str, bytes)):
+        if source.format != "text":
             return False
-        return peer_header(text_of(source.content, source.name, encoding).split("\n", TOP)[:TOP]) is not None
+        return peer_header([*islice(Text(source.content, source.name, encoding).top(), TOP)]) is not None
 
 
 def column_names(path: Source, **for_text: Any) -> tuple[str, ...]:
@@ -194,16 +195,15 @@ def _of_text(text: str, choice: _Choice, skip: int, delimiter: str | None, decim
 def _table_below_titles(text: str, delimiter: str | None, decimal: str | None) -> Table:
     """The table in a text, below any number of lines of text."""
     try:
-        return delimited(text, delimiter, decimal)
+        return delimited(Text(text), delimiter, decimal)
     except ValueError as error:
         lines, first_error = text.split("\n"), error
     titles = _titles(lines)
     for kept in (2, 1, 0):  # names and units, names, or neither
         dropped = titles[: max(0, len(titles) - kept)]
         try:
-            return delimited(
-                "\n".join("" if k in dropped else line for k, line in enumerate(lines)), delimiter, decimal
-            )
+            below = "\n".join("" if k in dropped else line for k, line in enumerate(lines))
+            return delimited(Text(below), delimiter, decimal)
         except ValueError:
             continue
     raise first_error

@@ -12,64 +12,105 @@ text in such columns and no number; a line of text in all of them right below th
 import csv
 import re
 from collections import Counter
-from typing import NamedTuple, TypeVar
+from collections.abc import Iterator, Sequence
+from typing import NamedTuple
 
+from hysim._printing import text_in_cell
 from hysim.files._cells import MISSING, Signs, parse
 from hysim.files._table import Column, require
+from hysim.files._text import COMMENTS, Lines, Text
 from hysim.interop import heading
 
 DELIMITERS = {"\t": "tab", ";": "semicolon", ",": "comma", " ": "white space"}
 DECIMALS = (".", ",")
-COMMENTS = ("#", "%")
 
-T = TypeVar("T")
-
-_LOOKED_AT = 100  # lines, of which the first half is from the top and the others are spread over the file
+_LOOKED_AT = 50  # lines from the top, and at most as many spread over the rest of the file
 _EXCEL = re.compile(r"sep=(.)", re.IGNORECASE)  # a first line for Excel, which names the delimiter
 _WORD = re.compile(r"[^\s\[(]+(?:\s*[\[(][^\[\]()]*[\])])?|\S+")
 
 
 class Layout(NamedTuple):
-    """The columns of a file, its delimiter, the signs in its numbers, and the samples' lines with their numbers."""
+    """The columns of a text, its delimiter, the signs in its numbers, and the place and number of its samples."""
 
     columns: list[Column]
     delimiter: str
     signs: Signs
-    numbers: list[int]
-    lines: list[str]
+    text: Text
+    head: int
+    n_samples: int
 
-    def rows(self) -> list[list[str]]:
-        """The cells of each sample."""
-        return _rows(self.lines, self.numbers, self.delimiter)
+    def samples(self) -> Iterator[Lines]:
+        """The lines of the samples, which are those below the header, some at a time."""
+        head = self.head
+        for lines in self.text.samples():
+            if head < len(lines.texts):
+                yield Lines(lines.numbers[head:], lines.texts[head:])
+            head = max(0, head - len(lines.texts))
 
-    def widths(self) -> list[int]:
-        """The number of cells of each sample."""
-        if any('"' in line for line in self.lines):
-            return [len(row) for row in self.rows()]
+    def rows(self, lines: Lines) -> list[list[str]]:
+        """The cells of some samples."""
+        return _rows(lines.texts, lines.numbers, self.delimiter)
+
+    def check_widths(self) -> None:
+        """Raise a ValueError with the number of the first line that has another number of cells."""
+        for lines in self.samples():
+            widths, width = self._widths(lines), len(self.columns)
+            if widths.count(width) < len(widths):
+                k = next(k for k, cells in enumerate(widths) if cells != width)
+                between = DELIMITERS.get(self.delimiter, repr(self.delimiter))
+                raise ValueError(
+                    f"line {lines.numbers[k]}: expected {width} cells, got {widths[k]} (separated by {between}); "
+                    "correct the line, begin it with # if it is no sample, pass the number of lines of a header "
+                    "above the columns as skip=, or the sign between the cells as delimiter="
+                )
+
+    def _widths(self, lines: Lines) -> list[int]:
+        if any('"' in line for line in lines.texts):
+            return [len(row) for row in self.rows(lines)]
         if self.delimiter == " ":
-            return [len(line.split()) for line in self.lines]
-        return [line.count(self.delimiter) + 1 for line in self.lines]
+            return [len(line.split()) for line in lines.texts]
+        return [line.count(self.delimiter) + 1 for line in lines.texts]
 
 
-def layout(text: str, delimiter: str | None, decimal: str | None, thousands: str | None = None) -> Layout:
+class _Survey(NamedTuple):
+    """Some of the lines that are neither blank nor comments: all at the top, others spread over the rest."""
+
+    top: Lines
+    rest: Lines
+    n_lines: int
+
+
+def _survey(text: Text) -> _Survey:
+    """The lines by which a layout is found, in one reading of a text."""
+    top, rest, n, step = Lines([], []), Lines([], []), 0, 1
+    for numbers, texts in text.samples():
+        own = max(0, _LOOKED_AT - n)
+        top = Lines([*top.numbers, *numbers[:own]], top.texts + texts[:own])
+        begin = own + (_LOOKED_AT - n - own) % step  # every step-th line below the top
+        rest = Lines([*rest.numbers, *numbers[begin::step]], rest.texts + texts[begin::step])
+        while len(rest.texts) > _LOOKED_AT:
+            rest, step = Lines(rest.numbers[::2], rest.texts[::2]), 2 * step
+        n += len(texts)
+    return _Survey(top, rest, n)
+
+
+def layout(text: Text, delimiter: str | None, decimal: str | None, thousands: str | None = None) -> Layout:
     """Detect the layout of a text with one sample a line; ValueError if it has none."""
-    every = text.split("\n")
-    if (said := _EXCEL.fullmatch(every[0].strip())) is not None:
-        every[0], delimiter = "", delimiter or said[1]
-    numbers = [k for k, line in enumerate(every, start=1) if line.strip() and not line.lstrip().startswith(COMMENTS)]
-    require(numbers, "the file is empty, there is no header and no sample")
-    lines = [every[k - 1] for k in numbers]
-    delimiter, signs = _signs(lines, delimiter, decimal, thousands)
+    (numbers, lines), (numbers_below, lines_below), n_lines = _survey(text)
+    if lines and (said := _EXCEL.fullmatch(lines[0].strip())) is not None and numbers[0] == 1:
+        return layout(text._replace(skip=1), delimiter or said[1], decimal, thousands)
+    require(lines, "the file is empty, there is no header and no sample")
+    delimiter, signs = _signs(lines + lines_below, delimiter, decimal, thousands)
     top = _rows(lines[:2], numbers, delimiter)
-    below = _rows(_spread(lines[1:]), _spread(numbers[1:]), delimiter)
+    below = _rows(lines[1:] + lines_below, [*numbers[1:], *numbers_below], delimiter)
     width = _most_common([len(row) for row in [top[0], *below]])
     has_header, has_units = _heads(top, [row for row in below if len(row) == width], numbers[0], width, signs)
-    first = has_header + has_units
-    require(first < len(lines), "there is a header, but no sample")
+    head = has_header + has_units
+    require(head < n_lines, "there is a header, but no sample")
     if has_header:
         names = _names(lines[0], delimiter)
     else:
-        names = _commented(every[: numbers[0] - 1], delimiter, width, signs) or [str(k) for k in range(width)]
+        names = _commented(text, numbers[0], delimiter, width, signs) or [str(k) for k in range(width)]
     is_named = len(names) == width
     require(
         is_named,
@@ -79,21 +120,13 @@ def layout(text: str, delimiter: str | None, decimal: str | None, thousands: str
     columns = [_column(place, label) for place, label in enumerate(names)]
     if has_units:
         columns = [c._replace(unit=c.unit or _unit(cell)) for c, cell in zip(columns, top[1], strict=True)]
-    result = Layout(columns, delimiter, signs, numbers[first:], lines[first:])
-    for number, cells in zip(result.numbers, result.widths(), strict=True):
-        if cells != width:
-            between = DELIMITERS.get(delimiter, repr(delimiter))
-            raise ValueError(
-                f"line {number}: expected {width} cells, got {cells} (separated by {between}); correct the line, begin "
-                "it with # if it is no sample, pass the number of lines of a header above the columns as skip=, or the "
-                "sign between the cells as delimiter="
-            )
+    result = Layout(columns, delimiter, signs, text, head, n_lines - head)
+    result.check_widths()
     return result
 
 
-def _signs(lines: list[str], delimiter: str | None, decimal: str | None, thousands: str | None) -> tuple[str, Signs]:
+def _signs(sample: list[str], delimiter: str | None, decimal: str | None, thousands: str | None) -> tuple[str, Signs]:
     """The delimiter and the signs in numbers; delimiter and decimal sign are detected where they are None."""
-    sample = _spread(lines)
     quoted = any('"' in line for line in sample)
     candidates = [
         (between, Signs(point, thousands))
@@ -119,7 +152,7 @@ def _score(lines: list[str], delimiter: str, signs: Signs) -> float:
     return sum(len(row) == width for row in rows) / len(rows) * plain / len(cells)
 
 
-def _rows(lines: list[str], numbers: list[int], delimiter: str) -> list[list[str]]:
+def _rows(lines: list[str], numbers: Sequence[int], delimiter: str) -> list[list[str]]:
     rows = []
     for line, number in zip(lines, numbers, strict=False):
         try:
@@ -132,14 +165,15 @@ def _rows(lines: list[str], numbers: list[int], delimiter: str) -> list[list[str
 def _cells(line: str, delimiter: str, *, strict: bool = True) -> list[str]:
     """The cells of a line; one that cannot be split is a csv.Error, or unless `strict` a single cell."""
     if '"' not in line:
-        return line.split() if delimiter == " " else [cell.strip() for cell in line.strip(" ").split(delimiter)]
+        cells = line.split() if delimiter == " " else line.strip(" ").split(delimiter)
+        return [text_in_cell(cell.strip()) for cell in cells]
     try:
         cells = next(csv.reader([line.strip()], delimiter=delimiter, skipinitialspace=True, strict=strict))
     except csv.Error:
         if strict:
             raise
         cells = [line]
-    return [cell.strip() for cell in cells]
+    return [text_in_cell(cell.strip()) for cell in cells]
 
 
 def _names(line: str, delimiter: str) -> list[str]:
@@ -172,12 +206,12 @@ def _kind(cell: str, signs: Signs) -> str:
     return "missing" if cell.strip().lower() in MISSING else "text" if parse(cell, signs) is None else "number"
 
 
-def _commented(above: list[str], delimiter: str, width: int, signs: Signs) -> list[str] | None:
-    """Names in the last comment above the samples, if they are as many as the columns."""
-    comments = [line.strip() for line in above if line.strip()]
-    if not comments:
-        return None
-    names = _names(comments[-1].lstrip("".join(COMMENTS)), delimiter)
+def _commented(text: Text, line: int, delimiter: str, width: int, signs: Signs) -> list[str] | None:
+    """Names in the last comment above the first sample, which is in this line, if they are as many as the columns."""
+    comment = ""
+    for each, _ in zip(text.top(), range(line - 1), strict=False):
+        comment = each.strip() or comment
+    names = _names(comment.lstrip("".join(COMMENTS)), delimiter)
     is_named = len(names) == width and all(_kind(name, signs) == "text" for name in names)
     return names if is_named else None
 
@@ -194,9 +228,3 @@ def _unit(cell: str) -> str:
 
 def _most_common(widths: list[int]) -> int:
     return Counter(widths).most_common(1)[0][0]
-
-
-def _spread(items: list[T]) -> list[T]:
-    """Some of the items: those at the top, and as many spread over the rest."""
-    head, rest = items[: _LOOKED_AT // 2], items[_LOOKED_AT // 2 :]
-    return head + rest[:: max(1, len(rest) // (_LOOKED_AT // 2))]

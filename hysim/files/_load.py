@@ -13,6 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 from hysim._frozen import FloatArray, check_choice
+from hysim._progress import Progress, Reports, reports
 from hysim._resolution import output_quantum
 from hysim.files._cells import THOUSANDS
 from hysim.files._delimited import delimited
@@ -23,9 +24,10 @@ from hysim.files._mat import mat
 from hysim.files._npz import npy, npz
 from hysim.files._source import Opened, Source, opened
 from hysim.files._table import Column, Table, shown
-from hysim.files._text import text_of
+from hysim.files._text import Text
 from hysim.records import Record
 
+_TIMES = 3
 ON_MISSING = ("error", "drop", "split")
 SIGNALS = {"u": "input", "y": "output"}
 
@@ -45,12 +47,14 @@ class _Options(TypedDict, total=False):
     resolution: float | Literal["detect"] | None
     name: str | None
     channels: Sequence[str] | Mapping[str, str | int | float] | None
+    progress: Reports
 
 
 @overload
 def load(path: Source, *, on_missing: Literal["error", "drop"] = "error", **options: Unpack[_Options]) -> Record: ...
 @overload
 def load(path: Source, *, on_missing: Literal["split"], **options: Unpack[_Options]) -> tuple[Record, ...]: ...
+@reports
 def load(
     path: Source,
     *,
@@ -67,6 +71,7 @@ def load(
     resolution: float | Literal["detect"] | None = None,
     name: str | None = None,
     channels: Sequence[str] | Mapping[str, str | int | float] | None = None,
+    progress: Reports = None,
 ) -> Record | tuple[Record, ...]:
     """Load a record from a file: text, NPZ, NPY, MAT or HDF5; or from a table in memory, such as a DataFrame.
 
@@ -122,6 +127,9 @@ def load(
         Further columns by their names, or names of channels to columns, by name or by number; a float is the value of a
         channel that is constant: ``{"T": "temp", "current": 0.5}``. By default those that the file of
         `hysim.save_record` names.
+    progress : callable or False, optional
+        Called as ``progress(done, total)`` with numbers of bytes of a text, which is read three times.
+        By default calls beyond 2 s report on the standard error; False turns this off.
 
     Returns
     -------
@@ -157,7 +165,7 @@ def load(
         raise ValueError(f'resolution must be a number or "detect", got {resolution!r}')
     for_text = options_of_a_text(delimiter, decimal, thousands, skip, encoding)
     with opened(path) as source, file_named(source):
-        with table_of(source, for_text) as table:
+        with table_of(source, for_text, progress) as table:
             columns = _columns(table, {"u": u, "y": y, "t": t})
             signals, places = [*columns], _channels(table, channels)
             constants = {label: place for label, place in places.items() if isinstance(place, float)}
@@ -206,14 +214,15 @@ def file_named(source: Opened) -> Iterator[None]:
 
 
 @contextmanager
-def table_of(source: Opened, for_text: Mapping[str, Any]) -> Iterator[Table]:
+def table_of(source: Opened, for_text: Mapping[str, Any], progress: Reports = None) -> Iterator[Table]:
     """The table that a source holds, open to be read from."""
-    if isinstance(source.content, (str, bytes)):
-        text = text_of(source.content, source.name, for_text["encoding"])
-        rest = text.split("\n")[for_text.get("skip") or 0 :]
-        text = "\n".join([""] * (for_text.get("skip") or 0) + rest)  # the lines keep their numbers
+    if source.format == "text":
+        reading = _Reading(progress or None, source.content)
+        text = Text(source.content, source.name, for_text["encoding"], for_text.get("skip") or 0, reading)
         yield delimited(text, for_text["delimiter"], for_text["decimal"], for_text.get("thousands"))
         return
+    if source.format == "model":
+        raise ValueError(f"{source.name} is a model: read it with hs.load_model")
     for argument, value in for_text.items():
         if value is not None:
             form = source.name if isinstance(source.content, Frame) else f"a file of the format {source.format}"
@@ -225,6 +234,19 @@ def table_of(source: Opened, for_text: Mapping[str, Any]) -> Iterator[Table]:
             yield table
     else:
         yield _READERS[source.format](source.content)
+
+
+class _Reading:
+    """Progress by the bytes of a text that is read `_TIMES` times: its layout is found and checked, then it is read."""
+
+    def __init__(self, progress: Progress | None, content: Any) -> None:
+        self.progress, self.done = progress, 0
+        self.total = 0 if progress is None or isinstance(content, str) else _TIMES * content.seek(0, 2)
+
+    def __call__(self, n_bytes: int) -> None:
+        self.done += n_bytes
+        if self.progress is not None:
+            self.progress(min(self.done, self.total), self.total)
 
 
 _READERS = {"npz": npz, "npy": npy, "mat": mat}

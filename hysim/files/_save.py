@@ -122,10 +122,12 @@ def packed(columns: Mapping[str, FloatArray], path: str | Path, notes: Notes) ->
 
 
 def ending(path: str | Path) -> str:
-    """The ending of a path, which names a format to save in; ValueError if it names none."""
+    """The ending of a path, which names a format to save in; ValueError if it names none, or its library is missing."""
     suffix = Path(path).suffix.lower()
     if suffix not in _WRITERS:
         raise ValueError(f"{Path(path).name}: the ending must be one of {', '.join(_WRITERS)}, got {suffix!r}")
+    if suffix in (".h5", ".hdf5"):
+        optional("h5py", "a file of HDF5", "io", ValueError)
     return suffix
 
 
@@ -136,14 +138,14 @@ def _text(columns: Mapping[str, FloatArray], notes: Notes, *, delimiter: str) ->
     comments["channels"] = dict(notes.channels)
     header = [f"{label} [{plain[label]}]" if label in plain else label for label in columns]
     rows = zip(*(values.tolist() for values in columns.values()), strict=True)
-    lines = "".join(f"# {name}: {json.dumps(value)}\n" for name, value in comments.items() if value)
+    lines = "".join(f"# {name}: {json.dumps(value)}\n" for name, value in comments.items() if value or value == "")
     return (lines + csv_text([header, *rows], delimiter=delimiter, nan="nan")).encode()
 
 
 def _arrays(columns: Mapping[str, FloatArray], notes: Notes) -> dict[str, Any]:
     """The columns, and the notes beside them, by the names that they have in a file."""
     others: dict[str, Any] = {f"{label}_units": unit for label, unit in notes.units.items()}
-    if notes.name:
+    if notes.name is not None:
         others["name"] = notes.name
     if notes.resolution is not None:
         others["resolution"] = np.asarray(notes.resolution)
@@ -170,7 +172,8 @@ _MAT_TITLE = b"MATLAB 5.0 MAT-file, saved by hysim".ljust(116)
 
 
 def _hdf5(columns: Mapping[str, FloatArray], notes: Notes) -> bytes:
-    h5py = optional("h5py", "a file of HDF5", "io", ValueError)
+    import h5py
+
     buffer = io.BytesIO()
     with h5py.File(buffer, "w") as root:
         for name, value in _arrays(columns, notes).items():

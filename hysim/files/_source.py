@@ -1,6 +1,7 @@
 """Sources to load from, and their formats, which are read from the first bytes and not from the name."""
 
 import os
+import re
 import stat
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -14,22 +15,23 @@ from hysim.interop import table_in
 Source = str | os.PathLike[str] | TextIO | BinaryIO | Any  # Any stands for tables of other libraries
 
 MOST_TEXT = 500_000_000
-"""Most bytes of a text file, and of any stream: a text takes ten times as much memory to read."""
+"""Most bytes of a text file, and of any stream."""
 
 _HEAD = 640  # bytes: HDF5 may begin behind a block of 512
+_MODEL = re.compile(rb'\s*\{(.*[{,])?\s*"family"\s*:', re.DOTALL)
 _HDF5 = b"\x89HDF\r\n\x1a\n"
 _PIECE = 1 << 20  # bytes that are read of a stream at once
 
 
 class Opened(NamedTuple):
-    """Name, format and content of a source, which is read if it is a text, and its path if it is a file with one.
+    """Name, format and content of a source, and its path if it is a file with one.
 
-    The content of a DataFrame or the like is its table.
+    The content of a DataFrame or the like is its table, that of a stream of letters is text.
     """
 
     name: str
     format: str
-    content: str | bytes | BinaryIO | Frame
+    content: Any
     path: Path | None = None
 
 
@@ -62,7 +64,7 @@ def opened(source: Source) -> Iterator[Opened]:
 
 
 def format_of(head: bytes) -> str:
-    """The format of a file that begins so: "npz", "npy", "mat", "mat7.3", "hdf5" or "text"."""
+    """The format of a file that begins so: "npz", "npy", "mat", "mat7.3", "hdf5", "model" or "text"."""
     if head.startswith((b"PK\x03\x04", b"PK\x05\x06")):
         return "npz"
     if head.startswith(b"\x93NUMPY"):
@@ -71,18 +73,16 @@ def format_of(head: bytes) -> str:
         return "mat7.3" if head.startswith(b"MATLAB") else "hdf5"
     if head.startswith(b"MATLAB 5.0") or head[124:128] in (b"\x00\x01IM", b"\x01\x00MI"):
         return "mat"
-    return "text"
+    return "model" if _MODEL.match(head) else "text"
 
 
 def _regular(path: Path, file: BinaryIO) -> Opened:
     form = format_of(file.read(_HEAD))
     file.seek(0)
-    if form != "text":
-        return Opened(path.name, form, file, path)
     size = os.fstat(file.fileno()).st_size
-    if size > MOST_TEXT:
+    if form == "text" and size > MOST_TEXT:
         raise ValueError(_too_large(path.name, str(size)))
-    return Opened(path.name, form, file.read(), path)
+    return Opened(path.name, form, file, path)
 
 
 def _stream(name: str, source: Any) -> Opened:
@@ -94,10 +94,10 @@ def _stream(name: str, source: Any) -> Opened:
             raise ValueError(_too_large(name, "more"))
         pieces.append(piece)
     if pieces and isinstance(pieces[0], str):
-        return Opened(name, "text", "".join(pieces))
+        text = "".join(pieces)
+        return Opened(name, "model" if _MODEL.match(text[:_HEAD].encode(errors="replace")) else "text", text)
     content = b"".join(pieces)
-    form = format_of(content[:_HEAD])
-    return Opened(name, form, content if form == "text" else BytesIO(content))
+    return Opened(name, format_of(content[:_HEAD]), BytesIO(content))
 
 
 def _too_large(name: str, size: str) -> str:

@@ -10,7 +10,8 @@ import numpy.typing as npt
 
 from hysim._blas import one_blas_thread
 from hysim._frozen import FloatArray, check_choice, check_count, read_only
-from hysim._parallel import Progress, at_most
+from hysim._parallel import at_most
+from hysim._progress import Progress, Reports, reports
 from hysim._results import model_of
 from hysim.identification import _direct as direct
 from hysim.identification._assumptions import Treated, decided, in_units_of_noise, quiet_rmse, treated
@@ -35,6 +36,7 @@ from hysim.models.whole.part_by_part import PartByPart
 from hysim.records import Record, several
 
 
+@reports
 def identify(
     model_or_class: Any,
     record_or_records: Record | Sequence[Record],
@@ -52,7 +54,7 @@ def identify(
     max_evaluations: int | None = None,
     seed: int = 0,
     workers: int | None = None,
-    progress: Progress | None = None,
+    progress: Reports = None,
 ) -> Identification:
     """Identify a model's parameters on one or several records, by its error in free run.
 
@@ -107,8 +109,9 @@ def identify(
         Seed of the starts and of random draws. The optimum does not depend on it.
     workers : int, optional
         Number of threads; by default one for each core.
-    progress : callable, optional
+    progress : callable or False, optional
         Called as ``progress(done, total)``.
+        By default calls beyond 2 s report on the standard error; False turns this off.
 
     Returns
     -------
@@ -168,7 +171,7 @@ def identify(
                 choice = choice._replace(problems=[replace(each, ends=ends) for each in choice.problems])
             searched = [in_units_of_noise(each, seed) for each in choice.problems]
             folds = left_out(cross_validate, records)
-            fit = _searched(searched, noise or "gaussian", intervals, folds, seed, progress, treatment)
+            fit = _searched(searched, noise or "gaussian", intervals, folds, seed, progress or None, treatment)
             fit = replace(fit, message="; ".join(filter(None, (fit.message, choice.sentence))))
             if not any(isinstance(record, Rescalable) for record in records):
                 fit = as_measured(fit, records, shares, treatment)

@@ -5,8 +5,8 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 from hysim._frozen import check_choice, frozen
-from hysim._parallel import Progress
 from hysim._printing import aligned, printed, summary_text
+from hysim._progress import Reports, announced_by, reports
 from hysim.identification._identify import identify
 from hysim.identification._result import Identification
 from hysim.identification.sharing import sharing
@@ -76,6 +76,7 @@ class Selection:
         )
 
 
+@reports
 def select(
     candidates: Mapping[str, Any] | Sequence[Any],
     record_or_records: Record | Sequence[Record],
@@ -87,7 +88,7 @@ def select(
     max_evaluations: int | None = None,
     seed: int = 0,
     workers: int | None = None,
-    progress: Progress | None = None,
+    progress: Reports = None,
     announce: Callable[[str], None] | None = None,
 ) -> Selection:
     """Identify several candidates, and rank them.
@@ -104,8 +105,9 @@ def select(
         others mean nothing.
     initial, noise, cross_validate, max_evaluations, seed, workers
         As in `identify`, the same for all. A fit that ends by `max_evaluations` is marked as partial.
-    progress : callable, optional
+    progress : callable or False, optional
         Called as ``progress(done, total)`` after each candidate.
+        By default calls beyond 2 s report on the standard error; False turns this off.
     announce : callable, optional
         Called as ``announce(name)`` before each candidate.
 
@@ -132,6 +134,7 @@ def select(
         raise ValueError('criterion="cv_rmse" needs a cross-validation: cross_validate="loo", or a number of blocks')
     named, report = _named(candidates), progress or (lambda done, total: None)
     fits: dict[str, Identification] = {}
+    announce = announce or announced_by(progress)
     with sharing():
         for name, candidate in named.items():
             if announce is not None:

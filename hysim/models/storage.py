@@ -98,7 +98,10 @@ def from_json(text: str | bytes, source: str | Path) -> tuple[Any, dict[str, str
         units = _units(document)
     except RecursionError:
         raise ValueError(f"{source} does not hold a model of hysim: {_TOO_DEEP}") from None
-    except ValueError as error:  # that it is no JSON among them
+    except (json.JSONDecodeError, UnicodeDecodeError) as error:
+        advice = "" if text.lstrip()[:1] in ("{", b"{") else "; if it is a record: read it with hs.load"
+        raise ValueError(f"{source} does not hold a model of hysim: {_one_line(error)}{advice}") from None
+    except ValueError as error:
         raise ValueError(f"{source} does not hold a model of hysim: {_one_line(error)}") from None
     return from_document(document, source), units
 

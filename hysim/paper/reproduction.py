@@ -9,7 +9,7 @@ import math
 import tempfile
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 
@@ -18,6 +18,7 @@ from hysim._blas import one_blas_thread
 from hysim._frozen import frozen
 from hysim._parallel import awaited, second_process
 from hysim._printing import csv_text
+from hysim._progress import reports
 from hysim.comparison import Comparison
 from hysim.datasets import table2
 from hysim.discovery import Discovery
@@ -56,8 +57,13 @@ class Reproduction:
     findings: Findings
 
 
+@reports
 def reproduce(
-    out: str | Path = "reproduction", *, quick: bool = False, page: bool = False, progress: Progress | None = None
+    out: str | Path = "reproduction",
+    *,
+    quick: bool = False,
+    page: bool = False,
+    progress: Progress | Literal[False] | None = None,
 ) -> Reproduction:
     """Reproduce the paper on its 52 points, and write the report.
 
@@ -69,8 +75,9 @@ def reproduce(
         Leave the cross-validation out.
     page : bool
         Also write ``table1.html``: the identified Bouc-Wen law with sliders over the points, for a browser.
-    progress : callable, optional
+    progress : callable or False, optional
         Called as ``progress(done, total, what)``.
+        By default calls beyond 2 s report on the standard error; False turns this off.
 
     Returns
     -------
@@ -86,7 +93,7 @@ def reproduce(
     with tempfile.TemporaryFile(dir=folder):
         pass
     with one_blas_thread():
-        computed = find(quick=quick, progress=progress)
+        computed = find(quick=quick, progress=progress or None)
         files = contents(computed) | (browser_page(computed) if page else {})
     for name in files:
         (folder / name).parent.mkdir(exist_ok=True)

@@ -12,7 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from hysim._frozen import FloatArray, read_only
-from hysim._parallel import Progress
+from hysim._progress import Progress
 from hysim.kernels import controllers
 from hysim.kernels import loop as kernels
 from hysim.laws.static import Line

@@ -8,8 +8,8 @@ import numpy as np
 
 from hysim._blas import one_blas_thread
 from hysim._frozen import check_choice, check_count, frozen
-from hysim._parallel import Progress
 from hysim._printing import aligned, listed, printed, summary_text
+from hysim._progress import Reports, reports
 from hysim.identification import Identification, identify
 from hysim.posterior._bridge import bridge_evidence
 from hysim.posterior._nested import LogEvidence, nested_evidence
@@ -177,6 +177,7 @@ class Evidence:
         return f"Evidence of {len(self.rows)} models, {self.noise} noise, by {self.method} sampling"
 
 
+@reports
 def compare_evidence(
     models: Mapping[str, Any],
     record_or_records: Record | Sequence[Record],
@@ -187,7 +188,7 @@ def compare_evidence(
     method: str = "nested",
     live_points: int = 500,
     seed: int = 0,
-    progress: Progress | None = None,
+    progress: Reports = None,
 ) -> Evidence:
     """Compare models by their evidence, the probability of the records under each model and its priors.
 
@@ -215,8 +216,9 @@ def compare_evidence(
         Of nested sampling: the error of ln Z falls with the root of their number.
     seed : int
         The same seed gives the same evidences to the last bit.
-    progress : callable, optional
+    progress : callable or False, optional
         Called as ``progress(done, total)`` after each evidence.
+        By default calls beyond 2 s report on the standard error; False turns this off.
 
     Returns
     -------
@@ -256,7 +258,7 @@ def compare_evidence(
             own = (priors or {}).get(name)
             found.append(log_evidence(fit, records, priors=own, factor=factor, **options))
             done += 1
-            if progress is not None:
+            if progress:
                 progress(done, len(FACTORS) * len(fits))
         rows.append(row_of(name, fit, found))
     return Evidence(rows=ordered(rows), noise=noise, method=method, seed=seed)

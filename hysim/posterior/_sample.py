@@ -7,7 +7,7 @@ import numpy as np
 
 from hysim._blas import one_blas_thread
 from hysim._frozen import FloatArray, check_count
-from hysim._parallel import Progress
+from hysim._progress import Reports, reports
 from hysim.identification import Identification
 from hysim.identification.likelihood.densities import density
 from hysim.identification.likelihood.refit import Problem, again, optima
@@ -23,6 +23,7 @@ _SAMPLES_PER_WALKER = 25  # effective ones: of shorter paths R-hat is large by c
 _MOST_STEPS = 100_000
 
 
+@reports
 def sample_posterior(
     fit: Identification,
     record_or_records: Record | Sequence[Record],
@@ -34,7 +35,7 @@ def sample_posterior(
     walkers: int | None = None,
     most_steps: int = _MOST_STEPS,
     seed: int = 0,
-    progress: Progress | None = None,
+    progress: Reports = None,
 ) -> Posterior:
     """Draw the free parameters of an identified model, and the scale of its noise, from their posterior distribution.
 
@@ -65,8 +66,9 @@ def sample_posterior(
         Steps of the walkers after which sampling ends in any case.
     seed : int
         The same seed gives the same draws to the last bit.
-    progress : callable, optional
+    progress : callable or False, optional
         Called as ``progress(done, total)`` with effective samples.
+        By default calls beyond 2 s report on the standard error; False turns this off.
 
     Returns
     -------
@@ -104,7 +106,7 @@ def sample_posterior(
             samples=samples,
             seed=seed,
             most_steps=most_steps,
-            progress=progress,
+            progress=progress or None,
         )
         return described(fit, posterior, chains, samples, seed)
 

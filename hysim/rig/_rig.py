@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Literal
 import numpy as np
 
 from hysim._frozen import FloatArray, checked, frozen
-from hysim._parallel import Progress
+from hysim._progress import Reports
 from hysim.laws.differential.polynomial_boucwen import PolynomialBoucWen
 from hysim.plants.actuator import Actuator
 from hysim.plants.amplifier import Amplifier
@@ -142,7 +142,7 @@ class Experiment:
         *,
         region: tuple[int, int, int, int] | None = None,
         reference: Literal["first", "running"] = "first",
-        progress: Progress | None = None,
+        progress: Reports = None,
     ) -> "Displacement":
         """The displacement that the frames show, by `hysim.vision.displacement`; needs the extra ``vision``.
 

@@ -13,6 +13,7 @@ import numpy.typing as npt
 
 from hysim._frozen import FloatArray
 from hysim._parallel import at_most
+from hysim._progress import silent
 from hysim.sweeps._space import Column
 
 Task = Callable[..., Any]
@@ -54,7 +55,7 @@ class Outcome(NamedTuple):
 
 def computed(task: Task, chunk: Chunk) -> Outcome:
     """The outcome of a chunk; kernels inside use one thread."""
-    with at_most(1):
+    with at_most(1), silent():
         return _together(task.batch, chunk) if isinstance(task, Batched) else _singly(task, chunk)
 
 

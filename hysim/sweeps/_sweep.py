@@ -16,7 +16,9 @@ from typing import Any
 import numpy as np
 
 from hysim._frozen import check_choice
-from hysim._parallel import GLANCE, Progress
+from hysim._parallel import GLANCE
+from hysim._progress import Progress, Reports, announced_by, reports
+from hysim._versions import is_installed
 from hysim.sweeps._chunks import Chunk, Outcome, part_of
 from hysim.sweeps._executors import Workers, workers_of
 from hysim.sweeps._identity import identity
@@ -33,6 +35,7 @@ _GROWTH = 4
 _PATIENCE = 0.6  # seconds to wait after an interrupt for the chunks that are being computed
 
 
+@reports
 def sweep(
     task: Callable[..., Any],
     space: Any,
@@ -42,7 +45,7 @@ def sweep(
     store: str | Path | None = None,
     seed: int = 0,
     on_change: OnChange = "error",
-    progress: Progress | None = None,
+    progress: Reports = None,
 ) -> Sweep:
     """Compute a function for many sets of parameters.
 
@@ -67,8 +70,9 @@ def sweep(
     on_change : {"error", "keep", "restart"}
         If the store holds a study with another task, space, seed or version of hysim: raise; keep the finished rows if
         space and seed are the same; or start again.
-    progress : callable, optional
+    progress : callable or False, optional
         Called as ``progress(done, total)`` when rows are finished and written.
+        By default calls beyond 2 s report on the standard error; False turns this off.
 
     Returns
     -------
@@ -94,6 +98,8 @@ def sweep(
     [0.337, 0.299, 0.264, 0.509, 0.442, 0.378]
     """
     check_choice("on_change", on_change, ON_CHANGE)
+    if (announce := announced_by(progress)) is not None and not is_installed("pandas"):
+        announce("without pandas, which to_frame needs")
     tasks = space_of(space)
     takes_seed = _takes_seed(task, tasks)
     task_seeds = seeds(seed, np.arange(tasks.n_tasks))
@@ -104,7 +110,7 @@ def sweep(
             opened_store.begin(identity(task, tasks, seed), tasks, task_seeds, on_change)
             table.restore(opened_store.layout(), opened_store.finished())
         with workers_of(executor, workers, task) as pool:
-            _Run(everything, table, opened_store, pool, progress).run()
+            _Run(everything, table, opened_store, pool, progress or None).run()
     return result_of(table, tasks.columns, tasks.axes, task_seeds)
 
 

@@ -9,7 +9,7 @@ from typing import Any, Literal
 
 import numpy as np
 
-from hysim._parallel import Progress
+from hysim._progress import Reports, reports
 from hysim.vision._direction import along, angle_of
 from hysim.vision._frames import Picture, grey_pictures, read_frames
 from hysim.vision._result import Displacement
@@ -21,6 +21,7 @@ REFERENCES = ("first", "running")
 _SMALLEST = 16  # side of a region [pixel]
 
 
+@reports
 def displacement(
     frames: Any,
     scale: float,
@@ -30,7 +31,7 @@ def displacement(
     reference: Any = "first",
     method: Literal["subpixel", "whole-pixel"] = "subpixel",
     unit: str = "um",
-    progress: Progress | None = None,
+    progress: Reports = None,
 ) -> Displacement:
     """Measure the displacement of the picture in each frame.
 
@@ -56,8 +57,9 @@ def displacement(
         Shifts as they are, or rounded to whole pixels along the rows or the columns.
     unit : str
         Label of the unit of length.
-    progress : callable, optional
+    progress : callable or False, optional
         Called as ``progress(done, total)`` after each frame; total is 0 where it is not known.
+        By default calls beyond 2 s report on the standard error; False turns this off.
 
     Returns
     -------
@@ -102,7 +104,7 @@ def displacement(
     places = []
     for place in follow(start, pictures):
         places.append(place)
-        if progress is not None:
+        if progress:
             progress(len(places), total)
     return along(places, start.visible, angle, float(scale), unit, whole=method == "whole-pixel")
 

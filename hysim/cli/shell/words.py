@@ -1,8 +1,9 @@
 """Messages of the library in the words of the shell: ``--encoding latin-1`` for ``encoding="latin-1"``.
 
 A message names an argument of a verb by ``name=``, with or without a value, or begins with its name. The option of a
-command that stands for it has the same name, or one in `OTHER_NAMES`. What no option stands for is left as it is, and
-so are the calls in a message, such as ``BoucWen(n=1.0)``.
+command that stands for it has the same name, or one in `OTHER_NAMES`; for an argument that the command lacks it is the
+option of another command, one `OF_OTHER_COMMANDS`. What no option stands for is left as it is, and so are the calls in
+a message, such as ``BoucWen(n=1.0)``.
 """
 
 import re
@@ -17,9 +18,22 @@ OTHER_NAMES = {
 }  # fmt: skip
 """Arguments whose option has another name, and that name."""
 
+OF_OTHER_COMMANDS = {
+    name: f"hysim identify {option}"
+    for name, option in {
+        "bounds": "--bounds", "channels": "--channel", "cross_validate": "--cross-validate", "fixed": "--fix",
+        "free": "--free", "initial": "--initial", "max_evaluations": "--max-evaluations", "weights": "--weights",
+        "excitation": "--excitation", "resolution": "--resolution", "t": "--t",
+    }.items()
+} | {"priors": "hysim posterior --prior"}  # fmt: skip
+"""Arguments that a message names to readers of a command without such an option, and the option that stands for it."""
+
 _PHRASES = (
     (', on_missing="split" cuts the record there', ""),
-    ("hysim.cycle_metrics measures", "--cycles without a number measures"),
+    ("hysim.loop_metrics(tolerance=...)", "hysim metrics --tolerance"),
+    ("hysim.cycle_metrics", "hysim metrics --cycles"),
+    (": read it with hs.load_model", ", which hysim simulate, control, page and c take, and hysim compare --model"),
+    ("; if it is a record: read it with hs.load", "; hysim identify --out makes a model of a record"),
     ("Record(resolution=...)", "resolution="),
     ("BoucWenOscillator.structure(initial=...)", "initial="),
     ('structure(excitation="force")', 'excitation="force"'),
@@ -60,8 +74,9 @@ def _translated(text: str, options: Mapping[str, str], is_first: bool) -> str:
     names = "|".join(sorted(map(re.escape, options), key=len, reverse=True))
     if not names:
         return text
-    assigned = re.compile(rf"(?<![\w.\"'-])({names})={_VALUE}")
-    text = assigned.sub(lambda match: _option(match, options[match[1]]), text)
+    known = {**OF_OTHER_COMMANDS, **options}
+    assigned = re.compile(rf"(?<![\w.\"'-])({'|'.join(sorted(map(re.escape, known), key=len, reverse=True))})={_VALUE}")
+    text = assigned.sub(lambda match: _option(match, known[match[1]]), text)
     if is_first:
         long = "|".join(name for name in options if len(name) > 1) or "-"
         text = re.sub(_BEGIN.format(long), lambda match: match["before"] + options[match["name"]], text)
@@ -76,7 +91,7 @@ def _option(argument: re.Match[str], flag: str) -> str:
     """The option with its value, as it is typed; a signal with a value is no argument, but as in ``--unit u=V``."""
     name, value = argument.groups()
     if len(name) == 1 and value is not None:
-        return "--no-t" if (name, value) == ("t", "False") else argument[0]
+        return flag.replace("--t", "--no-t") if (name, value) == ("t", "False") else argument[0]
     prefix = {"units": "u=", "channels": "CHANNEL="}.get(name, "")
     if value is None:
         return f"{flag} {prefix}{'UNIT' if name == 'units' else 'COLUMN'}" if prefix else flag

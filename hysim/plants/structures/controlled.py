@@ -5,7 +5,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from hysim._frozen import FloatArray
-from hysim._parallel import Progress, in_pieces
+from hysim._parallel import in_pieces
+from hysim._progress import Progress
 from hysim.kernels.controllers import CONTROLLER
 from hysim.kernels.structures.layout import Motion, Plant, Tracks
 from hysim.kernels.structures.loop import close
