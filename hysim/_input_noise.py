@@ -26,7 +26,17 @@ _MANY = 3.0  # times as many reversals as are above the noise
 
 
 def input_noise(u: FloatArray) -> float:
-    """Standard deviation of the noise of an input (n,); 0 where it is smooth, or does not turn more often for it."""
+    """As `noise_level`; 0 also where the input does not turn more often for its noise."""
+    noise = noise_level(u)
+    if noise == 0.0:
+        return 0.0
+    inner = len(turns(u, 0.0).plateaus) - 2
+    above = len(turns(u, min(_REACH * noise / float(np.ptp(u)), 0.4)).plateaus) - 2
+    return noise if inner > _MANY * max(above, 1) else 0.0
+
+
+def noise_level(u: FloatArray) -> float:
+    """Standard deviation of the noise of an input (n,); 0 where it is smooth."""
     span = float(np.ptp(u))
     if u.size < 20 or span == 0.0:
         return 0.0
@@ -37,9 +47,7 @@ def input_noise(u: FloatArray) -> float:
     noise = levels[1]
     if not 0.0 < noise <= _MOST * span or max(levels) - min(levels) > _AGREE * noise:
         return 0.0
-    inner = len(turns(u, 0.0).plateaus) - 2
-    above = len(turns(u, min(_REACH * noise / span, 0.4)).plateaus) - 2
-    return noise if inner > _MANY * max(above, 1) else 0.0
+    return noise
 
 
 def quiet_path(u: FloatArray, noise: float) -> FloatArray:

@@ -13,6 +13,7 @@ from hysim._frozen import FloatArray, check_choice, check_count, read_only
 from hysim._parallel import Progress, at_most
 from hysim.identification import _direct as direct
 from hysim.identification._assumptions import decided, in_units_of_noise, quiet_where_better
+from hysim.identification._diagnostics import rate_noise_warning
 from hysim.identification._extrapolation import implausible
 from hysim.identification._noise import Gaussian, Noise, Quantised, Robust
 from hysim.identification._problem import Problem
@@ -167,7 +168,7 @@ def identify(
             if not any(doubts) and not is_partial and not needs_time(fit.model):
                 doubts = [swapped_for(first.family, records, options, initial, 1.0 - fit.fit_percent / 100.0)]
             on_their_records = [on_record(each, record) for each, record in zip(fit.models, records, strict=True)]
-            doubts.append(implausible(on_their_records, records))
+            doubts += [implausible(on_their_records, records), rate_noise_warning(on_their_records, records)]
         warnings = (*fit.warnings, *filter(None, doubts))
         return replace(fit, warnings=warnings) if any(doubts) else fit
 
