@@ -264,11 +264,11 @@ def response_run(case: Case, chosen: Array) -> Run:
 
 def rate_dependent_run(case: Case, u: Array) -> Run:
     """The same at constant speed: each piece takes its part of the stride's time."""
-    y0, state = case.law.advance(case.before, 1.0)
+    y0, state = case.law.advance(case.before, sample_time=1.0)
     last, whole, y = case.before[-1], abs(u[-1] - case.before[-1]), np.empty(u.size)
     for k, value in enumerate(u):
         if abs(value - last) > whole * np.finfo(float).tiny:  # else no time passes
-            y0, state = case.law.advance([value], abs(value - last) / whole, state)
+            y0, state = case.law.advance([value], state, sample_time=abs(value - last) / whole)
             last = value
         y[k] = y0[-1]
     return Run(y, state)

@@ -24,14 +24,22 @@ _MOST = 0.05  # of the span
 _REACH = 5.0 * math.sqrt(2.0)  # of the noise: differences of two samples are larger once in a million
 _NORMAL = 1.4826  # standard deviation over the median size, of normal noise
 MOST_IGNORED = 0.4  # of the span: turning points are counted for tolerances below a half
-_CORNER = (
-    4.0  # of the noise: samples so far from a turning point, itself an extreme of noise, are averaged to its level
-)
+_CORNER = 4.0  # of the noise: samples so near to a turning point are averaged to its level
 _MANY = 3.0  # times as many reversals as are above the noise
 
 
 def input_noise(u: FloatArray) -> float:
-    """Standard deviation of the noise of an input (n,); 0 where it is smooth, or does not turn more often for it."""
+    """As `noise_level`; 0 also where the input does not turn more often for its noise."""
+    noise = noise_level(u)
+    if noise == 0.0:
+        return 0.0
+    inner = len(turns(u, 0.0).plateaus) - 2
+    above = len(turns(u, min(reach(noise) / float(np.ptp(u)), MOST_IGNORED)).plateaus) - 2
+    return noise if inner > _MANY * max(above, 1) else 0.0
+
+
+def noise_level(u: FloatArray) -> float:
+    """Standard deviation of the noise of an input (n,); 0 where it is smooth."""
     span = float(np.ptp(u))
     if u.size < 20 or span == 0.0:
         return 0.0
@@ -42,9 +50,7 @@ def input_noise(u: FloatArray) -> float:
     noise = levels[1]
     if not 0.0 < noise <= _MOST * span or max(levels) - min(levels) > _AGREE * noise:
         return 0.0
-    inner = len(turns(u, 0.0).plateaus) - 2
-    above = len(turns(u, min(reach(noise) / span, MOST_IGNORED)).plateaus) - 2
-    return noise if inner > _MANY * max(above, 1) else 0.0
+    return noise
 
 
 def reach(noise: float) -> float:

@@ -178,7 +178,7 @@ WHOLE = replace(
 def test_cut_and_continue_gives_the_same_bits(pieces, plant, substeps):
     u, state, parts = commands(60, scale=8.0), None, []
     for piece in np.split(u, np.minimum(np.cumsum([1, *pieces]), 60)):
-        y, state = plant.advance(piece, H, state, substeps=substeps)
+        y, state = plant.advance(piece, state, sample_time=H, substeps=substeps)
         parts.append(y)
     assert np.array_equal(np.concatenate(parts), plant.response(u, H, substeps=substeps))
     assert state.samples == 60
@@ -187,8 +187,8 @@ def test_cut_and_continue_gives_the_same_bits(pieces, plant, substeps):
 def test_an_output_at_the_end_of_the_hold_is_the_next_ones_begin():
     ends = replace(REFERENCE_CASE, vibration=replace(MODE, sample="end"))
     u = commands(50)
-    y, state = ends.advance(u[:20], H)
-    assert np.array_equal(np.append(y, ends.advance(u[20:], H, state)[0]), ends.response(u, H))
+    y, state = ends.advance(u[:20], sample_time=H)
+    assert np.array_equal(np.append(y, ends.advance(u[20:], state, sample_time=H)[0]), ends.response(u, H))
     assert np.array_equal(ends.response(u, H)[:-1], REFERENCE_CASE.response(u, H)[1:])
 
 

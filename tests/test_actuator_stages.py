@@ -257,7 +257,7 @@ def test_readings_are_steps_of_noisy_displacements():
             ValueError,
             "substeps must be an integer of at least 1, got 0",
         ),
-        (lambda: hs.Actuator().advance([], 0.1), ValueError, "u must hold a sample"),
+        (lambda: hs.Actuator().advance([], sample_time=0.1), ValueError, "u must hold a sample"),
     ],
 )
 def test_wrong_arguments_are_named(call, error, message):

@@ -1,5 +1,6 @@
 """Sums and cascades are models like any other: they respond, continue, invert, are stored and identified."""
 
+import inspect
 import os
 
 import numpy as np
@@ -9,6 +10,7 @@ from hypothesis import strategies as st
 from strategies import bounded_laws, short_inputs
 
 import hysim as hs
+from hysim.models.model import every_family
 
 needs_compiled = pytest.mark.skipif(
     os.environ.get("NUMBA_DISABLE_JIT", "0") != "0", reason="thousands of runs, which only compiled code does in time"
@@ -53,9 +55,31 @@ def test_a_transfer_function_continues_to_the_bit(u, cut, delay, hold):
     plant = hs.TransferFunction(
         num=(0.5, 2.0, 30.0), den=(1.0, 2.0, 30.0), delay=delay, hold=hold, initial_state=(0.3, -1.0)
     )
-    head, state = plant.advance(u[:cut], TIME)
-    tail, _ = plant.advance(u[cut:], TIME, state)
+    head, state = plant.advance(u[:cut], sample_time=TIME)
+    tail, _ = plant.advance(u[cut:], state, sample_time=TIME)
     assert np.concatenate([head, tail]).tolist() == plant.response(u, TIME).tolist()
+
+
+CONTINUED = sorted(
+    {
+        family
+        for family in every_family().values()
+        if "advance" in dir(family) and family.__module__.startswith("hysim.")
+    }
+    | {hs.TransferFunction, hs.Actuator, hs.Structure, hs.BoucWenOscillator, hs.Sum, hs.Cascade},
+    key=lambda family: family.__name__,
+)
+
+
+@pytest.mark.parametrize("family", CONTINUED)
+def test_whatever_can_be_continued_is_called_in_one_way(family):
+    """``advance(u, state=None, *, sample_time=None)``; a plant may take more by keyword."""
+    _, *arguments = inspect.signature(family.advance).parameters.values()
+    by_place = [(each.name, each.default) for each in arguments if each.kind is each.POSITIONAL_OR_KEYWORD]
+    by_name = {each.name: each.default for each in arguments if each.kind is each.KEYWORD_ONLY}
+    assert by_place == [("u", inspect.Parameter.empty), ("state", None)]
+    assert by_name["sample_time"] is None
+    assert set(by_name.values()) == {None}
 
 
 @given(sums(), short_inputs(), st.integers(1, 5))

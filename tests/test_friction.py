@@ -134,8 +134,8 @@ def stiff(law, u):
 def test_a_cut_changes_no_bit(family):
     for law, u, time in laws_of(family, 1):
         whole = law.response(u, time)
-        first, state = law.advance(u[:17], time)
-        second, _ = law.advance(u[17:], time, state)
+        first, state = law.advance(u[:17], sample_time=time)
+        second, _ = law.advance(u[17:], state, sample_time=time)
         assert np.concatenate([first, second]).tolist() == whole.tolist()
         step, parameters, memory = law.startable(time).started(u[0])
         assert [step(parameters, memory, each) for each in u] == whole.tolist()
@@ -250,7 +250,7 @@ def test_a_law_that_is_not_passive_pushes():
     """Bent slowly to the breakaway force, then moved fast: the bristles relax, and their damping pushes."""
     law = replace(PASSIVE, sigma1=40.0, sigma2=0.0)
     assert not law.is_passive()
-    bent = law.advance(np.linspace(0.0, 0.4, 41), 100.0)[1]
+    bent = law.advance(np.linspace(0.0, 0.4, 41), sample_time=100.0)[1]
     pushed = replace(law, z0=bent[1])
     work, stored = work_and_store(pushed, np.array([0.0, 0.01]), 1e-3)
     assert work < stored

@@ -1,6 +1,8 @@
 """Loops of known width and area are measured as what they are."""
 
+import json
 import math
+import re
 from itertools import pairwise
 
 import numpy as np
@@ -10,6 +12,7 @@ from hypothesis import strategies as st
 
 import hysim as hs
 from hysim._cycles import TOLERANCE, complete_cycles
+from hysim.cli import main
 from hysim.metrics.rows import LoopRows
 
 ROUNDING = 1e-12  # relative; sums of some hundred terms of order one
@@ -544,3 +547,66 @@ def test_a_law_that_never_repeats_has_no_describing_function():
 
     with pytest.raises(hs.SimulationError, match="does not repeat after 262128 cycles of amplitude 2"):
         hs.metrics.describing_function(Drift(), [2.0])
+
+
+SWEEP = hs.signals.triangle(-1.0, 1.0, cycles=3, samples_per_cycle=400)
+EVEN = hs.PolynomialBoucWen(gain=0.0, input_coefficients=(0.0, 1.0))
+BUTTERFLY = hs.Play(threshold=0.2) >> EVEN
+"""Its unloading branch is (u + r)^2, after a constant while the play stands still; the loading one (u - r)^2."""
+
+
+def test_a_butterfly_crosses_itself_and_has_two_lobes_of_known_areas():
+    r = 0.2
+    loop = hs.loop_metrics(SWEEP, BUTTERFLY.response(SWEEP))
+    left, right = loop.lobes
+    assert loop.crossings == (left.high,) == (right.low,) == pytest.approx((0.0,), abs=1e-12)
+    assert (left.low, right.high) == (-1.0, 1.0)
+    assert (left.orientation, right.orientation) == ("clockwise", "counterclockwise")
+    # the integral of the width: 4 r u up to 1 - 2 r, and (1 - r)^2 - (u - r)^2 from there to 1
+    expected = 2.0 * r * (1.0 - 2.0 * r) ** 2 + 2.0 * r * (1.0 - r) ** 2 - ((1.0 - r) ** 3 - (1.0 - 3.0 * r) ** 3) / 3.0
+    assert left.area == pytest.approx(expected, abs=1e-5)  # a parabola by chords of 0.01: 0.4 * 0.01^2 / 6
+    assert left.area == pytest.approx(right.area, rel=1e-12)
+    assert left.max_width == pytest.approx(0.48, abs=1e-12)  # (1 - r)^2 - (1 - 3 r)^2, where the play moves again
+    assert loop.area < 1e-12
+    assert "crosses itself at u = " in str(loop)
+    assert "clockwise, area 0.25" in str(loop)
+
+
+@pytest.mark.parametrize("noise", [1e-3, 0.01, 0.03, 0.1])
+def test_noise_makes_no_lobes_and_hides_none(noise):
+    rng, plain = np.random.default_rng(5), hs.BoucWen().response(SWEEP)
+    for _ in range(10):
+        added = noise * rng.standard_normal(SWEEP.size)
+        crossed = hs.loop_metrics(SWEEP, BUTTERFLY.response(SWEEP) + 0.64 * added).crossings
+        assert crossed == pytest.approx((0.0,), abs=3.4 * noise + 0.005)  # 3 deviations of the width over its slope
+        assert hs.loop_metrics(SWEEP, plain + np.ptp(plain) * added).crossings == ()
+
+
+def test_a_curve_without_a_loop_has_no_lobe():
+    assert hs.loop_metrics(SWEEP, SWEEP**3).lobes == ()
+
+
+@pytest.mark.parametrize(
+    "law",
+    [hs.BoucWen(), hs.PolynomialBoucWen(input_coefficients=(1.0, 0.5, 0.3)), hs.BoucWenBaberNoori(zeta_s=0.9, psi=0.3),
+     hs.GeneralizedBoucWen(), hs.ZhuWangBoucWen(delta=2.0), hs.Dahl(), hs.Play(threshold=0.3), hs.Tellinen(),
+     hs.JilesAtherton(Ms=1.0, a=0.4, alpha=0.5, k=0.3), hs.EnergyPlays(thresholds=(0.0, 0.2), weights=(2.0, 3.0)),
+     hs.MaxwellSlip(stiffness=(1.0, 0.5), slips=(0.3, 0.4))],
+    ids=lambda law: type(law).__name__,
+)  # fmt: skip
+def test_a_simple_law_draws_a_butterfly_only_before_an_even_curve(law):
+    assert hs.loop_metrics(SWEEP, law.response(SWEEP)).crossings == ()
+    assert len(hs.loop_metrics(SWEEP, (law >> EVEN).response(SWEEP)).crossings) == 1
+
+
+def test_the_command_prints_and_stores_the_lobes(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    record = hs.Record(u=SWEEP, y=BUTTERFLY.response(SWEEP), units={"u": "V", "y": "um"})
+    hs.save_record(record, "butterfly.csv")
+    assert main(["metrics", "butterfly.csv"]) == 0
+    printed = capsys.readouterr().out
+    assert re.search(r"^crosses itself +at .* V$", printed, re.MULTILINE)
+    assert re.search(r"^lobe 2 +counterclockwise, area 0.25\d* um V, max width 0.48 um, from .* to 1 V$", printed, re.M)
+    assert main(["metrics", "butterfly.csv", "--json"]) == 0
+    lobes = json.loads(capsys.readouterr().out)["lobes"]
+    assert [lobe["orientation"] for lobe in lobes] == ["clockwise", "counterclockwise"]

@@ -2,6 +2,7 @@
 
 import io
 import json
+import re
 
 import numpy as np
 import pytest
@@ -10,6 +11,7 @@ import hysim as hs
 from hysim._input_noise import input_noise, quiet_path
 from hysim._repeats import repeated_cycle
 from hysim.cli import main
+from hysim.identification._diagnostics import rate_noise_warning
 
 CYCLES = hs.signals.triangle(-1.0, 1.0, cycles=3, samples_per_cycle=200)
 SINE = np.sin(2.0 * np.pi * np.arange(800) / 250.0)
@@ -154,3 +156,41 @@ def test_the_command_line_takes_weights_from_a_column(source, tmp_path, monkeypa
     estimates = json.loads(capsys.readouterr().out)["estimates"]
     assert estimates["stiffness"] == pytest.approx(3.0, rel=1e-6)
     assert estimates["coulomb"] == pytest.approx(0.7, rel=1e-6)
+
+
+RATE = 1e-2  # s
+MOVING = np.sin(2.0 * np.pi * 0.4 * RATE * np.arange(800)) * (1.0 + 0.3 * np.sin(0.9 * RATE * np.arange(800)))
+FRICTION = hs.LuGre(sigma0=50.0, sigma1=0.05, sigma2=0.1, coulomb=1.0, breakaway=1.4, stribeck_velocity=0.3)
+DAMPER = hs.Line(slope=2.0) + hs.Dashpot(c=0.3)
+
+
+def moved(model, size):
+    """A record with noise of .3 % of the output's span, and of `size` on the measured input."""
+    y = model.response(MOVING, RATE)
+    y = y + 0.003 * np.ptp(y) * np.random.default_rng(4).standard_normal(y.size)
+    return hs.Record(u=MOVING + noise(size, MOVING.size), y=y, t=RATE * np.arange(y.size))
+
+
+@pytest.mark.parametrize("size", [3e-4, 3e-3, 0.03])
+@pytest.mark.parametrize("model", [FRICTION, DAMPER], ids=["LuGre", "dashpot"])
+def test_noise_of_an_input_whose_velocity_counts_is_named_with_its_size(model, size):
+    record = moved(model, size)
+    sentence = rate_noise_warning([model], [record])
+    level = float(re.search(r"noise of about (\S+) rms", sentence)[1])
+    assert level == pytest.approx(size, rel=0.2)
+    assert "savgol_filter" in sentence
+
+
+@pytest.mark.parametrize("model", [FRICTION, DAMPER], ids=["LuGre", "dashpot"])
+def test_an_input_without_noise_or_a_model_without_time_is_not_doubted(model):
+    assert rate_noise_warning([model], [moved(model, 0.0)]) == ""
+    assert rate_noise_warning([model], [moved(model, 1e-6)]) == ""
+    assert rate_noise_warning([LAW], [moved(model, 3e-3)]) == ""
+
+
+def test_a_fit_of_a_rate_says_that_its_input_is_noisy():
+    clean, noisy = (hs.identify(hs.Line() + hs.Dashpot(), moved(DAMPER, size)) for size in (0.0, 0.01))
+    assert clean.estimates["dashpot.c"] == pytest.approx(0.3, rel=0.01)
+    assert noisy.estimates["dashpot.c"] < 0.25  # a noisy regressor makes its coefficient smaller
+    assert not any("input has noise" in each for each in clean.warnings)
+    assert any("the input has noise of about 0.011 rms" in each for each in noisy.warnings)

@@ -172,22 +172,22 @@ def test_restoring_force_obeys_the_equation_of_motion():
 def test_cut_and_continued_it_has_the_same_bits(method, hold, monkeypatch):
     u = noise(60)
     whole_plant = plant(method=method, hold=hold, substeps=2)
-    whole, end = whole_plant.advance(u, 1.0 / RATE)
-    first, state = whole_plant.advance(u[:23], 1.0 / RATE)
-    second, again = whole_plant.advance(u[23:], 1.0 / RATE, state)
+    whole, end = whole_plant.advance(u, sample_time=1.0 / RATE)
+    first, state = whole_plant.advance(u[:23], sample_time=1.0 / RATE)
+    second, again = whole_plant.advance(u[23:], state, sample_time=1.0 / RATE)
     assert again == end
     for name, values in whole.items():
         assert np.array_equal(np.concatenate([first[name], second[name]]), values), name
     monkeypatch.setattr(module, "_CHUNK", 7)
     calls = []
-    chunked = whole_plant.advance(u, 1.0 / RATE, progress=lambda done, total: calls.append((done, total)))
+    chunked = whole_plant.advance(u, sample_time=1.0 / RATE, progress=lambda done, total: calls.append((done, total)))
     assert np.array_equal(chunked[0]["y"], whole["y"])
     assert calls[-1] == (60, 60)
     assert len(calls) == 9
 
 
 def test_nothing_in_is_nothing_out():
-    signals, state = plant().advance([], 1.0)
+    signals, state = plant().advance([], sample_time=1.0)
     assert signals["y"].shape == (0,)
     assert state.z == 0.0
 

@@ -95,7 +95,7 @@ def test_a_cut_input_gives_the_same_bits_and_no_input_no_motion(name):
     whole, cut = frame.signals(QUAKE[:60], H), []
     state = None
     for k in (slice(0, 1), slice(1, 17), slice(17, 60)):
-        signals, state = frame.advance(QUAKE[:60][k], H, state)
+        signals, state = frame.advance(QUAKE[:60][k], state, sample_time=H)
         cut.append(signals)
     for each, values in whole.items():
         assert np.array_equal(np.concatenate([part[each] for part in cut]), values), each

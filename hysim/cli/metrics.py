@@ -31,7 +31,9 @@ def run(options: argparse.Namespace) -> int:
     else:
         loop = loop_metrics(record.u, record.y, cycles=options.cycles, **tolerance)
         lines = [*_lines(loop, record.units)]
-        document, convention = outputs.scalars(loop), loop.sign_convention
+        lobes = [lobe._asdict() for lobe in loop.lobes]
+        document = outputs.scalars(loop) | {"crossings": list(loop.crossings), "lobes": lobes}
+        convention = loop.sign_convention
 
     def text() -> str:
         return "\n".join([*lines, *_step(record)])
@@ -55,6 +57,14 @@ def _lines(loop: "LoopMetrics", units: Mapping[str, str]) -> Iterator[str]:
         "stroke": quantity(loop.stroke, y),
         "area": quantity(loop.area, product),
         "orientation": loop.orientation,
+        "crosses itself": f"at {', '.join(f'{at:.6g}' for at in loop.crossings)} {u}" if loop.crossings else "",
+    }
+    for k, lobe in enumerate(loop.lobes if loop.crossings else (), 1):
+        values[f"lobe {k}"] = (
+            f"{lobe.orientation}, area {quantity(lobe.area, product)}, max width {quantity(lobe.max_width, y)}, "
+            f"from {lobe.low:.6g} to {lobe.high:.6g} {u}"
+        )
+    values |= {
         "closure gap": quantity(loop.closure_gap, y),
         "energy": quantity(loop.energy, product),
         "secant stiffness": f"{loop.secant_stiffness:.4g} {ratio}",
@@ -62,7 +72,7 @@ def _lines(loop: "LoopMetrics", units: Mapping[str, str]) -> Iterator[str]:
         "cycles": f"{loop.n_cycles}",
     }
     width = max(map(len, values))
-    yield from (f"{name:<{width}}  {value.rstrip()}" for name, value in values.items())
+    yield from (f"{name:<{width}}  {value.rstrip()}" for name, value in values.items() if value)
     if loop.orientation == "counterclockwise":
         yield from folded(loop.sign_convention)
 

@@ -70,7 +70,7 @@ def oscillator_system(plant: BoucWenOscillator, sample_time: float | None) -> An
         return np.array([velocity, force / plant.mass, law.A * velocity - abs(z) ** law.n * against])
 
     def update(t: float, x: FloatArray, u: FloatArray, params: Any) -> FloatArray:
-        _, end = sampled_plant.advance(u, step, OscillatorState(float(u[0]), *(x + start).tolist()))
+        _, end = sampled_plant.advance(u, OscillatorState(float(u[0]), *(x + start).tolist()), sample_time=step)
         return np.array([end.y, end.velocity, end.z]) - start
 
     def output(t: float, x: FloatArray, u: FloatArray, params: Any) -> FloatArray:

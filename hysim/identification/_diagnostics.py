@@ -1,17 +1,23 @@
 """Measures of a fit, whether its residuals are white, and how uncertain the loop width is."""
 
-from typing import TypedDict
+from collections.abc import Sequence
+from typing import Any, TypedDict
 
 import numpy as np
 
 from hysim import metrics
 from hysim._frozen import FloatArray
+from hysim._input_noise import noise_level
+from hysim.errors import SimulationError
 from hysim.identification._descent import Descent
 from hysim.identification._problem import Problem
 from hysim.identification._uncertainty import output_slopes
 from hysim.metrics.rows import LoopRows
+from hysim.models.protocols import needs_time
+from hysim.records import Record
 
 _MOST_LAGS = 20
+_SHARE_OF_NOISE = 0.3  # of the residuals: below it noise of the input adds less than 5 % to them
 
 
 class FitMeasures(TypedDict):
@@ -52,6 +58,35 @@ def whiteness(residual: FloatArray, n_parameters: int) -> float:
     correlation = np.array([centred[k:] @ centred[:-k] for k in range(1, lags + 1)]) / power
     statistic = n * (n + 2) * np.sum(correlation**2 / (n - np.arange(1, lags + 1)))
     return float(chi2.sf(statistic, lags))
+
+
+def rate_noise_warning(models: Sequence[Any], records: Sequence[Record]) -> str:
+    """A sentence where noise of the input explains residuals of models that depend on time; else the empty text.
+
+    The noise is added to each input once more: what the output of its model then changes by, the noise that is in the
+    input already has done to the residuals.
+    """
+    rng = np.random.default_rng(0)
+    for model, record in zip(models, records, strict=True):
+        noise = noise_level(record.u)
+        if not (noise and needs_time(model) and record.sample_time):
+            continue
+        try:
+            outputs = [
+                np.asarray(model.response(u, record.sample_time))
+                for u in (record.u, record.u + noise * rng.standard_normal(len(record)))
+            ]
+        except SimulationError:
+            continue
+        share = metrics.rmse(*outputs) / max(metrics.rmse(record.y, outputs[0]), float(np.finfo(float).tiny))
+        if share > _SHARE_OF_NOISE:
+            return (
+                f"the input has noise of about {noise:.2g} rms, {100.0 * noise / np.ptp(record.u):.2g} % of its span, "
+                f"and the model depends on its rate: noise of this size changes the output by {100.0 * share:.0f} % of "
+                "the residuals, and biases damping, breakaway and other parameters of the velocity. Smooth the "
+                "input and identify again, such as with scipy.signal.savgol_filter over a small part of a cycle"
+            )
+    return ""
 
 
 def loop_widths(descent: Descent, theta: FloatArray) -> FloatArray:

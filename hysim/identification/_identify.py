@@ -15,6 +15,7 @@ from hysim._progress import Progress, Reports, reports
 from hysim._results import model_of
 from hysim.identification import _direct as direct
 from hysim.identification._assumptions import Treated, decided, in_units_of_noise, quiet_rmse, treated
+from hysim.identification._diagnostics import rate_noise_warning
 from hysim.identification._extrapolation import implausible
 from hysim.identification._measured import as_measured, said_of_noise
 from hysim.identification._noise import Gaussian, Noise, Quantised, Robust
@@ -183,7 +184,7 @@ def identify(
             if not any(doubts) and not is_partial and not needs_time(fit.model):
                 doubts = [swapped_for(first.family, records, options, initial, 1.0 - fit.fit_percent / 100.0)]
             on_their_records = [on_record(each, record) for each, record in zip(fit.models, records, strict=True)]
-            doubts.append(implausible(on_their_records, records))
+            doubts += [implausible(on_their_records, records), rate_noise_warning(on_their_records, records)]
         warnings = (*fit.warnings, *filter(None, doubts))
         return replace(fit, warnings=warnings) if any(doubts) else fit
 

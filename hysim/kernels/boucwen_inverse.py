@@ -114,17 +114,19 @@ def monotone(
     """Whether the slope is positive from (u, z) to where the law's state stands; else `state` gets the place."""
     memory = state[N_OWN:]
     end, z_end = memory[0], memory[1]
-    if lowest_slope(u, z, end, z_end, direction, parameters) > 0.0:
+    lowest = lowest_slope(u, z, end, z_end, direction, parameters)
+    if lowest > 0.0:
         return True
+    flat = -_FLAT * slope(u, z, direction, parameters)  # and zero where the law has saturated
     for k in range(_POINTS + 1):
         point = u + (end - u) * (k / _POINTS)
         forward(u, z, point, parameters, memory, charts)
         steepness = slope(point, memory[1], direction, parameters)
-        if not steepness > 0.0:
+        if not steepness > flat:
             state[2], state[3] = point, parameters[0] * steepness
             return False
     memory[0], memory[1] = end, z_end
-    return bool(parameters[7] > 1.0)
+    return bool(parameters[7] > 1.0 or lowest > flat)
 
 
 @pasted
@@ -195,7 +197,10 @@ def inverse(parameters: FloatArray, state: FloatArray, y: float, charts: int | N
     direction, wanted = own[0] * upward, u
     if not gap <= 0.0:
         exists = solve(u, z, y, direction, gap, own, state, charts) and monotone(u, z, direction, own, state, charts)
-        wanted = memory[0] if exists else math.nan
+        stays = not exists and gap <= _ROUNDINGS * rounding(y, u, z, own)  # saturated but for rounding
+        if stays:
+            memory[0], memory[1] = u, z
+        wanted = memory[0] if exists or stays else math.nan
     end = within_limits(parameters, wanted, direction)
     if end == wanted:
         state[0], state[1] = wanted, y

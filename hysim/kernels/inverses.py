@@ -40,6 +40,7 @@ _NEAR, _NEARER, _NEAREST = 1e-10, 0.125, 1e-13
 """Parts of the largest output so far: distances behind a branch at which it is evaluated, the farthest first."""
 _ROUNDINGS = 64.0 * 2.0**-53
 _CLEAR = 256.0  # roundings by which an output has to rise to show it
+_BELOW = 16.0  # part of the rounding by which what is taken for saturated is below the last output
 _AHEAD = 2.0**-26
 """Part of a branch: distance beyond its end at which the output is evaluated; a turn is missed by its square."""
 _SMALLEST = 2.0**-1022
@@ -210,8 +211,19 @@ def _closed_in(
     high: float,
     high_error: float,
 ) -> float:
-    """The shortest length that reaches the output, by regula falsi (Illinois) where that is faster than halving."""
+    """The shortest length that reaches the output, by regula falsi (Illinois) where that is faster than halving.
+
+    Where the output stands still, saturated, the length is halved while it keeps the output.
+    """
     last_side = 0
+    while high_error == 0.0:
+        length = 0.5 * (low + high)
+        if (
+            not _apart(here, direction, low, length, high)
+            or _rise(step, parameters, law, before, places, here + direction * length, side, wanted) != 0.0
+        ):
+            return high
+        high = length
     for i in range(_HALVINGS):
         length = high - (high - low) * (high_error / (high_error - low_error))
         if i % 3 == 2 or not _apart(here, direction, low, length, high):
@@ -265,20 +277,22 @@ def _falls_back(
     here: float,
     direction: float,
     side: float,
-    reached: float,
     steepness: float,
     largest: float,
 ) -> bool:
-    """Whether the output falls where the input turns back; `steepness` is the slope of the branch ahead.
+    """Whether the output falls or stands still where the input turns back; `steepness` is the slope ahead.
 
-    It is evaluated as near as rounding allows, and counts as falling where it is infinite even there.
+    It is evaluated as near as rounding allows, and counts as falling where it is infinite even there. It stands still
+    behind the place where a law has saturated.
     """
     near, noise, known = _NEAR, 0.0, False
+    put_back(law, before, places)
+    reached = step(parameters, law, here)  # which differs from what was wanted by the rounding of the input
     while near > _NEAREST:
         back = _rise(
             step, parameters, law, before, places, here - direction * (near * largest / steepness), side, reached
         )
-        if back < -noise and math.isfinite(back):
+        if math.isfinite(back) and (back < -noise or (noise == 0.0 and back <= _ROUNDINGS * largest)):
             return True
         known = known or math.isfinite(back)
         near, noise = near * _NEARER, _ROUNDINGS * largest
@@ -314,6 +328,13 @@ def search(step: Step, parameters: FloatArray, state: FloatArray, y: float) -> f
                 step, own, law, before, places, here, direction, side, y, gap, guess, limit, ahead, allowed
             )
             reaches = 0.0 <= high_error < math.inf
+            if not reaches and -noise <= low_error < 0.0:  # saturated but for rounding: what is reached is wanted
+                y += side * (low_error - noise / _BELOW)
+                gap = side * (y - reached)
+                if low == 0.0 or gap < _SMALLEST:
+                    length = 0.0
+                    break
+                continue
             if reaches:
                 high = _closed_in(
                     step, own, law, before, places, here, direction, side, y, low, low_error, high, high_error
@@ -330,11 +351,9 @@ def search(step: Step, parameters: FloatArray, state: FloatArray, y: float) -> f
                     break
                 limit = turn
             ahead = max(_AHEAD, _CLEAR * noise / gap)
-        if resolved and not math.isnan(length):
+        if resolved and length > 0.0:
             steepness = gap / length
-            if certain or _falls_back(
-                step, own, law, before, places, here, direction, side, reached, steepness, largest
-            ):
+            if certain or _falls_back(step, own, law, before, places, here, direction, side, steepness, largest):
                 state[2] = rising * steepness
             else:
                 length = math.nan

@@ -10,9 +10,11 @@ import numpy.typing as npt
 from hysim._frozen import FloatArray, items, read_only
 from hysim.kernels import stepping
 from hysim.laws.static import linear_space
+from hysim.models.batch import Batch, Reduction, Sets
 from hysim.models.composable import Composable
 from hysim.models.protocols import CompiledLaw, Identifiable, Startable, needed_time, positive_time
 from hysim.models.search_space import ALL_FREE, Freedom, Parameters, SearchSpace
+from hysim.models.tables import tables_of
 from hysim.records import Record
 
 
@@ -47,18 +49,38 @@ class RatePart(Identifiable, Composable):
 
         Raises ValueError if `u` is not finite or has not one axis, or the sample time is not positive.
         """
-        return self.advance(u, sample_time)[0]
+        return self.advance(u, sample_time=sample_time)[0]
 
     def advance(
-        self, u: npt.ArrayLike, sample_time: float, state: float | None = None
+        self, u: npt.ArrayLike, state: float | None = None, *, sample_time: float | None = None
     ) -> tuple[FloatArray, float | None]:
         """Output continued from `state`, the last input, and the state after it; the same bits as uncut."""
         inputs = read_only(u, "u", ndim=1)
-        positive_time(sample_time)
+        time = positive_time(needed_time(self, sample_time))
         if not inputs.size:
             return inputs, state
         before = inputs[0] if state is None else state
-        return self.c * self.of_velocity(np.diff(inputs, prepend=before) / sample_time), float(inputs[-1])
+        return self.c * self.of_velocity(np.diff(inputs, prepend=before) / time), float(inputs[-1])
+
+    @classmethod
+    def responses(
+        cls,
+        parameters: Parameters,
+        u: npt.ArrayLike,
+        sample_time: float,
+        *,
+        reduce: Reduction | None = None,
+        target: npt.ArrayLike | None = None,
+        workers: int | None = None,
+    ) -> FloatArray:
+        """Outputs of many parts at one sample time [s]; else as `hysim.Law.responses`."""
+        time = positive_time(sample_time)
+        tables, inputs = tables_of(cls.__name__, {"c": cls.c}, parameters, u)
+
+        def compute(sets: Sets, u: FloatArray, y: FloatArray) -> None:
+            y[:] = tables["c"][sets] * cls.of_velocity(np.diff(u, prepend=u[:, :1]) / time)
+
+        return Batch(compute, len(tables["c"]), inputs).result(reduce, target, workers)
 
     def startable(self, sample_time: float | None = None) -> Startable:
         """The part at a sample time [s] as a step that runs from any first input, for exports."""

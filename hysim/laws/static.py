@@ -94,7 +94,9 @@ class SingleValued(Composable):
         """Output at the samples of `u`, shape (n,)."""
         return np.interp(read_only(u, "u", ndim=1), self.u, self.y)
 
-    def advance(self, u: npt.ArrayLike, state: tuple[()] | None = None) -> tuple[FloatArray, tuple[()]]:
+    def advance(
+        self, u: npt.ArrayLike, state: tuple[()] | None = None, *, sample_time: float | None = None
+    ) -> tuple[FloatArray, tuple[()]]:
         """Output at the samples of `u`, and a state that holds nothing."""
         return self.response(u), ()
 

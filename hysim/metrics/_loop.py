@@ -10,8 +10,10 @@ between their samples, y_l(u) and y_u(u).
     relative_width = max_width / stroke,    stroke = max y - min y
 
 A positive signed area is a counterclockwise loop, as of a piezoelectric actuator: unloading above loading. `area` is
-its magnitude. If u is a displacement and y a force, with y+ and y- the forces at the largest and the smallest
-displacement (the mean of the two branches there) and D half the span of u,
+its magnitude. In a loop that crosses itself, such as a butterfly, the signed areas of its lobes cancel in part; each
+lobe has an area and a width of its own, the integral of w and max |w| between two zeros of w. If u is a displacement
+and y a force, with y+ and y- the forces at the largest and the smallest displacement (the mean of the two branches
+there) and D half the span of u,
 
     energy             = integral of y du = -signed area         dissipated in a cycle; positive is clockwise
     secant_stiffness   = (y+ - y-) / (max u - min u)
@@ -27,7 +29,8 @@ the secant stiffness between the extremes of displacement, not of force.
 
 import math
 from collections.abc import Sequence
-from typing import Literal, overload
+from itertools import groupby, pairwise
+from typing import Literal, NamedTuple, overload
 
 import numpy as np
 import numpy.typing as npt
@@ -44,6 +47,24 @@ COUNTERCLOCKWISE = (
 FORCE = "Energy is the integral of y du: what a force y on a displacement u dissipates."
 
 
+_SMALLEST_LOBE = 0.02  # of the area of all lobes: where the branches meet at the ends they cross by less
+_CLEAR = 4.0  # standard deviations by which the mean width of a lobe is above the noise of the width
+
+
+class Lobe(NamedTuple):
+    """A part of a loop on which one branch stays above the other.
+
+    `low` and `high` are the inputs where it ends [unit of u], `area` what it encloses, at least 0, `max_width` its
+    largest width [unit of y], and `orientation` its sense, "counterclockwise" where unloading is above loading.
+    """
+
+    low: float
+    high: float
+    area: float
+    max_width: float
+    orientation: Literal["counterclockwise", "clockwise"]
+
+
 @printed
 @frozen
 class LoopMetrics:
@@ -56,7 +77,8 @@ class LoopMetrics:
     mean_width, mid_width : float
         Area over input span, and the width's magnitude at mid span [unit of y].
     area : float
-        Enclosed area, at least 0 [unit of y times unit of u].
+        Enclosed area, at least 0 [unit of y times unit of u]; of a loop that crosses itself the difference of the areas
+        that it encloses in either sense: see `lobes`.
     stroke : float
         Largest minus smallest output of the cycle [unit of y].
     relative_width : float
@@ -100,8 +122,32 @@ class LoopMetrics:
     unloading: FloatArray
     width: FloatArray
 
+    @property
+    def lobes(self) -> tuple[Lobe, ...]:
+        """Parts between which the loop crosses itself, by increasing input; one if it does not, none without a width.
+
+        Parts that are no larger than the noise of the width, or 2 % of the whole, belong to their neighbours.
+
+        Examples
+        --------
+        >>> import hysim as hs
+        >>> u = hs.signals.triangle(-1.0, 1.0, cycles=2, samples_per_cycle=400)
+        >>> butterfly = hs.Play(threshold=0.2) >> hs.PolynomialBoucWen(gain=0.0, input_coefficients=(0.0, 1.0))
+        >>> left, right = hs.loop_metrics(u, butterfly.response(u)).lobes
+        >>> left.orientation, right.orientation, round(left.area, 3), round(right.area, 3)
+        ('clockwise', 'counterclockwise', 0.251, 0.251)
+        """
+        return _lobes(self.u, self.width)
+
+    @property
+    def crossings(self) -> tuple[float, ...]:
+        """Inputs at which the loop crosses itself [unit of u]; empty for a simple loop."""
+        return tuple(lobe.high for lobe in self.lobes[:-1])
+
     def __str__(self) -> str:
         loop = "no loop" if self.orientation == "none" else f"{self.orientation} loop"
+        if self.crossings:
+            loop = f"loop that crosses itself at u = {', '.join(f'{u:.4g}' for u in self.crossings)}"
         cycles = "the last cycle" if self.n_cycles == 1 else f"the mean of {self.n_cycles} cycles"
         return summary_text(
             [f"LoopMetrics: {loop}, {cycles}, largest width {self.max_width:.4g}"],
@@ -111,6 +157,11 @@ class LoopMetrics:
                 "mean width": f"{self.mean_width:.4g}, at mid span {self.mid_width:.4g}",
                 "stroke": f"{self.stroke:.4g} over u of {extent(self.u)}",
                 "area": f"{self.area:.4g}, energy {self.energy:.4g}",
+                "lobes": "; ".join(
+                    f"u of {lobe.low:.4g} to {lobe.high:.4g}: {lobe.orientation}, area {lobe.area:.4g}, "
+                    f"width {lobe.max_width:.4g}"
+                    for lobe in (self.lobes if self.crossings else ())
+                ),
                 "closure gap": f"{self.closure_gap:.4g}",
                 "stiffness": f"{self.secant_stiffness:.4g}, {self._damping_in_words()}",
                 "sign": self.sign_convention if self.orientation == "counterclockwise" else "",
@@ -247,6 +298,42 @@ def width_rmse(a: LoopMetrics, b: LoopMetrics) -> float:
             f"the loops share no input: one runs from {a.u[0]} to {a.u[-1]}, the other from {b.u[0]} to {b.u[-1]}"
         )
     return math.sqrt(np.mean((a.width[common] - other[common]) ** 2))
+
+
+def _lobes(u: FloatArray, width: FloatArray) -> tuple[Lobe, ...]:
+    """Lobes of a signed width, those that are too small joined to their neighbours."""
+    turn = np.flatnonzero(width[:-1] * width[1:] < 0.0)
+    zeros = u[turn] + np.diff(u)[turn] * width[turn] / (width[turn] - width[turn + 1])
+    x, w = np.insert(u, turn + 1, zeros), np.insert(width, turn + 1, 0.0)
+    middle = 0.5 * (w[1:] + w[:-1])
+    areas = middle * np.diff(x)
+    joints = np.concatenate([[0], np.flatnonzero(w[1:-1] == 0.0) + 1, [x.size - 1]]).astype(int)
+    parts = [(int(a), int(b), float(areas[a:b].sum())) for a, b in pairwise(joints) if b > a]
+    total, noise = sum(abs(area) for *_, area in parts), _noise(u, width)
+    clear = [
+        part
+        for part in parts
+        if abs(part[2]) > _SMALLEST_LOBE * total
+        and abs(part[2]) > _CLEAR * noise * (x[part[1]] - x[part[0]]) / math.sqrt(part[1] - part[0])
+    ]
+    runs = [list(run) for _, run in groupby(clear, key=lambda part: part[2] > 0.0)]
+    crossed = [(before[-1][1] + after[0][0]) // 2 for before, after in pairwise(runs)]
+    lobes = []
+    for run, (a, b) in zip(runs, pairwise([0, *crossed, x.size - 1] if runs else []), strict=True):
+        signed = float(areas[a:b].sum())
+        highest = max(float(np.abs(w[first : last + 1]).max()) for first, last, _ in run)
+        sense: Literal["counterclockwise", "clockwise"] = "counterclockwise" if run[0][2] > 0.0 else "clockwise"
+        lobes.append(Lobe(float(x[a]), float(x[b]), abs(signed), highest, sense))
+    return tuple(lobes)
+
+
+def _noise(u: FloatArray, width: FloatArray) -> float:
+    """Standard deviation of the noise of a width, by its distances from the lines through its neighbours."""
+    if u.size < 3:
+        return 0.0
+    part = (u[1:-1] - u[:-2]) / (u[2:] - u[:-2])
+    distance = width[1:-1] - (1.0 - part) * width[:-2] - part * width[2:]
+    return 1.4826 * float(np.median(np.abs(distance) / np.sqrt(1.0 + part**2 + (1.0 - part) ** 2)))
 
 
 def _curve(u: FloatArray, y: FloatArray) -> tuple[FloatArray, FloatArray]:

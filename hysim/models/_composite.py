@@ -14,16 +14,7 @@ from hysim.models.by_structure import ByStructure
 from hysim.models.composable import Composable
 from hysim.models.inverse_search import inverse_at_rest, inverse_response
 from hysim.models.parts import compiled_law, exchanged, labels, own
-from hysim.models.protocols import (
-    CompiledLaw,
-    Continuable,
-    Numbered,
-    Placeable,
-    Startable,
-    Stretched,
-    needed_time,
-    needs_time,
-)
+from hysim.models.protocols import CompiledLaw, Continuable, Numbered, Placeable, Startable, Stretched, needs_time
 
 State = tuple[Any, ...]
 """The state of each member."""
@@ -150,10 +141,8 @@ def continued(part: Any, u: FloatArray, sample_time: float | None, state: Any) -
     """Output of a part from `state` on, None for its first sample, and the state after it."""
     if not isinstance(part, Continuable):
         raise TypeError(f"a {type(part).__name__} cannot be continued")
-    if isinstance(part, Composite):
-        return part.advance(u, state, sample_time=sample_time)
-    plant: Any = part
-    y, end = plant.advance(u, needed_time(part, sample_time), state) if needs_time(part) else part.advance(u, state)
+    time = {"sample_time": sample_time} if isinstance(part, Composite) or needs_time(part) else {}
+    y, end = part.advance(u, state, **time)
     return np.asarray(y["y"] if isinstance(y, dict) else y), end
 
 

@@ -121,6 +121,12 @@ def _slope(output: Callable[[float], float], here: float) -> float:
                 return float(slopes[0, 0])
         elif fallback == 0.0 and np.isfinite(slopes[:, 0]).sum() == 1:  # the memory diverges at once on the other side
             fallback = float(slopes[np.isfinite(slopes[:, 0]), 0][0])
+        elif fallback == 0.0 and reach < _REACH * (1.0 + abs(here)):  # saturated: the output stands still on one side
+            moves = int(np.abs(rises[1]).max() > np.abs(rises[0]).max())
+            still = float(np.abs(rises[1 - moves]).max())
+            even = (np.abs(slopes[moves] / slopes[moves, 0] - 1.0) < _LINEAR).all()
+            if even and still <= _HIDDEN * abs(reached) < _FLAT * abs(rises[moves, 0]):
+                fallback = float(slopes[moves, 0])
         highest = float(np.abs(rises).max())
         reach *= _WIDER
     return float(fallback)

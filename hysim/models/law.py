@@ -251,7 +251,9 @@ class Law(Placed, ABC):
         """
         return self.advance(u)[0]
 
-    def advance(self, u: npt.ArrayLike, state: State | None = None) -> tuple[FloatArray, State]:
+    def advance(
+        self, u: npt.ArrayLike, state: State | None = None, *, sample_time: float | None = None
+    ) -> tuple[FloatArray, State]:
         """Output at the samples of `u`, continued from `state`, and the state after the last sample.
 
         Parameters
@@ -260,6 +262,8 @@ class Law(Placed, ABC):
             Input.
         state : tuple of float, optional
             Last input and memory, as an earlier call returned them; by default those of a first sample.
+        sample_time : float, optional
+            Time between two samples [s], which the output does not depend on.
 
         Returns
         -------

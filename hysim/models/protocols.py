@@ -91,7 +91,7 @@ class Continuable(Protocol):
 
     @property
     def advance(self) -> Callable[..., tuple[Any, Any]]:
-        """``advance(u, state)`` returns output and state; a `Dynamic` model has the sample time in between."""
+        """``advance(u, state=None)`` returns output and state; a `Dynamic` model also takes ``sample_time=``."""
 
 
 @runtime_checkable

@@ -313,14 +313,14 @@ class Actuator:
         inputs = read_only(u, "u", ndim=1)
         if not self._moves or not inputs.size:
             return self.level(inputs)
-        return self.advance(inputs, sample_time, substeps=substeps)[0]
+        return self.advance(inputs, sample_time=sample_time, substeps=substeps)[0]
 
     def advance(
         self,
         u: npt.ArrayLike,
-        sample_time: float | None,
         state: ChainState | None = None,
         *,
+        sample_time: float | None = None,
         substeps: int | None = None,
     ) -> tuple[FloatArray, ChainState]:
         """As `response`, continued from `state` (by default rest), and the state after the last sample.
@@ -328,7 +328,7 @@ class Actuator:
         The bits are those of one uncut command. Raises ValueError also if there is neither a state nor a sample.
         """
         inputs = read_only(u, "u", ndim=1)
-        chain = self.chain(sample_time, substeps)
+        chain = self.chain(self._any_time(sample_time), substeps)
         if state is None and not inputs.size:
             raise ValueError("u must hold a sample to begin at rest with")
         begin = chain.rest(float(inputs[0])) if state is None else state

@@ -29,6 +29,7 @@ from hysim.kernels.charts import N_WORK
 from hysim.laws.differential.boucwen import BoucWen
 from hysim.laws.differential.polynomial_boucwen import PolynomialBoucWen
 from hysim.models.model import family
+from hysim.models.protocols import needed_time
 from hysim.plants.equation_of_motion import METHODS
 from hysim.plants.oscillator_structure import OscillatorStructure
 from hysim.plants.steady_state import ATTEMPTS, attracting_state
@@ -219,14 +220,14 @@ class BoucWenOscillator:
         start [J] ``"input_work"``, ``"damping_loss"``, ``"hysteresis_loss"``, ``"stored"``: the first is the sum of the
         others, up to the error of the method.
         """
-        return self.advance(u, sample_time)[0]
+        return self.advance(u, sample_time=sample_time)[0]
 
     def advance(
         self,
         u: npt.ArrayLike,
-        sample_time: float,
         state: OscillatorState | None = None,
         *,
+        sample_time: float | None = None,
         progress: Callable[[int, int], None] | None = None,
     ) -> tuple[dict[str, FloatArray], OscillatorState]:
         """As `signals`, continued from `state` (by default the initial one), and the state after the last sample.
@@ -234,7 +235,7 @@ class BoucWenOscillator:
         The bits are those of one uncut input, which goes on from the state's, one sample before the first.
         ``progress(done, total)`` is called now and then.
         """
-        inputs, states = self._states(u, sample_time, state, progress)
+        inputs, states = self._states(u, needed_time(self, sample_time), state, progress)
         y, velocity, z, input_work, damping_loss, memory_work = states.T.copy()
         law, start = self.law, self._start(0.0)
         recoverable = law.gain / law.A if law.A else 0.0

@@ -121,19 +121,19 @@ class TransferFunction(Composable):
         The samples are `sample_time` apart [s]. Raises SimulationError if the output diverges, as an unstable plant's
         may, and ValueError if `u` is not finite or has not one axis, or the sample time is not positive.
         """
-        return self.advance(u, sample_time)[0]
+        return self.advance(u, sample_time=sample_time)[0]
 
     def advance(
-        self, u: npt.ArrayLike, sample_time: float, state: LinearState | None = None
+        self, u: npt.ArrayLike, state: LinearState | None = None, *, sample_time: float | None = None
     ) -> tuple[FloatArray, LinearState]:
         """As `response`, continued from `state`, by default the initial one, and the state after the last sample.
 
         The bits are those of one uncut input.
         """
         inputs = read_only(u, "u", ndim=1)
-        positive_time(sample_time)
+        time = positive_time(needed_time(self, sample_time))
         with np.errstate(all="ignore"):
-            plant = self._plant(float(sample_time))
+            plant = self._plant(float(time))
             begin = state
             if begin is None:
                 free = np.array(self.initial_state or [0.0] * self.order) * plant.rate[0] ** -np.arange(self.order)

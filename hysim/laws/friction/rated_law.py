@@ -122,12 +122,14 @@ class RatedLaw(Identifiable, Placed, ABC):
         """
         return self.at_sample_time(sample_time).response(u)
 
-    def advance(self, u: npt.ArrayLike, sample_time: float, state: State | None = None) -> tuple[FloatArray, State]:
+    def advance(
+        self, u: npt.ArrayLike, state: State | None = None, *, sample_time: float | None = None
+    ) -> tuple[FloatArray, State]:
         """Output continued from `state`, last input and memory, and the state after the last sample.
 
         The bits are those of one uncut input; arguments and errors are those of `response`.
         """
-        return self.at_sample_time(sample_time).advance(u, state)
+        return self.at_sample_time(needed_time(self, sample_time)).advance(u, state)
 
     def response_jacobian(self, u: npt.ArrayLike, sample_time: float, names: Iterable[str] | None = None) -> "Jacobian":
         """Derivatives of the response by the numbers of the law; see `hysim.Law.response_jacobian`."""

@@ -68,7 +68,9 @@ class RelayLaw(ByStructure, Law):
         """E at the pairs of levels (upper, lower), shape (n_levels, n_levels) [unit of y]; zero above the diagonal."""
         return read_only(everett_of(np.array([self.weights]))[0])
 
-    def advance(self, u: npt.ArrayLike, state: State | None = None) -> tuple[FloatArray, State]:
+    def advance(
+        self, u: npt.ArrayLike, state: State | None = None, *, sample_time: float | None = None
+    ) -> tuple[FloatArray, State]:
         """Output and state as of `Law.advance`: the last input and the dominant extremes, the oldest first."""
         inputs = read_only(u, "u", ndim=1)
         past = self.past if state is None else state[1:]

@@ -205,13 +205,15 @@ class RateDependentPrandtlIshlinskii(ByStructure, Placed):
         law = self.at(sample_time)
         return {"y": law.response(u), "z": law.memory(u)}
 
-    def advance(self, u: npt.ArrayLike, sample_time: float, state: State | None = None) -> tuple[FloatArray, State]:
+    def advance(
+        self, u: npt.ArrayLike, state: State | None = None, *, sample_time: float | None = None
+    ) -> tuple[FloatArray, State]:
         """Output continued from `state`, input and positions at the last sample so far, and the state at the end.
 
         The bits are those of one uncut input, which moves evenly from the state's input to its first sample; arguments
         and errors are those of `response`. By default the state is ``(u[0], *z0)``.
         """
-        return self.at(sample_time).advance(u, state)
+        return self.at(needed_time(self, sample_time)).advance(u, state)
 
     def compiled(self, u0: float = 0.0, *, sample_time: float) -> CompiledLaw:
         """The law as compiled loops take it, after a first sample at the input `u0`."""

@@ -12,7 +12,7 @@ from hysim._parallel import in_pieces
 from hysim.errors import SimulationError
 from hysim.kernels.structures.layout import Motion, Plant, Tracks
 from hysim.kernels.structures.path import follow
-from hysim.models.protocols import positive_time
+from hysim.models.protocols import needed_time, positive_time
 from hysim.plants.structures import assembly
 from hysim.plants.structures._assembled import AssembledStructure
 
@@ -71,7 +71,7 @@ class MovingStructure(AssembledStructure):
             ``"dissipated"``, without what elastic unloading would return, force^2 / (2 k) with the slope k at the
             start; ``"imbalance"`` is the input less all others, the error of the method.
         """
-        return self.advance(u, sample_time)[0]
+        return self.advance(u, sample_time=sample_time)[0]
 
     def memories(self, u: npt.ArrayLike, sample_time: float) -> tuple[FloatArray, ...]:
         """State of each element's law at the samples of `u`, its last input and its memory.
@@ -101,9 +101,9 @@ class MovingStructure(AssembledStructure):
     def advance(
         self,
         u: npt.ArrayLike,
-        sample_time: float,
         state: StructureState | None = None,
         *,
+        sample_time: float | None = None,
         progress: Callable[[int, int], None] | None = None,
     ) -> tuple[dict[str, FloatArray], StructureState]:
         """As `signals`, continued from `state`, by default the initial one, and the state after the last sample.
@@ -112,7 +112,7 @@ class MovingStructure(AssembledStructure):
         ``progress(done, total)`` is called now and then.
         """
         inputs = read_only(u, "u", ndim=1)
-        begun, tracks = self._followed(inputs, sample_time, state, progress, with_laws=False)
+        begun, tracks = self._followed(inputs, needed_time(self, sample_time), state, progress, with_laws=False)
         return self.signals_of(inputs, begun, tracks), begun
 
     def _followed(
