@@ -42,7 +42,7 @@ void ${name}_init(${name}_state *state$first);
 
 /* $result */
 double ${name}_step(${name}_state *state, $arguments);
-
+$held_declared
 #ifdef __cplusplus
 }
 #endif
@@ -64,7 +64,11 @@ $init}
 double ${name}_step(${name}_state *state, $arguments) {
     return step(parameters, state->x, $inputs);
 }
-"""
+$held_defined"""
+
+_HELD = """
+/* Number of samples at which an input was not finite (or beyond 1e100) or no command was, and the last one was held. */
+unsigned long ${name}_held(const ${name}_state *state)"""
 
 _MAIN = """\
 /* $name at work: reads $inputs, one sample in each line, and prints $output. */
@@ -191,7 +195,11 @@ def _texts(program: Program, name: str, what: str, u0: float, y0: float) -> dict
     defines = [f"#define {name.upper()}_SAMPLE_TIME {program.sample_time!r} /* s */\n"] * timed
     defines += [f"#define {name.upper()}_AHEAD {program.ahead} /* samples of the reference */\n"] * (not is_model)
     n_inputs = len(program.inputs)
+    last = f"state->x[{program.state.size - 1}]"
+    held = "" if is_model else Template(_HELD).substitute(name=name)
     return {
+        "held_declared": held and f"{held};\n",
+        "held_defined": held and f"{held.partition('*/')[2]} {{\n    return (unsigned long){last};\n}}\n",
         "name": name,
         "NAME": name.upper(),
         "what": f"a {what}" if is_model else f"a sampled controller, {what}",
