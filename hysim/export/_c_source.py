@@ -149,7 +149,7 @@ def to_c(
     sample_time : float, optional
         Time between two samples [s]; a law that does not depend on time needs none.
     name : str
-        Name of the files, and prefix of every public name in them.
+        Name of the files, and prefix of every public name in them; no keyword, function or header of C.
     u0, y0 : float
         Command and displacement at which a controller starts, at rest [unit of u], [unit of y]. Laws and plants get
         their first input where they run.
@@ -180,12 +180,23 @@ def to_c(
     >>> hs.to_c(hs.BoucWen(), name="stack").state_size
     2
     """
-    if not re.fullmatch("[A-Za-z][A-Za-z0-9_]*", name) or name in _c.RESERVED:
-        raise ValueError(f"name must be letters, digits and underscores after a letter, got {name!r}")
+    if reason := _refusal(name):
+        raise ValueError(f"name must be letters, digits and underscores after a letter, got {name!r}: {reason}")
     program = program_of(thing, sample_time, u0=u0, y0=y0)
     texts = _texts(program, name, type(thing).__name__, u0, y0)
     header, source, main = (Template(text).substitute(texts) for text in (_HEADER, _SOURCE, _MAIN))
     return CSource(name=name, header=header, source=source, main=main, state_size=program.state.size)
+
+
+def _refusal(name: str) -> str:
+    """Why a name cannot be that of files and functions in C; empty for one that can."""
+    if not re.fullmatch("[A-Za-z][A-Za-z0-9_]*", name):
+        return "it has another character"
+    if name in _c.RESERVED:
+        return "it is a word of the language C"
+    if name in _c.MATHEMATICS | _c.TESTS:
+        return "it is a function of the C library"
+    return f"{name}.h is a header of the C library" if name.lower() in _c.HEADERS else ""
 
 
 def _texts(program: Program, name: str, what: str, u0: float, y0: float) -> dict[str, str]:
