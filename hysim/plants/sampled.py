@@ -124,7 +124,12 @@ def sampled(stage: Stage, step: float, delay: float = 0.0, *, creeping: int = 0,
     do not depend on others.
     """
     lag, part = whole_and_part(delay / step)
-    carried, B, through = _transition(stage, step, part, 1.0, linear)
+    with np.errstate(all="ignore"):
+        carried, B, through = _transition(stage, step, part, 1.0, linear)
+    if not (np.isfinite(carried).all() and np.isfinite(B).all()):
+        raise ValueError(
+            f"the motion of the plant within {step:g} s is beyond the largest number: check the sample time"
+        )
     return SampledStage(
         decline=read_only(np.expm1(np.diag(stage.F)[:creeping] * (stage.rate * step))),
         A=read_only(carried[creeping:]),
