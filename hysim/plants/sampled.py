@@ -110,6 +110,10 @@ def _companion(plant: TransferFunction, sample_time: float) -> Stage:
     numerator = np.concatenate([np.zeros(n + 1 - len(plant.num)), plant.num]) / plant.den[0]
     monic = np.array(plant.den[1:]) / plant.den[0]
     F, rate, scaled = scaled_companion(monic[np.newaxis], sample_time)
+    if not np.isfinite(F).all():
+        raise ValueError(
+            f"the rates of a plant sampled at {sample_time:g} s cannot be computed: check the time and den"
+        )
     back = rate[0] ** -np.arange(1.0, n + 1)
     with np.errstate(divide="ignore"):
         rest = np.concatenate([1.0 / scaled[0, -1:], np.zeros(max(n - 1, 0))])[:n]
