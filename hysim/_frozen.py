@@ -23,6 +23,7 @@ FloatArray = npt.NDArray[np.float64]
 LAST = {"last": True}  # metadata of a field of a base class that stands behind those of its families
 T = TypeVar("T")
 
+_MOST_SUBSTEPS = 1e9
 _TOO_LARGE = f"a number beyond {sys.float_info.max:.2g}"
 
 
@@ -240,6 +241,15 @@ def check_whole(value: Any, name: str, *, least: int = 1) -> None:
         raise TypeError(f"{name} must be a whole number, got {value!r}")
     if value < least:
         raise ValueError(f"{name} must {f'be at least {least}' if least else 'not be negative'}, got {value}")
+
+
+def whole_substeps(count: float) -> int:
+    """Sub-steps of a sample, at least one; ValueError for more than a computer takes in a reasonable time."""
+    if not count < _MOST_SUBSTEPS:
+        raise ValueError(
+            f"a sample would take {count:.3g} sub-steps: it is too long for the stiffness and damping over the mass"
+        )
+    return max(1, math.ceil(count))
 
 
 def items(value: Any) -> dict[str, Any]:

@@ -33,6 +33,7 @@ _LONGEST = 2_000_000  # samples to begin with, which take some tenths of a secon
 _PIECE, _GROWTH = 0.2, 16.0  # seconds of a call of a kernel, and largest ratio of a call to the one before
 _STRETCH = 100_000  # samples of one path: some hundredths of a second
 GLANCE = 0.1  # longest wait without a check for signals [s]
+_SIGNAL_OF_PARENTS_DEATH = 1  # PR_SET_PDEATHSIG of Linux
 _PATIENCE = 0.3  # seconds to wait for threads that are being stopped
 
 _most: ContextVar[int | None] = ContextVar("most threads", default=None)
@@ -303,6 +304,8 @@ def _begin(begin: Callable[..., None], arguments: tuple[Any, ...]) -> None:
     if sys.platform != "win32":
         signal.signal(signal.SIGHUP, signal.SIG_DFL)
         signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGINT, signal.SIGTERM})
+    if sys.platform.startswith("linux"):  # a long call that holds the interpreter's lock would keep the thread waiting
+        ctypes.CDLL(None).prctl(_SIGNAL_OF_PARENTS_DEATH, signal.SIGKILL)
     threading.Thread(target=_end_with_parent, daemon=True).start()
     silence()  # the parent reports
     begin(*arguments)

@@ -24,9 +24,9 @@ RANKS = (
     (
         "_drift",
         "_excursions",
-        "_repeats",
         "_input_noise",
-    ),  # drift between cycles, cycles about a level, and those that are repeated
+    ),  # drift between cycles, cycles about a level, the noise of an input
+    ("_repeats",),  # cycles that are repeated
     ("signals", "records", "metrics", "kernels", "_parallel"),
     ("datasets", "files", "models", "vision"),
     ("laws",),

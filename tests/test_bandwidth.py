@@ -54,3 +54,25 @@ def test_an_unstable_loop_is_said_to_be_one():
 def test_what_is_not_positive_is_refused(name):
     with pytest.raises(ValueError, match=name):
         bandwidth(LAG, hs.PID(ki=1.0), **(SINE | {name: 0.0}))
+
+
+def test_each_gain_is_fitted_to_four_periods_or_64_samples_behind_the_transient(monkeypatch):
+    """By the references that the loop is given: their lengths, and the sines themselves."""
+    tried, run = [], hs.control.RestingPlant.run
+
+    def spied(plant, controller, reference, *others):
+        tried.append(reference - plant.y0)
+        return run(plant, controller, reference, *others)
+
+    monkeypatch.setattr(hs.control.RestingPlant, "run", spied)
+    assert bandwidth(LAG, hs.PID(kp=9.0, ki=9.0), **(SINE | {"transient": 1.0})) == pytest.approx(9.0, rel=0.1)
+    sines = [sine for sine in tried if abs(sine[0]) < 1e-12 and sine.size >= 164]
+    frequencies = [math.asin(sine[1] / 0.5) / 0.01 for sine in sines]
+    assert min(frequencies) == pytest.approx(0.2)
+    assert len(sines) > 30
+    for sine, frequency in zip(sines, frequencies, strict=True):
+        samples = 2.0 * math.pi * 4.0 / (frequency * 0.01)
+        assert sine.size == pytest.approx(100 + max(64.0, samples), abs=1.0)
+    inverse = hs.TrackingController(feedforward=hs.InverseFeedforward())
+    assert bandwidth(hs.Line(slope=1.0), inverse, **(SINE | {"transient": 0.0})) == math.inf
+    assert tried[-1].size == 64  # the highest frequency has 2.5 samples in a period

@@ -2,12 +2,14 @@
 
 import math
 import os
+import re
 import shutil
 import subprocess
 import sys
 
 import numpy as np
 import pytest
+from test_inverse_of_every_law import LAWS
 
 import hysim as hs
 from hysim._frozen import read_only
@@ -135,7 +137,7 @@ def replayed(program, reference, measurement):
 
 def stepped(controller, reference, measurement, u0=0.0, y0=0.0):
     """Commands and drives in Python."""
-    step, parameters, state = controller.compiled(H, u0, y0)
+    step, parameters, state = controller.initial(H, u0, y0)
     out = np.empty((2, reference.size))
     with np.errstate(all="ignore"):
         replay(step, parameters, state, read_only(reference), read_only(measurement), out[0], out[1])
@@ -217,6 +219,26 @@ def test_the_worked_main_prints_the_response(name, tmp_path):
     assert np.abs(np.array(out.split(), dtype=float) - y).max() <= 1e-12 * np.ptp(y)
 
 
+@needs_compiler
+@pytest.mark.parametrize("law", LAWS.values(), ids=LAWS)
+def test_the_user_s_name_meets_none_of_ours(law, tmp_path):
+    """Public names are name_init, name_step, name_state and name_held; the natural one is that of our own step."""
+    ours = re.findall(r"^static .*?(\w+)(?:\(|\[)", hs.to_c(law, H).source, re.MULTILINE)
+    assert not [each for each in ours if each.endswith(("_init", "_step", "_state", "_held"))]
+    *_, name = type(law).__name__.lower(), *(each[: -len("_step_")] for each in ours if each.endswith("_step_"))
+    hs.to_c(law, H, name=name).write(tmp_path)
+    subprocess.run([compiler, *STRICT, "-fsyntax-only", f"{name}.c"], cwd=tmp_path, check=True)
+
+
+@needs_compiler
+@pytest.mark.parametrize(("law", "name"), [(hs.BoucWen(n=1.5), "boucwen"), (PLAYS, "clamps"), (hs.Play(), "play")])
+def test_a_law_of_its_natural_name_is_built(law, name, tmp_path):
+    hs.to_c(law, name=name).write(tmp_path)
+    subprocess.run([compiler, *STRICT, f"{name}.c", f"{name}_main.c", "-o", "a", "-lm"], cwd=tmp_path, check=True)
+    out = subprocess.run([tmp_path / "a"], input="0.5\n-0.2\n", capture_output=True, text=True, check=True).stdout
+    assert np.array(out.split(), dtype=float) == pytest.approx(law.response([0.5, -0.2]), abs=1e-14)
+
+
 def test_equal_settings_have_equal_texts():
     controller = CONTROLLERS["everything"]()[1]
     assert hs.to_c(controller, H) == hs.to_c(controller, H)
@@ -233,7 +255,10 @@ def test_the_state_of_a_lean_law_is_small():
     ("thing", "arguments", "error", "message"),
     [
         (PID, {"sample_time": H, "name": "2axes"}, ValueError, "name must be letters"),
-        (PID, {"sample_time": H, "name": "double"}, ValueError, "name must be letters"),
+        (PID, {"sample_time": H, "name": ""}, ValueError, "it has another character"),
+        (PID, {"sample_time": H, "name": "double"}, ValueError, "got 'double': it is a word of the language C"),
+        (PID, {"sample_time": H, "name": "sin"}, ValueError, "got 'sin': it is a function of the C library"),
+        (PID, {"sample_time": H, "name": "Math"}, ValueError, "got 'Math': Math.h is a header of the C library"),
         (PID, {"sample_time": H, "u0": math.nan}, ValueError, "u0 must be finite, got nan"),
         (PID, {}, ValueError, "give sample_time"),
         (PID, {"sample_time": 0.0}, ValueError, "sample_time must be positive"),

@@ -105,6 +105,7 @@ def task(k):
 hs.sweep(task, {{"k": range(8)}}, executor="{executor}", workers=2)
 """
 LOOP, SLEEP = "while True: k += 1", "time.sleep(600)"
+ONE_CALL = "sum(range(10**12))"  # no other thread of its process runs before it ends
 
 
 @linux
@@ -112,6 +113,7 @@ LOOP, SLEEP = "while True: k += 1", "time.sleep(600)"
     ("executor", "body", "number"),
     [
         ("processes", SLEEP, signal.SIGKILL),
+        ("processes", ONE_CALL, signal.SIGKILL),
         ("processes", LOOP, signal.SIGTERM),
         ("processes", SLEEP, signal.SIGINT),
         ("threads", LOOP, signal.SIGINT),

@@ -104,6 +104,14 @@ def test_a_notch_is_bilinear_and_right_at_its_frequency(frequency, ratio, new):
     assert abs(beside - 1.0) < 0.01
 
 
+def test_a_notch_has_poles_of_critical_damping_by_default():
+    """At its frequency it then passes the damping ratio of the resonance, and its two poles are one."""
+    notch = hs.Notch(natural_frequency=1e3, damping_ratio=0.01)
+    assert abs(notch.frequency_response(1e3, H)) == pytest.approx(0.01, rel=1e-9)
+    _, _, _, a1, a2 = notch.coefficients(H)
+    assert a1**2 - 4.0 * a2 == pytest.approx(0.0, abs=1e-9)
+
+
 @given(st.floats(100.0, 3e4), st.none() | st.floats(0.1, 2.0), st.sampled_from([-3.0, 0.2, 5.0]))
 def test_a_damping_loop_is_bilinear_and_has_its_gain_at_rest(frequency, ratio, gain):
     loop = hs.DampingLoop(gain=gain, frequency=frequency, damping_ratio=ratio)

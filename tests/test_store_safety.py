@@ -204,3 +204,21 @@ def test_a_file_with_arrays_that_is_gone_is_named(path, shards):
     file.unlink()
     with pytest.raises(FileNotFoundError, match=file.name):
         hs.load_sweep(path)
+
+
+@pytest.mark.parametrize("kept", [("-wal", "-shm"), ("-wal",), ("-shm",), ("-journal",)], ids="".join)
+@pytest.mark.parametrize("is_damaged", [False, True])
+def test_what_sqlite_has_left_beside_a_deleted_store_does_not_matter(tmp_path, kept, is_damaged):
+    """A study begins anew where the store alone was deleted, with the files of a killed writer still there."""
+    old, path = tmp_path / "old.sqlite", tmp_path / "study.sqlite"
+    with contextlib.closing(sqlite3.connect(old)) as database:
+        database.execute("PRAGMA journal_mode = wal" if "-journal" not in kept else "PRAGMA journal_mode = persist")
+        database.execute("CREATE TABLE results (task)")
+        database.executemany("INSERT INTO results VALUES (?)", [(k,) for k in range(3000)])
+        database.commit()
+        for end in kept:
+            left = old.with_name(old.name + end).read_bytes()
+            path.with_name(path.name + end).write_bytes(left[::-1] if is_damaged else left)
+    computed = hs.sweep(squares, SPACE, store=path, workers=1)
+    assert bits(hs.load_sweep(path)) == bits(computed)
+    assert bits(hs.sweep(squares, SPACE, store=path, workers=1)) == bits(computed)

@@ -45,7 +45,6 @@ MORE_THAN_FIELDS = {
     "ParametricPrandtlIshlinskii",
     "Chan",
     "JilesAtherton",
-    "Duhem",
     "ReversalFilter",
 }
 WITHOUT_INVERSE = {"Play", "Stop", "MaxwellSlip", "ColemanHodgdon", "ReversalFilter"}

@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from hysim._atomic import write_all
+from hysim._frozen import items
 from hysim.cli.options import INPUT, MODEL, PICTURE, PRINTED, TABLE
 from hysim.cli.records import STANDARD
 from hysim.cli.shell.words import in_shell_words
@@ -133,7 +134,7 @@ def _jsonable(value: Any) -> Any:
 
 def scalars(result: Any) -> dict[str, Any]:
     """The fields of a result that are numbers, words or truth values, by name."""
-    return {name: value for name, value in vars(result).items() if isinstance(value, (str, int, float))}
+    return {name: value for name, value in items(result).items() if isinstance(value, (str, int, float))}
 
 
 def fields_of(result: Any, names: Iterable[str]) -> dict[str, Any]:

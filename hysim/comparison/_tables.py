@@ -5,6 +5,7 @@ import math
 import re
 from typing import Any, NamedTuple
 
+from hysim._frozen import items
 from hysim._printing import aligned, csv_text, folded, summary_text
 from hysim.interop import frame, heading
 
@@ -62,7 +63,7 @@ def columns(comparison: Any) -> list[Column]:
 
 def rows(comparison: Any) -> list[dict[str, Any]]:
     """The values of each model by name; the best model compares with itself as 1."""
-    contrasts = {each.name: vars(each) for each in comparison.contrasts}
+    contrasts = {each.name: items(each) for each in comparison.contrasts}
     quantum, values = comparison.record.resolution, []
     for row in comparison.rows:
         same = math.nan if math.isnan(row.cv_rmse) else 1.0
@@ -70,7 +71,7 @@ def rows(comparison: Any) -> list[dict[str, Any]]:
         criteria = {name: math.nan if vars(row)[name] == -math.inf else vars(row)[name] for name in ("bic", "aic")}
         derived = {"residual_quanta": row.max_residual / quantum if quantum else math.nan}
         text = {"warnings": "; ".join(row.warnings)}
-        values.append(contrasts.get(row.name, best) | vars(row) | criteria | derived | text)
+        values.append(contrasts.get(row.name, best) | items(row) | criteria | derived | text)
     return values
 
 

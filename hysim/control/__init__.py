@@ -25,6 +25,8 @@ from hysim.control._open_loop import secant_gain as secant_gain
 from hysim.control._open_loop import slopes as slopes
 from hysim.control._pid import PID as PID
 from hysim.control._protocols import Controller as Controller
+from hysim.control._protocols import begun as begun
+from hysim.control._protocols import held_samples as held_samples
 from hysim.control._protocols import preview as preview
 from hysim.control._shaping import ModeInverse as ModeInverse
 from hysim.control._shaping import Shaper as Shaper

@@ -93,6 +93,11 @@ class AdaptiveInverse(SampledController):
             raise ValueError(f"the workspace of a {type(self.law).__name__} cannot follow numbers that change")
         self._rates()
 
+    @property
+    def substitute(self) -> float:
+        """nan in place of a missing measurement: one of an earlier command would be taken for a drift."""
+        return math.nan
+
     def frequency_response(self, frequency: npt.ArrayLike, sample_time: float) -> npt.NDArray[np.complex128]:
         """Zeros: the measurement moves the numbers of the law, not the command itself."""
         return np.zeros(np.shape(frequency), dtype=complex)

@@ -12,10 +12,10 @@ from hysim._frozen import FloatArray, frozen, read_only
 from hysim._printing import extent, printed, quantity, summary_text
 from hysim._progress import Progress, Reports, reports
 from hysim._results import model_of
-from hysim.control._protocols import Controller, limits_of, preview
+from hysim.control._protocols import Controller, begun, held_samples, limits_of, preview
 from hysim.errors import SimulationError, warn_beyond, warn_limited
 from hysim.models.model import in_brief
-from hysim.models.protocols import CompiledController, Remembering, Responding, standing
+from hysim.models.protocols import Remembering, Responding, standing
 from hysim.plants.actuator import Actuator
 from hysim.plants.actuator import as_actuator as as_actuator
 from hysim.plants.chain import Signals
@@ -26,6 +26,7 @@ from hysim.simulation import columns_of, dataset_of_signals, frame_of_signals
 
 _OF_REFERENCE = ("reference", "error", "y", "measurement")
 _OF_COMMAND = ("command", "drive", "u")
+_SHOWN = ("sample_time", "delay", "preview", "noise", "sensor_quantum", "voltage_noise_rms", "held_samples")
 
 
 @printed
@@ -50,8 +51,8 @@ class ClosedLoop:
     conditions : mapping
         plant, controller, sample_time [s], substeps, delay (of vibration and sensor) [s], preview [s], limits (of the
         controller), amplifier_limits, sensor_quantum, noise (rms), seed, u0, lowest_u, highest_u, limited_samples (at a
-        limit of controller or amplifier), voltage_noise_rms and voltage_noise_peak (difference to the same loop without
-        noise).
+        limit of controller or amplifier), held_samples (at which the controller had no valid input, or no command, and
+        held the last one), voltage_noise_rms and voltage_noise_peak (difference to the same loop without noise).
     units : mapping
         Labels of the units of ``"t"``, ``"u"`` and ``"y"``.
     signals : mapping
@@ -85,9 +86,7 @@ class ClosedLoop:
                 "plant": in_brief(conditions["plant"]) if "plant" in conditions else "",
                 "controller": in_brief(conditions["controller"]) if "controller" in conditions else "",
                 "conditions": ", ".join(
-                    f"{name.replace('_', ' ')} {conditions[name]:.4g}"
-                    for name in ("sample_time", "delay", "preview", "noise", "sensor_quantum", "voltage_noise_rms")
-                    if conditions.get(name)
+                    f"{name.replace('_', ' ')} {conditions[name]:.4g}" for name in _SHOWN if conditions.get(name)
                 ),
             },
         )
@@ -137,9 +136,10 @@ def close_loop(
 ) -> ClosedLoop:
     """Run a sampled controller around an actuator or a structure.
 
-    At every sample the controller reads the sensor and sends a command, which is held until the next. The plant
-    between the samples is exact; behind an amplifier that takes time it is second order in the sub-step. Model a
-    controller that needs a sample to compute by ``hs.Sensor(delay=sample_time)``.
+    At every sample the controller reads the sensor and sends a command, which is held until the next. A controller
+    without a valid input or a finite command holds the last one, as on a device; ``conditions["held_samples"]`` counts
+    these samples. The plant between the samples is exact; behind an amplifier that takes time it is second order in the
+    sub-step. Model a controller that needs a sample to compute by ``hs.Sensor(delay=sample_time)``.
 
     Parameters
     ----------
@@ -174,7 +174,7 @@ def close_loop(
     Raises
     ------
     SimulationError
-        If the loop diverges; it names the time.
+        If the loop diverges, or passes 1e100; it names the time.
     TypeError, ValueError
         If the plant is not one, times are uneven, lengths differ, the plant cannot rest at `u0`, or options of an
         actuator are given for a structure, or the other way round.
@@ -260,9 +260,10 @@ class RestingPlant:
 
     def attempt(self, controller: Controller, reference: FloatArray, progress: Progress | None = None) -> Signals:
         """As `run`; where the loop diverges, the signals name the sample."""
-        compiled = CompiledController(*controller.compiled(self.sample_time, self.u0, self.y0))
+        compiled = begun(controller, self.sample_time, self.u0, self.y0)
         ahead = _ahead(controller, self.sample_time, reference)
-        return self.chain.run(compiled, self.state, ahead, progress)[0]
+        signals, _ = self.chain.run(compiled, self.state, ahead, progress)
+        return signals._replace(held=held_samples(compiled))
 
     def attempt_each(
         self, controllers: Sequence[Controller], reference: FloatArray
@@ -271,7 +272,7 @@ class RestingPlant:
 
         With them the first sample of each that is not finite, -1 without one.
         """
-        compiled = [CompiledController(*each.compiled(self.sample_time, self.u0, self.y0)) for each in controllers]
+        compiled = [begun(each, self.sample_time, self.u0, self.y0) for each in controllers]
         return self.chain.run_each(compiled, self.state, reference)
 
     def voltages(self, signals: Signals) -> FloatArray:
@@ -309,7 +310,7 @@ def _around_structure(
     if ground is not None and ground.size != t.size:
         raise ValueError(f"ground_acceleration and t must have equal lengths, got {ground.size} and {t.size}")
     plant = ControlledStructure(structure, sample_time, ground)
-    compiled = CompiledController(*controller.compiled(sample_time, 0.0, plant.y0))
+    compiled = begun(controller, sample_time, 0.0, plant.y0)
     run = plant.run(compiled, _ahead(controller, sample_time, reference), progress)
     if run.lost >= 0:
         raise SimulationError(f"the loop diverges at t = {t[run.lost]:g}: it is unstable")
@@ -323,14 +324,14 @@ def _around_structure(
         z=None,
         y=run.y,
         measurement=run.y,
-        conditions=_conditions_of_structure(structure, controller, sample_time, run),
+        conditions=_conditions_of_structure(structure, controller, sample_time, run, held_samples(compiled)),
         units=units,
         signals={name: values for name, values in run.signals.items() if name != "y"},
     )
 
 
 def _conditions_of_structure(
-    structure: Structure, controller: Controller, sample_time: float, run: Controlled
+    structure: Structure, controller: Controller, sample_time: float, run: Controlled, held: int
 ) -> dict[str, Any]:
     """The conditions of an actuator's loop, those that a structure has not at their value of rest."""
     return {
@@ -349,6 +350,7 @@ def _conditions_of_structure(
         "lowest_u": float(run.drive.min()),
         "highest_u": float(run.drive.max()),
         "limited_samples": int(np.count_nonzero(run.drive != run.command)),
+        "held_samples": held,
         "voltage_noise_rms": 0.0,
         "voltage_noise_peak": 0.0,
     }
@@ -386,6 +388,7 @@ def _conditions(
         "lowest_u": float(u.min()),
         "highest_u": float(u.max()),
         "limited_samples": int(np.count_nonzero((signals.drive != signals.command) | ~within)),
+        "held_samples": signals.held,
     }
 
 

@@ -13,6 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 from hysim._frozen import FloatArray, check_not_negative, read_only
+from hysim.control._protocols import with_room
 from hysim.control._sampled import Feedback, SampledController, check_limits, check_sample_time
 from hysim.kernels import controllers as kernels
 from hysim.models.model import family
@@ -156,13 +157,15 @@ class PID(SampledController):
         if r.size != y.size:
             raise ValueError(f"reference and measurement must have equal lengths, got {r.size} and {y.size}")
         begin = self.start(y=float(y[0]) if y.size else 0.0) if state is None else state
-        state_after = np.array(read_only(begin, "state", ndim=1))
-        if state_after.size != 4:
-            raise ValueError(f"state must hold 4 numbers, as `start` gives them, got {state_after.size}")
+        numbers = read_only(begin, "state", ndim=1)
+        if numbers.size != 4:
+            raise ValueError(f"state must hold 4 numbers, as `start` gives them, got {numbers.size}")
+        rest = float(y[0]) if y.size else 0.0
+        state_after = with_room(numbers, float(numbers[0]), rest, rest)
         command, u = np.empty((2, r.size))
         step, parameters, _ = self.compiled(sample_time)
         kernels.replay(step, parameters, state_after, r, y, command, u)
-        last, integral, derivative, weighted = state_after.tolist()
+        last, integral, derivative, weighted = state_after[:4].tolist()
         return u, (last, integral, derivative, weighted)
 
     def frequency_response(self, frequency: npt.ArrayLike, sample_time: float) -> npt.NDArray[np.complex128]:

@@ -9,6 +9,8 @@ import numpy as np
 import numpy.typing as npt
 
 from hysim._frozen import FloatArray
+from hysim.control._protocols import begun
+from hysim.kernels.controllers import guarded
 from hysim.kernels.tracking import bound
 from hysim.models.protocols import CompiledController
 
@@ -72,10 +74,13 @@ class SampledController(ABC):
         ValueError
             If the sample time [s] is not positive and finite.
         """
-        return self.compiled(sample_time, u, y)
+        return begun(self, sample_time, u, y)
 
     def step(self, state: CompiledController, reference: float, measurement: float) -> tuple[float, CompiledController]:
         """Command for one sample, and the state after it; `state` itself does not change.
+
+        A reference or measurement that is not finite, or beyond 1e100, is replaced by the last valid one;
+        `hysim.control.held_samples` counts them.
 
         Parameters
         ----------
@@ -100,7 +105,7 @@ class SampledController(ABC):
         (1.0, 1.5)
         """
         after = state._replace(state=np.array(state.state))
-        return after.step(after.parameters, after.state, reference, measurement), after
+        return guarded(after.step, after.parameters, after.state, reference, measurement), after
 
 
 def check_kind(name: str, part: Any, kind: type) -> None:

@@ -33,6 +33,14 @@ RESERVED = frozenset(
 )
 """Words that are no names in C."""
 
+HEADERS = frozenset(
+    """
+    assert complex ctype errno fenv float inttypes iso646 limits locale math setjmp signal stdarg stdbool stddef stdint
+    stdio stdlib string tgmath time wchar wctype
+    """.split()  # noqa: SIM905
+)
+"""Headers of C99: a file of this name could hide one."""
+
 MATHEMATICS = frozenset(
     """
     acos acosh asin asinh atan atan2 atanh copysign cos cosh erf erfc exp expm1 fabs fmod hypot lgamma log log10 log1p

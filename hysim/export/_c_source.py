@@ -43,7 +43,7 @@ void ${name}_init(${name}_state *state$first);
 
 /* $result */
 double ${name}_step(${name}_state *state, $arguments);
-
+$held_declared
 #ifdef __cplusplus
 }
 #endif
@@ -65,7 +65,11 @@ $init}
 double ${name}_step(${name}_state *state, $arguments) {
     return step(parameters, state->x, $inputs);
 }
-"""
+$held_defined"""
+
+_HELD = """
+/* Number of samples at which an input was not finite (or beyond 1e100) or no command was, and the last one was held. */
+unsigned long ${name}_held(const ${name}_state *state)"""
 
 _MAIN = """\
 /* $name at work: reads $inputs, one sample in each line, and prints $output. */
@@ -151,7 +155,7 @@ def to_c(
     sample_time : float, optional
         Time between two samples [s]; a law that does not depend on time needs none.
     name : str
-        Name of the files, and prefix of every public name in them.
+        Name of the files, and prefix of every public name in them; no keyword, function or header of C.
     u0, y0 : float, optional
         Command and displacement at which a controller starts, at rest [unit of u], [unit of y]. By default the command
         at which the memory of its law holds, which of an identified law is the first input of its record, and the
@@ -184,13 +188,24 @@ def to_c(
     >>> hs.to_c(hs.BoucWen(), name="stack").state_size
     2
     """
-    if not re.fullmatch("[A-Za-z][A-Za-z0-9_]*", name) or name in _c.RESERVED:
-        raise ValueError(f"name must be letters, digits and underscores after a letter, got {name!r}")
+    if reason := _refusal(name):
+        raise ValueError(f"name must be letters, digits and underscores after a letter, got {name!r}: {reason}")
     thing = model_of(thing)
     program = program_of(thing, sample_time, u0=u0, y0=y0)
     texts = _texts(program, name, type(thing).__name__, *start_of(thing, sample_time or math.inf, u0, y0))
     header, source, main = (Template(text).substitute(texts) for text in (_HEADER, _SOURCE, _MAIN))
     return CSource(name=name, header=header, source=source, main=main, state_size=program.state.size)
+
+
+def _refusal(name: str) -> str:
+    """Why a name cannot be that of files and functions in C; empty for one that can."""
+    if not re.fullmatch("[A-Za-z][A-Za-z0-9_]*", name):
+        return "it has another character"
+    if name in _c.RESERVED:
+        return "it is a word of the language C"
+    if name in _c.MATHEMATICS | _c.TESTS:
+        return "it is a function of the C library"
+    return f"{name}.h is a header of the C library" if name.lower() in _c.HEADERS else ""
 
 
 def _texts(program: Program, name: str, what: str, u0: float, y0: float) -> dict[str, str]:
@@ -200,7 +215,11 @@ def _texts(program: Program, name: str, what: str, u0: float, y0: float) -> dict
     defines = [f"#define {name.upper()}_SAMPLE_TIME {program.sample_time!r} /* s */\n"] * timed
     defines += [f"#define {name.upper()}_AHEAD {program.ahead} /* samples of the reference */\n"] * (not is_model)
     n_inputs = len(program.inputs)
+    last = f"state->x[{program.state.size - 1}]"
+    held = "" if is_model else Template(_HELD).substitute(name=name)
     return {
+        "held_declared": held and f"{held};\n",
+        "held_defined": held and f"{held.partition('*/')[2]} {{\n    return (unsigned long){last};\n}}\n",
         "name": name,
         "NAME": name.upper(),
         "what": f"a {what}" if is_model else f"a sampled controller, {what}",

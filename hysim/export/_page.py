@@ -20,7 +20,7 @@ import numpy as np
 from hysim._atomic import write_text
 from hysim._cycles import TOLERANCE, Samples
 from hysim._excursions import measured_cycles
-from hysim._frozen import FloatArray
+from hysim._frozen import FloatArray, items
 from hysim._prefixes import label, printed
 from hysim._release import __version__
 from hysim._results import model_of
@@ -215,7 +215,7 @@ def _between(thing: Any, record: Record | None) -> tuple[float, float]:
     """Lowest and highest input at the start."""
     if record is not None:
         return float(record.u.min()), float(record.u.max())
-    fields = {name: np.asarray(value) for name, value in vars(thing).items() if isinstance(value, tuple) and value}
+    fields = {name: np.asarray(value) for name, value in items(thing).items() if isinstance(value, tuple) and value}
     if "levels" in fields:
         return float(fields["levels"][0]), float(fields["levels"][-1])
     if "thresholds" in fields and (most := 2.0 * float(fields["thresholds"].max())) > 0.0:

@@ -5,13 +5,15 @@ from dataclasses import replace
 from typing import Any, NamedTuple
 
 from hysim._frozen import FloatArray, frozen, read_only
-from hysim.control import Controller, InverseFeedforward, RestingPlant, TrackingController, preview
+from hysim.control import Controller, InverseFeedforward, RestingPlant, TrackingController, begun, preview
 from hysim.export._packing import packing
 from hysim.export._translate import Function, Translation
-from hysim.export._types import Scalar, Vector
+from hysim.export._types import Known, Scalar, Vector
+from hysim.kernels.controllers import guarded
 from hysim.kernels.stepping import Start, Step, complete
 from hysim.models.law import Law
 from hysim.models.protocols import Startable, Stepwise, needs_time, standing
+from hysim.models.tracing.routine import plain
 from hysim.plants.actuator import as_stepwise
 from hysim.plants.amplifier import Amplifier
 from hysim.plants.creep import Creep
@@ -190,9 +192,10 @@ def _of_model(model: Startable, sample_time: float | None) -> Program:
 
 
 def _of_controller(controller: Controller, sample_time: float, u0: float, y0: float) -> Program:
-    step, parameters, state = controller.compiled(sample_time, u0, y0)
+    step, parameters, state = begun(controller, sample_time, u0, y0)
     translation = Translation()
-    function = translation.function(step, (*_VECTORS, Scalar.DOUBLE, Scalar.DOUBLE))
+    function = translation.function(guarded, (Known(plain(step)), *_VECTORS, Scalar.DOUBLE, Scalar.DOUBLE))
+    function = function._replace(parameters=function.parameters[1:])
     inputs = _FEEDFORWARD if isinstance(controller, InverseFeedforward) else _CONTROLLER
     return Program(
         source=translation.text() + "\n" + _entry("step", function, inputs, (parameters.size, state.size), _CONTROLLER),

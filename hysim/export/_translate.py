@@ -88,9 +88,9 @@ class Translation:
         return "\n\n".join([*parts, *self._texts]) + "\n"
 
     def _free(self, wanted: str) -> str:
-        """A name in C that is not taken."""
-        name, k = wanted, 2
-        while name in self._names or name in _c.HELPERS:
+        """A name in C that is not taken; no public name ends with an underscore or a number behind one."""
+        name, k = f"{wanted}_", 2
+        while name in self._names:
             name, k = f"{wanted}_{k}", k + 1
         self._names.add(name)
         return name

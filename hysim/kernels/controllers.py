@@ -10,18 +10,27 @@ Advanced PID Control, 2006, chapter 13), e = r - y and h the sample time:
 
 Every controller is a function `command(parameters, state, reference, measurement) -> voltage` of one type,
 so that a loop is compiled once for all of them. Its state begins with the last command, before the limits.
+
+Loops, C and `SampledController.step` take every sample through `guarded`. A reference or measurement that is not
+finite, or beyond `LARGEST`, is replaced by the last valid one; where a step gives no finite voltage, the last one is
+held. Both are counted. Behind the controller's own state stand the last valid reference and measurement, the last
+voltage, and the count. A last valid measurement of nan stays so: the controller itself then goes without it.
 """
 
+import math
 from collections.abc import Callable
 
 from numba import float64, int64, types
 
 from hysim._frozen import FloatArray
-from hysim.kernels._compile import signed_kernel
+from hysim.kernels._compile import borrowed, signed_kernel
 from hysim.kernels.stepping import CONSTANTS, VECTOR
 
 ControllerStep = Callable[[FloatArray, FloatArray, float, float], float]
 CONTROLLER = types.FunctionType(float64(CONSTANTS, VECTOR, float64, float64))
+
+LARGEST = 1e100  # of a signal: its cube is finite, and so is its product with any sensible gain
+N_HELD = 4
 
 
 @signed_kernel(float64(CONSTANTS, VECTOR, float64, float64))
@@ -48,6 +57,31 @@ def through(parameters: FloatArray, state: FloatArray, reference: float, measure
     return reference
 
 
+@signed_kernel(float64(CONTROLLER, CONSTANTS, VECTOR, float64, float64))
+def guarded(
+    controller: ControllerStep, parameters: FloatArray, state: FloatArray, reference: float, measurement: float
+) -> float:
+    """The voltage of a controller that holds at samples that are not finite; the state 0 of `through` has no room."""
+    if state.size <= N_HELD:
+        return controller(parameters, state, reference, measurement)
+    state = borrowed(state)
+    own, held, is_valid = state[: state.size - N_HELD], state[state.size - N_HELD :], True
+    if abs(reference) <= LARGEST:
+        held[0] = reference
+    else:
+        reference, is_valid = held[0], False
+    if not abs(measurement) <= LARGEST:
+        measurement, is_valid = held[1], False
+    elif not math.isnan(held[1]):
+        held[1] = measurement
+    u = controller(parameters, own, reference, measurement)
+    if math.isfinite(u):
+        held[2] = u
+    if not (is_valid and math.isfinite(u)):
+        held[3] += 1.0
+    return float(held[2])
+
+
 @signed_kernel(int64(CONTROLLER, CONSTANTS, VECTOR, CONSTANTS, CONSTANTS, VECTOR, VECTOR))
 def replay(
     controller: ControllerStep,
@@ -60,6 +94,6 @@ def replay(
 ) -> int:
     """Commands and voltages of a controller for recorded references and measurements; 0."""
     for k in range(reference.size):
-        u[k] = controller(parameters, state, reference[k], measurement[k])
+        u[k] = guarded(controller, parameters, state, reference[k], measurement[k])
         command[k] = state[0]
     return 0

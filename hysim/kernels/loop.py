@@ -59,7 +59,7 @@ from numba import float64, int64, types, void
 
 from hysim._frozen import FloatArray
 from hysim.kernels._compile import borrowed, by_address, closure, inlined, signed_closure, signed_kernel
-from hysim.kernels.controllers import CONTROLLER
+from hysim.kernels.controllers import CONTROLLER, LARGEST, ControllerStep, guarded
 from hysim.kernels.stepping import CONSTANTS, START, STEP, VECTOR, Start, Step
 
 SIGNALS = types.Array(float64, 2, "C")
@@ -226,7 +226,7 @@ def chain_at_rest(law: Step, law_start: Start, parameters: FloatArray, state: Fl
     )
 )  # fmt: skip
 def close(
-    controller: object,
+    controller: ControllerStep,
     controller_parameters: FloatArray,
     controller_state: FloatArray,
     law: Step,
@@ -267,6 +267,7 @@ def close(
     ring, waiting = lag + 3, late + 1
     s = 2 + 2 * order
     x, past, readings = plant_state[2:s], plant_state[s:], plant_state[s + ring :]
+    largest = LARGEST if controller_state.size > 1 else math.inf  # `through` alone passes on what is finite
     for k in range(start, stop):
         j = k * substeps
         y = output(at_samples, x, past[(j + 1) % ring], past[(j + 2) % ring], 0.0)
@@ -274,9 +275,9 @@ def close(
         measurement = readings[(k + 1) % waiting] + inputs[1, k]
         if quantum > 0.0:
             measurement = quantum * ((measurement / quantum + 0.5) // 1.0)
-        drive = controller(controller_parameters, controller_state, inputs[0, k], measurement)  # type: ignore[operator]
+        drive = guarded(controller, controller_parameters, controller_state, inputs[0, k], measurement)
         samples[0, k], samples[1, k], samples[2, k], samples[3, k] = controller_state[0], drive, y, measurement
-        if not (math.isfinite(y) and math.isfinite(drive)):
+        if not (abs(y) < largest and abs(drive) < largest):
             return k
         target = min(max(plant[2] * drive + plant[3], plant[4]), plant[5])
         for sub in range(substeps):

@@ -148,7 +148,8 @@ def scaled_companion(monic: FloatArray, sample_time: float) -> tuple[FloatArray,
     n_sets, n = monic.shape
     degrees = np.arange(1, n + 1)
     rate = np.max(np.abs(monic) ** (1.0 / degrees), axis=1, initial=1.0 / sample_time)[:, np.newaxis]
-    scaled = monic / rate**degrees
+    with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
+        scaled = monic / rate**degrees
     F = np.zeros((n_sets, n, n))
     F[:, np.arange(n - 1), np.arange(1, n)] = 1.0
     F[:, n - 1 :, :] = -scaled[:, np.newaxis, ::-1]

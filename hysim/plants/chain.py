@@ -59,7 +59,7 @@ class ChainState(NamedTuple):
 class Signals(NamedTuple):
     """Signals of a run at every sample, and at every sub-step the voltage `v` at the law and its output `w`.
 
-    `lost` is the first sample that is not finite, or -1.
+    `lost` is the first sample that is not finite, or -1; `held` counts those at which the controller has held.
     """
 
     command: FloatArray
@@ -69,6 +69,7 @@ class Signals(NamedTuple):
     y: FloatArray
     measurement: FloatArray
     lost: int
+    held: int = 0
 
 
 class Chain:

@@ -21,7 +21,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy.linalg import expm
 
-from hysim._frozen import FloatArray, check_choice, check_whole, items, read_only
+from hysim._frozen import FloatArray, check_choice, check_whole, items, read_only, whole_substeps
 from hysim.errors import SimulationError
 from hysim.kernels import oscillator as kernels
 from hysim.kernels.boucwen import prepare
@@ -339,7 +339,7 @@ class BoucWenOscillator:
     def _substeps(self, sample_time: float) -> int:
         if self.substeps is not None:
             return self.substeps
-        return max(1, math.ceil(max(self.natural_frequency, abs(self.damping) / self.mass) * sample_time / _ANGLE))
+        return whole_substeps(max(self.natural_frequency, abs(self.damping) / self.mass) * sample_time / _ANGLE)
 
     def _states(
         self,

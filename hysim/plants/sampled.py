@@ -110,6 +110,10 @@ def _companion(plant: TransferFunction, sample_time: float) -> Stage:
     numerator = np.concatenate([np.zeros(n + 1 - len(plant.num)), plant.num]) / plant.den[0]
     monic = np.array(plant.den[1:]) / plant.den[0]
     F, rate, scaled = scaled_companion(monic[np.newaxis], sample_time)
+    if not np.isfinite(F).all():
+        raise ValueError(
+            f"the rates of a plant sampled at {sample_time:g} s cannot be computed: check the time and den"
+        )
     back = rate[0] ** -np.arange(1.0, n + 1)
     with np.errstate(divide="ignore"):
         rest = np.concatenate([1.0 / scaled[0, -1:], np.zeros(max(n - 1, 0))])[:n]
@@ -124,7 +128,12 @@ def sampled(stage: Stage, step: float, delay: float = 0.0, *, creeping: int = 0,
     do not depend on others.
     """
     lag, part = whole_and_part(delay / step)
-    carried, B, through = _transition(stage, step, part, 1.0, linear)
+    with np.errstate(all="ignore"):
+        carried, B, through = _transition(stage, step, part, 1.0, linear)
+    if not (np.isfinite(carried).all() and np.isfinite(B).all()):
+        raise ValueError(
+            f"the motion of the plant within {step:g} s is beyond the largest number: check the sample time"
+        )
     return SampledStage(
         decline=read_only(np.expm1(np.diag(stage.F)[:creeping] * (stage.rate * step))),
         A=read_only(carried[creeping:]),

@@ -9,6 +9,7 @@ With den monic the output is affine in the numerator and in the initial state, t
 delay, where it is not known, is searched beside the denominator.
 """
 
+import math
 from collections.abc import Iterable, Mapping
 from typing import ClassVar
 
@@ -87,6 +88,8 @@ class TransferFunction(Composable):
             raise ValueError(f"den must begin with a coefficient that is not zero, got {self.den}")
         if not self.num:
             raise ValueError("num must hold at least one coefficient")
+        if not all(math.isfinite(each / self.den[0]) for each in (*self.num, *self.den)):
+            raise ValueError(f"num and den over the first of den must be finite, got {self.num} and {self.den}")
         if len(self.num) > len(self.den):
             raise ValueError(f"the numerator's degree {len(self.num) - 1} is above the denominator's {self.order}")
         if self.delay < 0.0:

@@ -7,7 +7,9 @@
 m is the measured output at the last command, y the law's own there, and g its derivatives by the numbers, which
 are the differences to copies of the law with one number a little larger each. The copies remember their own past, so
 that g holds what a number has done to the memory z, and the memory is moved with the numbers (an extended Kalman filter
-of numbers and memory, whose only uncertainty is that of the numbers).
+of numbers and memory, whose only uncertainty is that of the numbers). An error m - y beyond 5 standard deviations
+counts as 5 of them, so that one false measurement does not carry the numbers away; without a measurement (nan) P alone
+moves.
 
 The parameters of the step are affine in the numbers, base + sum delta_i rates_i. `parameters` is (numbers p,
 parameters of the step q, places of the law's state s, places of the search, noise^2, drift^2 (p), differences h (p),
@@ -26,6 +28,7 @@ from hysim.kernels.controllers import CONTROLLER, ControllerStep
 from hysim.kernels.stepping import CONSTANTS, RESUME, STEP, VECTOR, Resume, Step
 
 N_HEAD = 5
+_OUTLIER = 5.0  # standard deviations: one in two million errors of a normal distribution is larger
 _SEARCH = float64(STEP, CONSTANTS, VECTOR, float64)
 
 
@@ -36,6 +39,7 @@ def estimate(parameters: FloatArray, state: FloatArray, error: float, g: FloatAr
     The moves are left in the p places before the last p of the state.
     """
     p = g.size
+    moves = state[state.size - 2 * p : state.size - p]
     delta, P = state[1 : 1 + p], state[1 + p : 1 + p + p * p].reshape((p, p))
     drift = parameters[N_HEAD : N_HEAD + p]
     variance = parameters[4]
@@ -47,8 +51,9 @@ def estimate(parameters: FloatArray, state: FloatArray, error: float, g: FloatAr
         moved = 0.0
         for j in range(p):
             moved += P[i, j] * g[j]
-        state[state.size - 2 * p + i] = moved
-    moves = state[state.size - 2 * p : state.size - p]
+        moves[i] = 0.0 if math.isnan(error) else moved
+    largest = _OUTLIER * math.sqrt(variance)
+    error = 0.0 if math.isnan(error) else min(max(error, -largest), largest)
     for i in range(p):
         for j in range(p):
             P[i, j] -= moves[i] * moves[j] / variance

@@ -8,13 +8,13 @@ sample the controller reads
 and then its force jumps.
 """
 
-import math
 from typing import Any
 
 import numpy as np
 
 from hysim._frozen import FloatArray
 from hysim.kernels._compile import kernel
+from hysim.kernels.controllers import LARGEST, guarded
 from hysim.kernels.structures.layout import Elements, Flows, Motion, Plant, Room, Steps, Tracks
 from hysim.kernels.structures.pointers import controller_at, follow_at
 
@@ -48,9 +48,9 @@ def close(
             y += weights[q] * motion.x[q]
         for e in range(n_elements):
             y += weights[m + e] * motion.carry[0, e]
-        drive = step(parameters, state, inputs[k, 0], y)
+        drive = guarded(step, parameters, state, inputs[k, 0], y)
         samples[k, 0], samples[k, 1], samples[k, 2] = state[0], drive, y
-        if not (math.isfinite(y) and math.isfinite(drive)):
+        if not (abs(y) < LARGEST and abs(drive) < LARGEST):
             return k
         motion.loads[0] = drive
     return -1

@@ -5,7 +5,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from hysim._frozen import FloatArray, read_only
+from hysim._frozen import FloatArray, read_only, whole_substeps
 from hysim.kernels.stepping import START
 from hysim.kernels.structures.ensembles import fill_slopes, fill_structure, start_motion
 from hysim.kernels.structures.flows import N_POWERS
@@ -135,8 +135,11 @@ def linear_parts(matrices: Matrices) -> tuple[FloatArray, FloatArray, FloatArray
     forces = np.concatenate([np.broadcast_to(matrices.directions, (n_sets, *matrices.directions.shape[1:])), rows], 1)
     A, loads = np.zeros((n_sets, 2 * n, 2 * n)), np.zeros((n_sets, forces.shape[1], 2 * n))
     A[:, :n, n:] = np.eye(n)
-    A[:, n:, :n] = -np.linalg.solve(mass, matrices.stiffness)
-    A[:, n:, n:] = -np.linalg.solve(mass, np.broadcast_to(matrices.damping, (n_sets, n, n)))
+    with np.errstate(over="ignore", invalid="ignore"):
+        A[:, n:, :n] = -np.linalg.solve(mass, matrices.stiffness)
+        A[:, n:, n:] = -np.linalg.solve(mass, np.broadcast_to(matrices.damping, (n_sets, n, n)))
+    if not np.isfinite(A).all():
+        raise ValueError("stiffness or damping over mass is beyond the largest number: check their units")
     loads[:, :, n:] = np.swapaxes(np.linalg.solve(mass, np.swapaxes(forces, 1, 2)), 1, 2)
     rates = np.abs(np.linalg.eigvals(A)).max(axis=1)
     return A, loads, rates
@@ -152,7 +155,7 @@ def steps_of(rate: float, sample_time: float, substeps: int | None, tolerance: f
     """How a sample is divided: as told, or by the tolerance from the phase on which the sweeps converge with."""
     if substeps is not None:
         return Steps(float(sample_time), rate, substeps, 0, tolerance)
-    return Steps(float(sample_time), rate, max(1, int(np.ceil(sample_time * rate / PHASE))), HALVINGS, tolerance)
+    return Steps(float(sample_time), rate, whole_substeps(sample_time * rate / PHASE), HALVINGS, tolerance)
 
 
 def empty_flows(halvings: int, m: int, n_loads: int, n_elements: int) -> tuple[FloatArray, FloatArray, Flows]:
