@@ -22,6 +22,7 @@ Where the best law of the region is not safe, or the family names none, the best
 the law descends in a box about its place, to which it moves where it is still safe there; else the box is halved.
 """
 
+import itertools
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
@@ -32,7 +33,7 @@ import numpy as np
 from hysim._frozen import FloatArray
 from hysim.errors import SimulationError
 from hysim.identification._result import Candidate
-from hysim.identification._search import Optimum, optima, polish, spread
+from hysim.identification._search import optima, polish, spread
 from hysim.identification._searched import LocalOptimum, Search
 from hysim.models.channels.dependent import AlongRecord, on_record
 from hysim.models.protocols import Responding, needs_time
@@ -53,6 +54,8 @@ _CLEAR = 10.0  # difference of two BIC
 _ROUNDING = 1e-10  # of the output's size: smaller residuals are those of a perfect fit
 _N_SCREENED = 256
 _N_TRIED = 64  # points that are tried for safety, the best first
+_N_BEGUN = 4  # safe points from which the best safe law is approached
+_LONG, _SHORT = 512, 250  # samples beyond which it is approached on so many first
 _LARGEST_BOX, _SMALLEST_BOX = 0.25, 1.0 / 512.0  # half a side, of the whole box
 _MOST_BOXES = 40
 _GAIN = 1e-4  # share of the sum of squares: a box that gains less is the last
@@ -233,12 +236,12 @@ def _safest(search: Search, likely: list[LocalOptimum] | None) -> tuple[Search, 
     likely = _reached(search) if likely is None else likely
     if likely and _is_safe(search, likely[0].theta):
         return search, likely
-    begin = _safe_point(search, likely)
-    return None if begin is None else _approached(search, begin)
+    ends = [_approached(search, x) for x in _safe_points(search, likely)]
+    return min((each for each in ends if each is not None), key=lambda each: each[1][0].loss, default=None)
 
 
-def _safe_point(search: Search, likely: Sequence[LocalOptimum]) -> FloatArray | None:
-    """Coordinates of the best safe law among other optima, the simpler family's admissible law, and random ones."""
+def _safe_points(search: Search, likely: Sequence[LocalOptimum]) -> FloatArray:
+    """Coordinates (n_sets, n_x) of safe laws: the best of other optima, the simpler family's, and random ones."""
     problem = search.problem
     points = [each.theta[np.newaxis, : problem.n_x] for each in likely[1:]]
     if problem.simpler is not None and problem.own.encoded is not None:
@@ -247,37 +250,36 @@ def _safe_point(search: Search, likely: Sequence[LocalOptimum]) -> FloatArray | 
             points.append(problem.begun(simple[1][0].theta[np.newaxis, : problem.simpler.n_x]))
     every = np.concatenate([*points, problem.space.starts, spread(problem.space, _N_SCREENED, search.seed)])
     costs = problem.costs(every)
-    for k in np.argsort(costs, kind="stable")[:_N_TRIED]:
-        if np.isfinite(costs[k]) and _is_safe(search, problem.completed(every[[k]])[0]):
-            return np.asarray(every[k])
-    return None
+    ranked = (k for k in np.argsort(costs, kind="stable")[:_N_TRIED] if np.isfinite(costs[k]))
+    safe = (every[k] for k in ranked if _is_safe(search, problem.completed(every[[k]])[0]))
+    return np.reshape([*itertools.islice(safe, _N_BEGUN)], (-1, problem.n_x))
 
 
 def _approached(search: Search, x: FloatArray) -> tuple[Search, list[LocalOptimum]] | None:
-    """The safe optimum that is reached from safe coordinates, box by box."""
-    problem, half, best = search.problem, _LARGEST_BOX, None
-    whole = problem.space.upper - problem.space.lower
-    cost = float(problem.costs(x[np.newaxis])[0])
-    for _ in range(_MOST_BOXES):
-        lower, upper = (
-            np.maximum(problem.space.lower, x - half * whole),
-            np.minimum(problem.space.upper, x + half * whole),
-        )
-        inside = _inside(search, lower, upper)
-        inside = replace(inside, problem=replace(inside.problem, simpler=None))
-        reached: Sequence[Optimum] = polish(inside.problem, x[np.newaxis])
-        if not reached or not _is_safe(search, problem.completed(reached[0].x[np.newaxis])[0]):
-            half *= 0.5
-            if half < _SMALLEST_BOX:
+    """The safe optimum that is reached from safe coordinates (n_x,), box by box; on few samples first."""
+    problem, half = search.problem, _LARGEST_BOX
+    short = problem.thinned(_SHORT) if problem.y.size > _LONG else None
+    whole, box, reached = problem.space.upper - problem.space.lower, problem.space, None
+    for part in filter(None, (short, problem)):
+        cost, reached = math.inf, None
+        for _ in range(_MOST_BOXES):
+            sides = np.clip([x - half * whole, x + half * whole], problem.space.lower, problem.space.upper)
+            inside = replace(part, space=_part(problem.space, *sides), ends=None, simpler=None)
+            end = next(iter(polish(inside, x[np.newaxis])), None)
+            if end is None or not _is_safe(search, problem.completed(end.x[np.newaxis])[0]):
+                half *= 0.5
+                if half < _SMALLEST_BOX:
+                    break
+                continue
+            gain, x, cost = cost - end.cost, end.x, end.cost
+            box, reached = inside.space, [end]
+            if gain <= _GAIN * cost:
                 break
-            continue
-        gain, x, cost = cost - reached[0].cost, reached[0].x, reached[0].cost
-        best = inside, reached
-        if gain <= _GAIN * cost:
-            break
-    if best is None:
+        half = max(half, _SMALLEST_BOX)
+    if reached is None:
         return None
-    return best[0], best[0].likely(best[1])
+    at_end = replace(search, problem=replace(problem, space=box, ends=None, simpler=None))
+    return at_end, at_end.likely(reached)
 
 
 def _band(records: Sequence[Record]) -> tuple[FloatArray, float, float]:
