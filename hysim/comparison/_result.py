@@ -220,7 +220,7 @@ class Comparison:
         every = [(row.name, each) for row in ranked for each in row.warnings]
         of_best = [f"{name}: {each}" for name, each in every if name == ranked[0].name and each != CONSTANT]
         swapped = [f"{name}: {each}" for name, each in every if each.startswith(SWAPPED)][:1]
-        unsafe = [f"{row.name}: {row.unsafe}" for row in ranked if row.unsafe]
+        unsafe = [f"{row.name}: {row.unsafe}" for row in self.rows if row.unsafe]
         return (*constant, *dict.fromkeys([*unsafe, *of_best, *swapped]))
 
     def _undecided_in_words(self) -> str:
