@@ -104,7 +104,12 @@ def test_a_law_that_is_safe_is_the_optimum_whatever_its_region():
     assert not fit.model.admissible
     assert fit.model.memory_bound < np.inf
     assert fit.regions["admissible"].fit_percent == pytest.approx(95.982, abs=1e-3)
-    assert fit.regions["admissible"].model.admissible
+    assert "best admissible: fit 95.98 % (admissible=True)" in fit.summary()
+    inside = hs.identify(hs.PolynomialBoucWen, hs.datasets.table1(), fixed={"n": 1.0}, admissible=True)
+    assert inside.model.admissible
+    assert inside.model == fit.regions["admissible"].model
+    assert inside.success
+    assert "that is not admissible" in inside.message
 
 
 def test_where_only_an_unsafe_law_fits_the_first_line_says_so(only_unsafe):

@@ -142,7 +142,8 @@ def choose(search: Search, likely: list[LocalOptimum], admissible: bool | None) 
     """The optimum, or the best admissible law in its place; `admissible` is that of `hysim.identify`."""
     best = likely[0]
     named = {name: each.candidate(inside[0].theta) for name, (each, inside) in _by_region(search, best).items()}
-    if admissible is False or _is_safe(search, best.theta) or _is_cut(search):
+    is_safe = _is_safe(search, best.theta)
+    if admissible is False or (is_safe and not (admissible and named)) or _is_cut(search):
         return Choice(search, likely, named)
     other = _safest(search, likely)
     if other is None:
@@ -151,10 +152,11 @@ def choose(search: Search, likely: list[LocalOptimum], admissible: bool | None) 
     if admissible is None and not _is_as_good(search, best.theta, inside[0].theta):
         return Choice(search, likely, {**named, "admissible": safe.candidate(inside[0].theta)})
     unrestricted = search.candidate(best.theta)
-    loss = "" if admissible else ", which fits no better within noise and creep"
+    kind = "is not admissible" if is_safe else "is unsafe on smaller cycles"
+    loss = "" if admissible else ", and fits no better within noise and creep"
     remark = (
-        f"the best admissible law, in place of one of fit {unrestricted.fit_percent:.2f} % that is unsafe on smaller "
-        f"cycles{loss}: admissible=False returns that one"
+        f"the best admissible law, in place of one of fit {unrestricted.fit_percent:.2f} % that {kind}{loss}: "
+        "admissible=False returns that one"
     )
     return Choice(safe, inside, {"unrestricted": unrestricted}, remark)
 

@@ -192,7 +192,9 @@ class Identification(Stored):
             lines.append(f"  loop width {width.value:.4g}  [{width.lower:.4g}, {width.upper:.4g}]")
         if not np.isnan(self.cv_rmse):
             lines.append(f"  cross-validated rmse {self.cv_rmse:.4g}")
-        lines += [f"  best {name}: fit {best.fit_percent:.2f} %" for name, best in self.regions.items()]
+        lines += [
+            f"  best {name}: fit {each.fit_percent:.2f} %{_ASKED.get(name, '')}" for name, each in self.regions.items()
+        ]
         lines.append(f"  {self.message}")
         return "\n".join([*lines, *(["Warnings"] if self.warnings else []), *(f"  {each}" for each in self.warnings)])
 
@@ -235,6 +237,9 @@ class Identification(Stored):
         if not np.isnan(self.whiteness):
             words.append(f"p = {self.whiteness:.2g} if white")
         return ", ".join(words)
+
+
+_ASKED = {"admissible": " (admissible=True)", "unrestricted": " (admissible=False)"}
 
 
 def _error_in_words(stderr: float) -> str:
