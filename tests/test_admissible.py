@@ -208,3 +208,15 @@ def test_correlated_residuals_count_as_fewer_samples(rho):
 def test_a_residual_of_nothing_has_all_its_samples():
     assert effective_samples(np.zeros(10)) == 10.0
     assert effective_samples(np.array([1.0, -1.0, 1.0])) == 3.0
+
+
+def test_a_wrong_family_is_not_excused_by_its_correlated_residual():
+    """Dahl's law follows Table 1 from a memory far from rest, to which it drifts in small cycles."""
+    table = hs.datasets.table1()
+    fit = hs.identify(hs.Dahl, table)
+    assert not fit.success
+    assert fit.unsafe.startswith("UNSAFE")
+    other = fit.regions["admissible"]
+    assert effective_samples(fit.residual) * 2.0 * np.log(other.rmse / fit.rmse) < 10.0
+    assert other.rmse > 1.25 * fit.rmse
+    assert excursion([other.model], [table]).is_safe

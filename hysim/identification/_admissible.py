@@ -13,10 +13,10 @@ safe. Otherwise the best admissible law is taken where it fits as well within no
 
     N_eff ln(V_admissible / V_best) <= 10,        N_eff = N / (1 + 2 sum of rho_k),
 
-with V the mean squared residual, not below that of the sensor's rounding, and rho_k the autocorrelation of the best
-law's residual up to the first pair of lags whose sum is not positive (C. J. Geyer, Stat. Sci. 7, 1992): creep and what
-the family cannot follow stay for many samples, and so leave few that are independent. 10 is the difference of two BIC
-that `_assumptions` calls clear.
+and its rmse is at most a quarter above, since the residual of a wrong family is correlated, too. V is the mean squared
+residual, not below that of the sensor's rounding, and rho_k the autocorrelation of the best law's residual up to the
+first pair of lags whose sum is not positive (C. J. Geyer, Stat. Sci. 7, 1992): creep stays for many samples, and so
+leaves few that are independent. 10 is the difference of two BIC that `_assumptions` calls clear.
 
 Where the best law of the region is not safe, or the family names none, the best safe law is approached from a safe one:
 the law descends in a box about its place, to which it moves where it is still safe there; else the box is halved.
@@ -51,6 +51,7 @@ _SCALES = ((0.5, 0.0), (0.5, -1.0), (0.5, 1.0), (0.9, 0.0), (0.9, -1.0), (0.9, 1
 _LOOPS = ((-0.5, 0.1), (-0.5, 0.4), (0.0, 0.1), (0.0, 0.4), (0.5, 0.1), (0.5, 0.4))  # centre and amplitude
 _REPEATED = 50
 _CLEAR = 10.0  # difference of two BIC
+_MOST_LOSS = 1.25  # rmse over that of the best law
 _ROUNDING = 1e-10  # of the output's size: smaller residuals are those of a perfect fit
 _N_SCREENED = 256
 _N_TRIED = 64  # points that are tried for safety, the best first
@@ -214,7 +215,7 @@ def _is_as_good(search: Search, best: FloatArray, other: FloatArray) -> bool:
     first, second = (share * search.residual(theta) for theta in (best, other))
     rounding = max(_ROUNDING * problem.scale, (problem.parts[0].record.resolution or 0.0) / math.sqrt(12.0))
     least, more = (max(float(np.mean(each**2)), rounding**2) for each in (first, second))
-    return effective_samples(first) * math.log(more / least) <= _CLEAR
+    return more <= _MOST_LOSS**2 * least and effective_samples(first) * math.log(more / least) <= _CLEAR
 
 
 def effective_samples(residual: FloatArray) -> float:

@@ -127,8 +127,8 @@ def identify(
     Notes
     -----
     Noise and creep allow a loss if N_eff ln(V_admissible / V) <= 10, with V the mean squared residuals and N_eff the
-    number of samples over the correlation time of the best law's residual. `Identification.regions` holds the law that
-    was not returned: ``"unrestricted"``, or ``"admissible"``.
+    number of samples over the correlation time of the best law's residual, and if the rmse rises by at most a quarter.
+    `Identification.regions` holds the law that was not returned: ``"unrestricted"``, or ``"admissible"``.
 
     Examples
     --------
