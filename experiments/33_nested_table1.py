@@ -62,7 +62,7 @@ class Rival(NamedTuple):
 
 def identified(family: Any, start: str | None = None, **fixed: float) -> Find:
     """What identifies a family, with some parameters fixed."""
-    return lambda record: hs.identify(family, record, initial=start, fixed=fixed)
+    return lambda record: hs.identify(family, record, initial=start, fixed=fixed, admissible=False)
 
 
 def rivals() -> list[Rival]:

@@ -4,7 +4,7 @@ Each case is a simulated twin of a device: a random law of one family, in random
 disturbed and rounded as its sensor would. The record is all that the default call is told. Three sums of squares stand
 beside each other, of the same family:
 
-- the default call's,
+- that of the default call, without its restriction to safe laws,
 - that of the truth, with all parameters of its law free, as a start for `scipy.optimize.least_squares`: the best that
   is known,
 - the best of `scipy.optimize.least_squares` from 20 random starts in a box, as long as ten times the time that the
@@ -254,7 +254,7 @@ def case(device: str, seed: int) -> Row:
     subject = twin.subject or type(twin.law)
     hs.identify(subject, hs.Record(u=record.u[few], y=record.y[few]))  # which compiles what the clock is not for
     begin = time.perf_counter()
-    fit = hs.identify(subject, record)
+    fit = hs.identify(subject, record, admissible=False)
     seconds = time.perf_counter() - begin
     cost = float(np.sum((fit.residual / unit_y) ** 2))
 

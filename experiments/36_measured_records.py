@@ -4,7 +4,7 @@ The records are public, and are not part of hysim: a mirror on piezo stacks, a m
 magnets, and steel coupons under cyclic strain, in a folder that the command names. Each is identified by the families
 that suit it. Sums of squares stand beside each other, of the same family:
 
-- the default call's,
+- that of the default call, without its restriction to safe laws,
 - that of a second call with another seed, on the record in other units,
 - that of `scipy.optimize.least_squares` from the end of this second call, the best start that is known,
 - the best of `scipy.optimize.least_squares` from 20 random starts in a box, as long as ten times the time that the
@@ -127,13 +127,13 @@ def case(device: str, record: hs.Record, family: str, seed: int = 0) -> Row:
     few = slice(None, None, max(1, len(record) // 60))
     hs.identify(subject, hs.Record(u=record.u[few], y=record.y[few]))  # which compiles what the clock is not for
     begin = time.process_time()
-    fit = hs.identify(subject, record)
+    fit = hs.identify(subject, record, admissible=False)
     seconds = time.process_time() - begin
     unit = float(np.abs(record.y).max())
     cost = float(np.sum((fit.residual / unit) ** 2))
 
     scaled = hs.Record(u=record.u / np.abs(record.u).max(), y=record.y / unit)
-    again = hs.identify(subject, scaled, seed=seed + 1)
+    again = hs.identify(subject, scaled, admissible=False, seed=seed + 1)
     box = {name: pair for name, pair in ranges.items() if name in again.model.scalars}
     patience = max(SHORTEST, PATIENCE * seconds)
     peer = Peer(again.model, box, scaled.u, scaled.y, LIMITS)

@@ -9,8 +9,8 @@ from scipy import stats
 
 import hysim as hs
 from hysim.cli import main
+from hysim.identification._admissible import danger, excursion, implausible
 from hysim.identification._diagnostics import whiteness
-from hysim.identification._extrapolation import implausible
 from hysim.identification._noise import Quantised
 from hysim.identification.sentences import sentences
 
@@ -251,18 +251,21 @@ OFF = "inside the span of the input"
 @pytest.mark.parametrize("law", PLAUSIBLE, ids=lambda law: type(law).__name__)
 def test_a_law_with_a_memory_that_fades_is_plausible_off_its_own_record(law):
     for u in (LOOP, OUTER, 0.5 * LOOP):
-        assert implausible([law], [hs.Record(u=u, y=law.response(u))]) == ""
+        off = excursion([law], [hs.Record(u=u, y=law.response(u))])
+        assert off is None or off.is_safe  # None: a line has no band
+        assert implausible(off) == ""
 
 
-def test_a_memory_that_grows_on_minor_loops_is_doubted():
+def test_a_memory_that_grows_on_minor_loops_is_unsafe():
     """Bouc-Wen with beta < 0 follows one loop, and leaves it on any other path."""
     law = hs.BoucWen(beta=-0.6, gamma=1.2, gain=0.3)
-    words = implausible([law], [hs.Record(u=LOOP, y=law.response(LOOP))])
-    assert OFF in words
-    assert "times this range" in words
+    records = [hs.Record(u=LOOP, y=law.response(LOOP), units={"u": "V"})]
+    words = danger(excursion([law], records), records, None)
+    assert words == "UNSAFE on smaller cycles: within +-1 V this law runs away. Take hs.PrandtlIshlinskii."
     faster = hs.BoucWen(beta=-0.3, gamma=1.3, n=2.0)
     inner = hs.Record(u=0.5 * LOOP, y=faster.response(0.5 * LOOP))
-    assert "the model diverges on" in implausible([faster], [inner])
+    assert excursion([faster], [inner]).beyond == np.inf
+    assert "runs away" in danger(excursion([faster], [inner]), [inner], None)
 
 
 def test_the_summary_says_that_a_model_is_not_plausible_off_the_record():
@@ -276,13 +279,14 @@ def test_the_summary_says_that_a_model_is_not_plausible_off_the_record():
 def test_nothing_is_said_where_nothing_can_be_tried():
     law = hs.BoucWen(beta=-0.6, gamma=1.2, gain=0.3)
     rising = np.linspace(-1.0, 1.0, 30)
-    assert implausible([law], [hs.Record(u=rising, y=law.response(rising))]) == ""
+    assert excursion([law], [hs.Record(u=rising, y=law.response(rising))]) is None
     timed = hs.Actuator(hysteresis=law, creep=hs.Creep.per_decade(1.0))
-    assert implausible([timed], [hs.Record(u=LOOP, y=law.response(LOOP), t=np.arange(LOOP.size))]) == ""
+    assert excursion([timed], [hs.Record(u=LOOP, y=law.response(LOOP), t=np.arange(LOOP.size))]) is None
+    assert danger(None, [], None) == implausible(None) == ""
 
 
 def test_of_several_records_the_one_of_the_widest_input_is_tried_with_its_own_model():
     law = hs.BoucWen(beta=-0.6, gamma=1.2, gain=0.3)
     wide, narrow = (hs.Record(u=u, y=law.response(u)) for u in (LOOP, 0.1 * LOOP))
-    assert OFF in implausible([hs.Line(), law], [narrow, wide])
-    assert implausible([law, hs.Line()], [narrow, wide]) == ""
+    assert not excursion([hs.Line(), law], [narrow, wide]).is_safe
+    assert excursion([law, hs.Line()], [narrow, wide]).is_safe

@@ -10,6 +10,7 @@ if TYPE_CHECKING:
     from hysim.plot import Figure
 
 SUCCESS, NOT_CONVERGED = 0, 1
+ADMISSIBLE = {None: None, "yes": True, "no": False}
 
 
 def run(options: argparse.Namespace) -> int:
@@ -32,12 +33,13 @@ def run(options: argparse.Namespace) -> int:
         bounds=dict(options.bounds),
         depends=dict(options.depends) or None,
         weights=weights,
+        admissible=ADMISSIBLE[options.admissible],
         **outputs.fields_of(options, ("initial", "noise", "intervals", "cross_validate", "max_evaluations", "seed")),
     )
     names = (
         "estimates", "stderr", "intervals", "interval_method", "free_names", "n_parameters", "noise", "sigma",
         "fit_percent", "rmse", "cv_rmse", "fpe", "aic", "bic", "whiteness", "seed", "success", "message",
-        "warnings",
+        "warnings", "unsafe",
     )  # fmt: skip
 
     def picture() -> "Figure":
@@ -55,7 +57,7 @@ COMMAND = Command(
     "identify",
     "identify a model on a file of your own",
     "Identify a model's parameters by its error in free run, and print them with their standard errors. Exit code 1: "
-    "the search did not converge.",
+    "the search did not converge, or the law is unsafe on smaller cycles.",
     f"""
 {records.OPTIONS_WITH_WEIGHTS.replace(records.FILE, records.FILES)}
 {models.OPTIONS}
@@ -71,6 +73,8 @@ COMMAND = Command(
 --intervals linear|profile|bootstrap  method of the 95 % intervals [default: linear]
 --cross-validate loo|cycles|K  leave out one sample at a time, one cycle, or one of K blocks
 --max-evaluations N  most parameter sets that the search simulates; a fit that ends by it is partial
+--admissible yes|no  whether the law must be safe on smaller cycles, whatever its fit (default: where noise and creep
+    allow the loss of fit)
 {SEED}
 {MODEL_OUT}
 --plot LOOP.svg  draw the record and the model

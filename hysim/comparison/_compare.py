@@ -212,7 +212,8 @@ class _Protocol:
             fitted |= {name: criterion(residual, d) for name, criterion in _CRITERIA.items()}
         if isinstance(subject, Identification):
             fitted |= {"cv_residual": subject.cv_residual, "warnings": tuple(subject.warnings)}
-            fitted |= {"success": subject.success, "message": subject.message if identified_here else ""}
+            fitted |= {"unsafe": subject.unsafe, "success": subject.success}
+            fitted |= {"message": subject.message if identified_here else ""}
         sense = -1.0 if {loop.orientation, measured.orientation} == {"clockwise", "counterclockwise"} else 1.0
         deviation = _rate_deviation(model, record, y)
         test_fit, test_rmse = self._test_errors(subject, model, identified_here)
@@ -321,7 +322,7 @@ def _with_initial_state(record: Record, fitted: Identification, seed: int) -> An
     is_alone = len(fitted.models) == 1 and model is fitted.model
     known = fitted.estimates if is_alone else model.scalars
     shared = {name: value for name, value in known.items() if name not in state}
-    return identify(model, record, fixed=shared, seed=seed).model
+    return identify(model, record, fixed=shared, admissible=False, seed=seed).model
 
 
 def _loop(model: Any, record: Record, y: FloatArray) -> LoopMetrics:

@@ -62,6 +62,8 @@ class ComparisonRow:
         Message of the identification; empty for a model that was not identified here.
     warnings : tuple of str
         Warnings of the identification.
+    unsafe : str
+        Sentence where the identified law is not safe on smaller cycles; see `hysim.Identification`.
     """
 
     name: str
@@ -90,6 +92,7 @@ class ComparisonRow:
     success: bool = True
     message: str = ""
     warnings: tuple[str, ...] = ()
+    unsafe: str = ""
 
     def __str__(self) -> str:
         fit = "fit not defined" if math.isnan(self.fit_percent) else f"fit {self.fit_percent:.2f} %"
@@ -102,7 +105,7 @@ class ComparisonRow:
                 "parameters": f"{self.n_parameters}, {bic_in_words(self.bic)}",
                 "model": in_brief(self.model),
                 "search": self.message,
-                "warnings": "; ".join(self.warnings),
+                "warnings": "; ".join(filter(None, (self.unsafe, *self.warnings))),
             },
         )
 
@@ -211,13 +214,14 @@ class Comparison:
 
     @property
     def warnings(self) -> tuple[str, ...]:
-        """Warnings, one sentence each: a constant output, those of the best model, and a swap of input and output."""
+        """Warnings, one sentence each: a constant output, unsafe laws, those of the best model, and swapped columns."""
         constant = [CONSTANT] if np.ptp(self.record.y) == 0.0 else []
         ranked = self.ranked() or self.ranked("rmse")
         every = [(row.name, each) for row in ranked for each in row.warnings]
         of_best = [f"{name}: {each}" for name, each in every if name == ranked[0].name and each != CONSTANT]
         swapped = [f"{name}: {each}" for name, each in every if each.startswith(SWAPPED)][:1]
-        return (*constant, *dict.fromkeys([*of_best, *swapped]))
+        unsafe = [f"{row.name}: {row.unsafe}" for row in self.rows if row.unsafe]
+        return (*constant, *dict.fromkeys([*unsafe, *of_best, *swapped]))
 
     def _undecided_in_words(self) -> str:
         method = "(signed ranks of left-out errors, 5 % after Holm's correction)"

@@ -70,7 +70,7 @@ def rows(comparison: Any) -> list[dict[str, Any]]:
         best = {"rmse_ratio": same, "typical_ratio": same, "probability": math.nan, "diverged": False}
         criteria = {name: math.nan if vars(row)[name] == -math.inf else vars(row)[name] for name in ("bic", "aic")}
         derived = {"residual_quanta": row.max_residual / quantum if quantum else math.nan}
-        text = {"warnings": "; ".join(row.warnings)}
+        text = {"warnings": "; ".join(filter(None, (row.unsafe, *row.warnings)))}
         values.append(contrasts.get(row.name, best) | items(row) | criteria | derived | text)
     return values
 
@@ -165,7 +165,7 @@ def _short(comparison: Any) -> list[list[str]]:
     selected = [column for column in columns(comparison) if column.short]
     body = [[_printed(row[column.name], column.digits) for column in selected] for row in rows(comparison)]
     for cells, row in zip(body, comparison.rows, strict=True):
-        cells[0] += "" if row.success else " (partial)"
+        cells[0] += " (UNSAFE)" if row.unsafe else "" if row.success else " (partial)"
     return [[column.heading for column in selected], *body]
 
 

@@ -14,9 +14,9 @@ from hysim._parallel import at_most
 from hysim._progress import Progress, Reports, reports
 from hysim._results import model_of
 from hysim.identification import _direct as direct
+from hysim.identification._admissible import choose, danger, excursion, implausible
 from hysim.identification._assumptions import Treated, decided, in_units_of_noise, quiet_rmse, treated
 from hysim.identification._diagnostics import rate_noise_warning
-from hysim.identification._extrapolation import implausible
 from hysim.identification._measured import as_measured, said_of_noise
 from hysim.identification._noise import Gaussian, Noise, Quantised, Robust
 from hysim.identification._problem import Problem
@@ -51,6 +51,7 @@ def identify(
     noise: str | None = None,
     intervals: str = "linear",
     cross_validate: str | int | None = None,
+    admissible: bool | None = None,
     weights: npt.ArrayLike | Sequence[npt.ArrayLike] | None = None,
     max_evaluations: int | None = None,
     seed: int = 0,
@@ -100,6 +101,13 @@ def identify(
     cross_validate : {None, "loo", "cycles", "records"} or int, optional
         What is left out at a time: an output sample, a cycle of the input (not the first), a record, or one of that
         many blocks of samples; the input is kept. Fills `Identification.cv_rmse` and `Identification.cv_residual`.
+    admissible : bool, optional
+        Whether the law must be safe on smaller cycles: tried on minor loops, fading stairs and the record's path at
+        smaller amplitudes, an admissible law leaves the band of the record by no more than half of the output's range,
+        and lies in the region that its family names ``"admissible"``, if it names one. By default the best law is
+        returned where it is safe; otherwise the best admissible one where noise and creep allow its loss of fit. Where
+        they do not, the result is the best law, `success` is False, and the summary begins with ``UNSAFE``. True
+        returns the best admissible law whatever its fit, False the best law of all. See the notes.
     weights : array, shape (n,), or one for each record, optional
         Weight of each sample in the sum of squares, not negative; 0 leaves a sample out. Only their ratios count, and
         the input of every sample is kept.
@@ -126,6 +134,12 @@ def identify(
         has not the channel that a parameter depends on, or the records too few different values of it.
     TypeError
         If the first argument is not something that can be identified.
+
+    Notes
+    -----
+    Noise and creep allow a loss if N_eff ln(V_admissible / V) <= 10, with V the mean squared residuals and N_eff the
+    number of samples over the correlation time of the best law's residual, and if the rmse rises by at most a quarter.
+    `Identification.regions` holds the law that was not returned: ``"unrestricted"``, or ``"admissible"``.
 
     Examples
     --------
@@ -172,7 +186,9 @@ def identify(
                 choice = choice._replace(problems=[replace(each, ends=ends) for each in choice.problems])
             searched = [in_units_of_noise(each, seed) for each in choice.problems]
             folds = left_out(cross_validate, records)
-            fit = _searched(searched, noise or "gaussian", intervals, folds, seed, progress or None, treatment)
+            fit = _searched(
+                searched, noise or "gaussian", intervals, folds, seed, progress or None, treatment, admissible
+            )
             fit = replace(fit, message="; ".join(filter(None, (fit.message, choice.sentence))))
             if not any(isinstance(record, Rescalable) for record in records):
                 fit = as_measured(fit, records, shares, treatment)
@@ -184,9 +200,15 @@ def identify(
             if not any(doubts) and not is_partial and not needs_time(fit.model):
                 doubts = [swapped_for(first.family, records, options, initial, 1.0 - fit.fit_percent / 100.0)]
             on_their_records = [on_record(each, record) for each, record in zip(fit.models, records, strict=True)]
-            doubts += [implausible(on_their_records, records), rate_noise_warning(on_their_records, records)]
-        warnings = (*fit.warnings, *filter(None, doubts))
-        return replace(fit, warnings=warnings) if any(doubts) else fit
+            off = excursion(on_their_records, records)
+            doubts += [implausible(off), rate_noise_warning(on_their_records, records)]
+            fit = _marked(fit, danger(off, records, fit.regions.get("admissible")), admissible)
+        return replace(fit, warnings=(*fit.warnings, *filter(None, doubts))) if any(doubts) else fit
+
+
+def _marked(fit: Identification, unsafe: str, admissible: bool | None) -> Identification:
+    """The fit of a law that is not safe, said in its first line; no success unless this was asked for."""
+    return replace(fit, unsafe=unsafe, success=fit.success and admissible is False) if unsafe else fit
 
 
 def _searched(
@@ -197,6 +219,7 @@ def _searched(
     seed: int,
     progress: Progress | None,
     treatment: Treated,
+    admissible: bool | None,
 ) -> Identification:
     problem = problems[0]
     n_samples, n_names = problem.n_samples, len(problem.space.names)
@@ -210,12 +233,13 @@ def _searched(
         raise ValueError("every parameter set tried diverged: check the units, or pass bounds=")
     if isinstance(density, Quantised):
         density = density.at_least(squares[0].cost, n_samples - len(problem.space.names))
-    search = Search(problem, density, seed, treatment)
-    result, likely = search.described(search.likely(squares), intervals, squares[0].x)
-    if remark := stages_in_words(problems, problem):
-        result = replace(result, message=f"{result.message}; {remark}")
-    errors = left_out_errors(problem, density, np.array([optimum.theta for optimum in likely]), folds)
-    return replace(result, regions=search.regions(likely[0]), cv_residual=errors, cv_rmse=rms_of_known(errors))
+    best = Search(problem, density, seed, treatment)
+    search, likely, named, remark = choose(best, best.likely(squares), admissible)
+    plain = squares[0].x if search is best else likely[0].theta[: problem.n_x]
+    result, likely = search.described(likely, intervals, plain)
+    message = "; ".join(filter(None, (result.message, remark, stages_in_words(problems, problem))))
+    errors = left_out_errors(search.problem, density, np.array([optimum.theta for optimum in likely]), folds)
+    return replace(result, message=message, regions=named, cv_residual=errors, cv_rmse=rms_of_known(errors))
 
 
 def _weights(weights: Any, records: Sequence[Record]) -> list[FloatArray] | None:

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from hysim._frozen import FloatArray, frozen
-from hysim._printing import bic_in_words, printed, summary_text, wrapped
+from hysim._printing import bic_in_words, folded, printed, summary_text, wrapped
 from hysim.identification._profile import Profile
 from hysim.identification.json_forms import Stored
 from hysim.interop import frame
@@ -83,13 +83,15 @@ class Identification(Stored):
     whiteness : float
         Probability of residuals at least as correlated if they were white (Ljung and Box); nan if unknown.
     success : bool
-        Whether the search converged.
+        Whether the search converged, and the law is safe on smaller cycles or was asked for by ``admissible=False``.
     message : str
         How the search ended, and which parameters the data do not determine.
     rivals : tuple of Candidate
         Other optima whose likelihood ratio is inside the 95 % region of this one, best first.
     regions : mapping
-        Region that the family names (for Bouc-Wen ``"admissible"``) to its best candidate, if the optimum is outside.
+        The best laws with and without restriction, beside the one that is returned: ``"admissible"``, that of the
+        region which the family names so or is safe on smaller cycles, if the best law of all is not; or
+        ``"unrestricted"``, if the admissible one is returned. See `admissible` of `hysim.identify`.
     cv_rmse, cv_residual : float, and array, shape (n,)
         Cross-validated rmse, and measured minus model at each sample by the fit without it [unit of y]; nan if unknown.
     seed : int
@@ -97,6 +99,9 @@ class Identification(Stored):
     warnings : tuple of str
         Sentences on a search that did not converge, a constant output, unknown standard errors, correlated residuals,
         input and output that may be swapped, or a response off the record that leaves the measured range by far.
+    unsafe : str
+        First line of the summary where the law is not safe on smaller cycles within the range of its record; else
+        empty.
     """
 
     json_name = "identification"
@@ -136,6 +141,7 @@ class Identification(Stored):
     cv_residual: FloatArray = field(default_factory=lambda: np.empty(0))
     seed: int = 0
     warnings: tuple[str, ...] = ()
+    unsafe: str = ""
 
     @property
     def family(self) -> str:
@@ -156,12 +162,13 @@ class Identification(Stored):
         return None if self.resolution is None else self.residual / self.resolution
 
     def __str__(self) -> str:
-        state = "" if self.success else ", NOT converged"
+        state = "" if self.success or self.unsafe else ", NOT converged"
         free = [f"{name} {self.estimates[name]:.4g}{_error_in_words(self.stderr[name])}" for name in self.free_names]
         fixed = [f"{name} {value:.4g}" for name, value in self.estimates.items() if name not in self.free_names]
         width = self.loop_width
         return summary_text(
             [
+                *(folded(self.unsafe, first="", indent="  ") if self.unsafe else []),
                 f"Identification of {self.family}: {self._fit_in_words()}, rmse {self.rmse:.4g}, "
                 f"{self.n_parameters} parameters{state}",
                 wrapped(free, most=4),
@@ -179,7 +186,8 @@ class Identification(Stored):
     def summary(self) -> str:
         """Report of several lines."""
         family = self.family
-        lines = [
+        lines = [self.unsafe] if self.unsafe else []
+        lines += [
             f"{family}: {self._fit_in_words()}, rmse {self.rmse:.4g}, FPE {self.fpe:.4g}, "
             f"{bic_in_words(self.bic)}, {self.n_parameters} parameters from {self.residual.size} samples"
         ]
@@ -192,7 +200,9 @@ class Identification(Stored):
             lines.append(f"  loop width {width.value:.4g}  [{width.lower:.4g}, {width.upper:.4g}]")
         if not np.isnan(self.cv_rmse):
             lines.append(f"  cross-validated rmse {self.cv_rmse:.4g}")
-        lines += [f"  best {name}: fit {best.fit_percent:.2f} %" for name, best in self.regions.items()]
+        lines += [
+            f"  best {name}: fit {each.fit_percent:.2f} %{_ASKED.get(name, '')}" for name, each in self.regions.items()
+        ]
         lines.append(f"  {self.message}")
         return "\n".join([*lines, *(["Warnings"] if self.warnings else []), *(f"  {each}" for each in self.warnings)])
 
@@ -235,6 +245,9 @@ class Identification(Stored):
         if not np.isnan(self.whiteness):
             words.append(f"p = {self.whiteness:.2g} if white")
         return ", ".join(words)
+
+
+_ASKED = {"admissible": " (admissible=True)", "unrestricted": " (admissible=False)"}
 
 
 def _error_in_words(stderr: float) -> str:

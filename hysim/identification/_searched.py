@@ -16,7 +16,7 @@ from hysim.identification._problem import Problem
 from hysim.identification._profile import Profile, profiles, threshold
 from hysim.identification._resampling import bootstrap
 from hysim.identification._result import Candidate, Identification, Width
-from hysim.identification._search import PERFECT, Optimum, optima, polish
+from hysim.identification._search import PERFECT, Optimum, polish
 from hysim.identification._uncertainty import Uncertainty, uncertainty
 from hysim.identification.sentences import sentences
 from hysim.records import Record
@@ -62,21 +62,6 @@ class Search:
             if not distinct or (not perfect and loss - distinct[-1].loss > 0.5 * self.problem.y.size * _SAME):
                 distinct.append(LocalOptimum(reached.theta[k], loss, sigma, squares[k].converged))
         return distinct
-
-    def regions(self, best: LocalOptimum) -> dict[str, Candidate]:
-        """Best candidate inside each named region that the optimum is not in."""
-        space, candidates = self.problem.space, {}
-        x = best.theta[: self.problem.n_x]
-        for name, (lower, upper) in space.regions.items():
-            if np.all(x >= lower) and np.all(x <= upper):
-                continue
-            box = replace(space, lower=lower, upper=upper, starts=np.clip(space.starts, lower, upper), regions={})
-            inside = replace(self, problem=replace(self.problem, space=box, ends=None))
-            if self.problem.budget is not None and self.problem.budget.cut:
-                continue
-            if squares := optima(inside.problem, seed=self.seed):
-                candidates[name] = inside.candidate(inside.likely(squares)[0].theta)
-        return candidates
 
     def candidate(self, theta: FloatArray) -> Candidate:
         problem = self.problem

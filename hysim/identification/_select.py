@@ -55,7 +55,7 @@ class Selection:
         criterion = CRITERIA[self.criterion]
         rows = [
             [
-                name if fit.success else f"{name} (partial)",
+                name if fit.success else f"{name} ({'UNSAFE' if fit.unsafe else 'partial'})",
                 str(fit.n_parameters),
                 "-" if math.isnan(fit.fit_percent) else f"{fit.fit_percent:.2f}",
                 f"{fit.rmse:.4g}",

@@ -31,6 +31,7 @@ _MOST_NAMES = 4  # in a sentence
 _SHARE = 0.125  # of the step, by which a derivative is computed again
 _CLOSE = 1e-4  # difference of both, of the derivative, up to which the first one is taken
 _MOST_SHARES = 4  # beyond which the rounding of the output is most of a difference
+_EDGE = "this law is at the edge of the admissible ones"
 _TAKES_PART = 0.05  # share of a parameter in a direction, of the largest share in it, to be named
 
 
@@ -73,8 +74,10 @@ def uncertainty(problem: Problem, theta: FloatArray, curvature: FloatArray) -> U
     width = space.upper - space.lower
     at_side = (x - space.lower < _AT_SIDE * width) | (space.upper - x < _AT_SIDE * width)
     at_bound = np.logical_or(*(linear == bound for bound in problem.linear_box()))
-    ended = zip((*space.coordinates, *space.linear), np.concatenate([at_side, at_bound]), strict=True)
+    is_end = at_side if space.whole is None else at_side & ((x <= space.whole[0]) | (x >= space.whole[1]))
+    ended = zip((*space.coordinates, *space.linear), np.concatenate([is_end, at_bound]), strict=True)
     reasons = _bounds_in_words([name for name, side in ended if side])
+    reasons += [_EDGE] if (at_side & ~is_end).any() else []
     reach = np.linalg.norm(slopes[:, : x.size], axis=0) * width
     has_effect = reach > _SINGULAR * reach.max(initial=0.0)
     known = np.concatenate([at_side & has_effect, np.zeros(linear.size, dtype=bool)])

@@ -59,6 +59,8 @@ class SearchSpace:
         Random points that a search should try beside the starts, where one evaluation is dear; 0 for none.
     drawn : tuple of two arrays, shape (n_x,) each, optional
         Lower and upper side of the part of the box from which these points are drawn; by default all of it.
+    whole : tuple of two arrays, shape (n_x,) each, optional
+        The box of which this one is the part with the admissible laws: only its sides are search bounds.
     encoded : callable, optional
         The user's parameters by name, as far as they differ from the start, to coordinates, shape (n_x,).
     """
@@ -78,6 +80,7 @@ class SearchSpace:
     state: tuple[str, ...] = ()
     screened: int | None = None
     drawn: tuple[FloatArray, FloatArray] | None = None
+    whole: tuple[FloatArray, FloatArray] | None = None
     encoded: Callable[[Mapping[str, float]], FloatArray] | None = None
 
     @classmethod

@@ -237,13 +237,6 @@ def _distinct(values: Sequence[float]) -> str:
 def _bouc_wen(study: Study) -> str:
     plain, asymmetric = study.fits["bouc-wen"], study.fits["bouc-wen-asymmetric"]
     u = study.comparison.record.u
-    admissible = plain.regions.get("admissible")
-    inside = (
-        " The best law with −β ≤ γ ≤ β, which creates no energy whatever the input, fits to "
-        f"{admissible.fit_percent:.2f} %."
-        if admissible
-        else ""
-    )
     rivals = "".join(
         f" Another optimum, {rival.fit_percent:.2f} %, is within the noise: n = {rival.estimates['n']:.3g}, "
         f"β = {rival.estimates['beta']:.3g}, γ = {rival.estimates['gamma']:.3g}, with a loop of "
@@ -256,14 +249,25 @@ def _bouc_wen(study: Study) -> str:
             "bouc-wen:             y = offset + feedthrough u + gain z\n"
             "bouc-wen-asymmetric:  y = offset + c1 u + c2 u^2 + gain z,  n = 1"
         )
-        + paragraph(f"Symmetric: {plain.fit_percent:.2f} % with {plain.n_parameters} parameters.{inside}{rivals}")
+        + paragraph(
+            f"Symmetric: {plain.fit_percent:.2f} % with {plain.n_parameters} parameters.{_admissible(plain)}{rivals}"
+        )
         + _parameters(plain)
         + paragraph(
             f"With a quadratic input: {asymmetric.fit_percent:.2f} % with {asymmetric.n_parameters} parameters. "
             "The measured loop is wider at low voltage than at high; the quadratic term lets the model follow that."
+            f"{_admissible(asymmetric)}"
         )
         + _parameters(asymmetric)
     )
+
+
+def _admissible(fit: Identification) -> str:
+    """Whether a law is safe on smaller cycles, and the fit of the best admissible one where that is another."""
+    other = fit.regions.get("admissible")
+    unsafe = " It follows this loop, and runs away on smaller ones." if fit.unsafe else ""
+    inside = " The best law with −β ≤ γ ≤ β, which creates no energy whatever the input, fits to "
+    return unsafe + ("" if other is None else f"{inside}{other.fit_percent:.2f} %.")
 
 
 def _discovered(study: Study, drawn: Drawn) -> str:

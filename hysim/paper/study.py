@@ -44,7 +44,8 @@ class Study:
 
 def asymmetric_law(quick: bool) -> Identification:
     """The Bouc-Wen law with n = 1 and a quadratic input on Table 1."""
-    return identify(PolynomialBoucWen, table1(), fixed={"n": 1.0}, cross_validate=None if quick else "loo")
+    folds = None if quick else "loo"
+    return identify(PolynomialBoucWen, table1(), fixed={"n": 1.0}, cross_validate=folds, admissible=False)
 
 
 def study(
@@ -73,7 +74,7 @@ def study(
     subjects: dict[str, Callable[[], Any]] = {
         "eq1-printed": printed_model,
         "tf-identified": lambda: identify(structure, record, cross_validate=folds),
-        "bouc-wen": lambda: identify(BoucWen, record, cross_validate=folds),
+        "bouc-wen": lambda: identify(BoucWen, record, cross_validate=folds, admissible=False),
         "bouc-wen-asymmetric": lambda: asymmetric(quick),
         "sindy": lambda: discover(record, library="duhem"),
         "line": lambda: identify(Line, record, cross_validate=folds),
@@ -100,7 +101,7 @@ def cross_validated(row: ComparisonRow) -> float:
     return of_discovered().left_out_rmse if row.name == "sindy" else row.cv_rmse
 
 
-def model_measures(study: Study) -> dict[str, dict[str, float | int | None]]:
+def model_measures(study: Study) -> dict[str, dict[str, Any]]:
     """The measures of each model by its name, with units in their keys; None where one does not apply.
 
     The cross-validated error of the discovered law is that of `hysim.paper.nested`.
@@ -119,8 +120,15 @@ def model_measures(study: Study) -> dict[str, dict[str, float | int | None]]:
             "width_rmse_um": row.width_rmse,
         }
         | ({} if row.name == "eq1-printed" else {"fpe": _or_none(row.fpe)})
+        | (_safety(study.fits[row.name]) if row.name in study.fits else {})
         for row in study.comparison.rows
     }
+
+
+def _safety(fit: Identification) -> dict[str, Any]:
+    """Whether the law runs away on smaller cycles, and the fit of the best admissible one where that is another."""
+    other = fit.regions.get("admissible")
+    return {"unsafe": bool(fit.unsafe)} | ({} if other is None else {"admissible_fit_percent": other.fit_percent})
 
 
 def _or_none(value: float) -> float | None:

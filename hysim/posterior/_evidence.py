@@ -313,7 +313,7 @@ def ordered(rows: Sequence[EvidenceRow]) -> tuple[EvidenceRow, ...]:
 def _fitted(model: Any, records: Sequence[Record], noise: str, initial: str | Sequence[str] | None) -> Identification:
     if isinstance(model, Identification):
         return model
-    return identify(model, records if len(records) > 1 else records[0], noise=noise, initial=initial)
+    return identify(model, records if len(records) > 1 else records[0], noise=noise, initial=initial, admissible=False)
 
 
 def _quoted(name: str) -> str:

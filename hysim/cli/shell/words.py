@@ -41,6 +41,7 @@ _PHRASES = (
     ("hs.discover_oscillator(record)", "hysim discover --route oscillator"),
     ("hs.discover_oscillator", "hysim discover --route oscillator"),
     ("hs.PrandtlIshlinskii or hs.Preisach", "prandtl-ishlinskii or preisach"),
+    ("Take hs.PrandtlIshlinskii", "Take prandtl-ishlinskii"),
     ("hysim.to_c and hysim.to_fmu", "hysim c and hysim fmu"),
     (", names as in Structure.scalars", ""),
 )
@@ -48,6 +49,7 @@ _BOUNDS = re.compile(r"bounds of '([^']+)' must be \(lower, upper\) with lower <
 _RESAMPLED = re.compile(r"hs\.load\(\.\.\.\)\.resample\(([^)]*)\)")
 _CALL = re.compile(r"\b[A-Za-z_]\w*\((?:[^()]|\([^()]*\))*\)")
 _VALUE = r"""(?:("[^"]*"|'[^']*'|\[[^\]]*\]|\{[^}]*\}|False|True|-?\d(?:[\w.+-]*\w)?)|(?!\w))"""
+_SAID = {"True": "yes", "False": "no"}
 _ITEM = re.compile(r"""['"]([^'"]+)['"]""")
 _PAIR = re.compile(r"""['"]?([\w.\[\]*]+)['"]?\s*:\s*(\([^)]*\)|[^,}]+)""")
 _BEGIN = r"(?P<before>^(?:\S+: )?)(?P<name>{})(?= (?:must|is|are|has|takes|names|needs|cannot)\b)"
@@ -100,6 +102,7 @@ def _option(argument: re.Match[str], flag: str) -> str:
     if value.startswith("{"):
         pairs = [f"{key}={_bounds(content)}" for key, content in _PAIR.findall(value)]
         return " ".join(f"{flag} {_typed(pair)}" for pair in pairs)
+    value = _SAID.get(value, value)
     return f"{flag} {_typed(prefix + value.strip(chr(34) + chr(39)))}"
 
 

@@ -91,7 +91,7 @@ def estimate_channel(
     space = model.law.search_space(record)
     state = tuple(name for name in space.state if name in space.coordinates)
     subject = _UnknownChannel(model, channel, others, (float(low), float(high)), space.columns, state)
-    fit = identify(subject, record, initial=initial, seed=seed)
+    fit = identify(subject, record, initial=initial, admissible=False, seed=seed)
     doubt = model.extrapolation({channel: fit.estimates[channel]})
     return replace(fit, warnings=(*fit.warnings, doubt)) if doubt else fit
 
