@@ -342,8 +342,9 @@ class Problem:
         solutions = np.asarray(least_squares(rows, goals) / norms)
         outside = np.flatnonzero(((solutions < lower) | (solutions > upper)).any(axis=1))
         for k in outside:
-            box = lower * norms[k], upper * norms[k]
-            solutions[k] = lsq_linear(rows[k], goals[k], bounds=box, method="bvls").x / norms[k]
+            size = float(np.linalg.norm(goals[k])) or 1.0  # the tolerance of the solver is an absolute one
+            unit = norms[k] / size
+            solutions[k] = lsq_linear(rows[k], goals[k] / size, bounds=(lower * unit, upper * unit), method="bvls").x / unit
         return solutions
 
     def linear_box(self) -> tuple[FloatArray, FloatArray]:

@@ -37,7 +37,7 @@ _ROUNDING = 1e-14  # of a number by way of its logarithm
 
 
 class Coordinate(NamedTuple):
-    """A parameter in its box: searched as a multiple of `scale`, or as its logarithm."""
+    """A parameter in its box: searched as a multiple of `scale`, or as the logarithm of one."""
 
     name: str
     lower: float
@@ -47,14 +47,14 @@ class Coordinate(NamedTuple):
 
     def encode(self, values: Any) -> Any:
         """Coordinates of values, those outside the box at its side."""
-        inside = np.clip(values, self.lower, self.upper)
-        return np.log(inside) if self.log else inside / self.scale
+        inside = np.clip(values, self.lower, self.upper) / self.scale
+        return np.log(inside) if self.log else inside
 
     def decode(self, x: FloatArray) -> FloatArray:
         """Values of coordinates; a value at a bound is exactly the bound, without the rounding of its logarithm."""
         if not self.log:
             return x * self.scale
-        values = np.exp(x)
+        values = np.exp(x) * self.scale
         for side in (self.lower, self.upper):
             values = np.where(np.abs(values - side) <= _ROUNDING * side, side, values)
         return np.asarray(values)
@@ -81,12 +81,14 @@ def declared_space(
     screened: int | None = None,
     *,
     units: Mapping[str, float] | None = None,
+    defaults: Mapping[str, Any] | None = None,
 ) -> SearchSpace:
     """The search box on one record.
 
     `starts` are points in the units of the parameters, from which the search begins beside `scalars`, the law's own
     values; `initial` are the fields of its initial memory, held at zero where the record begins at rest. A parameter
-    that is not declared is held, unless it is free and bounded. `units` are the record's, by default its `spans`.
+    that is not declared is held, unless it is free and bounded. `units` are the record's, by default its `spans`. A
+    number that is the family's by `defaults` is one in these units: the search does not depend on the record's scale.
 
     Raises ValueError if the input is constant, `freedom.initial` is unknown, or a name or a bound does not fit.
     """
@@ -99,8 +101,8 @@ def declared_space(
         raise ValueError(
             f"{unbounded[0]!r} is free, but has no bounds: give bounds={{{unbounded[0]!r}: (lower, upper)}}"
         )
-    own = freedom.held(scalars, at_rest=resting if freedom.starts_at_rest() else ())
-    held = {name: scalars[name] for name, each in of.items() if each is None and name not in bounded} | own
+    chosen = freedom.held(scalars, at_rest=resting if freedom.starts_at_rest() else ())
+    held = {name: scalars[name] for name, each in of.items() if each is None and name not in bounded} | chosen
     coordinates, values = [], {}
     for name, each in of.items():
         if each is None:
@@ -109,10 +111,11 @@ def declared_space(
             unit, origin = unit_of(each.unit, units), first if each.from_first else 0.0
             coordinates.append(Coordinate(name, origin + each.lower * unit, origin + each.upper * unit, unit, each.log))
             values[name] = origin, unit
-    points = [{name: values[name][0] + start[name] * values[name][1] for name in start} for start in starts]
+    own = {name: value for name, value in (defaults or {}).items() if name in values and scalars[name] == value}
+    points = [{name: values[name][0] + start[name] * values[name][1] for name in start} for start in (own, *starts)]
     columns = tuple(name for name, each in of.items() if each is not None and each.affine)
     limits = freedom.limits(scalars, held)
-    return space_of(coordinates, columns, scalars, held, limits, [{}, *points], state=resting, screened=screened)
+    return space_of(coordinates, columns, scalars, held, limits, points, state=resting, screened=screened)
 
 
 def free_coordinate(name: str, lower: float, upper: float) -> Coordinate:

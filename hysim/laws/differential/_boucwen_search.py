@@ -36,6 +36,8 @@ _SCALED = {  # parameters with a unit of their own, and their box in it
 }
 _MEMORY = ("A", "beta", "gamma", "n", *_FURTHER, *_SCALED)
 _PAIR = ("loading", "unloading")
+_LEAST_UNIT, _LARGEST_UNIT = 1e-290, 1e290  # times 1e17, the largest coefficient, still a number
+_BY_DEFAULT = {"A": 1.0, "beta": 0.5, "gamma": 0.5, "n": 1.0, "z0": 0.0}
 KNEE = float(np.arcsinh(40.0))
 _BOX = {
     "A": (-10.0, 10.0),
@@ -59,6 +61,9 @@ class Chart(Protocol):
     @property
     def values(self) -> Mapping[str, float]:
         """Parameters by name, as the search begins."""
+
+    def in_own_units(self) -> "Chart":
+        """The chart for an input of the span 1 and an output of the slope 1."""
 
     def encode(self, parameters: Mapping[str, float]) -> FloatArray:
         """Coordinates (n_x,) of the parameters."""
@@ -115,8 +120,12 @@ def space_of_chart(
     held: Mapping[str, float],
     bounds: Mapping[str, tuple[float, float]],
 ) -> SearchSpace:
-    """The search in the coordinates of a chart, between both sides of its `box`, from the chart's own values."""
+    """The search in the coordinates of a chart, between both sides of its `box`, from the chart's own values.
+
+    Those by default are taken in the units of the record, so that the search does not depend on its scale.
+    """
     lower, upper = box
+    begun = chart.in_own_units() if _BY_DEFAULT.items() <= defaults.items() else chart
 
     def encoded(parameters: Mapping[str, float]) -> FloatArray:
         return np.asarray(np.clip(chart.encode({**chart.values, **parameters}), lower, upper))
@@ -125,7 +134,7 @@ def space_of_chart(
         coordinates=chart.coordinates,
         lower=lower,
         upper=upper,
-        starts=encoded({})[np.newaxis],
+        starts=np.clip(begun.encode(chart.values), lower, upper)[np.newaxis],
         names=tuple(name for name in defaults if name not in held),
         columns=columns,
         linear=tuple(name for name in columns if name not in held),
@@ -158,6 +167,9 @@ class _Chart:
     span: float
     reach: float  # of |u|
     slope: float  # what A is measured in
+
+    def in_own_units(self) -> "_Chart":
+        return replace(self, span=1.0, reach=self.reach / self.span, slope=1.0)
 
     def decode(self, x: FloatArray) -> dict[str, FloatArray]:
         """Parameters of the memory, each (n_sets,), from coordinates (n_sets, n_x)."""
@@ -203,9 +215,11 @@ class _Chart:
 
 
 def shape_unit(A: FloatArray, n: FloatArray, span: float) -> FloatArray:
-    """The unit of beta and gamma, |A| / Z^n."""
+    """The unit of beta and gamma, |A| / Z^n, where that is a number which the coefficients can be measured in."""
     slope = _steepness(A)
-    return np.asarray(slope / (slope * span) ** n)
+    with np.errstate(over="ignore", under="ignore", divide="ignore"):
+        unit = slope / (slope * span) ** n
+    return np.clip(unit, _LEAST_UNIT, _LARGEST_UNIT)
 
 
 def _steepness(A: FloatArray) -> FloatArray:

@@ -122,6 +122,9 @@ class _Chart:
             return _BOX[name]
         return (float(np.log(limits[0])), float(np.log(limits[1]))) if name == "n" else limits
 
+    def in_own_units(self) -> "_Chart":
+        return replace(self, span=1.0, path=self.path / self.span, slope=1.0)
+
     def decode(self, x: FloatArray) -> dict[str, FloatArray]:
         """Parameters of the memory, each (n_sets,), from coordinates (n_sets, n_x)."""
         sets = np.atleast_2d(x)

@@ -23,6 +23,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from hysim._frozen import FloatArray
+from hysim.laws.magnetic._jiles_atherton_conversions import MU0
 from hysim.models.parameters import spans
 from hysim.models.search_space import Freedom, SearchSpace
 from hysim.records import Record
@@ -49,6 +50,8 @@ _LOGS = ("Ms", "a", "k")
 _CALLED = {"a": "width", "alpha": "stability"}
 _HELD = ("anisotropy", "reversible_feedback")
 _COLUMNS = ("gain", "feedthrough")
+_SI = ("A/m", "T")
+_IRON = {"Ms": 1.6e6, "a": 1100.0, "alpha": 1.6e-3, "k": 400.0}  # the law by default
 _LEAST = 1e-12  # of 1 - alpha Ms m0 / a
 _TURN = 12.0  # twice the stability at which alpha Ms s / a is 1
 _SMALLEST = 1e-3  # of the width: a for a coupling that is given, and nearly as large
@@ -61,10 +64,14 @@ def search_space(
     """The coordinates, their box and the way back to the user's parameters for one record.
 
     Held by default are gain and feedthrough, of which the first could not be told from Ms, and what makes the law
-    another one: an anisotropy that is zero at the start, and reversible_feedback.
+    another one: an anisotropy that is zero at the start, and reversible_feedback. The feedthrough of a law by default,
+    mu0, is that of a record in A/m and T; it is free in a record whose units are others or not known.
     """
+    is_of_vacuum = scalars["feedthrough"] == scalars["gain"] == MU0
+    has_other_units = is_of_vacuum and (record.units.get("u"), record.units.get("y")) != _SI
     further = [name for name in _HELD if name not in freedom.bounds and not (name == "anisotropy" and scalars[name])]
-    alone = tuple((name,) for name in (*_COLUMNS, *further) if name not in freedom.bounds)
+    known = _COLUMNS[:1] if has_other_units else _COLUMNS
+    alone = tuple((name,) for name in (*known, *further) if name not in freedom.bounds)
     at_rest = ("z0",) if freedom.starts_at_rest() else ()
     held = freedom.held(scalars, redundant=alone, at_rest=at_rest)
     bounds = freedom.limits(scalars, held)
@@ -92,7 +99,7 @@ def search_space(
         coordinates=tuple(name if name in limits else _CALLED.get(name, name) for name in chart.names),
         lower=lower,
         upper=upper,
-        starts=encoded({})[np.newaxis],
+        starts=(0.5 * (low + high) if _IRON.items() <= scalars.items() else encoded({}))[np.newaxis],
         names=tuple(name for name in scalars if name not in held),
         columns=columns,
         linear=tuple(name for name in columns if name not in held),

@@ -102,7 +102,9 @@ class DeadZoneStructure(Identifiable, Composable):
 
         columns = self.plays.regressors(own.parameters(np.empty((1, 0))), record)[0, :, :-1]
         limits = np.array([own.bounds.get(name, (-np.inf, np.inf)) for name in own.columns])
-        weights = lsq_linear(columns, record.y, bounds=tuple(limits.T), method="bvls").x[:-1]
+        size, unit = np.abs(columns).max(axis=0), float(np.abs(record.y).max()) or 1.0
+        box = tuple(limits.T * size / unit)  # the tolerance of the solver is an absolute one
+        weights = lsq_linear(columns / size, record.y / unit, bounds=box, method="bvls").x[:-1] * unit / size[:-1]
         return weights, columns[:, :-1] @ weights
 
     def _zones(self, x: FloatArray) -> FloatArray:
