@@ -344,7 +344,9 @@ class Problem:
         for k in outside:
             size = float(np.linalg.norm(goals[k])) or 1.0  # the tolerance of the solver is an absolute one
             unit = norms[k] / size
-            solutions[k] = lsq_linear(rows[k], goals[k] / size, bounds=(lower * unit, upper * unit), method="bvls").x / unit
+            solutions[k] = (
+                lsq_linear(rows[k], goals[k] / size, bounds=(lower * unit, upper * unit), method="bvls").x / unit
+            )
         return solutions
 
     def linear_box(self) -> tuple[FloatArray, FloatArray]:

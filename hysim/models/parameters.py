@@ -12,6 +12,7 @@ import numpy as np
 
 from hysim._frozen import FloatArray
 from hysim.models.search_space import Freedom, SearchSpace
+from hysim.models.tables import scalars_of
 from hysim.records import Record
 
 
@@ -111,7 +112,8 @@ def declared_space(
             unit, origin = unit_of(each.unit, units), first if each.from_first else 0.0
             coordinates.append(Coordinate(name, origin + each.lower * unit, origin + each.upper * unit, unit, each.log))
             values[name] = origin, unit
-    own = {name: value for name, value in (defaults or {}).items() if name in values and scalars[name] == value}
+    usual = scalars_of(defaults or {}).items()
+    own = {name: value for name, value in usual if name in values and scalars[name] == value}
     points = [{name: values[name][0] + start[name] * values[name][1] for name in start} for start in (own, *starts)]
     columns = tuple(name for name, each in of.items() if each is not None and each.affine)
     limits = freedom.limits(scalars, held)

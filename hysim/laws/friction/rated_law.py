@@ -185,9 +185,10 @@ class RatedLaw(Identifiable, Composable, ABC):
 
     def search_space(self, record: Record, freedom: Freedom = ALL_FREE) -> SearchSpace:
         """The box that `hysim.identify` searches; ValueError also if the record has no even time."""
+        units, defaults = rate_spans(record), self.at_sample_time(record.sample_time).defaults()
         return declared_space(
             self.searched, self.starts, self.scalars, self.initial, record, freedom, self.screened,
-            units=rate_spans(record), defaults=self.defaults(),
+            units=units, defaults=defaults,
         )  # fmt: skip
 
     def regressors(self, parameters: Parameters, record: Record) -> FloatArray:

@@ -88,7 +88,7 @@ class JilesAtherton(Law):
     ``dM/dHe = c M_an' + (M_an - M) / (delta k)`` is the same law; see `from_jamodel`, `from_total` and `from_circuit`
     for others. Where alpha is so large that H would fall while He rises, the magnetisation jumps: `response` raises
     SimulationError there. A law with ``alpha Ms < 3 a`` (and no anisotropy) does not jump from a state that an input
-    has led to.
+    has led to. `identify` holds the feedthrough mu0 in records whose units are A/m and T, and frees it in others.
 
     Examples
     --------
