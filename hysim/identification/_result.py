@@ -81,9 +81,10 @@ class Identification(Stored):
     whiteness : float
         Probability of residuals at least as correlated if they were white (Ljung and Box); nan if unknown.
     success : bool
-        Whether the search converged.
+        Whether the search converged, to an optimum that is not at a side of the search box. It may be at a bound of
+        physics, such as a damage that does not heal, or at one that was given.
     message : str
-        How the search ended, and which parameters the data do not determine.
+        How the search ended, which parameters are at a bound, and which the data do not determine.
     rivals : tuple of Candidate
         Other optima whose likelihood ratio is inside the 95 % region of this one, best first.
     regions : mapping
@@ -171,9 +172,10 @@ class Identification(Stored):
     def summary(self) -> str:
         """Report of several lines."""
         family = type(self.model).__name__
+        ended = "" if self.success else f"; NOT converged: {self.message.partition('; ')[0]}"
         lines = [
             f"{family}: {self._fit_in_words()}, rmse {self.rmse:.4g}, FPE {self.fpe:.4g}, "
-            f"{bic_in_words(self.bic)}, {self.n_parameters} parameters from {self.residual.size} samples"
+            f"{bic_in_words(self.bic)}, {self.n_parameters} parameters from {self.residual.size} samples{ended}"
         ]
         lines += [self._line(name) for name in self.free_names]
         fixed = [f"{name} = {value:g}" for name, value in self.estimates.items() if name not in self.free_names]

@@ -23,6 +23,8 @@ class Parameter:
     `lower` and `upper` are the box in units of `unit`: a quotient of the spans of input and output such as ``"y/u"``;
     ``"h"`` is half the span of the input. The box of a parameter with `from_first` stands about the first input, and
     one with `log` is searched on a log scale. The output is affine in an `affine` parameter, which needs no box.
+    `physical` says whether the lower and the upper side of the box is a limit of physics or of the law: the search is
+    not stopped there, as it is at other sides.
     """
 
     name: str
@@ -32,6 +34,7 @@ class Parameter:
     log: bool = False
     from_first: bool = False
     affine: bool = False
+    physical: tuple[bool, bool] = (False, False)
 
 
 _ROUNDING = 1e-14  # of a number by way of its logarithm
@@ -45,6 +48,7 @@ class Coordinate(NamedTuple):
     upper: float
     scale: float = 1.0
     log: bool = False
+    physical: tuple[bool, bool] = (False, False)
 
     def encode(self, values: Any) -> Any:
         """Coordinates of values, those outside the box at its side."""
@@ -110,7 +114,8 @@ def declared_space(
             coordinates += [free_coordinate(name, *freedom.bounds[name])] if name in bounded else []
         elif not each.affine:
             unit, origin = unit_of(each.unit, units), first if each.from_first else 0.0
-            coordinates.append(Coordinate(name, origin + each.lower * unit, origin + each.upper * unit, unit, each.log))
+            box = origin + each.lower * unit, origin + each.upper * unit
+            coordinates.append(Coordinate(name, *box, unit, each.log, each.physical))
             values[name] = origin, unit
     usual = scalars_of(defaults or {}).items()
     own = {name: value for name, value in usual if name in values and scalars[name] == value}
@@ -161,6 +166,7 @@ def space_of(
         linear=tuple(name for name in columns if name not in held),
         held=held,
         parameters=parameters,
+        physical={each.name: each.physical for each in searched if each.name not in limits},
         **{"bounds": {name: pair for name, pair in limits.items() if name in columns}, **others},
     )
 

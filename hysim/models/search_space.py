@@ -6,10 +6,11 @@ affine are not searched: for given others, the best ones are the solution of a l
 """
 
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 
 from hysim._frozen import FloatArray, frozen
 from hysim._names import among, meant
@@ -17,6 +18,9 @@ from hysim._names import among, meant
 Parameters = Mapping[str, Any]
 """User's names to floats or to arrays of shape (n_sets,)."""
 
+Flags = npt.NDArray[np.bool_]
+
+_AT_SIDE = 1e-6  # in units of the box
 
 STATES = ("free", "rest", "still", "periodic")
 """Values of `initial` of `hysim.identify`."""
@@ -59,6 +63,11 @@ class SearchSpace:
         Random points that a search should try beside the starts, where one evaluation is dear; 0 for none.
     drawn : tuple of two arrays, shape (n_x,) each, optional
         Lower and upper side of the part of the box from which these points are drawn; by default all of it.
+    physical : mapping
+        Coordinate to whether its lower and its upper side is a limit of physics or of the law itself: an optimum there
+        is one. At other sides that the user has not given the search has stopped, and the box is widened.
+    given : mapping
+        Searched or linear parameter to whether its lower and its upper bound is the user's.
     encoded : callable, optional
         The user's parameters by name, as far as they differ from the start, to coordinates, shape (n_x,).
     """
@@ -78,7 +87,35 @@ class SearchSpace:
     state: tuple[str, ...] = ()
     screened: int | None = None
     drawn: tuple[FloatArray, FloatArray] | None = None
+    physical: Mapping[str, tuple[bool, bool]] = field(default_factory=dict)
+    given: Mapping[str, tuple[bool, bool]] = field(default_factory=dict)
     encoded: Callable[[Mapping[str, float]], FloatArray] | None = None
+
+    def sides(self, kind: Mapping[str, tuple[bool, bool]]) -> tuple[Flags, Flags]:
+        """Which lower and upper sides of the box (n_x,) are of a kind, such as `physical` or `given`."""
+        lower, upper = np.array([kind.get(name, (False, False)) for name in self.coordinates]).reshape(-1, 2).T
+        return lower.astype(bool), upper.astype(bool)
+
+    def open_sides(self, x: FloatArray) -> tuple[Flags, Flags]:
+        """The lower and the upper sides at which `x` (n_x,) stands, and which are neither physical nor the user's."""
+        closed = zip(self.at_sides(x), self.sides(self.physical), self.sides(self.given), strict=True)
+        low, high = (at & ~physical & ~given for at, physical, given in closed)
+        return low, high
+
+    def at_sides(self, x: FloatArray) -> tuple[Flags, Flags]:
+        """The lower and the upper sides at which `x` (n_x,) stands."""
+        width = self.upper - self.lower
+        return x - self.lower < _AT_SIDE * width, self.upper - x < _AT_SIDE * width
+
+    def widened(self, low: Flags, high: Flags) -> "SearchSpace":
+        """The space whose box reaches a quarter of its width beyond these sides."""
+        width = self.upper - self.lower
+        lower, upper = self.lower - 0.25 * width * low, self.upper + 0.25 * width * high
+        regions = {
+            name: (np.where(below == self.lower, lower, below), np.where(above == self.upper, upper, above))
+            for name, (below, above) in self.regions.items()
+        }
+        return replace(self, lower=lower, upper=upper, regions=regions)
 
     @classmethod
     def without_coordinates(cls, names: tuple[str, ...]) -> "SearchSpace":

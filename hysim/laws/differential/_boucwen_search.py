@@ -39,6 +39,7 @@ _PAIR = ("loading", "unloading")
 _LEAST_UNIT, _LARGEST_UNIT = 1e-290, 1e290  # times 1e17, the largest coefficient, still a number
 _BY_DEFAULT = {"A": 1.0, "beta": 0.5, "gamma": 0.5, "n": 1.0, "z0": 0.0}
 KNEE = float(np.arcsinh(40.0))
+PHYSICAL = {"n": (False, True)}  # a larger exponent is a corner as sharp as that of two straight lines
 _BOX = {
     "A": (-10.0, 10.0),
     "loading": (-KNEE, KNEE),
@@ -143,6 +144,7 @@ def space_of_chart(
         redundant=REDUNDANT,
         bounds={name: pair for name, pair in bounds.items() if name in columns},
         state=("z0",),
+        physical={name: PHYSICAL[name] for name in chart.coordinates if name in PHYSICAL and name not in bounds},
         encoded=encoded,
     )
 

@@ -46,6 +46,10 @@ _DRAWN = {
     "c": (0.0, 0.8),
     "anisotropy": (-10.0, 10.0),
 }
+_PHYSICAL = {
+    "Ms": (True, False),
+    **dict.fromkeys(("c", "reversible_feedback", "z0"), (True, True)),
+}
 _LOGS = ("Ms", "a", "k")
 _CALLED = {"a": "width", "alpha": "stability"}
 _HELD = ("anisotropy", "reversible_feedback")
@@ -107,6 +111,7 @@ def search_space(
         parameters=chart.decode,
         bounds={name: pair for name, pair in bounds.items() if name in columns},
         state=("z0",),
+        physical={name: _PHYSICAL[name] for name in chart.names if name in _PHYSICAL and name not in limits},
         screened=_SCREENED,
         drawn=(low, high),
         encoded=encoded,

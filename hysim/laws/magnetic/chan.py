@@ -16,7 +16,7 @@ from hysim.records import Record
 
 _BEHIND_A_GAP = {
     "saturation": Parameter("saturation", 1e-2, 1e2, unit="y", log=True),
-    "feedthrough": Parameter("feedthrough", 0.0, 10.0, unit="y/u"),
+    "feedthrough": Parameter("feedthrough", 0.0, 10.0, unit="y/u", physical=(True, False)),
 }
 """Parameters in which the output is affine without a gap alone."""
 _SAME = 1e-9  # relative difference of numbers that are the same

@@ -59,7 +59,10 @@ class DeadZoneStructure(Identifiable, Composable):
         slope = float(np.ptp(record.y)) / float(np.ptp(record.u)) or 1.0
         largest = max(_LARGEST * abs(slope), 2.0 * float(np.abs(start).max()))  # a steep start is inside
         sides = {name: np.clip(own.bounds.get(name, (-np.inf, np.inf)), -largest, largest) for name in weights}
-        box = [Coordinate(name, float(pair[0]), float(pair[1]), slope) for name, pair in sides.items()]
+        box = [
+            Coordinate(name, float(low), float(high), slope, physical=(low == 0.0, high == 0.0))
+            for name, (low, high) in sides.items()
+        ]
         held = dict(own.held) | {f"dead_zones[{j}]": d for j, d in enumerate(zones.tolist())} | held
         return space_of(box, columns, defaults, held, limits, starts, state=own.state, screened=0)
 

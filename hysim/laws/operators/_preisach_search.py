@@ -65,7 +65,7 @@ class PreisachStructure(Identifiable, Composable):
         chosen = freedom.held(defaults)
         held = {**places, **resting, **{name: 0.0 for name in untold if name not in freedom.free}, **chosen}
         limits = freedom.limits(defaults, held)
-        turn = Coordinate(TURN, *limits.get(TURN, (lowest, highest)), scale)
+        turn = Coordinate(TURN, *limits.get(TURN, (lowest, highest)), scale, physical=(True, True))
         points = [
             {TURN: value} for value in np.linspace(turn.lower, turn.upper, 1 if TURN in held else _STARTS).tolist()
         ]

@@ -101,7 +101,7 @@ class ParametricPrandtlIshlinskii(Law):
 
     step = staticmethod(kernels.bent_step)
     searched = (
-        Parameter("exponent", -0.95, 4.0),
+        Parameter("exponent", -0.95, 4.0, physical=(True, False)),
         Parameter("decay", 3e-3, 1e2, unit="h", log=True),
         *(Parameter(name, affine=True) for name in ("weight", "weight_slope", "offset", "input_coefficients")),
         Parameter("z0", -2.0, 2.0, unit="h", from_first=True),
