@@ -225,7 +225,7 @@ def _freedom(fixed: Mapping[str, float], free: Sequence[str], bounds: Mapping[st
     for name, pair in bounds.items():
         if np.shape(pair) != (2,):
             raise ValueError(f"bounds of {name!r} must be (lower, upper), got {pair!r}")
-    return Freedom(fixed, (free,) if isinstance(free, str) else tuple(free), bounds)
+    return Freedom(fixed, (free,) if isinstance(free, str) else tuple(free), bounds, starts_anew=True)
 
 
 def _family(model_or_class: Any, depends: Mapping[str, tuple[str, int]] | None) -> Identifiable:

@@ -64,6 +64,12 @@ class Coordinate(NamedTuple):
             values = np.where(np.abs(values - side) <= _ROUNDING * side, side, values)
         return np.asarray(values)
 
+    def holding(self, value: float) -> "Coordinate":
+        """The coordinate in a box that holds a value, where that is one of a law."""
+        if self.log and not value > 0.0:
+            return self
+        return self._replace(lower=min(self.lower, value), upper=max(self.upper, value))
+
     def limited(self, limits: Mapping[str, tuple[float, float]]) -> "Coordinate":
         """The coordinate in the user's bounds.
 
@@ -117,11 +123,13 @@ def declared_space(
             box = origin + each.lower * unit, origin + each.upper * unit
             coordinates.append(Coordinate(name, *box, unit, each.log, each.physical))
             values[name] = origin, unit
-    usual = scalars_of(defaults or {}).items()
+    usual = scalars_of(defaults or {}).items() if freedom.starts_anew else ()
     own = {name: value for name, value in usual if name in values and scalars[name] == value}
     points = [{name: values[name][0] + start[name] * values[name][1] for name in start} for start in (own, *starts)]
     columns = tuple(name for name, each in of.items() if each is not None and each.affine)
     limits = freedom.limits(scalars, held)
+    if not freedom.starts_anew:
+        coordinates = [each.holding(scalars[each.name]) for each in coordinates]
     return space_of(coordinates, columns, scalars, held, limits, points, state=resting, screened=screened)
 
 

@@ -136,12 +136,17 @@ class SearchSpace:
 
 @dataclass(frozen=True)
 class Freedom:
-    """The user's wishes about the parameters; see `hysim.identify` for the meaning."""
+    """The user's wishes about the parameters; see `hysim.identify` for the meaning.
+
+    A search that `starts_anew` takes numbers that a family has by default in units of the record, so that it does not
+    depend on the record's scale. Else the first start is the law itself, and the box holds it.
+    """
 
     fixed: Mapping[str, float] = field(default_factory=dict)
     free: tuple[str, ...] = ()
     bounds: Mapping[str, tuple[float, float]] = field(default_factory=dict)
     initial: str | None = None
+    starts_anew: bool = False
 
     def starts_at_rest(self, default: str = "free") -> bool:
         """Whether the initial state is not free, where the user says nothing by the family's default."""

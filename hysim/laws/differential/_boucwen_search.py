@@ -106,7 +106,7 @@ def search_space(
 
     quadrant = np.array([max(low, 0.0) if name in _PAIR else low for name, (low, _) in box.items()])
     return replace(
-        space_of_chart(chart, (lower, upper), defaults, columns, held, bounds),
+        space_of_chart(chart, (lower, upper), defaults, columns, held, bounds, anew=freedom.starts_anew),
         parameters=decoded,
         regions={"admissible": (quadrant, upper)} if set(_PAIR) <= set(box) and not extended else {},
         screened=screened,
@@ -120,13 +120,19 @@ def space_of_chart(
     columns: tuple[str, ...],
     held: Mapping[str, float],
     bounds: Mapping[str, tuple[float, float]],
+    *,
+    anew: bool,
 ) -> SearchSpace:
     """The search in the coordinates of a chart, between both sides of its `box`, from the chart's own values.
 
-    Those by default are taken in the units of the record, so that the search does not depend on its scale.
+    `anew` is `Freedom.starts_anew`.
     """
     lower, upper = box
-    begun = chart.in_own_units() if _BY_DEFAULT.items() <= defaults.items() else chart
+    begun = chart.in_own_units() if anew and _BY_DEFAULT.items() <= defaults.items() else chart
+    if not anew:
+        own = chart.encode(chart.values)
+        free = np.array([name not in bounds for name in chart.coordinates], dtype=bool)
+        lower, upper = np.where(free, np.minimum(lower, own), lower), np.where(free, np.maximum(upper, own), upper)
 
     def encoded(parameters: Mapping[str, float]) -> FloatArray:
         return np.asarray(np.clip(chart.encode({**chart.values, **parameters}), lower, upper))

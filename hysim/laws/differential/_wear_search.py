@@ -108,7 +108,7 @@ def search_space(
     physical = {name: _PHYSICAL[name] for name in chart.coordinates if name in _PHYSICAL and name not in limits}
     physical |= {"loading": (True, False)} if pinches and "loading" in chart.coordinates else {}
     return replace(
-        plain.space_of_chart(chart, (lower, upper), defaults, columns, held, bounds),
+        plain.space_of_chart(chart, (lower, upper), defaults, columns, held, bounds, anew=freedom.starts_anew),
         physical=physical,
         drawn=(np.array([low for low, _ in drawn]), np.array([high for _, high in drawn])),
     )

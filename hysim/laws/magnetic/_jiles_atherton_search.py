@@ -93,6 +93,11 @@ def search_space(
         magnetisation=0.5 * unit["y"] / (abs(values["gain"]) or 1.0),
     )
     lower, upper = np.array([chart.side(name) for name in chart.names]).reshape(-1, 2).T
+    begins_anew = freedom.starts_anew and _IRON.items() <= scalars.items()
+    if not freedom.starts_anew:
+        own = chart.encode(values)
+        free = np.array([name not in limits for name in chart.names], dtype=bool)
+        lower, upper = np.where(free, np.minimum(lower, own), lower), np.where(free, np.maximum(upper, own), upper)
     drawn = np.array([chart.side(name) if name in limits else _DRAWN.get(name, _BOX[name]) for name in chart.names])
     low, high = np.clip(drawn.reshape(-1, 2).T, lower, upper)
 
@@ -103,7 +108,7 @@ def search_space(
         coordinates=tuple(name if name in limits else _CALLED.get(name, name) for name in chart.names),
         lower=lower,
         upper=upper,
-        starts=(0.5 * (low + high) if _IRON.items() <= scalars.items() else encoded({}))[np.newaxis],
+        starts=(0.5 * (low + high) if begins_anew else encoded({}))[np.newaxis],
         names=tuple(name for name in scalars if name not in held),
         columns=columns,
         linear=tuple(name for name in columns if name not in held),
