@@ -149,14 +149,13 @@ class Identification(Stored):
         return None if self.resolution is None else self.residual / self.resolution
 
     def __str__(self) -> str:
-        state = "" if self.success else ", NOT converged"
         free = [f"{name} {self.estimates[name]:.4g}{_error_in_words(self.stderr[name])}" for name in self.free_names]
         fixed = [f"{name} {value:.4g}" for name, value in self.estimates.items() if name not in self.free_names]
         width = self.loop_width
         return summary_text(
             [
                 f"Identification of {type(self.model).__name__}: {self._fit_in_words()}, rmse {self.rmse:.4g}, "
-                f"{self.n_parameters} parameters{state}",
+                f"{self.n_parameters} parameters{self._failure_in_words()}",
                 wrapped(free, most=4),
                 wrapped(fixed, most=1, first="  held: "),
             ],
@@ -172,10 +171,10 @@ class Identification(Stored):
     def summary(self) -> str:
         """Report of several lines."""
         family = type(self.model).__name__
-        ended = "" if self.success else f"; NOT converged: {self.message.partition('; ')[0]}"
         lines = [
             f"{family}: {self._fit_in_words()}, rmse {self.rmse:.4g}, FPE {self.fpe:.4g}, "
-            f"{bic_in_words(self.bic)}, {self.n_parameters} parameters from {self.residual.size} samples{ended}"
+            f"{bic_in_words(self.bic)}, {self.n_parameters} parameters from {self.residual.size} samples"
+            f"{self._failure_in_words()}"
         ]
         lines += [self._line(name) for name in self.free_names]
         fixed = [f"{name} = {value:g}" for name, value in self.estimates.items() if name not in self.free_names]
@@ -218,6 +217,9 @@ class Identification(Stored):
 
     def _fit_in_words(self) -> str:
         return "fit not defined" if np.isnan(self.fit_percent) else f"fit {self.fit_percent:.2f} %"
+
+    def _failure_in_words(self) -> str:
+        return "" if self.success else f", NOT converged: {self.message.partition('; ')[0]}"
 
     def _residual_in_words(self) -> str:
         largest = float(np.abs(self.residual).max())

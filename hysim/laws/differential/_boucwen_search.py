@@ -12,7 +12,8 @@ for every n,
     l = k (1 + |k|)^(n - 1),    k = sinh(c)
 
 The box is |k| <= 40 for both, n in [0.5, 10] on a log scale, z0/Z in [-1, 1], and open for the
-parameters in which the output is affine. The further shape coefficients b2 to b6 of the generalised law
+parameters in which the output is affine; the upper side of n is a limit, beyond the others `hysim.identify` searches
+where an optimum stands at them. The further shape coefficients b2 to b6 of the generalised law
 have the coordinates of beta; the forcing delta of Zhu and Wang is measured by what it adds to |A| where |u|
 is largest, in [-5, 5]. A parameter that the user bounds is its own coordinate, between these bounds; bounds from
 or to zero and infinity cut the box at zero.

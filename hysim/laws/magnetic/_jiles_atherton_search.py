@@ -55,7 +55,6 @@ _CALLED = {"a": "width", "alpha": "stability"}
 _HELD = ("anisotropy", "reversible_feedback")
 _COLUMNS = ("gain", "feedthrough")
 _SI = ("A/m", "T")
-_IRON = {"Ms": 1.6e6, "a": 1100.0, "alpha": 1.6e-3, "k": 400.0}  # the law by default
 _LEAST = 1e-12  # of 1 - alpha Ms m0 / a
 _TURN = 12.0  # twice the stability at which alpha Ms s / a is 1
 _SMALLEST = 1e-3  # of the width: a for a coupling that is given, and nearly as large
@@ -63,9 +62,16 @@ _SCREENED = 1024
 
 
 def search_space(
-    scalars: Mapping[str, float], columns: tuple[str, ...], record: Record, freedom: Freedom
+    scalars: Mapping[str, float],
+    columns: tuple[str, ...],
+    record: Record,
+    freedom: Freedom,
+    *,
+    is_by_default: bool,
 ) -> SearchSpace:
     """The coordinates, their box and the way back to the user's parameters for one record.
+
+    A search of the law by default begins in the middle of the box.
 
     Held by default are gain and feedthrough, of which the first could not be told from Ms, and what makes the law
     another one: an anisotropy that is zero at the start, and reversible_feedback. The feedthrough of a law by default,
@@ -93,7 +99,7 @@ def search_space(
         magnetisation=0.5 * unit["y"] / (abs(values["gain"]) or 1.0),
     )
     lower, upper = np.array([chart.side(name) for name in chart.names]).reshape(-1, 2).T
-    begins_anew = freedom.starts_anew and _IRON.items() <= scalars.items()
+    begins_anew = freedom.starts_anew and is_by_default
     if not freedom.starts_anew:
         own = chart.encode(values)
         free = np.array([name not in limits for name in chart.names], dtype=bool)

@@ -232,7 +232,8 @@ class JilesAtherton(Law):
 
     def search_space(self, record: Record, freedom: Freedom = ALL_FREE) -> SearchSpace:
         """The box in the scales of the record's field and magnetisation."""
-        return search.search_space(self.scalars, self.columns, record, freedom)
+        is_by_default = self.arguments == self.defaults()
+        return search.search_space(self.scalars, self.columns, record, freedom, is_by_default=is_by_default)
 
     def regressors(self, parameters: Parameters, record: Record) -> FloatArray:
         """Columns M, H, 1 and 0, shape (n_sets, n_samples, 4)."""
