@@ -5,6 +5,9 @@ some quanta and rounded to the sensor's quantum, a fortieth of the stroke, as in
 identified with the likelihood of quantised data; its profile intervals stand beside the linear ones of least squares.
 Bias is the median error in standard errors of the record. With the redundant pair A and gain both free the result has
 to say so, and to print no interval.
+
+`python experiments/09_recovery.py normal` counts the linear intervals under normal noise of 1 % of the range instead,
+300 samples that are not rounded, with short searches from the truth: all seven parameters are to have 95 %.
 """
 
 import sys
@@ -13,6 +16,7 @@ from itertools import repeat
 from pathlib import Path
 
 import numpy as np
+import numpy.typing as npt
 
 import hysim as hs
 from hysim.plot import Figure, figure
@@ -42,12 +46,16 @@ def random_law(rng: np.random.Generator) -> hs.BoucWen:
     )
 
 
+def fading(n_samples: int) -> npt.NDArray[np.float64]:
+    """A triangle of decaying amplitude."""
+    corners = np.concatenate([[0.0], np.linspace(1.0, 0.3, 6) * (-1.0) ** np.arange(6)])
+    return np.interp(np.linspace(0.0, 6.0, n_samples), np.arange(7), corners)
+
+
 def random_record(n_samples: int, noise: float, seed: int) -> tuple[hs.BoucWen, hs.Record]:
     """A law, and what a sensor sees of it; `noise` is in quanta."""
     rng = np.random.default_rng(seed)
-    law = random_law(rng)
-    corners = np.concatenate([[0.0], np.repeat(np.linspace(1.0, 0.3, 6), 1) * (-1.0) ** np.arange(6)])
-    u = np.interp(np.linspace(0.0, 6.0, n_samples), np.arange(7), corners)
+    law, u = random_law(rng), fading(n_samples)
     y = law.response(u)
     quantum = float(np.ptp(y)) / 40.0
     measured = quantum * np.round(y / quantum + noise * rng.standard_normal(n_samples))
@@ -97,6 +105,24 @@ def coverage(n_samples: int, noise: float, n_records: int, processes: int) -> li
     return rows
 
 
+def normal_noise(n_records: int = 400, n_samples: int = 300) -> dict[str, float]:
+    """Percent of the linear intervals that hold the truth, by parameter, under normal noise of 1 % of the range."""
+    held: dict[str, list[bool]] = {}
+    for seed in range(n_records):
+        rng = np.random.default_rng(seed)
+        law, u = random_law(rng), fading(n_samples)
+        y = law.response(u)
+        record = hs.Record(u=u, y=y + 0.01 * np.ptp(y) * rng.standard_normal(n_samples))
+        fit = hs.identify(law, record, max_evaluations=400, workers=1)
+        for name, (lower, upper) in fit.intervals.items():
+            if not np.isnan(lower):  # n is at its bound in some
+                held.setdefault(name, []).append(bool(lower <= getattr(law, name) <= upper))
+    shares = {name: 100.0 * float(np.mean(each)) for name, each in held.items()}
+    for name, share in shares.items():
+        print(f"{name:<12} {share:5.1f} % of {len(held[name])}")
+    return shares
+
+
 def redundant_pair() -> str:
     """What the result says of A and gain, both free."""
     _, record = random_record(60, 0.3, 0)
@@ -111,6 +137,8 @@ def main(smoke: bool = False) -> list[Row]:
     records, levels, processes = ({60: 1}, (0.3,), 1) if smoke else (RECORDS, LEVELS, 2)
     rows = [row for n, many in records.items() for level in levels for row in coverage(n, level, many, processes)]
     message = redundant_pair()
+    if smoke:
+        normal_noise(2)
     for row in rows:
         print(
             f"{row['samples']:>4} samples, noise {row['noise_in_quanta']:.1f} quanta, {row['kind']:<7} "
@@ -146,4 +174,4 @@ def draw(rows: list[Row]) -> Figure:
 
 
 if __name__ == "__main__":
-    main()
+    normal_noise() if "normal" in sys.argv[1:] else main()

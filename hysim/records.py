@@ -33,6 +33,7 @@ _EVEN = 1e-4  # of a step: largest error of an even time
 _COARSEST = 0.1  # of a step: largest last digit of times that may have been rounded
 _ROUNDED = 0.75  # of the last digit: half of it, and as much of the line's own
 _MOST_DIGITS = 8  # of a time that was written down
+_LARGEST = 1e40  # of a record to identify: the squares of quotients of such numbers, and of their inverses, are numbers
 
 
 @printed
@@ -447,16 +448,28 @@ class Record:
 def several(records: Any, verb: str) -> tuple[Record, ...]:
     """One record or a sequence of them as a tuple; other arguments are errors that name the `verb`.
 
-    Tables of other libraries with the columns u and y are records, too.
+    Tables of other libraries with the columns u and y are records, too. ValueError if the squares and quotients of a
+    record's numbers would not be numbers.
     """
     if (single := as_record(records, verb)) is not None:
-        return (single,)
+        return (_of_ordinary_size(single, verb),)
     members = [as_record(each, verb) for each in records] if isinstance(records, Sequence) else [None]
     if any(each is None for each in members):
         raise TypeError(f"{verb} takes a Record or several of them, got {type(records).__name__}: hs.Record(u=u, y=y)")
     if not members:
         raise ValueError(f"{verb} takes a Record or several of them: no record was given")
-    return tuple(each for each in members if each is not None)
+    return tuple(_of_ordinary_size(each, verb) for each in members if each is not None)
+
+
+def _of_ordinary_size(record: Record, verb: str) -> Record:
+    for name, values in (("input u", record.u), ("output y", record.y)):
+        size = float(np.abs(values).max())
+        if size and not 1.0 / _LARGEST <= size <= _LARGEST:
+            raise ValueError(
+                f"{verb} takes records between {1.0 / _LARGEST:g} and {_LARGEST:g} in size, got an {name} of "
+                f"{size:.3g}: convert it to another unit"
+            )
+    return record
 
 
 def as_record(value: Any, verb: str) -> Record | None:

@@ -168,3 +168,35 @@ def test_what_cannot_be_expressed_is_refused(call, message):
 def test_parameters_go_by_name(name):
     with pytest.raises(TypeError, match="positional"):
         getattr(hs.BoucWen, f"from_{name}")(*THEIRS[name].values())
+
+
+@pytest.mark.parametrize(
+    ("converted", "needed", "left_out"),
+    [
+        (hs.BoucWen.from_low_guo, {"alpha": 0.35, "beta": 0.02, "gamma": 0.005}, {"d": 1.0, "h0": 0.0}),
+        (
+            hs.BoucWen.from_wen,
+            {"alpha": 0.1, "k": 20.0, "beta": 0.6, "gamma": 0.4, "n": 1.5},
+            {"A": 1.0, "D": 1.0, "z0": 0.0},
+        ),
+        (hs.BoucWen.from_normalized, {"k_x": 2.0, "k_w": 3.0, "rho": 1.5, "sigma": 0.8, "n": 1.5}, {"w0": 0.0}),
+        (
+            hs.BoucWen.from_noel_schoukens,
+            {"alpha": 5e4, "beta": 1e3, "gamma": 0.8, "delta": -1.1, "nu": 1.0},
+            {"z0": 0.0},
+        ),
+        (
+            hs.BoucWen.from_opensees,
+            {"alpha": 0.1, "ko": 20.0, "n": 1.5, "gamma": 0.4, "beta": 0.6},
+            {"Ao": 1.0, "deltaA": 0.0, "deltaNu": 0.0, "deltaEta": 0.0},
+        ),
+        (
+            hs.BoucWen.from_opensees_original,
+            {"E": 200.0, "fy": 4.0, "alphaL": 0.1},
+            {"alphaNL": 0.0, "eta": 1.0, "beta": 0.5, "gamma": 0.5},
+        ),
+    ],
+)
+def test_what_other_programs_leave_out_has_their_default(converted, needed, left_out):
+    """z = 1 where a law yields, and Bouc's own shape beta = gamma; nothing else is at work."""
+    assert converted(**needed) == converted(**needed, **left_out)

@@ -265,7 +265,11 @@ def test_periodic_loops_that_begin_anywhere_give_the_constants_back():
     for amplitude, first in ((40.0, 5), (110.0, 21)):
         u = amplitude * np.tile(np.roll(loop, first), 30)
         records.append(
-            hs.Record(u=u[: loop.size + 1], y=truth.response(u)[-loop.size - 1 :][np.r_[1 : loop.size + 1, 1]])
+            hs.Record(
+                u=u[: loop.size + 1],
+                y=truth.response(u)[-loop.size - 1 :][np.r_[1 : loop.size + 1, 1]],
+                units={"u": "A/m", "y": "T"},
+            )
         )
     fit = hs.identify(hs.JilesAtherton, records, initial="periodic")
     assert fit.free_names == ("Ms", "a", "alpha", "k", "c", "offset")

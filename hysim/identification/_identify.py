@@ -22,7 +22,7 @@ from hysim.identification._noise import Gaussian, Noise, Quantised, Robust
 from hysim.identification._problem import Problem
 from hysim.identification._resampling import left_out_errors, rms_of_known
 from hysim.identification._result import Identification
-from hysim.identification._search import PERFECT, chosen, stages_in_words
+from hysim.identification._search import PERFECT, chosen, stages_in_words, widened
 from hysim.identification._searched import Search
 from hysim.identification.channels.starts import begun
 from hysim.identification.folds import left_out
@@ -77,7 +77,8 @@ def identify(
         Parameters to identify that are held by default. One of each redundant group is held, for Bouc-Wen ``A = 1``,
         since only the product of A and gain is determined. Of a `hysim.Structure` all parameters are held but these.
     bounds : mapping, optional
-        Name to (lower, upper), in place of the family's own box.
+        Name to (lower, upper), in place of the family's own box. That box is widened where the optimum stands at a side
+        of it that is no limit of physics; an optimum which still does is reported by `Identification.success`.
     depends : mapping, optional
         Name of a parameter to (channel, degree): the parameter is a polynomial of this degree in a channel of the
         records, ``{"gain": ("T", 1)}``. It is identified by its values at degree + 1 places of the channel's range,
@@ -228,7 +229,7 @@ def _searched(
     if n_samples < n_names:
         raise ValueError(f"{n_names} parameters cannot be estimated from {n_samples} samples; fix some of them")
     density = _density(noise, problem)
-    problem, squares = chosen(problems, seed=seed, progress=progress)
+    problem, squares = widened(*chosen(problems, seed=seed, progress=progress))
     if not squares:
         raise ValueError("every parameter set tried diverged: check the units, or pass bounds=")
     if isinstance(density, Quantised):
@@ -237,7 +238,7 @@ def _searched(
     search, likely, named, remark = choose(best, best.likely(squares), admissible)
     plain = squares[0].x if search is best else likely[0].theta[: problem.n_x]
     result, likely = search.described(likely, intervals, plain)
-    message = "; ".join(filter(None, (result.message, remark, stages_in_words(problems, problem))))
+    message = "; ".join(filter(None, (result.message, remark, stages_in_words(problems, problem.stage))))
     errors = left_out_errors(search.problem, density, np.array([optimum.theta for optimum in likely]), folds)
     return replace(result, message=message, regions=named, cv_residual=errors, cv_rmse=rms_of_known(errors))
 
@@ -266,7 +267,7 @@ def _freedom(fixed: Mapping[str, float], free: Sequence[str], bounds: Mapping[st
     for name, pair in bounds.items():
         if np.shape(pair) != (2,):
             raise ValueError(f"bounds of {name!r} must be (lower, upper), got {pair!r}")
-    return Freedom(fixed, (free,) if isinstance(free, str) else tuple(free), bounds)
+    return Freedom(fixed, (free,) if isinstance(free, str) else tuple(free), bounds, starts_anew=True)
 
 
 def _family(model_or_class: Any, depends: Mapping[str, tuple[str, int]] | None) -> Identifiable:

@@ -341,8 +341,11 @@ class Problem:
         solutions = np.asarray(least_squares(rows, goals) / norms)
         outside = np.flatnonzero(((solutions < lower) | (solutions > upper)).any(axis=1))
         for k in outside:
-            box = lower * norms[k], upper * norms[k]
-            solutions[k] = lsq_linear(rows[k], goals[k], bounds=box, method="bvls").x / norms[k]
+            size = float(np.linalg.norm(goals[k])) or 1.0  # the tolerance of the solver is an absolute one
+            unit = norms[k] / size
+            solutions[k] = (
+                lsq_linear(rows[k], goals[k] / size, bounds=(lower * unit, upper * unit), method="bvls").x / unit
+            )
         return solutions
 
     def linear_box(self) -> tuple[FloatArray, FloatArray]:
@@ -421,6 +424,9 @@ def _alone(
     shared = None if kinds[0] is None else "free" if "free" in kinds else "rest"
     widest = max(records, key=lambda record: (float(np.ptp(record.u)), len(record)))  # it scales the box
     own = family.search_space(widest, replace(freedom, initial=shared))
+    told = {name: freedom.bounds.get(name, freedom.bounds.get(name.partition("(")[0])) for name in own.names}
+    given = {name: (bool(np.isfinite(pair[0])), bool(np.isfinite(pair[1]))) for name, pair in told.items() if pair}
+    own = replace(own, given=given)
     if len(records) == 1:
         every = np.arange(len(own.coordinates)), np.arange(len(own.linear))
         return Problem(family, own, own, (Part(records[0], *every, _before(records[0], kinds[0]), {}),))
@@ -456,6 +462,8 @@ def _together(
     linear: list[tuple[str, int | None]] = [(name, None) for name in own.linear if name not in states]
     linear += [(name, k) for k in with_own for name in own.linear if name in states]
 
+    searched = [(own.coordinates[place], k) for place, k in order]
+
     def box(values: FloatArray) -> FloatArray:
         return values[..., [place for place, _ in order]]
 
@@ -472,7 +480,7 @@ def _together(
     free_states = tuple(f"{name}[{k}]" for k in with_own for name in states)
     space = replace(
         own,
-        coordinates=tuple(_called(own.coordinates[place], k) for place, k in order),
+        coordinates=tuple(_called(name, k) for name, k in searched),
         lower=box(own.lower),
         upper=box(own.upper),
         starts=box(own.starts) if own.starts.size else np.empty((len(own.starts), len(order))),
@@ -481,6 +489,8 @@ def _together(
         drawn=own.drawn and (box(own.drawn[0]), box(own.drawn[1])),
         regions={name: (box(lower), box(upper)) for name, (lower, upper) in own.regions.items()},
         bounds={_called(name, k): own.bounds[name] for name, k in linear if name in own.bounds},
+        physical={_called(name, k): own.physical[name] for name, k in searched if name in own.physical},
+        given={_called(name, k): own.given[name] for name, k in (*searched, *linear) if name in own.given},
         state=free_states,
     )
     return Problem(family, space, own, parts)

@@ -83,9 +83,11 @@ class Identification(Stored):
     whiteness : float
         Probability of residuals at least as correlated if they were white (Ljung and Box); nan if unknown.
     success : bool
-        Whether the search converged, and the law is safe on smaller cycles or was asked for by ``admissible=False``.
+        Whether the search converged, to an optimum that is not at a side of the search box, and the law is safe on
+        smaller cycles or was asked for by ``admissible=False``. It may be at a bound of physics, such as a damage that
+        does not heal, or at one that was given.
     message : str
-        How the search ended, and which parameters the data do not determine.
+        How the search ended, which parameters are at a bound, and which the data do not determine.
     rivals : tuple of Candidate
         Other optima whose likelihood ratio is inside the 95 % region of this one, best first.
     regions : mapping
@@ -162,7 +164,6 @@ class Identification(Stored):
         return None if self.resolution is None else self.residual / self.resolution
 
     def __str__(self) -> str:
-        state = "" if self.success or self.unsafe else ", NOT converged"
         free = [f"{name} {self.estimates[name]:.4g}{_error_in_words(self.stderr[name])}" for name in self.free_names]
         fixed = [f"{name} {value:.4g}" for name, value in self.estimates.items() if name not in self.free_names]
         width = self.loop_width
@@ -170,7 +171,7 @@ class Identification(Stored):
             [
                 *(folded(self.unsafe, first="", indent="  ") if self.unsafe else []),
                 f"Identification of {self.family}: {self._fit_in_words()}, rmse {self.rmse:.4g}, "
-                f"{self.n_parameters} parameters{state}",
+                f"{self.n_parameters} parameters{self._failure_in_words()}",
                 wrapped(free, most=4),
                 wrapped(fixed, most=1, first="  held: "),
             ],
@@ -190,6 +191,7 @@ class Identification(Stored):
         lines += [
             f"{family}: {self._fit_in_words()}, rmse {self.rmse:.4g}, FPE {self.fpe:.4g}, "
             f"{bic_in_words(self.bic)}, {self.n_parameters} parameters from {self.residual.size} samples"
+            f"{self._failure_in_words()}"
         ]
         lines += [self._line(name) for name in self.free_names]
         fixed = [f"{name} = {value:g}" for name, value in self.estimates.items() if name not in self.free_names]
@@ -234,6 +236,9 @@ class Identification(Stored):
 
     def _fit_in_words(self) -> str:
         return "fit not defined" if np.isnan(self.fit_percent) else f"fit {self.fit_percent:.2f} %"
+
+    def _failure_in_words(self) -> str:
+        return "" if self.success or self.unsafe else f", NOT converged: {self.message.partition('; ')[0]}"
 
     def _residual_in_words(self) -> str:
         largest = float(np.abs(self.residual).max())

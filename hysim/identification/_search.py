@@ -6,6 +6,7 @@ projected Levenberg-Marquardt steps in one batch. The best distinct optima desce
 
 import math
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -49,6 +50,7 @@ _PASSES = 3  # of the best alone
 _LAST = 25  # steps with exact slopes
 _PASSED = 1e-6  # share of the sum of squares: a step that gains less ends a pass, a pass the polish
 _RIVAL = 20.0  # log-likelihood below the best optimum's, from which on an optimum is not within the noise
+_WIDENINGS = 4  # of a box, each by a quarter of its width: in all to 2.4 times it
 _ROUGH = 0.1  # share of the cost by which the rough law's may differ: beyond, it does not say what stays
 BRIEFLY, NEARLY, FULLY = range(3)  # as far as optima of a law with a rough one are polished
 _FAR_FROM_CLOSE = 100.0  # times the accuracy of a close law: a residual of this size is fitted as well by it
@@ -90,12 +92,31 @@ def chosen(
     return problem, polish_on(problem, likely)
 
 
-def stages_in_words(problems: Sequence[Problem], best: Problem) -> str:
-    """Which stages the criterion keeps, where it has the choice."""
+def widened(problem: Problem, optima: Sequence[Optimum]) -> tuple[Problem, list[Optimum]]:
+    """The problem in a box that holds the best optimum, and the optima there.
+
+    Where it stands at a side that is neither physical nor the user's, the box is widened and the optimum polished in
+    it, a few times: a parameter that runs away stays at the side.
+    """
+    best = list(optima)
+    for _ in range(_WIDENINGS if best else 0):
+        low, high = problem.space.open_sides(best[0].x)
+        if not (low | high).any():
+            break
+        wider = replace(problem, space=problem.space.widened(low, high), ends=None)
+        reached = polish(wider, best[0].x[np.newaxis])
+        if not reached or not reached[0].cost <= best[0].cost:
+            break
+        problem, best = wider, _distinct([reached[0], *best[1:]])
+    return problem, best
+
+
+def stages_in_words(problems: Sequence[Problem], last: Stage | None) -> str:
+    """Which stages the criterion keeps, up to the `last` one, where it has the choice."""
     stages = [problem.stage.word for problem in problems if problem.stage is not None and problem.stage.word]
     if len(problems) < 2 or not stages:
         return ""
-    after = next(k for k, problem in enumerate(problems) if problem is best)
+    after = next(k for k, problem in enumerate(problems) if problem.stage is last)
     n_kept = len(stages) - (len(problems) - 1 - after)
     kept, others = stages[:n_kept], stages[n_kept:]
     words = [f"keeps {listed(kept)}"] if kept else []

@@ -174,18 +174,21 @@ class Search:
             resolution=problem.parts[0].record.resolution,
             response_stderr=known.output,
             loop_width=self._width(best.theta, known, draws),
-            success=best.converged,
+            success=best.converged and not known.stopped,
             message="; ".join([*_phrases(best.converged, problem, known, rivals, curves), *self._notes(best, draws)]),
             rivals=rivals,
             seed=self.seed,
-            warnings=sentences(
-                spread=float(np.std(problem.y)),
-                size=problem.scale,
-                rmse=chosen.rmse,
-                whiteness=measures["whiteness"],
-                stderr=stderr,
-                reasons=known.reasons,
-                success=best.converged,
+            warnings=(
+                *known.stopped,
+                *sentences(
+                    spread=float(np.std(problem.y)),
+                    size=problem.scale,
+                    rmse=chosen.rmse,
+                    whiteness=measures["whiteness"],
+                    stderr=stderr,
+                    reasons=(*known.stopped, *known.reasons),
+                    success=best.converged,
+                ),
             ),
         )
 
@@ -247,7 +250,8 @@ def _phrases(
     rivals: Sequence[Candidate],
     curves: Mapping[str, Profile],
 ) -> list[str]:
-    phrases = ["converged" if converged else "the search did not converge", *known.reasons]
+    ended = known.stopped or (("converged",) if converged else ())
+    phrases = [*ended, *(() if converged else ("the search did not converge",)), *known.reasons]
     inputs = [part.record.u for part in problem.parts]
     if all((np.diff(u) >= 0.0).all() or (np.diff(u) <= 0.0).all() for u in inputs):
         phrases.append("the input never turns back: the parameters of unloading are not determined")

@@ -13,7 +13,7 @@ the output bends within the step, as at a stiff optimum in a wide box: there the
 (`hysim.Law.response_jacobian`), and those of others, or of long records, differences over a shorter step.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -24,9 +24,9 @@ from hysim.identification._descent import named_slopes
 from hysim.identification._problem import Problem
 from hysim.models.derivatives.jacobian import FEW
 from hysim.models.law import Law
+from hysim.models.search_space import Flags
 
 _SINGULAR = 1e-7  # below this share of the largest, a direction of the scaled Jacobian is not identifiable
-_AT_SIDE = 1e-6  # in units of the box
 _MOST_NAMES = 4  # in a sentence
 _SHARE = 0.125  # of the step, by which a derivative is computed again
 _CLOSE = 1e-4  # difference of both, of the derivative, up to which the first one is taken
@@ -46,6 +46,7 @@ class Uncertainty:
     condition: float
     redundant: tuple[tuple[str, ...], ...]
     reasons: tuple[str, ...]
+    stopped: tuple[str, ...] = ()  # by which sides of the box, in words
     slopes: FloatArray | None = None  # dm/dtheta (n_samples, n_theta), where it was computed
 
     def with_disturbances(self, disturbances: FloatArray, curvature: FloatArray) -> "Uncertainty":
@@ -72,14 +73,11 @@ def uncertainty(problem: Problem, theta: FloatArray, curvature: FloatArray) -> U
         return _unknown(problem, theta, "no standard errors: the output is not finite beside the optimum")
     x, linear = np.split(theta, [problem.n_x])
     width = space.upper - space.lower
-    at_side = (x - space.lower < _AT_SIDE * width) | (space.upper - x < _AT_SIDE * width)
-    at_bound = np.logical_or(*(linear == bound for bound in problem.linear_box()))
-    is_end = at_side if space.whole is None else at_side & ((x <= space.whole[0]) | (x >= space.whole[1]))
-    ended = zip((*space.coordinates, *space.linear), np.concatenate([is_end, at_bound]), strict=True)
-    reasons = _bounds_in_words([name for name, side in ended if side])
-    reasons += [_EDGE] if (at_side & ~is_end).any() else []
+    at_side, is_end = (np.logical_or(*sides) for sides in (space.at_sides(x), space.ends(x)))
     reach = np.linalg.norm(slopes[:, : x.size], axis=0) * width
     has_effect = reach > _SINGULAR * reach.max(initial=0.0)
+    stopped, reasons = _bounds_in_words(problem, theta, way_back, is_end & has_effect)
+    reasons += [_EDGE] if (at_side & ~is_end).any() else []
     known = np.concatenate([at_side & has_effect, np.zeros(linear.size, dtype=bool)])
     slopes[:, : x.size][:, at_side & ~has_effect] = 0.0
     scaled, way_back = np.where(known, 0.0, slopes) * np.sqrt(curvature)[:, np.newaxis], np.where(known, 0.0, way_back)
@@ -104,7 +102,9 @@ def uncertainty(problem: Problem, theta: FloatArray, curvature: FloatArray) -> U
     condition = float(free[0] / free[-1]) if free.size and free[-1] > 0.0 else np.inf
     output = np.linalg.norm(slopes @ spread, axis=1)
     together = spread @ (way_back @ spread).T
-    return Uncertainty(covariance, spread @ spread.T, together, output, condition, redundant, tuple(reasons), computed)
+    return Uncertainty(
+        covariance, spread @ spread.T, together, output, condition, redundant, tuple(reasons), stopped, computed
+    )
 
 
 def output_slopes(problem: Problem, theta: FloatArray, *, refined: bool = True) -> FloatArray:
@@ -193,10 +193,36 @@ def _in_words(names: tuple[str, ...], groups: tuple[tuple[str, ...], ...]) -> st
     return f"the data do not determine {_shortened(names)} separately"
 
 
-def _bounds_in_words(names: Sequence[str]) -> list[str]:
+def _bounds_in_words(
+    problem: Problem, theta: FloatArray, way_back: FloatArray, at_side: Flags
+) -> tuple[tuple[str, ...], list[str]]:
+    """Sides of the box at which the search has stopped, and other bounds at which parameters stand.
+
+    A coordinate that is no parameter of the user stands for those that it moves.
+    """
+    space, x = problem.space, theta[: problem.n_x]
+    values = dict(zip(space.names, problem.named(theta[np.newaxis])[0].tolist(), strict=True))
+    is_open = np.logical_or(*space.open_sides(x))
+    search, physical, given = list[str](), list[str](), list[str]()
+    for k in np.flatnonzero(at_side).tolist():
+        name, is_upper = space.coordinates[k], bool(space.upper[k] - x[k] < x[k] - space.lower[k])
+        moved = [each for each, slope in zip(space.names, way_back[:, k], strict=True) if slope]
+        told = given if space.given.get(name, (False, False))[is_upper] else physical
+        (search if is_open[k] else told).extend([name] if name in values else moved)
+    for name, value, low, high in zip(space.linear, theta[problem.n_x :].tolist(), *problem.linear_box(), strict=True):
+        if value in (low, high):
+            (given if space.given.get(name, (False, False))[int(value == high)] else physical).append(name)
+    stopped = [f"{_at(search, values, 'reached', 'search bound')}: widen it with bounds="] if search else []
+    kinds = {"physical bound": physical, "given bound": given}
+    others = [_at(names, values, "is at", kind) for kind, names in kinds.items() if names]
+    return tuple(stopped), others
+
+
+def _at(names: Sequence[str], values: Mapping[str, float], verb: str, bound: str) -> str:
+    """Parameters at a bound; the values of a few."""
     if len(names) > _MOST_NAMES:
-        return [f"{_shortened(names)} reached their search bounds: widen them with bounds="]
-    return [f"{name} reached its search bound: widen it with bounds=" for name in names]
+        return f"{_shortened(names)} {verb.replace('is', 'are')} their {bound}s"
+    return ", ".join(f"{name} {verb} its {bound} {values[name]:.4g}" for name in names)
 
 
 def _shortened(names: Sequence[str]) -> str:

@@ -134,7 +134,9 @@ class CustomLaw(Law):
         """The box of the bounded parameters."""
         boxes = {**self.bounds, **freedom.bounds}
         searched = [
-            Parameter(name, *boxes[name], log=boxes[name][0] > 0.0) for name in boxes if name not in self.linear
+            Parameter(name, *boxes[name], log=boxes[name][0] > 0.0, physical=(True, True))
+            for name in boxes
+            if name not in self.linear
         ]
         searched += [Parameter(name, affine=True) for name in self.linear]
         return declared_space(searched, (), self.scalars, self.initial, record, freedom)

@@ -71,6 +71,7 @@ def together(spaces: Mapping[str, SearchSpace]) -> SearchSpace:
         regions=regions,
         bounds=mapped(lambda space: space.bounds),
         state=named(lambda space: space.state),
+        physical=mapped(lambda space: space.physical),
         screened=None if None in screened else max((n for n in screened if n is not None), default=0),
         drawn=(np.concatenate([low for low, _ in drawn]), np.concatenate([high for _, high in drawn])),
     )

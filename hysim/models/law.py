@@ -537,7 +537,10 @@ class Law(Placed, ABC):
 
     def search_space(self, record: Record, freedom: Freedom = ALL_FREE) -> SearchSpace:
         """The box that `hysim.identify` searches, by the declarations in `searched`."""
-        return declared_space(self.searched, self.starts, self.scalars, self.initial, record, freedom, self.screened)
+        return declared_space(
+            self.searched, self.starts, self.scalars, self.initial, record, freedom, self.screened,
+            defaults=self.defaults(),
+        )  # fmt: skip
 
     def simpler(self) -> Simpler | None:
         """The law that this one `contains`, with the values that both have."""
@@ -561,8 +564,9 @@ class Law(Placed, ABC):
         """As `regressors`, by a function from parameters and an input to outputs (n_sets, n_samples)."""
         zero = {**parameters, **dict.fromkeys(self.columns, 0.0)}
         rest = outputs(zero, u)
-        with np.errstate(invalid="ignore"):
-            added = [outputs({**zero, name: 1.0}, u) - rest for name in self.columns]
+        size = _sizes(rest, u)
+        with np.errstate(invalid="ignore", over="ignore"):
+            added = [(outputs({**zero, name: size}, u) - rest) / size[:, np.newaxis] for name in self.columns]
         return np.stack([*added, rest], axis=-1)
 
     def steady(self, parameters: Parameters, record: Record) -> dict[str, FloatArray]:
@@ -690,6 +694,14 @@ def _first(u: FloatArray) -> float:
 def of_sets(parameters: Parameters, sets: npt.NDArray[np.intp]) -> dict[str, Any]:
     """The parameters of some sets; a single value is that of all."""
     return {name: value if np.size(value) == 1 else np.asarray(value)[sets] for name, value in parameters.items()}
+
+
+def _sizes(rest: FloatArray, u: FloatArray) -> FloatArray:
+    """Powers of two (n_sets,), so large that what they add to the outputs `rest` is not lost in their rounding."""
+    reach = float(np.abs(u).max()) or 1.0
+    output = np.nan_to_num(np.abs(rest).max(axis=1), posinf=0.0)
+    least = np.where(output > 0.0, np.maximum(output, 1.0) * max(reach, 1.0 / reach), 0.5)
+    return np.asarray(np.exp2(np.frexp(least)[1]))
 
 
 def _corners(record: Record) -> npt.NDArray[np.intp]:

@@ -12,6 +12,7 @@ import numpy as np
 
 from hysim._frozen import FloatArray
 from hysim.models.search_space import Freedom, SearchSpace
+from hysim.models.tables import scalars_of
 from hysim.records import Record
 
 
@@ -22,6 +23,8 @@ class Parameter:
     `lower` and `upper` are the box in units of `unit`: a quotient of the spans of input and output such as ``"y/u"``;
     ``"h"`` is half the span of the input. The box of a parameter with `from_first` stands about the first input, and
     one with `log` is searched on a log scale. The output is affine in an `affine` parameter, which needs no box.
+    `physical` says whether the lower and the upper side of the box is a limit of physics or of the law: the search is
+    not stopped there, as it is at other sides.
     """
 
     name: str
@@ -31,33 +34,41 @@ class Parameter:
     log: bool = False
     from_first: bool = False
     affine: bool = False
+    physical: tuple[bool, bool] = (False, False)
 
 
 _ROUNDING = 1e-14  # of a number by way of its logarithm
 
 
 class Coordinate(NamedTuple):
-    """A parameter in its box: searched as a multiple of `scale`, or as its logarithm."""
+    """A parameter in its box: searched as a multiple of `scale`, or as the logarithm of one."""
 
     name: str
     lower: float
     upper: float
     scale: float = 1.0
     log: bool = False
+    physical: tuple[bool, bool] = (False, False)
 
     def encode(self, values: Any) -> Any:
         """Coordinates of values, those outside the box at its side."""
-        inside = np.clip(values, self.lower, self.upper)
-        return np.log(inside) if self.log else inside / self.scale
+        inside = np.clip(values, self.lower, self.upper) / self.scale
+        return np.log(inside) if self.log else inside
 
     def decode(self, x: FloatArray) -> FloatArray:
         """Values of coordinates; a value at a bound is exactly the bound, without the rounding of its logarithm."""
         if not self.log:
             return x * self.scale
-        values = np.exp(x)
+        values = np.exp(x) * self.scale
         for side in (self.lower, self.upper):
             values = np.where(np.abs(values - side) <= _ROUNDING * side, side, values)
         return np.asarray(values)
+
+    def holding(self, value: float) -> "Coordinate":
+        """The coordinate in a box that holds a value, where that is one of a law."""
+        if self.log and not value > 0.0:
+            return self
+        return self._replace(lower=min(self.lower, value), upper=max(self.upper, value))
 
     def limited(self, limits: Mapping[str, tuple[float, float]]) -> "Coordinate":
         """The coordinate in the user's bounds.
@@ -81,12 +92,14 @@ def declared_space(
     screened: int | None = None,
     *,
     units: Mapping[str, float] | None = None,
+    defaults: Mapping[str, Any] | None = None,
 ) -> SearchSpace:
     """The search box on one record.
 
     `starts` are points in the units of the parameters, from which the search begins beside `scalars`, the law's own
     values; `initial` are the fields of its initial memory, held at zero where the record begins at rest. A parameter
-    that is not declared is held, unless it is free and bounded. `units` are the record's, by default its `spans`.
+    that is not declared is held, unless it is free and bounded. `units` are the record's, by default its `spans`. A
+    number that is the family's by `defaults` is one in these units: the search does not depend on the record's scale.
 
     Raises ValueError if the input is constant, `freedom.initial` is unknown, or a name or a bound does not fit.
     """
@@ -99,20 +112,25 @@ def declared_space(
         raise ValueError(
             f"{unbounded[0]!r} is free, but has no bounds: give bounds={{{unbounded[0]!r}: (lower, upper)}}"
         )
-    own = freedom.held(scalars, at_rest=resting if freedom.starts_at_rest() else ())
-    held = {name: scalars[name] for name, each in of.items() if each is None and name not in bounded} | own
+    chosen = freedom.held(scalars, at_rest=resting if freedom.starts_at_rest() else ())
+    held = {name: scalars[name] for name, each in of.items() if each is None and name not in bounded} | chosen
     coordinates, values = [], {}
     for name, each in of.items():
         if each is None:
             coordinates += [free_coordinate(name, *freedom.bounds[name])] if name in bounded else []
         elif not each.affine:
             unit, origin = unit_of(each.unit, units), first if each.from_first else 0.0
-            coordinates.append(Coordinate(name, origin + each.lower * unit, origin + each.upper * unit, unit, each.log))
+            box = origin + each.lower * unit, origin + each.upper * unit
+            coordinates.append(Coordinate(name, *box, unit, each.log, each.physical))
             values[name] = origin, unit
-    points = [{name: values[name][0] + start[name] * values[name][1] for name in start} for start in starts]
+    usual = scalars_of(defaults or {}).items() if freedom.starts_anew else ()
+    own = {name: value for name, value in usual if name in values and scalars[name] == value}
+    points = [{name: values[name][0] + start[name] * values[name][1] for name in start} for start in (own, *starts)]
     columns = tuple(name for name, each in of.items() if each is not None and each.affine)
     limits = freedom.limits(scalars, held)
-    return space_of(coordinates, columns, scalars, held, limits, [{}, *points], state=resting, screened=screened)
+    if not freedom.starts_anew:
+        coordinates = [each.holding(scalars[each.name]) for each in coordinates]
+    return space_of(coordinates, columns, scalars, held, limits, points, state=resting, screened=screened)
 
 
 def free_coordinate(name: str, lower: float, upper: float) -> Coordinate:
@@ -156,6 +174,7 @@ def space_of(
         linear=tuple(name for name in columns if name not in held),
         held=held,
         parameters=parameters,
+        physical={each.name: each.physical for each in searched if each.name not in limits},
         **{"bounds": {name: pair for name, pair in limits.items() if name in columns}, **others},
     )
 

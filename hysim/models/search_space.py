@@ -6,10 +6,11 @@ affine are not searched: for given others, the best ones are the solution of a l
 """
 
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 
 from hysim._frozen import FloatArray, frozen
 from hysim._names import among, meant
@@ -17,6 +18,9 @@ from hysim._names import among, meant
 Parameters = Mapping[str, Any]
 """User's names to floats or to arrays of shape (n_sets,)."""
 
+Flags = npt.NDArray[np.bool_]
+
+_AT_SIDE = 1e-6  # in units of the box
 
 STATES = ("free", "rest", "still", "periodic")
 """Values of `initial` of `hysim.identify`."""
@@ -61,6 +65,11 @@ class SearchSpace:
         Lower and upper side of the part of the box from which these points are drawn; by default all of it.
     whole : tuple of two arrays, shape (n_x,) each, optional
         The box of which this one is the part with the admissible laws: only its sides are search bounds.
+    physical : mapping
+        Coordinate to whether its lower and its upper side is a limit of physics or of the law itself: an optimum there
+        is one. At other sides that the user has not given the search has stopped, and the box is widened.
+    given : mapping
+        Searched or linear parameter to whether its lower and its upper bound is the user's.
     encoded : callable, optional
         The user's parameters by name, as far as they differ from the start, to coordinates, shape (n_x,).
     """
@@ -81,7 +90,43 @@ class SearchSpace:
     screened: int | None = None
     drawn: tuple[FloatArray, FloatArray] | None = None
     whole: tuple[FloatArray, FloatArray] | None = None
+    physical: Mapping[str, tuple[bool, bool]] = field(default_factory=dict)
+    given: Mapping[str, tuple[bool, bool]] = field(default_factory=dict)
     encoded: Callable[[Mapping[str, float]], FloatArray] | None = None
+
+    def sides(self, kind: Mapping[str, tuple[bool, bool]]) -> tuple[Flags, Flags]:
+        """Which lower and upper sides of the box (n_x,) are of a kind, such as `physical` or `given`."""
+        lower, upper = np.array([kind.get(name, (False, False)) for name in self.coordinates]).reshape(-1, 2).T
+        return lower.astype(bool), upper.astype(bool)
+
+    def open_sides(self, x: FloatArray) -> tuple[Flags, Flags]:
+        """The lower and the upper sides at which `x` (n_x,) stands, and which are neither physical nor the user's."""
+        closed = zip(self.ends(x), self.sides(self.physical), self.sides(self.given), strict=True)
+        low, high = (at & ~physical & ~given for at, physical, given in closed)
+        return low, high
+
+    def at_sides(self, x: FloatArray) -> tuple[Flags, Flags]:
+        """The lower and the upper sides at which `x` (n_x,) stands."""
+        width = self.upper - self.lower
+        return x - self.lower < _AT_SIDE * width, self.upper - x < _AT_SIDE * width
+
+    def ends(self, x: FloatArray) -> tuple[Flags, Flags]:
+        """As `at_sides`, without the sides that part the admissible laws from the others."""
+        low, high = self.at_sides(x)
+        if self.whole is None:
+            return low, high
+        return low & (self.lower <= self.whole[0]), high & (self.upper >= self.whole[1])
+
+    def widened(self, low: Flags, high: Flags) -> "SearchSpace":
+        """The space whose box reaches a quarter of its width beyond these sides."""
+        width = self.upper - self.lower
+        lower, upper = self.lower - 0.25 * width * low, self.upper + 0.25 * width * high
+        regions = {
+            name: (np.where(below == self.lower, lower, below), np.where(above == self.upper, upper, above))
+            for name, (below, above) in self.regions.items()
+        }
+        whole = None if self.whole is None else (np.minimum(self.whole[0], lower), np.maximum(self.whole[1], upper))
+        return replace(self, lower=lower, upper=upper, regions=regions, whole=whole)
 
     @classmethod
     def without_coordinates(cls, names: tuple[str, ...]) -> "SearchSpace":
@@ -102,12 +147,17 @@ class SearchSpace:
 
 @dataclass(frozen=True)
 class Freedom:
-    """The user's wishes about the parameters; see `hysim.identify` for the meaning."""
+    """The user's wishes about the parameters; see `hysim.identify` for the meaning.
+
+    A search that `starts_anew` takes numbers that a family has by default in units of the record, so that it does not
+    depend on the record's scale. Else the first start is the law itself, and the box holds it.
+    """
 
     fixed: Mapping[str, float] = field(default_factory=dict)
     free: tuple[str, ...] = ()
     bounds: Mapping[str, tuple[float, float]] = field(default_factory=dict)
     initial: str | None = None
+    starts_anew: bool = False
 
     def starts_at_rest(self, default: str = "free") -> bool:
         """Whether the initial state is not free, where the user says nothing by the family's default."""

@@ -45,7 +45,7 @@ class Linear(NamedTuple):
 
 
 Filter = Callable[[FloatArray, int], FloatArray]
-"""Signals (..., n_samples) and a power k to s^k / D(s) of them, shape (..., n_compared)."""
+"""Signals (..., n_samples) and a power k to s^k mass / D(s) of them, shape (..., n_compared)."""
 
 
 def linear_plant(motion: Motion) -> Linear | None:
@@ -78,8 +78,8 @@ def regression(columns: FloatArray, target: FloatArray) -> list[float]:
 
 
 def filtering(motion: Motion, plant: Linear) -> Filter:
-    """1/D(s) of a plant: on the spectrum of one period, real parts before imaginary ones, or in time from rest."""
-    denominator = list(plant)
+    """mass / D(s) of a plant: on the spectrum of one period, real parts before imaginary ones, or in time from rest."""
+    denominator = [each / plant.mass for each in plant]  # else a light plant and a heavy one overflow
     if motion.periodic:
         s = 2j * np.pi * np.fft.rfftfreq(motion.y.size, motion.sample_time)
         force = np.abs(np.fft.rfft(motion.force))

@@ -97,6 +97,7 @@ class OscillatorStructure(Identifiable):
             linear=(),
             held=held,
             parameters=lambda x: box.decode(np.atleast_2d(x), laws),
+            physical={**laws.physical, **dict.fromkeys(("damping", "A"), (True, False))},
             redundant=redundant,
             screened=0,
         )

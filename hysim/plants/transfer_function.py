@@ -36,6 +36,10 @@ _LONG = 1000  # samples from which the starts from the record are relied upon
 _AGREED = 0.02  # of the box: starts from different cutoffs this close to their median are one optimum
 _MAJORITY = 3  # of them are enough to search no further
 _SCREENED = 64  # random points beside starts that differ
+_PHYSICAL = {  # the record shows nothing slower or faster, and a pole is stable
+    **dict.fromkeys(("log frequency", "log rate"), (True, True)),
+    **dict.fromkeys(("log damping", "delay"), (True, False)),
+}
 
 
 @family
@@ -366,6 +370,7 @@ class TransferFunctionStructure(Identifiable, Composable):
             parameters=lambda x: self._searched(np.atleast_2d(x), sample_time, known_delay),
             bounds=limits,
             state=self.columns[self.zeros + 1 :],
+            physical={name: _PHYSICAL[name.partition("[")[0]] for name in coordinates},
         )
 
     def regressors(self, parameters: Parameters, record: Record) -> FloatArray:

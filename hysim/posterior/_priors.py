@@ -203,7 +203,8 @@ def _scale(problem: Problem, k: int) -> Scale:
         points = np.log(np.abs(values)) if is_log else values
         slope = float((points[-1] - points[0]) / (x[-1, k] - x[0, k]))
         origin = float(points[0] - slope * x[0, k])
-        if np.allclose(points, origin + slope * x[:, k], rtol=1e-9) and (not is_log or abs(slope - 1.0) < 1e-9):
+        apart = np.abs(points - (origin + slope * x[:, k])).max()
+        if apart <= 1e-9 * np.abs(points).max() and (not is_log or abs(slope - 1.0) < 1e-9):
             size = math.copysign(math.exp(min(origin, 700.0)), values[0])
             return Scale(size, 0.0, True) if is_log else Scale(slope, origin, False)
     raise ValueError(f"a distribution of {space.coordinates[k]!r} is not possible: pass (low, high)")

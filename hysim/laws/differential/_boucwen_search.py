@@ -12,7 +12,8 @@ for every n,
     l = k (1 + |k|)^(n - 1),    k = sinh(c)
 
 The box is |k| <= 40 for both, n in [0.5, 10] on a log scale, z0/Z in [-1, 1], and open for the
-parameters in which the output is affine. The further shape coefficients b2 to b6 of the generalised law
+parameters in which the output is affine; the upper side of n is a limit, beyond the others `hysim.identify` searches
+where an optimum stands at them. The further shape coefficients b2 to b6 of the generalised law
 have the coordinates of beta; the forcing delta of Zhu and Wang is measured by what it adds to |A| where |u|
 is largest, in [-5, 5]. A parameter that the user bounds is its own coordinate, between these bounds; bounds from
 or to zero and infinity cut the box at zero.
@@ -36,7 +37,10 @@ _SCALED = {  # parameters with a unit of their own, and their box in it
 }
 _MEMORY = ("A", "beta", "gamma", "n", *_FURTHER, *_SCALED)
 _PAIR = ("loading", "unloading")
+_LEAST_UNIT, _LARGEST_UNIT = 1e-290, 1e290  # times 1e17, the largest coefficient, still a number
+_BY_DEFAULT = {"A": 1.0, "beta": 0.5, "gamma": 0.5, "n": 1.0, "z0": 0.0}
 KNEE = float(np.arcsinh(40.0))
+PHYSICAL = {"n": (False, True)}  # a larger exponent is a corner as sharp as that of two straight lines
 _BOX = {
     "A": (-10.0, 10.0),
     "loading": (-KNEE, KNEE),
@@ -59,6 +63,9 @@ class Chart(Protocol):
     @property
     def values(self) -> Mapping[str, float]:
         """Parameters by name, as the search begins."""
+
+    def in_own_units(self) -> "Chart":
+        """The chart for an input of the span 1 and an output of the slope 1."""
 
     def encode(self, parameters: Mapping[str, float]) -> FloatArray:
         """Coordinates (n_x,) of the parameters."""
@@ -100,7 +107,7 @@ def search_space(
 
     quadrant = np.array([max(low, 0.0) if name in _PAIR else low for name, (low, _) in box.items()])
     return replace(
-        space_of_chart(chart, (lower, upper), defaults, columns, held, bounds),
+        space_of_chart(chart, (lower, upper), defaults, columns, held, bounds, anew=freedom.starts_anew),
         parameters=decoded,
         regions={"admissible": (quadrant, upper)} if set(_PAIR) <= set(box) and not extended else {},
         screened=screened,
@@ -114,9 +121,19 @@ def space_of_chart(
     columns: tuple[str, ...],
     held: Mapping[str, float],
     bounds: Mapping[str, tuple[float, float]],
+    *,
+    anew: bool,
 ) -> SearchSpace:
-    """The search in the coordinates of a chart, between both sides of its `box`, from the chart's own values."""
+    """The search in the coordinates of a chart, between both sides of its `box`, from the chart's own values.
+
+    `anew` is `Freedom.starts_anew`.
+    """
     lower, upper = box
+    begun = chart.in_own_units() if anew and _BY_DEFAULT.items() <= defaults.items() else chart
+    if not anew:
+        own = chart.encode(chart.values)
+        free = np.array([name not in bounds for name in chart.coordinates], dtype=bool)
+        lower, upper = np.where(free, np.minimum(lower, own), lower), np.where(free, np.maximum(upper, own), upper)
 
     def encoded(parameters: Mapping[str, float]) -> FloatArray:
         return np.asarray(np.clip(chart.encode({**chart.values, **parameters}), lower, upper))
@@ -125,7 +142,7 @@ def space_of_chart(
         coordinates=chart.coordinates,
         lower=lower,
         upper=upper,
-        starts=encoded({})[np.newaxis],
+        starts=np.clip(begun.encode(chart.values), lower, upper)[np.newaxis],
         names=tuple(name for name in defaults if name not in held),
         columns=columns,
         linear=tuple(name for name in columns if name not in held),
@@ -134,6 +151,7 @@ def space_of_chart(
         redundant=REDUNDANT,
         bounds={name: pair for name, pair in bounds.items() if name in columns},
         state=("z0",),
+        physical={name: PHYSICAL[name] for name in chart.coordinates if name in PHYSICAL and name not in bounds},
         encoded=encoded,
     )
 
@@ -158,6 +176,9 @@ class _Chart:
     span: float
     reach: float  # of |u|
     slope: float  # what A is measured in
+
+    def in_own_units(self) -> "_Chart":
+        return replace(self, span=1.0, reach=self.reach / self.span, slope=1.0)
 
     def decode(self, x: FloatArray) -> dict[str, FloatArray]:
         """Parameters of the memory, each (n_sets,), from coordinates (n_sets, n_x)."""
@@ -203,9 +224,11 @@ class _Chart:
 
 
 def shape_unit(A: FloatArray, n: FloatArray, span: float) -> FloatArray:
-    """The unit of beta and gamma, |A| / Z^n."""
+    """The unit of beta and gamma, |A| / Z^n, where that is a number which the coefficients can be measured in."""
     slope = _steepness(A)
-    return np.asarray(slope / (slope * span) ** n)
+    with np.errstate(over="ignore", under="ignore", divide="ignore"):
+        unit = slope / (slope * span) ** n
+    return np.clip(unit, _LEAST_UNIT, _LARGEST_UNIT)
 
 
 def _steepness(A: FloatArray) -> FloatArray:

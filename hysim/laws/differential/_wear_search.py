@@ -14,7 +14,8 @@ its path, k the knee and l the shape coefficients of `hysim.laws.differential._b
     z0            z0 / z_u
     zeta_s, q     themselves
 
-A parameter that the user bounds is its own coordinate, between these bounds.
+The rates are not negative, since damage does not heal. A parameter that the user bounds is its own coordinate, between
+these bounds.
 """
 
 from collections.abc import Mapping
@@ -36,24 +37,29 @@ _BOX = {
     "beta": (-plain.KNEE, plain.KNEE),
     "gamma": (-plain.KNEE, plain.KNEE),
     "n": (float(np.log(0.5)), float(np.log(10.0))),
-    "delta_a": (-0.5, 4.0),
-    "delta_nu": (-0.5, 4.0),
-    "delta_eta": (-0.5, 4.0),
+    "delta_a": (0.0, 4.0),
+    "delta_nu": (0.0, 4.0),
+    "delta_eta": (0.0, 4.0),
     "zeta_s": (0.0, 0.999),
     "q": (-1.0, 1.0),
     "p": (float(np.log(0.05)), float(np.log(300.0))),
     "psi": (float(np.log(0.02)), float(np.log(5.0))),
-    "delta_psi": (-0.5, 4.0),
+    "delta_psi": (0.0, 4.0),
     "lambda_": (float(np.log(0.02)), float(np.log(10.0))),
     "z0": (-3.0, 3.0),
 }
 _DRAWN = {
     "loading": (float(np.arcsinh(1.0 / 3.0)), float(np.arcsinh(500.0))),
     "ratio": (-1.0, 3.0),
-    "delta_psi": (-0.2, 2.0),
+    "delta_psi": (0.0, 2.0),
     "z0": (-1.0, 1.0),
 }
 _RATES = ("delta_a", "delta_nu", "delta_eta", "delta_psi")
+_PHYSICAL = {  # damage does not heal, and a slope along a branch does not change its sign
+    **plain.PHYSICAL,
+    **dict.fromkeys(_RATES, (True, False)),
+    "zeta_s": (True, True),
+}
 _LOGS = ("p", "psi", "lambda_")
 _MEMORY = (
     *("A", "beta", "gamma", "n", "delta_a", "delta_nu", "delta_eta"),
@@ -99,8 +105,11 @@ def search_space(
         pair if name in limits else _DRAWN.get(name, pair) for name, pair in zip(chart.coordinates, box, strict=True)
     ]
 
+    physical = {name: _PHYSICAL[name] for name in chart.coordinates if name in _PHYSICAL and name not in limits}
+    physical |= {"loading": (True, False)} if pinches and "loading" in chart.coordinates else {}
     return replace(
-        plain.space_of_chart(chart, (lower, upper), defaults, columns, held, bounds),
+        plain.space_of_chart(chart, (lower, upper), defaults, columns, held, bounds, anew=freedom.starts_anew),
+        physical=physical,
         drawn=(np.array([low for low, _ in drawn]), np.array([high for _, high in drawn])),
     )
 
@@ -121,6 +130,9 @@ class _Chart:
         if limits is None:
             return _BOX[name]
         return (float(np.log(limits[0])), float(np.log(limits[1]))) if name == "n" else limits
+
+    def in_own_units(self) -> "_Chart":
+        return replace(self, span=1.0, path=self.path / self.span, slope=1.0)
 
     def decode(self, x: FloatArray) -> dict[str, FloatArray]:
         """Parameters of the memory, each (n_sets,), from coordinates (n_sets, n_x)."""

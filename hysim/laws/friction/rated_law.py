@@ -188,9 +188,10 @@ class RatedLaw(Identifiable, Placed, ABC):
 
     def search_space(self, record: Record, freedom: Freedom = ALL_FREE) -> SearchSpace:
         """The box that `hysim.identify` searches; ValueError also if the record has no even time."""
+        units, defaults = rate_spans(record), self.at_sample_time(record.sample_time).defaults()
         return declared_space(
             self.searched, self.starts, self.scalars, self.initial, record, freedom, self.screened,
-            units=rate_spans(record),
+            units=units, defaults=defaults,
         )  # fmt: skip
 
     def regressors(self, parameters: Parameters, record: Record) -> FloatArray:
@@ -219,7 +220,10 @@ class AtSampleTime(Law):
         """The box of the family for samples that are the law's sample time apart."""
         times = np.asarray(self.scalars["sample_time"] * np.arange(len(record)), dtype=np.float64)
         timed = replace(record, t=times)
-        return declared_space(self.searched, (), self.scalars, self.initial, record, freedom, units=rate_spans(timed))
+        units, defaults = rate_spans(timed), self.defaults()
+        return declared_space(
+            self.searched, (), self.scalars, self.initial, record, freedom, units=units, defaults=defaults
+        )
 
     @classmethod
     def initial_memory(cls, tables: Tables, *, further: int = 0) -> FloatArray:

@@ -39,10 +39,10 @@ class BranchLaw(Law):
     searched: ClassVar[tuple[Parameter, ...]] = (
         Parameter("saturation", affine=True),
         Parameter("coercivity", 1e-3, 3.0, unit="h", log=True),
-        Parameter("squareness", 1e-3, 0.999),
+        Parameter("squareness", 1e-3, 0.999, physical=(True, True)),
         Parameter("feedthrough", affine=True),
         Parameter("offset", affine=True),
-        Parameter("z0", -1.0, 1.0),
+        Parameter("z0", -1.0, 1.0, physical=(True, True)),
     )
     starts = tuple(
         {"coercivity": coercivity, "squareness": squareness, "z0": z0}

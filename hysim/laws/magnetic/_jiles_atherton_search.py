@@ -23,6 +23,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from hysim._frozen import FloatArray
+from hysim.laws.magnetic._jiles_atherton_conversions import MU0
 from hysim.models.parameters import spans
 from hysim.models.search_space import Freedom, SearchSpace
 from hysim.records import Record
@@ -45,10 +46,15 @@ _DRAWN = {
     "c": (0.0, 0.8),
     "anisotropy": (-10.0, 10.0),
 }
+_PHYSICAL = {
+    "Ms": (True, False),
+    **dict.fromkeys(("c", "reversible_feedback", "z0"), (True, True)),
+}
 _LOGS = ("Ms", "a", "k")
 _CALLED = {"a": "width", "alpha": "stability"}
 _HELD = ("anisotropy", "reversible_feedback")
 _COLUMNS = ("gain", "feedthrough")
+_SI = ("A/m", "T")
 _LEAST = 1e-12  # of 1 - alpha Ms m0 / a
 _TURN = 12.0  # twice the stability at which alpha Ms s / a is 1
 _SMALLEST = 1e-3  # of the width: a for a coupling that is given, and nearly as large
@@ -56,15 +62,26 @@ _SCREENED = 1024
 
 
 def search_space(
-    scalars: Mapping[str, float], columns: tuple[str, ...], record: Record, freedom: Freedom
+    scalars: Mapping[str, float],
+    columns: tuple[str, ...],
+    record: Record,
+    freedom: Freedom,
+    *,
+    is_by_default: bool,
 ) -> SearchSpace:
     """The coordinates, their box and the way back to the user's parameters for one record.
 
+    A search of the law by default begins in the middle of the box.
+
     Held by default are gain and feedthrough, of which the first could not be told from Ms, and what makes the law
-    another one: an anisotropy that is zero at the start, and reversible_feedback.
+    another one: an anisotropy that is zero at the start, and reversible_feedback. The feedthrough of a law by default,
+    mu0, is that of a record in A/m and T; it is free in a record whose units are others or not known.
     """
+    is_of_vacuum = scalars["feedthrough"] == scalars["gain"] == MU0
+    has_other_units = is_of_vacuum and (record.units.get("u"), record.units.get("y")) != _SI
     further = [name for name in _HELD if name not in freedom.bounds and not (name == "anisotropy" and scalars[name])]
-    alone = tuple((name,) for name in (*_COLUMNS, *further) if name not in freedom.bounds)
+    known = _COLUMNS[:1] if has_other_units else _COLUMNS
+    alone = tuple((name,) for name in (*known, *further) if name not in freedom.bounds)
     at_rest = ("z0",) if freedom.starts_at_rest() else ()
     held = freedom.held(scalars, redundant=alone, at_rest=at_rest)
     bounds = freedom.limits(scalars, held)
@@ -82,6 +99,11 @@ def search_space(
         magnetisation=0.5 * unit["y"] / (abs(values["gain"]) or 1.0),
     )
     lower, upper = np.array([chart.side(name) for name in chart.names]).reshape(-1, 2).T
+    begins_anew = freedom.starts_anew and is_by_default
+    if not freedom.starts_anew:
+        own = chart.encode(values)
+        free = np.array([name not in limits for name in chart.names], dtype=bool)
+        lower, upper = np.where(free, np.minimum(lower, own), lower), np.where(free, np.maximum(upper, own), upper)
     drawn = np.array([chart.side(name) if name in limits else _DRAWN.get(name, _BOX[name]) for name in chart.names])
     low, high = np.clip(drawn.reshape(-1, 2).T, lower, upper)
 
@@ -92,7 +114,7 @@ def search_space(
         coordinates=tuple(name if name in limits else _CALLED.get(name, name) for name in chart.names),
         lower=lower,
         upper=upper,
-        starts=encoded({})[np.newaxis],
+        starts=(0.5 * (low + high) if begins_anew else encoded({}))[np.newaxis],
         names=tuple(name for name in scalars if name not in held),
         columns=columns,
         linear=tuple(name for name in columns if name not in held),
@@ -100,6 +122,7 @@ def search_space(
         parameters=chart.decode,
         bounds={name: pair for name, pair in bounds.items() if name in columns},
         state=("z0",),
+        physical={name: _PHYSICAL[name] for name in chart.names if name in _PHYSICAL and name not in limits},
         screened=_SCREENED,
         drawn=(low, high),
         encoded=encoded,

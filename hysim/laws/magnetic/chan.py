@@ -16,7 +16,7 @@ from hysim.records import Record
 
 _BEHIND_A_GAP = {
     "saturation": Parameter("saturation", 1e-2, 1e2, unit="y", log=True),
-    "feedthrough": Parameter("feedthrough", 0.0, 10.0, unit="y/u"),
+    "feedthrough": Parameter("feedthrough", 0.0, 10.0, unit="y/u", physical=(True, False)),
 }
 """Parameters in which the output is affine without a gap alone."""
 _SAME = 1e-9  # relative difference of numbers that are the same
@@ -133,7 +133,9 @@ class Chan(BranchLaw):
             return super().search_space(record, freedom)
         searched = tuple(_BEHIND_A_GAP.get(each.name, each) for each in self.searched)
         starts = tuple({**start, "saturation": 1.0, "feedthrough": 0.0} for start in self.starts)
-        return declared_space(searched, starts, self.scalars, self.initial, record, freedom, self.screened)
+        return declared_space(
+            searched, starts, self.scalars, self.initial, record, freedom, self.screened, defaults=self.defaults()
+        )
 
     @classmethod
     def from_ltspice(

@@ -88,7 +88,7 @@ class JilesAtherton(Law):
     ``dM/dHe = c M_an' + (M_an - M) / (delta k)`` is the same law; see `from_jamodel`, `from_total` and `from_circuit`
     for others. Where alpha is so large that H would fall while He rises, the magnetisation jumps: `response` raises
     SimulationError there. A law with ``alpha Ms < 3 a`` (and no anisotropy) does not jump from a state that an input
-    has led to.
+    has led to. `identify` holds the feedthrough mu0 in records whose units are A/m and T, and frees it in others.
 
     Examples
     --------
@@ -235,7 +235,8 @@ class JilesAtherton(Law):
 
     def search_space(self, record: Record, freedom: Freedom = ALL_FREE) -> SearchSpace:
         """The box in the scales of the record's field and magnetisation."""
-        return search.search_space(self.scalars, self.columns, record, freedom)
+        is_by_default = self.arguments == self.defaults()
+        return search.search_space(self.scalars, self.columns, record, freedom, is_by_default=is_by_default)
 
     def regressors(self, parameters: Parameters, record: Record) -> FloatArray:
         """Columns M, H, 1 and 0, shape (n_sets, n_samples, 4)."""

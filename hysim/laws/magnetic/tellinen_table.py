@@ -67,7 +67,7 @@ class TellinenTable(Law):
     searched = (
         Parameter("feedthrough", affine=True),
         Parameter("offset", affine=True),
-        Parameter("z0", -1.0, 1.0),
+        Parameter("z0", -1.0, 1.0, physical=(True, True)),
     )
 
     @classmethod

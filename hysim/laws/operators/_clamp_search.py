@@ -46,12 +46,16 @@ _ROUNDING = 1e-9  # of a threshold
 
 
 class Axis(NamedTuple):
-    """A coordinate beside thresholds and turning point: its box and starts, and the scale by which it is divided."""
+    """A coordinate beside thresholds and turning point: its box and starts, and the scale by which it is divided.
+
+    `physical` is that of `hysim.models.parameters.Parameter`.
+    """
 
     lower: float
     upper: float
     starts: tuple[float, ...]
     scale: float
+    physical: tuple[bool, bool] = (False, False)
 
 
 @checked
@@ -115,10 +119,12 @@ class ClampStructure(Identifiable, Composable):
         limits = freedom.limits(defaults, held)
         gaps = zip(names, _gaps(thresholds), strict=True)
         box = [
-            *(Coordinate(name, *gap, half) for name, gap in gaps),
+            *(Coordinate(name, *gap, half, physical=(True, True)) for name, gap in gaps),
             *(Coordinate(turn, first - 2.0 * half, first + 2.0 * half, half) for turn in turns),
         ]
-        box += [Coordinate(name, axis.lower, axis.upper, axis.scale) for name, axis in axes.items()]
+        box += [
+            Coordinate(name, axis.lower, axis.upper, axis.scale, physical=axis.physical) for name, axis in axes.items()
+        ]
         pasts = [point for point in _pasts(turns, record) if not set(turns) & set(held)] or [{}]
         starts = {name: axis.starts for name, axis in axes.items() if name not in held}
         points = [

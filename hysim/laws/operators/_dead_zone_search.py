@@ -59,7 +59,10 @@ class DeadZoneStructure(Identifiable, Composable):
         slope = float(np.ptp(record.y)) / float(np.ptp(record.u)) or 1.0
         largest = max(_LARGEST * abs(slope), 2.0 * float(np.abs(start).max()))  # a steep start is inside
         sides = {name: np.clip(own.bounds.get(name, (-np.inf, np.inf)), -largest, largest) for name in weights}
-        box = [Coordinate(name, float(pair[0]), float(pair[1]), slope) for name, pair in sides.items()]
+        box = [
+            Coordinate(name, float(low), float(high), slope, physical=(low == 0.0, high == 0.0))
+            for name, (low, high) in sides.items()
+        ]
         held = dict(own.held) | {f"dead_zones[{j}]": d for j, d in enumerate(zones.tolist())} | held
         return space_of(box, columns, defaults, held, limits, starts, state=own.state, screened=0)
 
@@ -102,7 +105,9 @@ class DeadZoneStructure(Identifiable, Composable):
 
         columns = self.plays.regressors(own.parameters(np.empty((1, 0))), record)[0, :, :-1]
         limits = np.array([own.bounds.get(name, (-np.inf, np.inf)) for name in own.columns])
-        weights = lsq_linear(columns, record.y, bounds=tuple(limits.T), method="bvls").x[:-1]
+        size, unit = np.abs(columns).max(axis=0), float(np.abs(record.y).max()) or 1.0
+        box = tuple(limits.T * size / unit)  # the tolerance of the solver is an absolute one
+        weights = lsq_linear(columns / size, record.y / unit, bounds=box, method="bvls").x[:-1] * unit / size[:-1]
         return weights, columns[:, :-1] @ weights
 
     def _zones(self, x: FloatArray) -> FloatArray:

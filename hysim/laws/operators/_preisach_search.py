@@ -65,7 +65,7 @@ class PreisachStructure(Identifiable, Composable):
         chosen = freedom.held(defaults)
         held = {**places, **resting, **{name: 0.0 for name in untold if name not in freedom.free}, **chosen}
         limits = freedom.limits(defaults, held)
-        turn = Coordinate(TURN, *limits.get(TURN, (lowest, highest)), scale)
+        turn = Coordinate(TURN, *limits.get(TURN, (lowest, highest)), scale, physical=(True, True))
         points = [
             {TURN: value} for value in np.linspace(turn.lower, turn.upper, 1 if TURN in held else _STARTS).tolist()
         ]
@@ -179,7 +179,8 @@ def _support(columns: FloatArray, goal: FloatArray, bounds: list[tuple[float, fl
     sides += [(len(bounds), 1.0), (len(bounds), -1.0)]
     places, signs = np.array([k for k, _ in sides]), np.array([sign for _, sign in sides])
     size = np.linalg.norm(columns, axis=0)[places]
-    solution, _ = nnls(signs * columns[:, places] / np.where(size > 0.0, size, 1.0), goal)
+    unit = np.linalg.norm(goal) or 1.0  # the tolerance of the solver is an absolute one
+    solution, _ = nnls(signs * columns[:, places] / np.where(size > 0.0, size, 1.0), goal / unit)
     return np.isin(np.arange(len(bounds)), places[solution > 0.0])
 
 

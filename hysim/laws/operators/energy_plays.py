@@ -181,7 +181,7 @@ class AnhystereticCurve(Pushing):
         """The field."""
         half = spans(record)["h"]
         starts = (*self.first, *(half * start for start in _STARTS))
-        return {"field": Axis(_FIELDS[0] * half, _FIELDS[1] * half, starts, half)}
+        return {"field": Axis(_FIELDS[0] * half, _FIELDS[1] * half, starts, half, (True, False))}
 
     def outputs(self, z: FloatArray, parameters: Parameters) -> FloatArray:
         """The curve at the positions (n_sets, n_samples, n_plays)."""

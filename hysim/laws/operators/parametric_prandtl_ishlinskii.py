@@ -101,7 +101,7 @@ class ParametricPrandtlIshlinskii(Law):
 
     step = staticmethod(kernels.bent_step)
     searched = (
-        Parameter("exponent", -0.95, 4.0),
+        Parameter("exponent", -0.95, 4.0, physical=(True, False)),
         Parameter("decay", 3e-3, 1e2, unit="h", log=True),
         *(Parameter(name, affine=True) for name in ("weight", "weight_slope", "offset", "input_coefficients")),
         Parameter("z0", -2.0, 2.0, unit="h", from_first=True),
@@ -169,7 +169,9 @@ class ParametricPrandtlIshlinskii(Law):
         turns = [{}] if names[-1] in held else [{names[-1]: turn} for turn in _TURNS]
         starts = [{"exponent": a, "decay": decay} | turn for a, decay in _DENSITIES for turn in turns]
         asked = replace(freedom, fixed=held)
-        return declared_space(law.searched, starts, law.scalars, law.initial, record, asked, law.screened)
+        return declared_space(
+            law.searched, starts, law.scalars, law.initial, record, asked, law.screened, defaults=self.defaults()
+        )
 
     def _likely_past(self, record: Record) -> tuple[float, float]:
         """Inputs before the first sample: those of the cycle, unless plays that stand still fit clearly better."""

@@ -25,7 +25,7 @@ class _Element(ClampLaw):
     gain: float
 
     searched = (
-        Parameter("threshold", 1e-3, 1.5, unit="h"),
+        Parameter("threshold", 1e-3, 1.5, unit="h", physical=(True, False)),
         Parameter("z0", -1.0, 1.0, unit="h", from_first=True),
         Parameter("gain", affine=True),
         Parameter("offset", affine=True),

@@ -66,6 +66,7 @@ def expanded(
         parameters=parameters,
         regions={each: (laid(low), laid(high)) for each, (low, high) in space.regions.items()},
         bounds={name: pair for each, pair in space.bounds.items() for name in names.get(each, (each,))},
+        physical={name: pair for each, pair in space.physical.items() for name in names.get(each, (each,))},
         drawn=space.drawn and (laid(space.drawn[0]), laid(space.drawn[1])),
         encoded=None,
         screened=_SCREENED if starts else space.screened,

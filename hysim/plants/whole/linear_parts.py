@@ -141,13 +141,13 @@ class LinearParts:
             frequency, damping = f"{FREQUENCY}[{k}]", f"{DAMPING}[{k}]"
             gains = [self.gain_of(k, name) for name in self.inputs] if k and self.gains else []
             box += [
-                Coordinate(frequency, lowest, highest, log=True),
-                Coordinate(damping, *_DAMPING, log=True),
+                Coordinate(frequency, lowest, highest, log=True, physical=(True, True)),  # no more is in the record
+                Coordinate(damping, *_DAMPING, log=True, physical=(True, False)),
                 *(Coordinate(gain, *limits) for gain in gains),
             ]
             defaults |= {frequency: (lowest * highest) ** 0.5, damping: 0.02, **dict.fromkeys(gains, 0.0)}
         if self.delay:
-            box.append(Coordinate("delay", 0.0, _LATEST * survey.shortest, survey.shortest))
+            box.append(Coordinate("delay", 0.0, _LATEST * survey.shortest, survey.shortest, physical=(True, False)))
             defaults["delay"] = 0.0
         return tuple(box), defaults
 
