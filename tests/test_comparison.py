@@ -343,6 +343,25 @@ def test_a_model_that_is_worse_by_a_third_is_seen_in_four_hundred_samples():
     assert np.mean([probability(*pair) < 0.05 for pair in zip(a, b, strict=True)]) > 0.9
 
 
+def test_a_record_that_is_given_twice_counts_once(table1):
+    once = hs.compare({"line": hs.Line, "play": hs.Play}, table1, cross_validate=5)
+    copy = hs.Record(u=table1.u, y=table1.y)
+    twice = hs.compare({"line": hs.Line, "play": hs.Play}, [copy, table1], cross_validate=5)
+    assert twice.probabilities == once.probabilities
+    assert twice["line"].cv_rmse == once["line"].cv_rmse
+    fit = hs.identify(hs.Play, [table1, copy])
+    with pytest.raises(ValueError, match="give each record once"):
+        hs.compare({"line": hs.Line, "play": fit}, [table1, copy])
+
+
+def test_a_verdict_on_hundreds_of_models_names_the_first_ones(quick):
+    row = quick["Play"]
+    table = dataclasses.replace(quick, rows=tuple(dataclasses.replace(row, name=f"m{k}") for k in range(300)))
+    assert len(table.undecided) == 299
+    assert "difference to m1, m2, m3, m4, m5 and 294 others (" in table.verdict
+    assert len(table.verdict) < 300
+
+
 def test_one_outlier_does_not_hide_that_a_model_is_worse():
     """Squared errors made of one huge error have a variance that swallows their mean."""
     rng = np.random.default_rng(2)
