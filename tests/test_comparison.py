@@ -360,6 +360,8 @@ def test_a_verdict_on_hundreds_of_models_names_the_first_ones(quick):
     assert len(table.undecided) == 299
     assert "difference to m1, m2, m3, m4, m5 and 294 others (" in table.verdict
     assert len(table.verdict) < 300
+    with pytest.raises(KeyError, match="there are m0, m1, m2, m3, m4, m5, 294 others"):
+        table["two"]
 
 
 def test_one_outlier_does_not_hide_that_a_model_is_worse():
