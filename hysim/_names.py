@@ -12,6 +12,8 @@ _WORDS = [line.split() for line in _LINES]  # "from hysim.records import Record 
 MODULE_OF = {words[3]: words[1] for words in _WORDS if words[:1] == ["from"]}
 """Public name to the module that holds it; ``hysim`` for a module of that name."""
 
+_MANY, _FIRST = 100, 6  # names that are all printed, and those that are printed of more
+
 
 def nearest(name: object, known: Iterable[object]) -> str | None:
     """The known name that is nearest to a misspelt one, whatever its capitals, hyphens and underscores; else None."""
@@ -31,9 +33,10 @@ def meant(name: object, known: Iterable[object]) -> str:
 
 
 def among(name: object, known: Iterable[object]) -> str:
-    """The known names in a row, and the one that may have been meant by an unknown one."""
+    """The known names in a row, the first ones of hundreds, and the one that may have been meant by an unknown one."""
     names = [*map(str, known)]
-    return f"{', '.join(names)}{meant(name, names)}"
+    shown = names if len(names) <= _MANY else [*names[:_FIRST], f"{len(names) - _FIRST} others"]
+    return f"{', '.join(shown)}{meant(name, names)}"
 
 
 def plain(name: str) -> str:

@@ -11,7 +11,7 @@ from scipy.optimize import least_squares
 
 import hysim as hs
 from hysim.discovery._held_out import at_one_rate, rate_spread
-from hysim.discovery._judgement import BETTER, RATES, competitors, doubts, judge
+from hysim.discovery._judgement import BETTER, RATES, _loops, competitors, doubts, judge
 from hysim.discovery._rival import steady_width
 
 TAU = 0.05  # s
@@ -138,6 +138,12 @@ def test_a_bouc_wen_law_at_two_rates_is_hysteresis(noise):
     assert np.ptp(found.widths["rival"]) > 0.1
     assert found.one_sign
     assert found.dissipation > 0.0
+
+
+def test_the_steady_loops_lie_about_the_middle_of_the_range_of_the_input():
+    loops = _loops(LAW, hs.signals.triangle(1.0, 3.0, cycles=2, samples_per_cycle=40))
+    reached = [(float(loop.u.min()), float(loop.u.max())) for loop in loops]
+    assert reached == [(1.75, 2.25), (1.5, 2.5), (1.25, 2.75), (1.0, 3.0)]
 
 
 def test_the_sign_of_the_loop_is_that_of_the_memory():

@@ -14,7 +14,7 @@ from hysim.discovery import _laws
 from hysim.discovery._discover import left_out_rmse
 from hysim.discovery._refinement import _SCHEDULE, FreeRun, bic_of
 from hysim.discovery._search import Library, Options, searched
-from hysim.discovery._selection import Search, pruned
+from hysim.discovery._selection import INDISTINCT, Search, pruned
 from hysim.discovery._structures import AnyExponent, Terms
 from hysim.identification.marquardt import SumOfSquares, descend, differences
 from hysim.laws.differential.terms import Term, bouc_wen_terms
@@ -272,3 +272,15 @@ def test_a_number_within_two_standard_errors_of_zero_is_taken_out():
     assert small.structure.terms == terms(["u'", "u' |z|", "|u'| z"])
     assert (small.significance >= 2.0).all()
     assert pruned(free_run, small, frozenset(), 1e-12) is small
+
+
+@pytest.mark.parametrize(("rests", "starts"), [((False,), 2), ((False, True), 0)])
+def test_a_structure_could_win_if_its_bic_with_the_starts_of_all_records_may_be_the_best(rests, starts):
+    """At rest the records have no starts to fit."""
+    records = record_of(LAW.memory, CYCLES, noise=0.05), record_of(LAW.memory, multisine(150), noise=0.05)
+    search = Search(FreeRun(records), (), rests=rests)
+    found = search.refine(Terms(terms(["u'", "|u'| z", "u' |z|"])), np.array([1.0, -0.6, -0.3, 0.0, 0.0]))
+    bound = bic_of(found.cost, search.free_run.n_samples, 2 + starts)
+    assert bound < found.bic
+    assert search.could_win(2, bound - INDISTINCT + 1e-6)
+    assert not search.could_win(2, bound - INDISTINCT - 1e-6)

@@ -177,6 +177,16 @@ def test_a_run_that_escapes_is_a_row_of_inf():
         hs.Duhem.from_terms({"u' z^2": 1.0, "u' |z| z": 1.0}, y0=1.0).response([0.0, 1.0])
 
 
+def test_a_run_that_needs_more_steps_than_allowed_is_a_row_of_inf():
+    u = hs.Record(u=[0.0, 1.0, -1.0, 1.0], y=np.zeros(4)).u[np.newaxis]
+    laws = np.array([[1.0, -2.0], [1.0, -2e3]])  # the second one turns within a 2000th of a stroke
+    terms = [Term.parse("u'"), Term.parse("|u'| z")]
+    few, many = (free_runs(terms, laws, 0.0, 0.0, u, 100.0, most_steps=most) for most in (5, 20_000))
+    assert np.isposinf(few[1]).all()
+    assert np.isfinite(many).all()
+    assert np.array_equal(few[0], many[0])
+
+
 def test_without_bars_and_feedthrough_the_memory_is_the_output_and_is_called_so():
     terms = {"u'": 1.0, "|u'| u y^2": -1.0}
     assert hs.Duhem.from_terms(terms).terms == terms

@@ -62,7 +62,8 @@ def compare(
         are listed with the reason.
     record_or_records : Record or sequence of Record
         With at least one complete cycle of the input. Of several, which may differ in their channels, fit, rmse and
-        criteria are those of all; loops are compared on the last one, which alone `Comparison.record` holds.
+        criteria are those of all; loops are compared on the last one, which alone `Comparison.record` holds. A record
+        that is given twice counts once.
     cross_validate : {"auto", "loo", "cycles", None} or int
         Cross-validation of the classes and structures; see `identify`. ``"auto"`` leaves out one sample at a time on
         records of up to 200 samples, and one of 10 blocks on longer ones.
@@ -105,7 +106,7 @@ def compare(
     (['line', 'truth'], 100.0)
     """
     records = several(record_or_records, "compare")
-    subjects = _subjects(models, len(records))
+    records, subjects = _distinct(records, _subjects(models, len(records)))
     trial = _trial(records, test)
     records = (*records[:-1], trial.training) if trial else records
     training = records[-1]
@@ -266,6 +267,20 @@ def _subjects(models: Mapping[str, Any] | Sequence[Any] | str | None, n_records:
         if not all(is_identifiable(each) or isinstance(model_of(each), Responding) for each in members):
             raise TypeError(f"compare takes a model, a result, a model class or a structure, got {subject!r} as {name}")
     return models
+
+
+def _distinct(records: tuple[Record, ...], subjects: dict[str, Any]) -> tuple[tuple[Record, ...], dict[str, Any]]:
+    """The records without copies of earlier ones, which are no evidence, and the subjects on them."""
+    samples = [(each.u.tobytes(), each.y.tobytes()) for each in records]
+    places = [k for k, own in enumerate(samples) if own not in samples[:k]]
+    if len(places) == len(records):
+        return records, subjects
+    for name, subject in subjects.items():
+        if isinstance(subject, Identification) and len(subject.models) == len(records):
+            raise ValueError(f"{name} was identified on records of which some are the same: give each record once")
+        if isinstance(subject, list | tuple):
+            subjects = {**subjects, name: [subject[k] for k in places]}
+    return tuple(records[k] for k in places), subjects
 
 
 def _named(models: Any) -> dict[str, Any]:

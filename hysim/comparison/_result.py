@@ -1,7 +1,7 @@
 """The result of `compare`."""
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import field
 from typing import Any
 
@@ -16,6 +16,8 @@ from hysim.identification.sentences import CONSTANT, SWAPPED
 from hysim.metrics import LoopMetrics
 from hysim.models.model import in_brief
 from hysim.records import Record
+
+_NAMED = 6  # models that a sentence names
 
 
 @printed
@@ -227,11 +229,11 @@ class Comparison:
         method = "(signed ranks of left-out errors, 5 % after Holm's correction)"
         smaller = tuple(each.name for each in self.contrasts if each.contradicts)
         if similar := tuple(name for name in self.undecided if name not in smaller):
-            return f"{len(self.record)} samples show no significant difference to {listed(similar)} {method}"
+            return f"{len(self.record)} samples show no significant difference to {_first(similar)} {method}"
         if any(math.isnan(each.probability) and not each.diverged for each in self.contrasts):
             return "the errors that would show a difference to the others are not all known"
         if smaller:
-            return f"all others but {listed(smaller)} are significantly worse {method}"
+            return f"all others but {_first(smaller)} are significantly worse {method}"
         nearest = self.contrasts[0]
         if nearest.diverged:
             return "all others diverged or are significantly worse"
@@ -244,11 +246,16 @@ class Comparison:
         """Models that diverged, and those whose ranks and rmse disagree."""
         diverged = tuple(each.name for each in self.contrasts if each.diverged)
         smaller = tuple(each.name for each in self.contrasts if each.contradicts)
-        sentences = [f"{listed(diverged)} diverged on samples left out."] if diverged else []
+        sentences = [f"{_first(diverged)} diverged on samples left out."] if diverged else []
         if smaller:
             has = "has" if len(smaller) == 1 else "have"
             sentences.append(
-                f"{listed(smaller)} {has} significantly smaller typical errors than {self.winner} but a larger rmse: "
+                f"{_first(smaller)} {has} significantly smaller typical errors than {self.winner} but a larger rmse: "
                 "a few large errors decide the ranking."
             )
         return sentences
+
+
+def _first(names: Sequence[str]) -> str:
+    """The names in a sentence; of many the first ones, and the number of the others."""
+    return listed(names if len(names) <= _NAMED else [*names[: _NAMED - 1], f"{len(names) - _NAMED + 1} others"])

@@ -22,6 +22,8 @@ from hysim.records import Record
 
 Bounds = tuple[FloatArray, FloatArray]
 
+_MOST_STEPS = 500  # of the series from one sample to the next: laws that need more are steps, and take most of the time
+
 
 class Terms(NamedTuple):
     """The law of some terms of a library."""
@@ -55,9 +57,9 @@ class Terms(NamedTuple):
         """Outputs (n_sets, n_samples) of numbers (n_sets, size) from y0 (n_sets,), rows of inf where one diverges."""
         feedthrough, offset = shifts(self, numbers)
         coefficients = numbers[:, : len(self.terms)]
-        return (
-            free_runs(self.terms, coefficients, feedthrough, y0 - offset, u[np.newaxis], bound) + offset[:, np.newaxis]
-        )
+        memory = y0 - offset
+        runs = free_runs(self.terms, coefficients, feedthrough, memory, u[np.newaxis], bound, most_steps=_MOST_STEPS)
+        return runs + offset[:, np.newaxis]
 
 
 @dataclass(frozen=True)

@@ -211,16 +211,16 @@ def zero(powers: FloatArray, last: int, end: float) -> float:
 
 @inner
 def advance(
-    u: float, z: float, du: float, law: FloatArray, bound: float, local: FloatArray, powers: FloatArray
+    u: float, z: float, du: float, law: FloatArray, bound: float, most: int, local: FloatArray, powers: FloatArray
 ) -> float:
     """Memory after the input has moved monotonically from `u` by `du`.
 
-    A memory beyond `bound` counts as an escape.
+    It is inf beyond `bound`, and nan where `most` steps do not reach the end.
     """
     two_sided = law.shape[0] == 4
     above = 0 if du > 0.0 else law.shape[0] // 2
     rest = h = du
-    for _ in range(MAX_STEPS):
+    for _ in range(most):
         if rest == 0.0:
             return z
         here = u + (du - rest)
@@ -255,12 +255,12 @@ def advance(
 
 
 @kernel
-def path(law: FloatArray, last_u: float, z: float, u: FloatArray, bound: float, out: FloatArray) -> int:
+def path(law: FloatArray, last_u: float, z: float, u: FloatArray, bound: float, most: int, out: FloatArray) -> int:
     """Memory at the samples of `u` from the state (last_u, z) into `out`: the first one not finite, or -1."""
     rows, columns = law.shape[1:]
     local, powers = np.empty((rows, columns)), np.empty((max(2, columns), N_TERMS + 1))
     for k in range(u.size):
-        z = advance(last_u, z, u[k] - last_u, law, bound, local, powers)
+        z = advance(last_u, z, u[k] - last_u, law, bound, most, local, powers)
         last_u = u[k]
         out[k] = z
         if not math.isfinite(z):
@@ -270,18 +270,19 @@ def path(law: FloatArray, last_u: float, z: float, u: FloatArray, bound: float, 
 
 @kernel
 def batch(
-    laws: FloatArray, z0: FloatArray, u: FloatArray, bound: float, out: FloatArray, start: int, stop: int
+    laws: FloatArray, z0: FloatArray, u: FloatArray, bound: float, most: int, out: FloatArray, start: int, stop: int
 ) -> None:
     """Memories of the laws `start` to `stop - 1`.
 
     `laws` is (n_sets, 2 or 4, rows, columns), `z0` is (n_sets,), `u` is (1, n_samples) or (n_sets, n_samples),
-    `out` is (n_sets, n_samples). A law that diverges is a row of inf.
+    `out` is (n_sets, n_samples). A law that diverges, or needs more than `most` steps from one sample to the next, is a
+    row of inf.
     """
     if u.shape[1] == 0:
         return
     for i in range(start, stop):
         row = u[min(i, u.shape[0] - 1)]
-        if path(laws[i], row[0], z0[i], row, bound, out[i]) >= 0:
+        if path(laws[i], row[0], z0[i], row, bound, most, out[i]) >= 0:
             out[i] = math.inf
 
 
@@ -301,7 +302,7 @@ def step(parameters: FloatArray, state: FloatArray, u: float) -> float:
     powers = state[2 + size : state_size(rows, columns)].reshape((max(2, columns), N_TERMS + 1))
     z = state[1]
     if math.isfinite(z):  # a memory that has diverged remains so
-        z = advance(state[0], z, u - state[0], law, LARGEST, local, powers)
+        z = advance(state[0], z, u - state[0], law, LARGEST, MAX_STEPS, local, powers)
     state[0], state[1] = u, z
     return float(parameters[0] + (parameters[1] * u + z))
 

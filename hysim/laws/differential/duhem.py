@@ -247,7 +247,7 @@ class Duhem(Law):
     def path(cls, law: CompiledLaw, u: FloatArray, y: FloatArray) -> int:
         offset, feedthrough, *shape = law.parameters[:5]
         slopes = law.parameters[5:].reshape([int(length) for length in shape])
-        lost = int(kernels.path(slopes, law.state[0], law.state[1], u, kernels.LARGEST, y))
+        lost = int(kernels.path(slopes, law.state[0], law.state[1], u, kernels.LARGEST, kernels.MAX_STEPS, y))
         if lost < 0:
             law.state[:2] = u[-1], y[-1]
             y[:] = offset + (feedthrough * u + y)

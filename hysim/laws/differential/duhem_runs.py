@@ -25,19 +25,27 @@ def free_runs(
     u: FloatArray,
     bound: float,
     *,
+    most_steps: int = kernels.MAX_STEPS,
     workers: int | None = None,
 ) -> FloatArray:
     """Outputs (n_sets, n_samples) of many laws from `coefficients` (n_sets, n_terms); inf where one diverges.
 
     `feedthrough` and `y0` are one number or (n_sets,), the inputs `u` (1 or n_sets, n_samples) and read-only. A law
-    whose memory goes beyond the `bound` counts as diverging. The result does not depend on the number of `workers`.
+    whose memory goes beyond the `bound`, or that needs more than `most_steps` steps of its series between two samples,
+    counts as diverging. The result does not depend on the number of `workers`.
     """
     laws = branches(polynomials(terms, np.atleast_2d(coefficients)))
-    return outputs(laws, np.asarray(feedthrough), np.asarray(y0), u, bound, workers)
+    return outputs(laws, np.asarray(feedthrough), np.asarray(y0), u, bound, workers, most_steps)
 
 
 def outputs(
-    laws: FloatArray, feedthrough: FloatArray, y0: FloatArray, u: FloatArray, bound: float, workers: int | None
+    laws: FloatArray,
+    feedthrough: FloatArray,
+    y0: FloatArray,
+    u: FloatArray,
+    bound: float,
+    workers: int | None,
+    most_steps: int = kernels.MAX_STEPS,
 ) -> FloatArray:
     """As `free_runs`, of the laws (1 or n_sets, 2 or 4, rows, columns) of `branches`; all lengths may be 1."""
     n_sets = max(len(laws), feedthrough.size, y0.size, len(u))
@@ -48,7 +56,7 @@ def outputs(
 
     def work(start: int, stop: int) -> None:
         with np.errstate(all="ignore"):  # a memory that diverges overflows, and uncompiled kernels would warn of it
-            kernels.batch(laws, z0, u, bound, y, start, stop)
+            kernels.batch(laws, z0, u, bound, most_steps, y, start, stop)
 
     in_chunks(work, n_sets, workers=workers, minimum=1 + _SAMPLES_PER_THREAD // max(1, u.shape[1]))
     if feedthrough.any():
