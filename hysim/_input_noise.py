@@ -28,14 +28,14 @@ _CORNER = 4.0  # of the noise: samples so near to a turning point are averaged t
 _MANY = 3.0  # times as many reversals as are above the noise
 
 
-def input_noise(u: FloatArray) -> float:
-    """As `noise_level`; 0 also where the input does not turn more often for its noise."""
+def input_noise(u: FloatArray, many: float = _MANY) -> float:
+    """As `noise_level`; 0 also where noise makes no `many` times as many reversals as the input has above it."""
     noise = noise_level(u)
     if noise == 0.0:
         return 0.0
     inner = len(turns(u, 0.0).plateaus) - 2
     above = len(turns(u, min(reach(noise) / float(np.ptp(u)), MOST_IGNORED)).plateaus) - 2
-    return noise if inner > _MANY * max(above, 1) else 0.0
+    return noise if inner > many * max(above, 1) else 0.0
 
 
 def noise_level(u: FloatArray) -> float:

@@ -1,7 +1,7 @@
 """The errors of hysim; wrong arguments raise the built-in `ValueError` or `TypeError`."""
 
 import warnings
-from typing import Any
+from typing import Any, Protocol, runtime_checkable
 
 _LIMITED = 0.05  # of the samples: a limit that is touched at the corners of a reference is not worth a word
 _BEYOND = 1e-6  # of the identified range: rounding of an inverse that ends at its edge
@@ -28,6 +28,20 @@ def warn_beyond(u_range: tuple[float, ...] | None, u: Any, name: str) -> None:
             HysimWarning,
             stacklevel=3,
         )
+
+
+@runtime_checkable
+class _Doubted(Protocol):
+    """A result that says where its model is not safe."""
+
+    @property
+    def unsafe(self) -> str: ...
+
+
+def warn_unsafe(thing: Any) -> None:
+    """Warn where the model of a result that is to drive a device runs away on smaller cycles."""
+    if isinstance(thing, _Doubted) and thing.unsafe:
+        warnings.warn(thing.unsafe, HysimWarning, stacklevel=3)
 
 
 def warn_limited(limited: int, samples: int) -> None:

@@ -220,3 +220,9 @@ def test_a_wrong_family_is_not_excused_by_its_correlated_residual():
     assert effective_samples(fit.residual) * 2.0 * np.log(other.rmse / fit.rmse) < 10.0
     assert other.rmse > 1.25 * fit.rmse
     assert excursion([other.model], [table]).is_safe
+
+
+def test_a_verb_that_drives_a_device_warns_of_an_unsafe_law(only_unsafe):
+    for drive in (hs.InverseFeedforward.of, hs.to_c, lambda fit: hs.Actuator.of(fit)):
+        with pytest.warns(hs.HysimWarning, match="UNSAFE on smaller cycles"):
+            drive(only_unsafe)

@@ -5,6 +5,8 @@ from pathlib import Path
 
 import pytest
 
+from hysim.cli import main
+
 ROOT = Path(__file__).parent.parent
 README = (ROOT / "README.md").read_text(encoding="utf-8")
 
@@ -29,17 +31,21 @@ def test_it_is_read_in_a_few_minutes():
 
 
 def test_its_python_block_fits_draws_and_compensates_a_file(tmp_path, monkeypatch, capsys):
-    table = (ROOT / "hysim" / "data" / "table1.csv").read_text()
-    header = "voltage [V],displacement [um]"
-    rows = [",".join(line.split(",")[-2:]) for line in table.splitlines() if re.match(r"^\d", line)]
-    (tmp_path / "loop.csv").write_text("\n".join([header, *rows]))
     monkeypatch.chdir(tmp_path)
+    assert "`hysim example loop.csv`" in README
+    assert main(["example", "loop.csv"]) == 0
     namespace = {}
     for block in blocks("python"):
         exec(compile(block, "README.md", "exec"), namespace)
     assert (tmp_path / "law.json").exists()
-    assert "loop width" in capsys.readouterr().out
-    # of one sample the triangle moves by 7.5 nm, which the loop is late; noise of 1 nm and 4 % of the stroke are more
+    printed = capsys.readouterr().out
+    assert "loop width" in printed
+    assert f"The last line is `{printed.splitlines()[-1]}`" in README
+    low, high = namespace["rec"].u.min(), namespace["rec"].u.max()
+    assert low <= namespace["voltage"].min() <= namespace["voltage"].max() <= high
+    assert namespace["stage"].amplifier.limits == (low, high)
+    assert namespace["run"].conditions["limited_samples"] == 0
+    # the loop is late by one sample, in which the triangle moves by 7.5 nm; most of the rest are the sensor's 76 nm
     late = namespace["run"].y[401:] - namespace["wanted"][400:-1]
     assert abs(late).max() < 0.06
 

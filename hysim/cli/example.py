@@ -62,7 +62,7 @@ DEVICES = {
     "piezo": Device(
         "voltages and displacements measured on a piezo stack",
         _piezo,
-        ("metrics {}", "identify {} --model bouc-wen --plot fit.svg"),
+        ("metrics {}", "identify {} --model polynomial-bouc-wen --plot fit.svg"),
     ),
     "damper": Device(
         "simulated test of a steel damper, displacements and forces in cycles of growing amplitude",

@@ -82,7 +82,7 @@ COMMAND = Command(
 """,
     run,
     """
-hysim identify loop.csv --model bouc-wen --out law.json --plot fit.svg
+hysim identify loop.csv --model polynomial-bouc-wen --out law.json --plot fit.svg
 hysim identify loop.csv --u voltage --y displacement --model bouc-wen --fix n=1
 hysim identify drive.csv --y-file sensor.csv --model prandtl-ishlinskii --plays 8
 hysim identify test.csv --model oscillator --excitation base

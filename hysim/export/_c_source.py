@@ -13,6 +13,7 @@ from hysim._frozen import FloatArray, frozen
 from hysim._printing import printed, summary_text
 from hysim._release import __version__
 from hysim._results import model_of
+from hysim.errors import warn_unsafe
 from hysim.export import _c
 from hysim.export._program import Program, program_of, start_of
 
@@ -190,6 +191,7 @@ def to_c(
     """
     if reason := _refusal(name):
         raise ValueError(f"name must be letters, digits and underscores after a letter, got {name!r}: {reason}")
+    warn_unsafe(thing)
     thing = model_of(thing)
     program = program_of(thing, sample_time, u0=u0, y0=y0)
     texts = _texts(program, name, type(thing).__name__, *start_of(thing, sample_time or math.inf, u0, y0))

@@ -15,6 +15,7 @@ from typing import Any, Literal, NamedTuple
 from hysim._atomic import write_all
 from hysim._frozen import check_choice
 from hysim._results import model_of
+from hysim.errors import warn_unsafe
 from hysim.export._compilers import TARGETS, Target, compiler, host, shared_library, universal
 from hysim.export._field_units import field_unit
 from hysim.export._fmu_source import source_of, token_of
@@ -115,6 +116,7 @@ def to_fmu(
     ...     zipfile.ZipFile(path).namelist()
     ['modelDescription.xml', 'sources/Dahl.c']
     """
+    warn_unsafe(thing)
     thing = model_of(thing)
     target = _checked(Path(path), version, platforms)
     labels = dict(units or {})

@@ -106,7 +106,9 @@ def treated(
     """
     if how == "raw" or any(isinstance(record, Rescalable) for record in records):
         return Treated(records)
-    noises = tuple(input_noise(record.u) for record in records)
+    # creep is read from what a law does not explain, to which few false reversals are much
+    many = {"many": 1.0} if isinstance(family, PartByPart) else {}
+    noises = tuple(input_noise(record.u, **many) for record in records)
     if not any(noises):
         if how == "filtered":
             raise ValueError("no noise was found in the input, so that there is nothing to filter: leave out input=")

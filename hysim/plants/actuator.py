@@ -9,7 +9,7 @@ import numpy.typing as npt
 
 from hysim._frozen import FloatArray, items, read_only
 from hysim._results import model_of
-from hysim.errors import SimulationError
+from hysim.errors import SimulationError, warn_unsafe
 from hysim.models.cascade import Cascade
 from hysim.models.model import family
 from hysim.models.protocols import (
@@ -477,6 +477,7 @@ def as_actuator(plant: Any) -> Actuator:
     >>> hs.control.as_actuator(hs.Line(slope=2.0) >> mode) == hs.Actuator(hysteresis=hs.Line(slope=2.0), vibration=mode)
     True
     """
+    warn_unsafe(plant)
     plant = model_of(plant)
     if isinstance(plant, Actuator):
         return plant
