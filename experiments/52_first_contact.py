@@ -163,7 +163,7 @@ def measured(folder: Path) -> Iterator[Case]:
             yield from _each(hs.Record(u=columns[0], y=columns[1], name=f"{material} {k + 1}"), every)
     for k in (1, 2, 3):
         path = folder / "steel_resspylab" / f"example_{k}.csv"
-        yield from _each(hs.load(path, u="e_true", y="Sigma_true", name=f"coupon {k}"), every)
+        yield from _each(hs.load(path, u="e_true", y="Sigma_true", name=f"coupon {k}"), (*every, "Baber-Noori"))
 
 
 def _each(record: hs.Record, families: tuple[str, ...]) -> Iterator[Case]:
@@ -190,6 +190,8 @@ def row_of(case: Case, folder: Path, *, with_flow: bool) -> Row:
         "fit_percent": fit.fit_percent,
         "verbs": len(numbers),
         "largest_difference": largest_difference(numbers),
+        "at_search_bound": "search bound" in fit.message,
+        "heals": any(fit.estimates[name] < 0.0 for name in fit.estimates if name.startswith("delta_")),
         "residual_is_the_models": bool(np.array_equal(fit.residual, own)),
         **_beside_truth(case, fit),
         **(flow(case.record, fit, folder) if with_flow else NO_FLOW),
@@ -315,6 +317,9 @@ def summary(rows: list[Row]) -> Row:
         "over_floor_worst": max(over),
         "held_percent": 100.0 * sum(row["held"] for row in noisy) / parameters,
         "parameters": parameters,
+        "baber_noori": sum(row["family"] == "Baber-Noori" and row["kind"] == "measured" for row in rows),
+        "baber_noori_heals": sum(row["heals"] for row in rows),
+        "baber_noori_at_search_bound": sum(row["at_search_bound"] for row in rows if row["family"] == "Baber-Noori"),
         "flows": len(flows),
         "flows_refused": sum(str(row["flow"]).startswith("refused") for row in rows),
         "outside_without_warning": sum(bool(row["outside_without_warning"]) for row in flows),

@@ -182,3 +182,13 @@ def test_every_family_of_laws_has_such_a_place():
     assert all(issubclass(each, Law) for each in families)
     for each in families:
         assert {"u0", "u_range"} <= {field.name for field in dataclasses.fields(each)}
+
+
+def test_many_structures_begin_as_one_does():
+    law = hs.BoucWen(beta=2.0, gamma=1.0, feedthrough=5.0, gain=30.0, u0=0.3)
+    frame = hs.Structure(mass=1.0, elements=[hs.Element(law, between=(0, 1))], damping=0.5)
+    t = 0.01 * np.arange(100)
+    quake = 5.0 * np.sin(12.0 * t)
+    one = hs.simulate(frame, t, quake).peaks["drift"]
+    many = frame.responses({"elements.0.beta": np.array([2.0, 1.0])}, quake, sample_time=0.01)
+    np.testing.assert_allclose(many[0], one, rtol=1e-12)

@@ -161,9 +161,10 @@ class RatedLaw(Identifiable, Placed, ABC):
     def rated(self) -> Startable:
         """The law as an element of a structure takes it, without the dashpot of `viscosity`.
 
-        Before the first stroke its duration is infinite: the law is at rest.
+        Before the first stroke its duration is infinite: the law is at rest, at zero where it has a `u0`.
         """
-        parameters, memory = self.at_sample_time(1.0).packed
+        law = self.at_sample_time(1.0)
+        parameters, memory = law.packed[0], np.array(law.packed[1] if self.u0 is None else law.state_at(0.0))
         state = np.concatenate([memory[:1], np.zeros(N_RATED - 1), memory[1:]])
         state[1] = np.inf
         return Startable(type(self).rated_step, parameters, state, stepping.start)

@@ -141,7 +141,8 @@ def _stacked(structure: Any, values: Mapping[str, FloatArray], n_sets: int) -> _
     """All structures: by tables where only laws with tables and the three matrices vary, else one by one."""
     numbers = {name: column for name, column in values.items() if name != "scale"}
     places = {name: int(name.split(".")[1]) for name in numbers if name.startswith("elements.")}
-    has_table = all(isinstance(structure.elements[place].law, Law) for place in places.values())
+    varied = [structure.elements[place].law for place in places.values()]
+    has_table = all(isinstance(law, Law) and law.u0 is None for law in varied)  # else a law first moves from its u0
     if has_table and all(name in places or name in _MATRICES for name in numbers):
         return _by_tables(structure, numbers, n_sets)
     return _one_by_one(structure, numbers, n_sets)
