@@ -34,7 +34,7 @@ from results_folder import write_results
 
 RESULTS = Path(__file__).parent / "results" / "first_contact"
 NOISES = (0.0, 0.01, 0.03, 0.1, 0.3, 1.0)  # % of the span of the input
-SEEDS = 6
+SEEDS = 4
 BRIEF = 300  # sets that a search of a family beside the five simulates: the verbs agree wherever it ends
 FILTERS = (0.0, *np.geomspace(1.0, 12.0, 12).tolist())  # thresholds of the best filter, in sizes of the noise
 OUTPUT_NOISE = 1e-3  # of the range of the output
