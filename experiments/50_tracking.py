@@ -52,7 +52,7 @@ class DriftingPlant:
     """A law whose numbers are others at each sample; its memory goes on."""
 
     def __init__(self, law: Any, truth: dict[str, np.ndarray]) -> None:
-        self.law, self.truth, self.k, self.state = law, truth, 0, law.first_state(0.0)
+        self.law, self.truth, self.k, self.state = law, truth, 0, law.state_at(0.0)
 
     def moved(self, u: float) -> float:
         """The output at the next input."""
@@ -73,7 +73,7 @@ def record(truth: dict[str, np.ndarray], cycles: int, seed: int) -> tuple[hs.Rec
     """A record of the law that drifts, and the standard deviation of its noise."""
     u = hs.signals.triangle(-REACH, REACH, cycles=cycles, samples_per_cycle=SAMPLES)
     plant = DriftingPlant(LAW, truth)
-    plant.state = LAW.first_state(float(u[0]))
+    plant.state = LAW.state_at(float(u[0]))
     y = np.array([plant.moved(float(each)) for each in u])
     noise = 0.01 * NOISE_PERCENT * float(np.ptp(y))
     return hs.Record(u=u, y=y + noise * np.random.default_rng(seed).standard_normal(u.size)), noise

@@ -349,6 +349,12 @@ def line(rng: Rng) -> Drawn:
     return Drawn(hs.Line(offset=float(rng.normal()), slope=float(rng.normal()) / length), length)
 
 
+def reversal_filter(rng: Rng) -> Drawn:
+    """A filter of small reversals."""
+    length = decades(rng, -3.0, 3.0)
+    return Drawn(hs.ReversalFilter(threshold=length * float(rng.uniform(0.0, 1.0))), length)
+
+
 def single_valued(rng: Rng) -> Drawn:
     """A broken line."""
     length = decades(rng, -3.0, 3.0)
@@ -429,6 +435,7 @@ DRAWS: dict[str, Callable[..., Drawn]] = {
     "Cascade": cascaded,
     "CustomLaw": custom,
     "Line": line,
+    "ReversalFilter": reversal_filter,
     "SingleValued": single_valued,
 }
 """What draws a law of each family."""

@@ -203,6 +203,8 @@ def size(law: Any, before: Array, u: Array, y: Array) -> Array:
         law = law.bouc_wen
     if isinstance(law, hs.Preisach):
         return np.full(u.size, abs(law.offset) + float(np.abs(law.weights).sum()))
+    if isinstance(law, hs.ReversalFilter):
+        return np.full(u.size, float(np.abs(np.concatenate([before, u])).max()))
     if isinstance(law, hs.Line):
         return np.abs(law.offset) + np.abs(law.slope * u)
     if isinstance(law, hs.Tellinen | hs.Chan):

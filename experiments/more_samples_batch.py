@@ -1,6 +1,6 @@
 """The same cases in batches, and three near invariants: a path that is cut, an input at rest, and odd symmetry."""
 
-from dataclasses import fields, replace
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -21,7 +21,7 @@ def batch_runs(cases: list[Case], paths: list[list[Run]]) -> list[list[Run]]:
     found: list[list[Run]] = [[] for _ in cases]
     for members in groups.values():
         laws = [cases[k].law for k in members]
-        parameters = {field.name: np.array([getattr(law, field.name) for law in laws]) for field in fields(laws[0])}
+        parameters = {name: np.array([getattr(law, name) for law in laws]) for name in laws[0].arguments}
         for chosen in range(3):
             inputs = np.array([held(cases[k], chosen) for k in members])
             y = type(laws[0]).responses(parameters, inputs)
@@ -39,7 +39,7 @@ LONGEST = 3
 def even_verdicts(cases: list[Case], rng: Rng) -> list[Verdict]:
     """Strides of a rate-dependent law in one piece and in even ones: a batch has one time for all samples."""
     laws = [case.law for case in cases]
-    parameters = {field.name: np.array([getattr(law, field.name) for law in laws]) for field in fields(laws[0])}
+    parameters = {name: np.array([getattr(law, name) for law in laws]) for name in laws[0].arguments}
     count = int(decades(rng, np.log10(2.0), np.log10(N_PIECES)))
     u = np.array([np.linspace(case.before[0], case.u[-1], count + 1) for case in cases])
     coarse = hs.RateDependentPrandtlIshlinskii.responses(parameters, u[:, [0, -1]], 1.0)
@@ -56,7 +56,7 @@ def even_verdicts(cases: list[Case], rng: Rng) -> list[Verdict]:
 
 def structure_of(case: Case) -> Any:
     """What the laws of one batch have in common."""
-    values = (getattr(case.law, field.name) for field in fields(case.law))
+    values = case.law.arguments.values()
     two_sided = isinstance(case.law, hs.Duhem) and bool(case.law.p_abs.any() or case.law.q_abs.any())
     return type(case.law), tuple(np.shape(value) for value in values), two_sided
 

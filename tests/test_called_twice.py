@@ -16,6 +16,7 @@ from hysim.models.model import every_family
 H = 5e-5  # s
 U = np.concatenate([np.linspace(0.0, 0.6, 7), np.linspace(0.5, -0.4, 7)])
 OTHERS = {
+    "ReversalFilter": hs.ReversalFilter(threshold=0.2),
     "Actuator": hs.Actuator(hysteresis=LAWS["BoucWen"], creep=hs.Creep.per_decade(1.5)),
     "TransferFunction": hs.TransferFunction(num=(1.0,), den=(1e-4, 1.0)),
     "Modes": hs.Modes(natural_frequencies=(3e3,), damping_ratios=(0.05,), gains=(0.9,)),

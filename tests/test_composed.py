@@ -64,7 +64,7 @@ CONTINUED = sorted(
     {
         family
         for family in every_family().values()
-        if "advance" in dir(family) and family.__module__.startswith("hysim.")
+        if "advance" in dir(family) and family.__module__.startswith(("hysim.laws.", "hysim.models.", "hysim.plants."))
     }
     | {hs.TransferFunction, hs.Actuator, hs.Structure, hs.BoucWenOscillator, hs.Sum, hs.Cascade},
     key=lambda family: family.__name__,

@@ -63,7 +63,7 @@ def test_a_hostile_value_at_any_place_is_one_line(family):
                 assert said.startswith("x.json "), (place, value)
                 assert "\n" not in said, (place, value)
                 assert len(said) <= 1200, (place, value)
-    assert refused > 3 * len(BY_FAMILY[family].__dataclass_fields__)  # null may stand for a default
+    assert refused > 3 * len(document["parameters"])  # null may stand for a default
 
 
 @pytest.mark.parametrize(

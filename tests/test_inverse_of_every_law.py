@@ -69,6 +69,7 @@ LAWS = {
     "CustomLaw": hs.CustomLaw(step=stiffening, parameters={"slope": 1.0, "r": 0.2}, state={"z": 0.0}),
 }
 REFUSED = {
+    "ReversalFilter": (hs.ReversalFilter(threshold=0.2), ValueError, "does not rise or fall"),
     "Play": (hs.Play(threshold=0.2), ValueError, "does not rise or fall"),
     "PreisachRelays": (hs.PreisachRelays(levels=(-1.0, 0.5, 1.0), weights=(1.0, 0.5, 1.0)), ValueError, "does not"),
     "SingleValued": (hs.SingleValued(u=[0.0, 1.0], y=[0.0, 2.0]), TypeError, "that a loop can step"),

@@ -122,7 +122,7 @@ def plant_under(measure, n=1500):
     plant, state, memory, y, errors = LAW.with_scalars({"gain": -0.56}), ADAPTIVE.initial(0.01), None, 0.0, []
     for k, r in enumerate((0.9 * np.sin(0.05 * np.arange(n))).tolist()):
         u, state = ADAPTIVE.step(state, r, measure(k, y))
-        output, memory = plant.advance([u], memory if memory is not None else plant.first_state(0.0))
+        output, memory = plant.advance([u], memory if memory is not None else plant.state_at(0.0))
         y = float(output[0])
         errors.append(abs(y - r))
     return np.array(errors), state

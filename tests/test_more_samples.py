@@ -39,7 +39,7 @@ def test_every_law_that_hysim_exports_is_among_the_families():
     classes = {name: each for name in hs.__all__ if isinstance(each := getattr(hs, name), type)}
     exported = {name for name, each in classes.items() if hasattr(each, "response")} - {"Law"}
     assert exported == {*experiment.DRAWS, *NOT_RATE_INDEPENDENT, *INVERSES}
-    undone = {name for name in experiment.DRAWS if hasattr(getattr(hs, name), "inverse_response")}
+    undone = {name for name in experiment.DRAWS if getattr(getattr(hs, name), "inverse_response", None)}
     assert undone - SEARCHED == set(experiment.INVERTED)
 
 

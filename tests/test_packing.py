@@ -17,6 +17,7 @@ PLAYS = {"thresholds": (0.0, 0.2, 0.5), "weights": (1.0, 0.5, 0.3)}
 RELAYS = {"levels": (0.0, 1.0, 2.5, 3.0), "weights": (1.0, 0.5, 1.0, -0.2, 0.3, 0.7)}
 DUHEM = {"u'": 1.0, "u' u^2": 0.2, "u' |z|": -0.3, "|u'| z": -0.6}
 LAWS = {
+    "ReversalFilter": hs.ReversalFilter(threshold=0.3),
     "BoucWen": hs.BoucWen(n=1.4, feedthrough=0.5),
     "PolynomialBoucWen": hs.PolynomialBoucWen(n=1.0, input_coefficients=(0.5, 0.1)),
     "ZhuWangBoucWen": hs.ZhuWangBoucWen(n=1.4, delta=0.2),

@@ -14,7 +14,7 @@ import numpy.typing as npt
 from hysim import signals
 from hysim._frozen import FloatArray, read_only
 from hysim.control._assessment_results import HysteresisAssessment, OpenLoop, SquareWaveAssessment, StepAssessment
-from hysim.control._loop import RestingPlant, as_actuator, close_loop
+from hysim.control._loop import RestingPlant, around_actuator, as_actuator
 from hysim.control._loop_assessment import judged
 from hysim.control._open_loop import secant_gain, without_memory
 from hysim.control._protocols import Controller, preview
@@ -71,7 +71,7 @@ def assess_hysteresis(
     reference = signals.triangle(low, high, cycles=cycles, samples_per_cycle=samples)
     opened = open_loop(actuator, reference, sample_time, samples)
     line = RestingPlant(without_memory(actuator, opened.cycle / opened.secant_gain), sample_time)
-    closed = close_loop(actuator, controller, opened.t, reference)
+    closed = around_actuator(actuator, controller, opened.t, reference)
     counted = slice(-samples - 1, None)
     loop = judged(actuator, controller, closed, opened.cycle, opened.secant_gain, counted, period)
     reduction = opened.reduction_percent(closed.y) if loop.stable else math.nan
@@ -193,7 +193,7 @@ def assess_step(
     t = sample_time * np.arange(before + after)
     resting = RestingPlant(actuator, sample_time, u0)
     reference = resting.y0 + np.where(np.arange(t.size) < before + ahead, 0.0, step)
-    closed = close_loop(actuator, controller, t, reference, u0=u0)
+    closed = around_actuator(actuator, controller, t, reference, u0)
     cycle = np.array([resting.y0, resting.y0 + step])
     gain = secant_gain(actuator, cycle)
     loop = judged(actuator, controller, closed, cycle, gain, slice(None))
@@ -251,7 +251,7 @@ def assess_square_wave(
     t = sample_time * np.arange(reference.size)
     levels = np.array([low, high])
     gain = secant_gain(actuator, levels)
-    closed = close_loop(actuator, controller, t, reference)
+    closed = around_actuator(actuator, controller, t, reference)
     open_y = RestingPlant(actuator, sample_time).driven(reference / gain)
     last, last_half = slice(-2 * half, None), slice(-half, None)
     loop = judged(actuator, controller, closed, levels, gain, last, period)

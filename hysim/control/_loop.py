@@ -202,8 +202,7 @@ def close_loop(
     >>> bool(damped.signals["peak_drift"][-1] < 0.7 * free.signals["peak_drift"][-1])
     True
     """
-    if not is_controller(controller):
-        raise TypeError(f"controller must be a PID or the like, got {type(controller).__name__}")
+    _check_controller(controller)
     r, times = read_only(reference, "reference", ndim=1), read_only(t, "t", ndim=1)
     plant = model_of(plant)
     if isinstance(plant, Structure):
@@ -213,15 +212,31 @@ def close_loop(
     actuator = as_actuator(plant)
     if ground_acceleration is not None:
         raise ValueError(f"only a Structure stands on the ground, got {type(plant).__name__} and ground_acceleration")
+    run = around_actuator(actuator, controller, times, r, u0, substeps, units, progress or None)
+    warn_beyond(actuator.u_range, run.u, type(actuator.hysteresis).__name__)
+    warn_limited(run.conditions["limited_samples"], run.u.size)
+    return run
+
+
+def around_actuator(
+    actuator: Actuator,
+    controller: Controller,
+    times: FloatArray,
+    r: FloatArray,
+    u0: float | None = None,
+    substeps: int | None = None,
+    units: Mapping[str, str] | None = None,
+    progress: Progress | None = None,
+) -> ClosedLoop:
+    """The loop around an actuator, without the warnings of `close_loop`: measures of loops print what these say."""
+    _check_controller(controller)
     plant_at_rest = RestingPlant(actuator, sample_time_of(times, r), u0, substeps)
-    signals = plant_at_rest.run(controller, r, progress or None, float(times[0]))
+    signals = plant_at_rest.run(controller, r, progress, float(times[0]))
     u = plant_at_rest.voltages(signals)
     conditions = {
         **_conditions(actuator, controller, plant_at_rest, signals, u),
         **_voltage_noise(actuator, controller, plant_at_rest, r, u),
     }
-    warn_beyond(actuator.u_range, u, type(actuator.hysteresis).__name__)
-    warn_limited(conditions["limited_samples"], u.size)
     return ClosedLoop(
         t=times,
         reference=r,
@@ -235,6 +250,11 @@ def close_loop(
         conditions=conditions,
         units=units or {},
     )
+
+
+def _check_controller(controller: Any) -> None:
+    if not is_controller(controller):
+        raise TypeError(f"controller must be a PID or the like, got {type(controller).__name__}")
 
 
 class RestingPlant:

@@ -8,7 +8,7 @@ import numpy.typing as npt
 
 from hysim._frozen import FloatArray, frozen, read_only
 from hysim._printing import printed, quantity, summary_text
-from hysim.control._loop import ClosedLoop, RestingPlant, as_actuator, close_loop
+from hysim.control._loop import ClosedLoop, RestingPlant, around_actuator, as_actuator
 from hysim.control._open_loop import secant_gain
 from hysim.control._protocols import Controller
 from hysim.control._stability import closing_slopes, limit_cycle, linear_figures
@@ -131,7 +131,7 @@ def assess_loop(
     ([True, False], 'the loop is unstable: a pole of the linear loop lies outside the unit circle')
     """
     actuator, r = as_actuator(plant), read_only(reference, "reference", ndim=1)
-    closed = close_loop(actuator, controller, t, r, u0=u0)
+    closed = around_actuator(actuator, controller, read_only(t, "t", ndim=1), r, u0)
     h = closed.conditions["sample_time"]
     samples = r.size if math.isnan(period) else round(period / h)
     if not 0 < samples <= r.size:

@@ -166,13 +166,15 @@ def program_of(
 def start_of(thing: Any, sample_time: float, u0: float | None, y0: float | None) -> tuple[float, float]:
     """Command and displacement at which a controller starts, as in `hysim.close_loop`.
 
-    By default the command is that at which the memory of its law holds, else 0; the displacement is that of its model
-    there, 0 without a law.
+    By default they are the command at which the memory of its law holds and the displacement of its model there; 0 for
+    a law that has no such command.
     """
     command = standing(thing, u0)
-    if y0 is None and isinstance(thing, InverseFeedforward | TrackingController) and thing.plant is not None:
-        return command, RestingPlant(thing.plant, min(sample_time, 1.0), command).y0
-    return command, y0 or 0.0
+    if y0 is not None or u0 is not None or not isinstance(thing, InverseFeedforward | TrackingController):
+        return command, y0 or 0.0
+    if thing.plant is None or thing.u0 is None:
+        return command, 0.0
+    return command, RestingPlant(thing.plant, min(sample_time, 1.0), command).y0
 
 
 def _of_model(model: Startable, sample_time: float | None) -> Program:

@@ -277,7 +277,7 @@ def close(
             measurement = quantum * ((measurement / quantum + 0.5) // 1.0)
         drive = guarded(controller, controller_parameters, controller_state, inputs[0, k], measurement)
         samples[0, k], samples[1, k], samples[2, k], samples[3, k] = controller_state[0], drive, y, measurement
-        if not (abs(y) < largest and abs(drive) < largest):
+        if not (abs(y) < largest and math.isfinite(drive)):  # a drive beyond all limits is one at a limit
             return k
         target = min(max(plant[2] * drive + plant[3], plant[4]), plant[5])
         for sub in range(substeps):
