@@ -4,7 +4,7 @@ import warnings
 from typing import Any, Protocol, runtime_checkable
 
 _LIMITED = 0.05  # of the samples: a limit that is touched at the corners of a reference is not worth a word
-_BEYOND = 1e-6  # of the identified range: rounding of an inverse that ends at its edge
+_BEYOND = 0.01  # of the identified range: a law does not change within so little
 
 
 class SimulationError(RuntimeError):

@@ -82,9 +82,7 @@ def test_wrong_units_do_not_change_the_fit(table1, of_u, of_y):
 
 def test_values_beyond_all_units_are_refused(table1):
     for family in (hs.Line, hs.BoucWen):
-        with pytest.raises(
-            ValueError, match=r"records between 1e-40 and 1e\+40 in size, got an output y of 2.67e\+200"
-        ):
+        with pytest.raises(ValueError, match=r"records between 1e-40 and 1e\+40 in size, got an output y of"):
             hs.identify(family, hs.Record(u=table1.u, y=1e200 * table1.y))
 
 

@@ -23,7 +23,7 @@ from hysim._names import meant
 from hysim._repeats import repeated_cycle
 from hysim.identification._budget import Budget
 from hysim.identification._regression import Settled, least_squares, triangle
-from hysim.models.protocols import Forgetting, Identifiable, Staged
+from hysim.models.protocols import Forgetting, Identifiable, Staged, placed
 from hysim.models.search_space import STATES, STATES_IN_WORDS, Freedom, Parameters, SearchSpace
 from hysim.models.stages import BASE, Stage
 from hysim.records import Record
@@ -384,7 +384,11 @@ def _at(part: Part, chosen: npt.NDArray[np.intp]) -> Part:
 def problem(
     family: Identifiable, records: Sequence[Record], freedom: Freedom, initial: str | Sequence[str] | None
 ) -> Problem:
-    """Put the records of one family together; a ValueError says why `initial` or `freedom` does not fit."""
+    """Put the records of one family together; a ValueError says why `initial` or `freedom` does not fit.
+
+    The memory of a law that stands somewhere is that at the first sample of each record.
+    """
+    family = placed(family, None)
     alone = _alone(family, records, freedom, initial)
     simple = family.simpler() if isinstance(family, Staged) else None
     if simple is None or alone.own.encoded is None:

@@ -507,7 +507,8 @@ class Law(Placed, ABC):
 
     def search_inverse(self, state: State, *, terms: float = 0.0) -> CompiledLaw:
         """The inverse of the law in this state by a search on its step; see `hysim.models.inverse_search`."""
-        law = self.assemble(dict(zip(self.initial_names, state[1:], strict=False)))  # whose slopes are those from here
+        memory = dict(zip(self.initial_names, state[1:], strict=False))
+        law = self.with_scalars(memory)  # whose slopes are those from here
         return searched_inverse(law, self._begun(state[0], state)[0], terms=terms)
 
     def unreached(self, sample: int, y: float, inverse: CompiledLaw) -> str:

@@ -21,7 +21,8 @@ OTHER_NAMES = {
 OF_OTHER_COMMANDS = {
     name: f"hysim identify {option}"
     for name, option in {
-        "admissible": "--admissible", "bounds": "--bounds", "channels": "--channel", "cross_validate": "--cross-validate", "fixed": "--fix",
+        "admissible": "--admissible", "bounds": "--bounds", "channels": "--channel",
+        "cross_validate": "--cross-validate", "fixed": "--fix",
         "free": "--free", "initial": "--initial", "max_evaluations": "--max-evaluations", "weights": "--weights",
         "excitation": "--excitation", "resolution": "--resolution", "t": "--t",
     }.items()
