@@ -15,7 +15,7 @@ class HysimWarning(UserWarning):
     """A result that is computed as asked, and may not be what the device does."""
 
 
-def warn_beyond(u_range: tuple[float, ...] | None, u: Any, name: str) -> None:
+def warn_beyond(u_range: tuple[float, ...] | None, u: Any, name: str, *, stacklevel: int = 3) -> None:
     """Warn once if an input `u` (n,) leaves the range that a model of this `name` was identified on."""
     if u_range is None or not u.size:
         return
@@ -26,18 +26,18 @@ def warn_beyond(u_range: tuple[float, ...] | None, u: Any, name: str) -> None:
             f"the input goes from {lowest:.4g} to {highest:.4g}, but the {name} was identified from {low:.4g} to "
             f"{high:.4g}: what it says beyond is extrapolated",
             HysimWarning,
-            stacklevel=3,
+            stacklevel=stacklevel,
         )
 
 
-def warn_limited(limited: int, samples: int) -> None:
+def warn_limited(limited: int, samples: int, *, stacklevel: int) -> None:
     """Warn if a command stands at a limit for more than 5 % of its samples."""
     if limited > _LIMITED * samples:
         warnings.warn(
             f"the command is at a limit of the controller or the amplifier in {limited} of {samples} samples: the "
             "reference is out of reach there",
             HysimWarning,
-            stacklevel=3,
+            stacklevel=stacklevel,
         )
 
 
