@@ -5,6 +5,7 @@ from typing import Any
 
 _LIMITED = 0.05  # of the samples: a limit that is touched at the corners of a reference is not worth a word
 _BEYOND = 1e-6  # of the identified range: rounding of an inverse that ends at its edge
+_CLOSED = 4  # frames above a warning of `close_loop`: of this module, of the loop, of `reports` around it, the caller's
 
 
 class SimulationError(RuntimeError):
@@ -15,7 +16,7 @@ class HysimWarning(UserWarning):
     """A result that is computed as asked, and may not be what the device does."""
 
 
-def warn_beyond(u_range: tuple[float, ...] | None, u: Any, name: str, *, stacklevel: int = 3) -> None:
+def warn_beyond(u_range: tuple[float, ...] | None, u: Any, name: str, *, stacklevel: int = _CLOSED) -> None:
     """Warn once if an input `u` (n,) leaves the range that a model of this `name` was identified on."""
     if u_range is None or not u.size:
         return
@@ -30,14 +31,14 @@ def warn_beyond(u_range: tuple[float, ...] | None, u: Any, name: str, *, stackle
         )
 
 
-def warn_limited(limited: int, samples: int, *, stacklevel: int) -> None:
+def warn_limited(limited: int, samples: int) -> None:
     """Warn if a command stands at a limit for more than 5 % of its samples."""
     if limited > _LIMITED * samples:
         warnings.warn(
             f"the command is at a limit of the controller or the amplifier in {limited} of {samples} samples: the "
             "reference is out of reach there",
             HysimWarning,
-            stacklevel=stacklevel,
+            stacklevel=_CLOSED,
         )
 
 

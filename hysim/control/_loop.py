@@ -27,7 +27,6 @@ from hysim.simulation import columns_of, dataset_of_signals, frame_of_signals
 _OF_REFERENCE = ("reference", "error", "y", "measurement")
 _OF_COMMAND = ("command", "drive", "u")
 _SHOWN = ("sample_time", "delay", "preview", "noise", "sensor_quantum", "voltage_noise_rms", "held_samples")
-_CALLER = 4  # frames above a warning: its function, the loop, `reports`, and who closed the loop
 
 
 @printed
@@ -221,8 +220,8 @@ def close_loop(
         **_conditions(actuator, controller, plant_at_rest, signals, u),
         **_voltage_noise(actuator, controller, plant_at_rest, r, u),
     }
-    warn_beyond(actuator.u_range, u, type(actuator.hysteresis).__name__, stacklevel=_CALLER)
-    warn_limited(conditions["limited_samples"], u.size, stacklevel=_CALLER)
+    warn_beyond(actuator.u_range, u, type(actuator.hysteresis).__name__)
+    warn_limited(conditions["limited_samples"], u.size)
     return ClosedLoop(
         t=times,
         reference=r,

@@ -10,7 +10,6 @@ middle, 34 V, of Table 2's 18 and 50 V.
 The paper prints no gains: they come from `hysim.paper.search`, one search for each plant and each pair of limits.
 """
 
-import warnings
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 from typing import Any, Generic, NamedTuple, TypeVar
@@ -27,7 +26,6 @@ from hysim.control import (
     assess_square_wave,
     assess_step,
 )
-from hysim.errors import HysimWarning
 from hysim.metrics import VibrationReduction, loop_metrics, reduction_percent
 from hysim.paper.equations import EQUATION_1, EQUATION_4, EQUATION_6, EQUATION_7
 from hysim.paper.search import Found, Limits, Task, search, step_task, triangle_task, volts_per_pixel
@@ -246,10 +244,13 @@ def _step(
 
 
 def _square(name: str, plant: TransferFunction, found: Found, period: float) -> SquareCase:
-    """A square wave on a plant; the report says how long the command stands at a limit, so that no warning has to."""
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", HysimWarning)
-        assessment = assess_square_wave(
+    return Case(
+        plant=name,
+        reference=f"square wave -0.5 to 0.5 um, period {period:g} samples",
+        period=period,
+        found=found,
+        limits=ABOUT_34_V,
+        assessment=assess_square_wave(
             plant,
             found.controller,
             low=-0.5,
@@ -257,14 +258,7 @@ def _square(name: str, plant: TransferFunction, found: Found, period: float) -> 
             period=period,
             sample_time=UNIT_STEP,
             periods=round(DURATION / period),
-        )
-    return Case(
-        plant=name,
-        reference=f"square wave -0.5 to 0.5 um, period {period:g} samples",
-        period=period,
-        found=found,
-        limits=ABOUT_34_V,
-        assessment=assessment,
+        ),
     )
 
 
