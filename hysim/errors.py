@@ -5,6 +5,7 @@ from typing import Any, Protocol, runtime_checkable
 
 _LIMITED = 0.05  # of the samples: a limit that is touched at the corners of a reference is not worth a word
 _BEYOND = 0.01  # of the identified range: a law does not change within so little
+_CLOSED = 4  # frames above a warning of `close_loop`: of this module, of the loop, of `reports` around it, the caller's
 
 
 class SimulationError(RuntimeError):
@@ -15,7 +16,7 @@ class HysimWarning(UserWarning):
     """A result that is computed as asked, and may not be what the device does."""
 
 
-def warn_beyond(u_range: tuple[float, ...] | None, u: Any, name: str) -> None:
+def warn_beyond(u_range: tuple[float, ...] | None, u: Any, name: str, *, stacklevel: int = _CLOSED) -> None:
     """Warn once if an input `u` (n,) leaves the range that a model of this `name` was identified on."""
     if u_range is None or not u.size:
         return
@@ -26,7 +27,7 @@ def warn_beyond(u_range: tuple[float, ...] | None, u: Any, name: str) -> None:
             f"the input goes from {lowest:.4g} to {highest:.4g}, but the {name} was identified from {low:.4g} to "
             f"{high:.4g}: what it says beyond is extrapolated",
             HysimWarning,
-            stacklevel=3,
+            stacklevel=stacklevel,
         )
 
 
@@ -51,7 +52,7 @@ def warn_limited(limited: int, samples: int) -> None:
             f"the command is at a limit of the controller or the amplifier in {limited} of {samples} samples: the "
             "reference is out of reach there",
             HysimWarning,
-            stacklevel=3,
+            stacklevel=_CLOSED,
         )
 
 

@@ -155,16 +155,19 @@ def test_an_input_beyond_the_identified_range_is_warned_of():
     with pytest.warns(hs.HysimWarning, match="but the .* was identified from -1 to 1"):
         (hs.ReversalFilter(threshold=0.1) >> law).placed(0.0, (-1.0, 1.0)).inverse_response(outside)
     t = 0.01 * np.arange(20)
-    with pytest.warns(hs.HysimWarning, match="was identified from -1 to 1"):
+    with pytest.warns(hs.HysimWarning, match="was identified from -1 to 1") as told:
         hs.close_loop(law, hs.InverseFeedforward(law=law), t, np.linspace(0.0, float(outside.min()), 20))
+    assert {each.filename for each in told} == {__file__}
     assert warn_beyond(None, np.array([9.0]), "BoucWen") is None
 
 
 def test_a_command_at_its_limit_is_warned_of():
     t = 0.01 * np.arange(100)
     limited = hs.TrackingController(feedforward=hs.InverseFeedforward(), limits=(0.0, 0.5))
-    with pytest.warns(hs.HysimWarning, match="at a limit of the controller or the amplifier in 49 of 100 samples"):
+    words = "at a limit of the controller or the amplifier in 49 of 100 samples"
+    with pytest.warns(hs.HysimWarning, match=words) as told:
         hs.close_loop(hs.Line(slope=1.0), limited, t, t)
+    assert [each.filename for each in told] == [__file__]
 
 
 def test_an_identified_law_stands_at_the_first_input_of_its_record():

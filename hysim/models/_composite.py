@@ -133,7 +133,7 @@ class Composite(ByStructure, Composable):
         if not outputs.size:
             return outputs
         u = inverse_response(inverse_at_rest(self, float(outputs[0]), self.u0 if u0 is None else u0), outputs)
-        warn_beyond(self.u_range, u, type(self).__name__)
+        warn_beyond(self.u_range, u, type(self).__name__, stacklevel=3)
         return u
 
 

@@ -494,7 +494,7 @@ class Law(Placed, ABC):
         if self.u0 is not None and state is None:
             u0, state = None, self.advance([] if u0 is None else [u0])[1]
         u = self.inverted(outputs, u0, state)
-        warn_beyond(self.u_range, u, type(self).__name__)
+        warn_beyond(self.u_range, u, type(self).__name__, stacklevel=3)
         return u
 
     def inverted(self, y: FloatArray, u0: float | None, state: State | None) -> FloatArray:
