@@ -67,7 +67,7 @@ def one(n_samples: int, noise: float, seed: int) -> dict[str, dict[str, list[flo
     law, record = random_record(n_samples, noise, seed)
     found: dict[str, dict[str, list[float]]] = {}
     for kind, density in (("profile", "quantised"), ("linear", "gaussian")):
-        fit = hs.identify(hs.BoucWen, record, noise=density, intervals=kind, workers=1)
+        fit = hs.identify(hs.BoucWen, record, noise=density, intervals=kind, admissible=False, workers=1)
         found[kind] = {}
         for name in fit.free_names:
             lower, upper = fit.intervals[name]
@@ -113,7 +113,7 @@ def normal_noise(n_records: int = 400, n_samples: int = 300) -> dict[str, float]
         law, u = random_law(rng), fading(n_samples)
         y = law.response(u)
         record = hs.Record(u=u, y=y + 0.01 * np.ptp(y) * rng.standard_normal(n_samples))
-        fit = hs.identify(law, record, max_evaluations=400, workers=1)
+        fit = hs.identify(law, record, max_evaluations=400, admissible=False, workers=1)
         for name, (lower, upper) in fit.intervals.items():
             if not np.isnan(lower):  # n is at its bound in some
                 held.setdefault(name, []).append(bool(lower <= getattr(law, name) <= upper))
@@ -126,7 +126,7 @@ def normal_noise(n_records: int = 400, n_samples: int = 300) -> dict[str, float]
 def redundant_pair() -> str:
     """What the result says of A and gain, both free."""
     _, record = random_record(60, 0.3, 0)
-    fit = hs.identify(hs.BoucWen, record, free=("A", "gain"), noise="quantised")
+    fit = hs.identify(hs.BoucWen, record, free=("A", "gain"), noise="quantised", admissible=False)
     if not all(np.isnan(fit.intervals[name]).all() for name in ("A", "gain")):
         raise RuntimeError("an interval is printed for a parameter that the data cannot tell")
     return fit.message

@@ -995,6 +995,27 @@ def controllers_in_c(result: Result) -> list[str]:
     ]
 
 
+def first_contact(result: Result) -> list[str]:
+    """What every verb says of one fit, and the flow of the README on records of others."""
+    require(result["largest_difference"] < 1e-9, "every verb says the same number")
+    require(result["residuals_not_the_models"] == 0, "each residual is that of the returned model")
+    require(result["outside_without_warning"] == 0, "no command leaves the range of its record without a warning")
+    require(result["over_floor_median"] <= 1.3 and result["over_floor_worst"] <= 2.0, "the error is near the floor")
+    require(result["held_percent"] >= 90.0, "intervals hold the true parameters")
+    require(result["baber_noori_heals"] == 0, "no damage heals")
+    return [
+        f"On {count(result['records'])} records, {count(result['measured'])} of them measured, {result['verbs']} or more "
+        f"verbs report the same fit, to {number(result['largest_difference'], 1)} %.",
+        f"On {count(result['noisy_twins'])} simulated records with noise of the input, the error of the returned model "
+        f"is {number(result['over_floor_median'], 2)} times that of the true law behind the best filter in the median "
+        f"and {number(result['over_floor_worst'])} times at worst; 95 % intervals hold "
+        f"{percent(result['held_percent'])} of {count(result['parameters'])} parameters.",
+        f"The README's flow ran on {count(result['flows'])} records, without a command beyond the record that was not "
+        f"warned of; on {count(result['flows_refused'])} more the law has no inverse there, and says so. C and Python "
+        f"differ by at most {number(result['c_apart_worst'], 2)} of the span of the commands.",
+    ]
+
+
 def page_redraw(result: Result) -> list[str]:
     """Redraws of a page after a slider, beside Python and Matplotlib."""
     rows, promised = result["rows"], result["promised_ms"]
@@ -1400,6 +1421,7 @@ GROUPS: dict[str, tuple[Finding, ...]] = {
         benchmark_bouc_wen,
         transfer_functions,
         table1_models,
+        first_contact,
         recovery,
         all_families,
         nested_table1,
