@@ -1004,8 +1004,8 @@ def first_contact(result: Result) -> list[str]:
     require(result["held_percent"] >= 90.0, "intervals hold the true parameters")
     require(result["baber_noori_heals"] == 0, "no damage heals")
     return [
-        f"On {count(result['records'])} records, {count(result['measured'])} of them measured, {result['verbs']} or more "
-        f"verbs report the same fit, to {number(result['largest_difference'], 1)} %.",
+        f"On {count(result['records'])} records, {count(result['measured'])} of them measured, at least "
+        f"{result['verbs']} verbs report the same fit, to {number(result['largest_difference'], 1)} %.",
         f"On {count(result['noisy_twins'])} simulated records with noise of the input, the error of the returned model "
         f"is {number(result['over_floor_median'], 2)} times that of the true law behind the best filter in the median "
         f"and {number(result['over_floor_worst'])} times at worst; 95 % intervals hold "
