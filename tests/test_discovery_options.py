@@ -8,9 +8,11 @@ import pytest
 from discovered import CYCLES, DAHL, LAW, TRUTH, duhem, multisine, record_of, zigzag
 
 import hysim as hs
-from hysim.discovery import _discover
+from hysim.discovery import _discover, _structures
 from hysim.discovery._refinement import FreeRun
 from hysim.discovery._search import Library, Options, searched
+from hysim.discovery._selection import MOST_WORK
+from hysim.laws.differential.duhem_runs import free_runs
 from hysim.laws.differential.terms import memory_terms
 
 RECORD = record_of(LAW.memory, multisine(200), noise=0.01)
@@ -80,7 +82,7 @@ def test_cross_validation_repeats_the_whole_search(monkeypatch):
     ]
     assert found.cv_rmse == pytest.approx(np.sqrt(np.mean(np.concatenate(errors) ** 2)) * np.ptp(record.y), rel=1e-12)
     assert found.cv_rmse > found.scores["rmse"]
-    assert done == [(k, 6) for k in range(1, 7)]
+    assert done[-4:] == [(20, 80), (40, 80), (60, 80), (80, 80)]  # the search, and each fold
 
 
 @pytest.mark.parametrize("optimizer", ["SR3", "SSR", "FROLS"])
@@ -261,4 +263,28 @@ def test_progress_counts_up_to_its_total(library):
     calls = []
     degree = {"degree": 1} if library == "duhem" else {}
     hs.discover(RECORD, library=library, **degree, progress=lambda done, total: calls.append((done, total)))
-    assert calls == [(k, len(calls)) for k in range(1, len(calls) + 1)]
+    done, totals = np.array(calls).T
+    assert set(totals) == {20}
+    assert (np.diff(done) > 0).all()
+    assert done[0] <= 2
+    assert done[-1] == 20
+
+
+def test_a_search_among_stiff_laws_ends_at_its_limit_of_work(monkeypatch):
+    counted = []
+
+    def runs_and_count(*arguments, **named):
+        runs, terms = free_runs(*arguments, **named)
+        counted.append(terms)
+        return runs, terms
+
+    monkeypatch.setattr(_structures, "free_runs", runs_and_count)
+    u = np.cumsum(np.random.default_rng(0).standard_normal(80))
+    record = hs.Record(u=u, y=hs.Play(threshold=0.005 * np.ptp(u)).response(u))
+    found = hs.discover(record)
+    assert "stopped at its limit of work" in found.message
+    assert found.scores["fit_percent"] > 99.0
+    assert sum(counted) < 2.5 * MOST_WORK * len(record)  # two libraries, and the judgement
+    smooth = len(counted)
+    assert "limit of work" not in hs.discover(RECORD, degree=1).message
+    assert sum(counted[smooth:]) < MOST_WORK * len(RECORD)

@@ -146,7 +146,7 @@ def test_batches_are_the_path_to_the_bit():
     factors = np.linspace(0.5, 1.5, 5)
     sets = {"p": MIXED.p, "q": MIXED.q, "p_abs": factors[:, None, None] * MIXED.p_abs, "q_abs": MIXED.q_abs}
     together = hs.Duhem.responses(sets | {"feedthrough": factors, "y0": 0.2}, PATH)
-    runs = free_runs(
+    runs, _ = free_runs(
         [Term.parse(name) for name in MIXED.terms],
         np.tile(list(MIXED.terms.values()), (5, 1)),
         factors,
@@ -170,7 +170,7 @@ def test_a_law_without_bars_among_others_is_the_same_to_rounding():
 def test_a_run_that_escapes_is_a_row_of_inf():
     terms = [Term.parse("u'"), Term.parse("u' |z|")]
     u = hs.Record(u=[0.0, 1.0, 10.0], y=[0.0, 0.0, 0.0]).u[np.newaxis]
-    runs = free_runs(terms, np.array([[1.0, 1.0], [1.0, -1.0]]), 2.0, 0.0, u, 100.0)
+    runs, _ = free_runs(terms, np.array([[1.0, 1.0], [1.0, -1.0]]), 2.0, 0.0, u, 100.0)
     assert np.isposinf(runs[0]).all()
     assert runs[1] == pytest.approx(2.0 * u[0] + 1.0 - np.exp(-u[0]), rel=1e-14)  # a few roundings
     with pytest.raises(SimulationError, match=r"diverges at sample 1 .*: z' = u' \(1 \|z\| z \+ 1 z\^2\), y = z"):
@@ -181,10 +181,19 @@ def test_a_run_that_needs_more_steps_than_allowed_is_a_row_of_inf():
     u = hs.Record(u=[0.0, 1.0, -1.0, 1.0], y=np.zeros(4)).u[np.newaxis]
     laws = np.array([[1.0, -2.0], [1.0, -2e3]])  # the second one turns within a 2000th of a stroke
     terms = [Term.parse("u'"), Term.parse("|u'| z")]
-    few, many = (free_runs(terms, laws, 0.0, 0.0, u, 100.0, most_steps=most) for most in (5, 20_000))
+    few, many = (free_runs(terms, laws, 0.0, 0.0, u, 100.0, most_steps=most)[0] for most in (5, 20_000))
     assert np.isposinf(few[1]).all()
     assert np.isfinite(many).all()
     assert np.array_equal(few[0], many[0])
+
+
+def test_the_terms_of_series_count_the_work_of_each_law():
+    u = hs.Record(u=np.tile([1.0, -1.0], 150), y=np.zeros(300)).u[np.newaxis]
+    laws = np.repeat([[1.0, -1.0], [1.0, -2e3]], 150, axis=0)  # the second one turns within a 2000th of a stroke
+    terms = [Term.parse("u'"), Term.parse("|u'| z")]
+    smooth, stiff = (free_runs(terms, sets, 0.0, 0.0, u, 100.0)[1] for sets in np.split(laws, 2))
+    assert 150 * 299 <= smooth < 0.5 * stiff
+    assert free_runs(terms, laws, 0.0, 0.0, u, 100.0, workers=2)[1] == smooth + stiff
 
 
 def test_without_bars_and_feedthrough_the_memory_is_the_output_and_is_called_so():

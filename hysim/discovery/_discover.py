@@ -21,9 +21,10 @@ from hysim._frozen import FloatArray, check_choice
 from hysim._progress import Progress, Reports, reports
 from hysim.discovery import _laws, _pysindy
 from hysim.discovery._judgement import HYSTERESIS, LAG, NO_STRUCTURE, Competitors, Judgement, competitors, doubts, judge
-from hysim.discovery._refinement import DIVERGED, Candidate, FreeRun, Samples
+from hysim.discovery._refinement import DIVERGED, Candidate, FreeRun, Samples, Work
 from hysim.discovery._result import Discovery
 from hysim.discovery._search import Library, Options, Outcome, or_any_exponent, searched
+from hysim.discovery._selection import MOST_WORK
 from hysim.discovery._slopes import FORMS, signs_of
 from hysim.discovery._structures import AnyExponent
 from hysim.identification.folds import folds
@@ -37,7 +38,13 @@ _OSCILLATOR = (
     "The laws that were tried explain little of these records. If u is the force on a mass with a hysteretic spring "
     "and y its displacement, use hs.discover_oscillator."
 )
-_STAGES = 3  # library of z, other libraries, judgement
+_CUT = (
+    "the search stopped at its limit of work, since many of the laws that it tried are stiff on these records: other "
+    "structures may fit better. Give fewer terms by library= or a smaller degree to try all of them"
+)
+_REPORTS = 20  # calls of the progress for the search, and for each fold
+_SEARCHES = 0.9  # share of the searches; the rest is the judgement
+_OF_REFIT = MOST_WORK / 20.0
 
 
 @reports
@@ -95,7 +102,8 @@ def discover(
     seed : int
         Seed of random restarts, and of the ensemble.
     progress : callable or False, optional
-        Called as ``progress(done, total)``; each fold of the cross-validation is one step.
+        Called as ``progress(done, total)`` about every twentieth of the search, and after each fold of the
+        cross-validation, which counts like a search.
         By default calls beyond 2 s report on the standard error; False turns this off.
 
     Returns
@@ -160,14 +168,17 @@ def discover(
         # the folds of a cross-validation repeat the search without knowing what the competitors know
         enough=None if n_folds else lambda: others().enough,
     )
-    report = progress or (lambda done, total: None)
-    outcomes = _searched(records, (of_memory,), options)
-    report(1, _STAGES + n_folds)
+    report = _in_steps(progress or (lambda done, total: None), _REPORTS, 1 + n_folds)
+    share = _SEARCHES / (1 + len(of_output))
+    outcomes = _searched(records, (of_memory,), replace(options, report=lambda done: report(share * done)))
+    report(share)
     any_exponent = library is None and symmetry is None and not signs
 
     def chosen(first: list[Outcome], masks: tuple[Samples, ...] | None) -> tuple[Outcome, Candidate[Any]]:
-        more = _searched(records, of_output, options, first[0].searched.bic, masks)
-        outcome = min([*first, *more], key=lambda each: each.candidate.bic)
+        of_others = options if masks else replace(options, report=lambda done: report(share * (1.0 + done)))
+        both = [*first, *_searched(records, of_output, of_others, first[0].searched.bic, masks)]
+        outcome = min(both, key=lambda each: each.candidate.bic)
+        outcome = replace(outcome, is_cut=any(each.is_cut for each in both))
         if not any_exponent or outcome.is_short:
             return outcome, outcome.candidate
         return outcome, or_any_exponent(FreeRun(records, masks), first[0], outcome)
@@ -176,16 +187,29 @@ def discover(
         return chosen(_searched(records, (of_memory,), options, masks=masks), masks)[1]
 
     outcome, candidate = chosen(outcomes, None)
-    report(_STAGES - 1, _STAGES + n_folds)
+    report(_SEARCHES)
     result = _discovery(records, outcome, candidate, others(), seed)
-    report(_STAGES, _STAGES + n_folds)
+    report(1.0)
     error = math.nan
     if cross_validate is not None:
-        error = left_out_rmse(records, again, cross_validate, lambda done, n: report(_STAGES + done, _STAGES + n))
+        error = left_out_rmse(records, again, cross_validate, lambda done, _: report(1.0 + done))
     warnings = [*result.warnings, swapped_columns(records)]
     if route == "auto" and result.verdict != LAG and _may_be_an_oscillators(records, outcomes[0].candidate):
         warnings.append(_OSCILLATOR)
     return replace(result, warnings=tuple(filter(None, warnings)), cv_rmse=error)
+
+
+def _in_steps(progress: Progress, each: int, searches: int) -> Callable[[float], None]:
+    """A function of the searches that are done which calls `progress`, `each` times for one search at most."""
+    last = 0
+
+    def report(done: float) -> None:
+        nonlocal last
+        if (steps := math.floor(each * done + 1e-9)) > last:
+            last = steps
+            progress(steps, each * searches)
+
+    return report
 
 
 def _rests(initial: str, library: Library, records: Sequence[Record]) -> tuple[bool, ...]:
@@ -298,7 +322,7 @@ def _discovery(
 
 def _message(outcome: Outcome, rest: bool) -> str:
     parts = [f"{outcome.library.letter} is held at zero at the first sample"] * rest
-    parts += [_SHORT] * outcome.is_short
+    parts += [_SHORT] * outcome.is_short + [_CUT] * outcome.is_cut
     return "; ".join(parts)
 
 
@@ -317,9 +341,8 @@ def _judged(
     structure = candidate.structure
 
     def refit(some: Sequence[Record], weights: Sequence[FloatArray]) -> Sequence[Any]:
-        refined = FreeRun(tuple(some), tuple(each > 0.0 for each in weights)).refine(
-            structure, candidate.unknowns[np.newaxis]
-        )
+        masks = tuple(each > 0.0 for each in weights)
+        refined = FreeRun(tuple(some), masks, work=Work(_OF_REFIT)).refine(structure, candidate.unknowns[np.newaxis])
         if refined is None:
             raise ValueError("the law diverges")
         return _laws.law_from(refined, some, letter).models

@@ -32,6 +32,7 @@ RANKING = 1e-5  # relative change of the cost at which a descent ends: far less 
 POLISH = 1e-12
 _STEPS_TO_RANK = 20  # a structure that is still on its way then is not taken for its last digits
 _STEPS = 200
+_FEWEST_STEPS = 2  # where the work is done
 _SCHEDULE = Schedule(factors=(1e-3, 1e-1, 1.0, 10.0), success=1.0, failure=1e4, least=1e-12, most=1e8)
 _RIDGES = tuple(10.0**power for power in range(-9, 1))
 _SINGULAR = 1e-10
@@ -109,16 +110,36 @@ def bic_of(cost: float, n_samples: int, n_parameters: int) -> float:
     return information(cost / n_samples, n_samples, n_parameters, floor=FLOOR)
 
 
+@dataclass
+class Work:
+    """Terms of series for each sample that free runs have taken, and the `most` that a search may take.
+
+    A stiff law takes a hundred times as many as a smooth one. No clock is read: the result is always the same.
+    """
+
+    most: float = math.inf
+    done: float = 0.0
+
+    @property
+    def share(self) -> float:
+        return self.done / self.most
+
+    def steps(self, cost: float) -> float:
+        """How many steps of this cost remain."""
+        return max(0.0, self.most - self.done) / cost if cost else math.inf
+
+
 @dataclass(frozen=True)
 class FreeRun:
     """Least-squares problem of some records; `signs` are those that coefficients must have.
 
-    `masks`, (n_samples,) for each record, mark the visible outputs; by default all.
+    `masks`, (n_samples,) for each record, mark the visible outputs; by default all. All runs add to the `work`.
     """
 
     records: tuple[Record, ...]
     masks: tuple[Samples, ...] | None = None
     signs: Mapping[Term, int] = field(default_factory=dict)
+    work: Work = field(default_factory=Work, compare=False)
 
     @cached_property
     def visible(self) -> tuple[Record, ...]:
@@ -167,16 +188,18 @@ class FreeRun:
     ) -> Candidate[S] | None:
         """Optimum that is reached from the best of `starts` (n_starts, size + n_records); None if all diverge.
 
-        A descent that will not come below the cost `hopeless` [squared strokes] is given up.
+        A descent that will not come below the cost `hopeless` [squared strokes] is given up, and has few steps where
+        the work is nearly done.
         """
         units = self.units(structure)
         lower, upper = self._bounds(structure, units)
-        starts = np.clip(starts, lower, upper)
+        starts, before = np.clip(starts, lower, upper), self.work.done
         costs = np.sum(self.residuals(structure, starts) ** 2, axis=1)
         if costs.min() >= DIVERGED**2:
             return None
         is_ranked = tolerance >= RANKING  # else polished
-        residuals = self._scaled(structure)
+        residuals, n_runs = self._scaled(structure), len(_SCHEDULE.factors) + units.size * (1 if is_ranked else 2)
+        affordable = self.work.steps((self.work.done - before) / len(starts) * n_runs)
 
         def slopes(x: FloatArray, residual: FloatArray) -> FloatArray:
             return differences(residuals, x, residual, central=not is_ranked)
@@ -185,7 +208,7 @@ class FreeRun:
             SumOfSquares(residuals, slopes, lower / units, upper / units),
             starts[[np.argmin(costs)]] / units,
             relative=tolerance,
-            steps=_STEPS_TO_RANK if is_ranked else _STEPS,
+            steps=int(max(_FEWEST_STEPS, min(affordable, _STEPS_TO_RANK if is_ranked else _STEPS))),
             hopeless=hopeless,
             schedule=_SCHEDULE,
         )
@@ -236,7 +259,7 @@ class FreeRun:
             path = np.concatenate([u, np.tile([middle - reach, middle + reach], _CYCLES)])
             path.setflags(write=False)
             numbers, y0 = unknowns[np.newaxis, : structure.size], unknowns[np.newaxis, structure.size + k]
-            y = structure.run(path, numbers, y0, BOUND * self.stroke)[0]
+            y = structure.run(path, numbers, y0, BOUND * self.stroke)[0][0]
             if not np.isfinite(y).all() or np.abs(y[-4:-2] - y[-2:]).max() > _STEADY * self.stroke:
                 return False
         return True
@@ -247,7 +270,8 @@ class FreeRun:
         numbers, y0 = unknowns[:, : structure.size], unknowns[:, structure.size + k]
         if structure.rest:
             y0 = output_at_rest(structure, numbers, float(record.u[0]))
-        y = structure.run(record.u, numbers, y0, bound)
+        y, terms = structure.run(record.u, numbers, y0, bound)
+        self.work.done += terms / self.n_samples
         if self.masks is not None:
             y = y[:, self.masks[k]]
         residual = (visible.y - y) / self.stroke

@@ -21,8 +21,20 @@ import numpy as np
 from hysim._frozen import FloatArray
 from hysim.discovery import _pysindy
 from hysim.discovery._held_out import about_trends, rms
-from hysim.discovery._refinement import POLISH, Candidate, FreeRun, Samples, bic_of
-from hysim.discovery._selection import ALIKE, INDISTINCT, Search, Start, gap, preferred, pruned, thinned, turning
+from hysim.discovery._refinement import POLISH, Candidate, FreeRun, Samples, Work, bic_of
+from hysim.discovery._selection import (
+    ALIKE,
+    INDISTINCT,
+    MOST_WORK,
+    PATH_SHARE,
+    Search,
+    Start,
+    gap,
+    preferred,
+    pruned,
+    thinned,
+    turning,
+)
 from hysim.discovery._slopes import FORMS, Feature, Slopes, ridge, slopes
 from hysim.discovery._structures import AnyExponent, Terms, shifts
 from hysim.laws.differential.terms import Term, symmetric
@@ -63,18 +75,25 @@ class Library:
 
 @dataclass(frozen=True)
 class Options:
-    """Signs of coefficients, and arguments of `discover`; `enough` is the rmse that makes a full search worth while."""
+    """Signs of coefficients, and arguments of `discover`; `enough` is the rmse that makes a full search worth while.
+
+    `report` is called with the share of a search that is done.
+    """
 
     signs: Mapping[Term, int] = field(default_factory=dict)
     optimizer: str = "STLSQ"
     derivative: str = "auto"
     seed: int = 0
     enough: Callable[[], float] | None = None
+    report: Callable[[float], None] = lambda share: None
 
 
 @dataclass(frozen=True)
 class Outcome:
-    """Law of one library for the records, and its search; `is_short` if only the optimizer's path was searched."""
+    """Law of one library for the records, and its search; `is_short` if only the optimizer's path was searched.
+
+    `is_cut` if the search ended at its limit of work.
+    """
 
     library: Library
     candidate: Candidate[Terms]
@@ -83,6 +102,7 @@ class Outcome:
     slopes: Slopes
     path: list[tuple[float, Terms]]
     is_short: bool = False
+    is_cut: bool = False
 
     @property
     def searched(self) -> Candidate[Terms]:
@@ -129,7 +149,7 @@ def searched(
     Only outputs in the `masks`, (n_samples,) for each record, are used. The search is short if no law on the
     optimizer's path, which has the largest ones, comes near an rmse that is enough.
     """
-    free_run = FreeRun(tuple(records), None if masks is None else tuple(masks), options.signs)
+    free_run = FreeRun(tuple(records), None if masks is None else tuple(masks), options.signs, Work(MOST_WORK))
     thin = thinned(free_run)
     optimizer, form = options.optimizer, options.derivative
     if form == "auto":
@@ -137,7 +157,7 @@ def searched(
     rows = slopes(free_run.visible, form)
     starts = shifted(rows, library.terms, feedthrough=library.feedthrough != "no", offset=library.offset)
     required = frozenset({"feedthrough"} if library.feedthrough == "must" else ())
-    search = Search(thin, starts, required, library.rests)
+    search = Search(thin, starts, required, library.rests, report=options.report)
     for start in starts:
         search.refine(library.structure(start.regression.terms))
     if not search.could_win(1, best):
@@ -145,18 +165,18 @@ def searched(
     search.refine(LINE._replace(rest=all(library.rests)), thin.line)
     for start in starts:
         for _, structure in _path(start, library, optimizer):
-            search.refine(structure)
+            if thin.work.share < PATH_SHARE or not search.candidates:
+                search.refine(structure)
     if not search.candidates:
         raise ValueError(
             f"every law that was tried diverges on these records, whose output moves by {free_run.stroke:.3g} about "
             f"{float(records[0].y[0]):.3g}: check the units, or subtract the offset"
         )
     is_short = options.enough is not None and not _least_rmse(search) <= _HOPELESS * options.enough()
-    if not is_short:
-        search.explore(library.structure(starts[0].regression.terms))
-    chosen = _on_all_samples(free_run, search, library, options.seed, restarts=0 if is_short else _RESTARTS)
+    is_cut = not is_short and not search.explore(library.structure(starts[0].regression.terms))
+    chosen = _on_all_samples(free_run, search, library, options.seed, restarts=0 if is_short or is_cut else _RESTARTS)
     start = _start_at(rows, library, chosen)
-    return Outcome(library, chosen, search, start, rows, _path(start, library, optimizer), is_short)
+    return Outcome(library, chosen, search, start, rows, _path(start, library, optimizer), is_short, is_cut)
 
 
 def _least_rmse(search: Search) -> float:

@@ -20,7 +20,7 @@ their samples, the reversals among them; the best structures are then refined on
 """
 
 import math
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
@@ -45,6 +45,9 @@ HOPELESS = 20.0  # BIC above the best, beyond which a structure is not followed 
 _POINTS = 2  # candidates about which one round linearises
 _LIKELY = 8.0  # predicted BIC above the lowest one, beyond which a structure is not refined
 _TWINS = 6
+MOST_WORK = 2.5e5  # terms of series for each sample, of one library: smooth laws take a tenth to a half of it
+PATH_SHARE, SEARCH_SHARE = 0.45, 0.7  # of that, after which no further structure is tried; the rest is for last digits
+_EXPECTED = 40.0  # structures of one search, of which there are 30 to 100
 
 
 class Start(NamedTuple):
@@ -76,7 +79,7 @@ def thinned(free_run: FreeRun) -> FreeRun:
         Record(u=r.u[included], y=r.y[included]) for r, included in zip(free_run.records, samples, strict=True)
     )
     masks = free_run.masks and tuple(mask[included] for mask, included in zip(free_run.masks, samples, strict=True))
-    return FreeRun(records, masks, free_run.signs)
+    return FreeRun(records, masks, free_run.signs, free_run.work)
 
 
 def turning(u: FloatArray) -> npt.NDArray[np.bool_]:
@@ -98,7 +101,8 @@ def is_plain(structure: Terms, letter: str) -> bool:
 class Search:
     """Structures tried on some records, with their refinements: None where every free run diverged.
 
-    `required` are numbers that no structure may lose; `rests` the values of `Terms.rest` to try.
+    `required` are numbers that no structure may lose; `rests` the values of `Terms.rest` to try. After each structure
+    `report` is called with the share of the search that is done, about.
     """
 
     free_run: FreeRun
@@ -106,6 +110,7 @@ class Search:
     required: frozenset[str] = frozenset()
     rests: tuple[bool, ...] = (False,)
     tried: dict[Terms, Candidate[Terms] | None] = field(default_factory=dict)
+    report: Callable[[float], None] = lambda share: None
 
     def refine(self, structure: Terms, *unknowns: FloatArray, race: bool = False) -> Candidate[Terms] | None:
         """Refine a structure once, from its regressions and these starts; in a `race` it may be given up."""
@@ -118,6 +123,7 @@ class Search:
             own = np.array(unknowns).reshape(-1, structure.size + len(self.free_run.records))
             starts, hopeless = np.concatenate([own, *regressed]), self._hopeless(structure) if race else math.inf
             self.tried[structure] = self.free_run.refine(structure, starts, hopeless=hopeless)
+            self.report(max(1.0 - math.exp(-len(self.tried) / _EXPECTED), min(1.0, self.free_run.work.share)))
         return self.tried[structure]
 
     @property
@@ -142,8 +148,11 @@ class Search:
         best, d = sound[0], structure.size + (0 if structure.rest else len(self.free_run.records))
         return max(cost_of(best.bic + HOPELESS, n, d), best.cost + n * ALIKE**2)
 
-    def explore(self, largest: Terms) -> None:
-        """Steps 2 and 3: the structures inside `largest` that the linearised free run predicts to be best."""
+    def explore(self, largest: Terms) -> bool:
+        """Steps 2 and 3: the structures inside `largest` that the linearised free run predicts to be best.
+
+        Returns whether all of them were tried before the work was done.
+        """
         done: set[Terms] = set()
         for _ in range(ROUNDS):
             points = [c for c in self.sound[:_POINTS] if c.structure not in done]
@@ -152,10 +161,13 @@ class Search:
                 break
             done |= {candidate.structure for candidate in points}
             for each in [each for candidate in points for each in self.predicted(candidate, largest)]:
+                if self.free_run.work.share >= SEARCH_SHARE:
+                    return False
                 self.refine(each.structure, each.unknowns, race=True)
         for candidate in self.sound[:_TWINS]:
             for rest in self.rests:
                 self.refine(candidate.structure._replace(rest=rest), candidate.unknowns)
+        return True
 
     def predicted(self, candidate: Candidate[Terms], largest: Terms) -> list[Prediction]:
         """The MET structures inside `largest` of lowest BIC, in the free run linearised about a candidate."""

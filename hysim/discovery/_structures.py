@@ -53,13 +53,18 @@ class Terms(NamedTuple):
         wanted = np.array([signs.get(term, 0) for term in self.terms] + [0] * (self.feedthrough + self.offset))
         return np.where(wanted > 0, 0.0, -np.inf), np.where(wanted < 0, 0.0, np.inf)
 
-    def run(self, u: FloatArray, numbers: FloatArray, y0: FloatArray, bound: float) -> FloatArray:
-        """Outputs (n_sets, n_samples) of numbers (n_sets, size) from y0 (n_sets,), rows of inf where one diverges."""
+    def run(self, u: FloatArray, numbers: FloatArray, y0: FloatArray, bound: float) -> tuple[FloatArray, int]:
+        """Outputs (n_sets, n_samples) of numbers (n_sets, size) from y0 (n_sets,), and the terms of series they take.
+
+        A law that diverges is a row of inf.
+        """
         feedthrough, offset = shifts(self, numbers)
         coefficients = numbers[:, : len(self.terms)]
         memory = y0 - offset
-        runs = free_runs(self.terms, coefficients, feedthrough, memory, u[np.newaxis], bound, most_steps=_MOST_STEPS)
-        return runs + offset[:, np.newaxis]
+        runs, work = free_runs(
+            self.terms, coefficients, feedthrough, memory, u[np.newaxis], bound, most_steps=_MOST_STEPS
+        )
+        return runs + offset[:, np.newaxis], work
 
 
 @dataclass(frozen=True)
@@ -85,14 +90,15 @@ class AnyExponent:
         lower[3], upper[3] = self.LOWEST, self.HIGHEST
         return lower, upper
 
-    def run(self, u: FloatArray, numbers: FloatArray, y0: FloatArray, bound: float) -> FloatArray:
+    def run(self, u: FloatArray, numbers: FloatArray, y0: FloatArray, bound: float) -> tuple[FloatArray, int]:
+        """As of `Terms`, whose work is not counted: no law of this form takes long."""
         feedthrough, offset = shifts(self, numbers)
         A, dissipative, conservative, n = numbers[:, :4].T
         laws = {"A": A, "beta": -dissipative, "gamma": -conservative, "n": n}
         shift = {"feedthrough": feedthrough, "offset": offset, "z0": y0 - offset - feedthrough * u[0]}
         y = BoucWen.responses({**laws, **shift}, u)
         y[~(np.abs(y) <= bound).all(axis=1)] = np.inf
-        return y
+        return y, 0
 
 
 Structure = Terms | AnyExponent

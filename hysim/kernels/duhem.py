@@ -212,25 +212,27 @@ def zero(powers: FloatArray, last: int, end: float) -> float:
 @inner
 def advance(
     u: float, z: float, du: float, law: FloatArray, bound: float, most: int, local: FloatArray, powers: FloatArray
-) -> float:
-    """Memory after the input has moved monotonically from `u` by `du`.
+) -> tuple[float, int]:
+    """Memory after the input has moved monotonically from `u` by `du`, and the terms of series that this takes.
 
-    It is inf beyond `bound`, and nan where `most` steps do not reach the end.
+    The memory is inf beyond `bound`, and nan where `most` steps do not reach the end.
     """
     two_sided = law.shape[0] == 4
     above = 0 if du > 0.0 else law.shape[0] // 2
     rest = h = du
+    terms = 0
     for _ in range(most):
         if rest == 0.0:
-            return z
+            return z, terms
         here = u + (du - rest)
         expand(law, above + 1 if two_sided and z < 0.0 else above, here, h, local)
         if two_sided and z == 0.0 and falls_from_zero(local, h):
             expand(law, above + 1, here, h, local)
         last, served = series(local, z, h, powers)
+        terms += last
         if served == 0.0:
             if not math.isfinite(powers[1, 1]):
-                return math.inf
+                return math.inf, terms
             h *= _RETREAT
             continue
         end = served
@@ -240,50 +242,60 @@ def advance(
         for k in range(last, -1, -1):
             z = z * end + powers[1, k]
         if not abs(z) <= bound:
-            return math.inf
+            return math.inf, terms
         if abs(h * end) <= ROUNDING * abs(du) and abs(z) > 1.01 * abs(before) > 0.0:  # nothing moves u any more, but z
-            return math.inf
+            return math.inf, terms
         if two_sided and ((before > 0.0 and z < 0.0) or (before < 0.0 and z > 0.0)):
             end, z = zero(powers, last, end), 0.0
         taken = h * end
         rest = 0.0 if taken == rest else rest - taken
         h = math.copysign(min(abs(rest), _GROWTH * abs(h * served)), du)
-    return math.nan
+    return math.nan, terms
 
 
 # ---------------------------------------------------------------------------------- path and batch
 
 
 @kernel
-def path(law: FloatArray, last_u: float, z: float, u: FloatArray, bound: float, most: int, out: FloatArray) -> int:
-    """Memory at the samples of `u` from the state (last_u, z) into `out`: the first one not finite, or -1."""
+def path(
+    law: FloatArray, last_u: float, z: float, u: FloatArray, bound: float, most: int, out: FloatArray
+) -> tuple[int, int]:
+    """Memory at the samples of `u` from the state (last_u, z) into `out`.
+
+    Returns the first sample that is not finite, or -1, and the terms of series that the samples take.
+    """
     rows, columns = law.shape[1:]
+    total = 0
     local, powers = np.empty((rows, columns)), np.empty((max(2, columns), N_TERMS + 1))
     for k in range(u.size):
-        z = advance(last_u, z, u[k] - last_u, law, bound, most, local, powers)
-        last_u = u[k]
+        z, terms = advance(last_u, z, u[k] - last_u, law, bound, most, local, powers)
+        last_u, total = u[k], total + terms
         out[k] = z
         if not math.isfinite(z):
-            return k
-    return -1
+            return k, total
+    return -1, total
 
 
 @kernel
 def batch(
     laws: FloatArray, z0: FloatArray, u: FloatArray, bound: float, most: int, out: FloatArray, start: int, stop: int
-) -> None:
-    """Memories of the laws `start` to `stop - 1`.
+) -> int:
+    """Memories of the laws `start` to `stop - 1`; returns the terms of series that they take.
 
     `laws` is (n_sets, 2 or 4, rows, columns), `z0` is (n_sets,), `u` is (1, n_samples) or (n_sets, n_samples),
     `out` is (n_sets, n_samples). A law that diverges, or needs more than `most` steps from one sample to the next, is a
     row of inf.
     """
     if u.shape[1] == 0:
-        return
+        return 0
+    total = 0
     for i in range(start, stop):
         row = u[min(i, u.shape[0] - 1)]
-        if path(laws[i], row[0], z0[i], row, bound, most, out[i]) >= 0:
+        lost, terms = path(laws[i], row[0], z0[i], row, bound, most, out[i])
+        total += terms
+        if lost >= 0:
             out[i] = math.inf
+    return total
 
 
 # ---------------------------------------------------------------------------------- one sample at a time
@@ -302,7 +314,7 @@ def step(parameters: FloatArray, state: FloatArray, u: float) -> float:
     powers = state[2 + size : state_size(rows, columns)].reshape((max(2, columns), N_TERMS + 1))
     z = state[1]
     if math.isfinite(z):  # a memory that has diverged remains so
-        z = advance(state[0], z, u - state[0], law, LARGEST, MAX_STEPS, local, powers)
+        z = advance(state[0], z, u - state[0], law, LARGEST, MAX_STEPS, local, powers)[0]
     state[0], state[1] = u, z
     return float(parameters[0] + (parameters[1] * u + z))
 

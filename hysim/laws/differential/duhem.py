@@ -247,7 +247,7 @@ class Duhem(Law):
     def path(cls, law: CompiledLaw, u: FloatArray, y: FloatArray) -> int:
         offset, feedthrough, *shape = law.parameters[:5]
         slopes = law.parameters[5:].reshape([int(length) for length in shape])
-        lost = int(kernels.path(slopes, law.state[0], law.state[1], u, kernels.LARGEST, kernels.MAX_STEPS, y))
+        lost = int(kernels.path(slopes, law.state[0], law.state[1], u, kernels.LARGEST, kernels.MAX_STEPS, y)[0])
         if lost < 0:
             law.state[:2] = u[-1], y[-1]
             y[:] = offset + (feedthrough * u + y)
@@ -257,7 +257,7 @@ class Duhem(Law):
     def rows(cls, tables: Tables, u: FloatArray, y: FloatArray) -> None:
         laws = branches(Polynomials(*(tables[name] for name in Polynomials._fields)))
         offset, feedthrough, y0 = (tables[name][:, 0] for name in ("offset", "feedthrough", "y0"))
-        y[:] = outputs(laws, feedthrough, y0 - offset, u, kernels.LARGEST, 1) + offset[:, np.newaxis]
+        y[:] = outputs(laws, feedthrough, y0 - offset, u, kernels.LARGEST, 1)[0] + offset[:, np.newaxis]
 
     def divergence(self, sample: int, u: float, y: float) -> str:
         """Message with the law's equation."""
@@ -275,7 +275,7 @@ class Duhem(Law):
         sets = np.stack(coefficients, axis=1) if coefficients else np.empty((len(y0), 0))
         bound = _BOUND * (float(np.abs(record.y).max()) or 1.0)
         terms = [Term.parse(name) for name in names]
-        y = free_runs(terms, sets, feedthrough, y0 - offset, record.u[np.newaxis], bound)
+        y, _ = free_runs(terms, sets, feedthrough, y0 - offset, record.u[np.newaxis], bound)
         return np.asarray(y + offset[:, np.newaxis])[..., np.newaxis]
 
     def steady(self, parameters: Parameters, record: Record) -> dict[str, FloatArray]:

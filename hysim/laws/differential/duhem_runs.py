@@ -27,12 +27,12 @@ def free_runs(
     *,
     most_steps: int = kernels.MAX_STEPS,
     workers: int | None = None,
-) -> FloatArray:
-    """Outputs (n_sets, n_samples) of many laws from `coefficients` (n_sets, n_terms); inf where one diverges.
+) -> tuple[FloatArray, int]:
+    """Outputs (n_sets, n_samples) of many laws, inf where one diverges, and the terms of series that they take.
 
-    `feedthrough` and `y0` are one number or (n_sets,), the inputs `u` (1 or n_sets, n_samples) and read-only. A law
-    whose memory goes beyond the `bound`, or that needs more than `most_steps` steps of its series between two samples,
-    counts as diverging. The result does not depend on the number of `workers`.
+    The `coefficients` are (n_sets, n_terms), `feedthrough` and `y0` one number or (n_sets,), the inputs `u` (1 or
+    n_sets, n_samples) and read-only. A law whose memory goes beyond the `bound`, or that needs more than `most_steps`
+    steps of its series between two samples, counts as diverging. The result does not depend on the number of `workers`.
     """
     laws = branches(polynomials(terms, np.atleast_2d(coefficients)))
     return outputs(laws, np.asarray(feedthrough), np.asarray(y0), u, bound, workers, most_steps)
@@ -46,22 +46,22 @@ def outputs(
     bound: float,
     workers: int | None,
     most_steps: int = kernels.MAX_STEPS,
-) -> FloatArray:
+) -> tuple[FloatArray, int]:
     """As `free_runs`, of the laws (1 or n_sets, 2 or 4, rows, columns) of `branches`; all lengths may be 1."""
     n_sets = max(len(laws), feedthrough.size, y0.size, len(u))
     laws = read_only(np.broadcast_to(laws, (n_sets, *laws.shape[1:])), finite=False)
     direct = np.broadcast_to(feedthrough, n_sets)
     z0 = read_only(y0 - direct * (u[:, 0] if u.size else 0.0), finite=False)
-    y = np.empty((n_sets, u.shape[1]))
+    y, terms = np.empty((n_sets, u.shape[1])), list[int]()
 
     def work(start: int, stop: int) -> None:
         with np.errstate(all="ignore"):  # a memory that diverges overflows, and uncompiled kernels would warn of it
-            kernels.batch(laws, z0, u, bound, most_steps, y, start, stop)
+            terms.append(kernels.batch(laws, z0, u, bound, most_steps, y, start, stop))
 
     in_chunks(work, n_sets, workers=workers, minimum=1 + _SAMPLES_PER_THREAD // max(1, u.shape[1]))
     if feedthrough.any():
         y += direct[:, np.newaxis] * u
-    return y
+    return y, sum(terms)
 
 
 def branches(parts: Polynomials) -> FloatArray:
