@@ -31,7 +31,7 @@ from hysim.identification.whole.parts import begun_by_parts
 from hysim.models.candidates import family_named
 from hysim.models.channels.dependent import Dependent, on_record
 from hysim.models.channels.structure import DependentStructure
-from hysim.models.protocols import Direct, Identifiable, Recorded, Rescalable, needs_time, placed
+from hysim.models.protocols import Direct, Identifiable, Recorded, needs_time, placed
 from hysim.models.search_space import Freedom
 from hysim.models.whole.part_by_part import PartByPart
 from hysim.records import Record, several
@@ -191,7 +191,7 @@ def identify(
                 searched, noise or "gaussian", intervals, folds, seed, progress or None, treatment, admissible
             )
             fit = replace(fit, message="; ".join(filter(None, (fit.message, choice.sentence))))
-            if not any(isinstance(record, Rescalable) for record in records):
+            if all(type(record) is Record for record in records):  # not in units of sensors, nor weighted by a verb
                 fit = as_measured(fit, records, shares, treatment)
                 fit = said_of_noise(fit, records, treatment, quiet_rmse(family, treatment, options, initial))
             first, doubts = choice.problems[0], [swapped_columns(records)]
