@@ -104,7 +104,7 @@ def treated(
     where it predicts the second halves as well, both along the input as measured and along its quiet path: on the
     first alone a law whose parameters make up for false reversals may be as good.
     """
-    if how == "raw" or any(isinstance(record, Rescalable) for record in records):
+    if how == "raw" or any(type(record) is not Record for record in records):  # of several sensors, or weighted
         return Treated(records)
     # creep is read from what a law does not explain, to which few false reversals are much
     many = {"many": 1.0} if isinstance(family, PartByPart) else {}
