@@ -40,7 +40,7 @@ def test_its_python_block_fits_draws_and_compensates_a_file(tmp_path, monkeypatc
     assert (tmp_path / "law.json").exists()
     printed = capsys.readouterr().out
     assert "loop width" in printed
-    assert f"The last line is `{printed.splitlines()[-1]}`" in README
+    assert f"# {printed.splitlines()[-1]}, " in README
     low, high = namespace["rec"].u.min(), namespace["rec"].u.max()
     assert low <= namespace["voltage"].min() <= namespace["voltage"].max() <= high
     assert namespace["stage"].amplifier.limits == (low, high)
