@@ -167,7 +167,7 @@ def in_python(case: Case) -> float:
     """Seconds of the compiled step, called by its pointer."""
     if len(case.inputs) == 2:
         command, u = np.empty(case.y.size), np.empty(case.y.size)
-        step, parameters, state = case.thing.compiled(SAMPLE_TIME)
+        step, parameters, state = case.thing.initial(SAMPLE_TIME)
         return least_seconds(lambda: replay(step, parameters, state.copy(), *case.inputs, command, u))
     law, y = case.thing.startable(SAMPLE_TIME).started(float(case.inputs[0, 0])), np.empty(case.y.size)
     return least_seconds(lambda: drive(law.step, law.parameters, law.state.copy(), case.inputs[0], y))

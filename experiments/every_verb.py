@@ -101,7 +101,7 @@ def _of_residuals(fit: hs.Identification, rec: hs.Record, spread: float) -> floa
 
 
 def _printed(text: str) -> float:
-    return float(re.search(r"fit ([-+.\de]+) %", text)[1])
+    return float(re.search(r"fit ([-+.\de]+) %, rmse", text)[1])
 
 
 def largest_difference(numbers: dict[str, float]) -> float:

@@ -324,7 +324,7 @@ def case(family: str, kind: str, thing: Any, inputs: Array) -> Case:
     """The thing as a program, and its outputs in Python."""
     if len(inputs) == 2:
         program = program_of(thing, SAMPLE_TIME)
-        step, parameters, state = thing.compiled(SAMPLE_TIME)
+        step, parameters, state = thing.initial(SAMPLE_TIME)
         command, u = np.empty(inputs.shape[1]), np.empty(inputs.shape[1])
         replay(step, parameters, state, inputs[0], inputs[1], command, u)
         return Case(family, kind, thing, program.source, False, False, program.parameters, program.state, inputs, u)

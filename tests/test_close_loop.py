@@ -383,9 +383,9 @@ def test_an_unreachable_reference_asks_for_a_bounded_command():
 
 
 def test_an_unstable_loop_is_an_error_that_names_the_time():
-    """u_k = 2 u_(k-1) - 2 is -2^(k+2) + 2: sample 331 is the first beyond 1e100, above 2^332."""
+    """u_k = 2 u_(k-1) - 2 is -2^(k+2) + 2, beyond 1e100 from sample 331 on (2^332); the output is one sample later."""
     t = 3.0 + 0.5 * np.arange(3000)
-    with pytest.raises(hs.SimulationError, match=r"at t = 168.5: it is unstable"):
+    with pytest.raises(hs.SimulationError, match=r"at t = 169: it is unstable"):
         hs.close_loop(hs.Actuator(), hs.PID(kp=-2.0), t, np.ones(3000))
     assert np.isfinite(hs.close_loop(hs.Actuator(), hs.PID(kp=-2.0), t[:331], np.ones(331)).u).all()
 

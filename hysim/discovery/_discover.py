@@ -40,7 +40,7 @@ _OSCILLATOR = (
 )
 _CUT = (
     "the search stopped at its limit of work, since many of the laws that it tried are stiff on these records: other "
-    "structures may fit better. Give fewer terms by library= or a smaller degree to try all of them"
+    "structures may fit better. A library of fewer terms lets it try all of them"
 )
 _REPORTS = 20  # calls of the progress for the search, and for each fold
 _SEARCHES = 0.9  # share of the searches; the rest is the judgement
