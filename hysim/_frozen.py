@@ -147,7 +147,26 @@ def _freeze(cls: type[T], *, finite: bool) -> type[T]:
     made = dataclasses.dataclass(frozen=True, kw_only=True, eq=False)(cls)
     if _field_names(made)[2]:  # type: ignore[arg-type]
         made.__repr__ = _repr_without_none  # type: ignore[method-assign]
+        made.__doc__ = _with_last(made.__doc__ or "")
     return _with_advice(made)
+
+
+_PARAMETERS = "\n    Parameters\n    ----------\n"
+_PLACE = """    u0 : float, optional
+        Input at which the initial memory holds [unit of u], from which the law first moves to an input's first sample;
+        by default that sample itself.
+    u_range : (float, float), optional
+        Lowest and highest input of the record that the law was identified on [unit of u].
+"""
+
+
+def _with_last(text: str) -> str:
+    """A docstring whose section of parameters ends with those that are `LAST`."""
+    before, heading, rest = text.partition(_PARAMETERS)
+    if not heading or _PLACE in text:
+        return text
+    own, blank, others = rest.partition("\n\n    ")
+    return before + heading + own.rstrip() + "\n" + (_PLACE.rstrip("\n") if blank else _PLACE) + blank + others
 
 
 def _repr_without_none(self: Any) -> str:
