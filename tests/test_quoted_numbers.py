@@ -67,6 +67,7 @@ def test_a_finding_is_a_few_sentences_that_follow_the_numbers(finding):
         "batch",
         "transfer_functions",
         "magnetic_loops",
+        "first_contact",
     ):  # twice their numbers are no longer true
         with pytest.raises(ValueError, match="no longer supports"):
             finding(scaled(result, 2, kinds))
