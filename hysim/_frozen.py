@@ -149,7 +149,7 @@ def _freeze(cls: type[T], *, finite: bool) -> type[T]:
     if _field_names(made)[2]:  # type: ignore[arg-type]
         made.__repr__ = _repr_without_none  # type: ignore[method-assign]
         made.__doc__ = _with_last(made.__doc__ or "")
-        _, *arguments = inspect.signature(made.__init__).parameters.values()  # type: ignore[misc]
+        _, *arguments = inspect.signature(made.__init__).parameters.values()
         arguments.sort(key=lambda each: each.name in _field_names(made)[2])  # type: ignore[arg-type]
         made.__signature__ = inspect.Signature(arguments)  # type: ignore[attr-defined]
     return _with_advice(made)
