@@ -194,3 +194,13 @@ def test_a_fit_of_a_rate_says_that_its_input_is_noisy():
     assert noisy.estimates["dashpot.c"] < 0.25  # a noisy regressor makes its coefficient smaller
     assert not any("input has noise" in each for each in clean.warnings)
     assert any("the input has noise of about 0.011 rms" in each for each in noisy.warnings)
+
+
+def test_parameters_that_follow_a_channel_take_a_noisy_input_as_it_is():
+    records = [
+        hs.Record(u=CYCLES + noise(0.01, seed=k), y=T * hs.Play(threshold=0.2).response(CYCLES), channels={"T": T})
+        for k, T in enumerate((1.0, 2.0))
+    ]
+    fit = hs.identify(hs.Play, records, depends={"gain": ("T", 1)})
+    assert isinstance(fit.model, hs.Dependent)
+    assert fit.fit_percent > 95.0

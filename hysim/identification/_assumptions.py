@@ -28,6 +28,7 @@ from hysim.identification._problem import Problem, problem, problems
 from hysim.identification._search import brief_optima, brief_optimum, optima
 from hysim.laws.operators.reversal_filter import ReversalFilter
 from hysim.metrics.criteria import information
+from hysim.models.channels.structure import DependentStructure
 from hysim.models.protocols import LongerPast, Rescalable, Undecided, Variant
 from hysim.models.search_space import Freedom, SearchSpace
 from hysim.models.whole.part_by_part import PartByPart
@@ -104,7 +105,8 @@ def treated(
     where it predicts the second halves as well, both along the input as measured and along its quiet path: on the
     first alone a law whose parameters make up for false reversals may be as good.
     """
-    if how == "raw" or any(type(record) is not Record for record in records):  # of several sensors, or weighted
+    is_plain = all(type(record) is Record for record in records)  # not of several sensors, nor weighted
+    if how == "raw" or not is_plain or isinstance(family, DependentStructure):  # which no stage can stand in front of
         return Treated(records)
     # creep is read from what a law does not explain, to which few false reversals are much
     many = {"many": 1.0} if isinstance(family, PartByPart) else {}
