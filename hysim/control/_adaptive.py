@@ -95,7 +95,7 @@ class AdaptiveInverse(SampledController):
 
     @property
     def substitute(self) -> float:
-        """What stands for a missing measurement: nan, since one of an earlier command would be taken for a drift."""
+        """Stand-in for a missing measurement: nan, since one of an earlier command would be taken for a drift."""
         return math.nan
 
     def frequency_response(self, frequency: npt.ArrayLike, sample_time: float) -> npt.NDArray[np.complex128]:

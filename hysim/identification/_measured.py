@@ -96,8 +96,12 @@ def _alone_in_words(models: Sequence[Any], records: Sequence[Record], spread: fl
 
 
 def _behind(front: ReversalFilter | None, model: Any) -> Any:
-    """A model behind a filter of its input; of an actuator the filter stands in front of its law."""
-    return model if front is None else _with_law(model, lambda law: front >> law)
+    """A model behind a filter of its input; of an actuator the filter of its voltage stands in front of its law."""
+    if front is None:
+        return model
+    if isinstance(model, Actuator) and model.amplifier is not None:
+        front = ReversalFilter(threshold=abs(model.amplifier.gain) * front.threshold)
+    return _with_law(model, lambda law: front >> law)
 
 
 def _alone(model: Any) -> Any:

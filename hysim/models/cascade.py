@@ -97,7 +97,7 @@ class Cascade(Composite):
 
     @property
     def behind_filter(self) -> Any:
-        """What an inverse inverts: the cascade without the filters of a noisy input at its front."""
+        """The cascade without the filters of a noisy input at its front, which inverses leave out."""
         first, *others = self.stages
         if not isinstance(first, InputFilter) or not others:
             return self

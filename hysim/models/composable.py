@@ -77,7 +77,7 @@ class Placed(Composable):
         return own_items(self)
 
     def placed(self, u0: float | None, u_range: tuple[float, ...] | None = None) -> Self:
-        """The same numbers with the memory at the input `u0`, and the range of the identified input."""
+        """This law with its memory at the input `u0`, and the range of the identified input."""
         return replace(self, u0=u0, u_range=u_range)
 
 

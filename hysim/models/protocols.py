@@ -169,7 +169,7 @@ class Placeable(Protocol):
 
 @runtime_checkable
 class Standing(Protocol):
-    """What begins at a command of its own, if any: a model, or a controller around one."""
+    """A model, or a controller around one, that begins at a command of its own."""
 
     @property
     def u0(self) -> float | None:

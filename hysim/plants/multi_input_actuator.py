@@ -80,7 +80,7 @@ class MultiInputActuator:
         return main.u_range if isinstance(main, Placeable) else None
 
     def placed(self, u0: float | None, u_range: tuple[float, ...] | None = None) -> "MultiInputActuator":
-        """The same with the memory of the law of ``"u"`` at the input `u0`."""
+        """This model with the memory of the law of ``"u"`` at the input `u0`."""
         pairs = zip(self.inputs, self.actuators, strict=True)
         actuators = [placed(each, u0, u_range) if name == _MAIN else each for name, each in pairs]
         return replace(self, actuators=tuple(actuators))

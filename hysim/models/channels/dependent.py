@@ -129,7 +129,7 @@ class Dependent:
         return self.law.u_range if isinstance(self.law, Placeable) else None
 
     def placed(self, u0: float | None, u_range: tuple[float, ...] | None = None) -> "Dependent":
-        """The same with the memory of the law at the input `u0`."""
+        """This model with the memory of its law at the input `u0`."""
         return replace(self, law=placed(self.law, u0, u_range))
 
     @property
