@@ -89,6 +89,7 @@ class Line:
 
     def __init__(self, verb: str) -> None:
         self.verb, self.subject, self.counted, self.is_shown = verb, "", "", False
+        self.warning = ""
         self.first: tuple[float, int] | None = None  # seconds and the number that was done
         self.done = 0
         self.due = time.monotonic() + _SILENT
@@ -118,6 +119,10 @@ class Line:
             self.counted += f", {timedelta(seconds=round((total - done) / rate))} left"
         self._show(self.counted)
 
+    def warn(self, warning: str) -> None:
+        """Write a warning on a line of its own, above the next report."""
+        self.warning = warning
+
     def announce(self, subject: str) -> None:
         """Name what is at work from now on."""
         self.subject = subject
@@ -133,7 +138,8 @@ class Line:
             return
         line = ": ".join(filter(None, (self.verb, self.subject, text)))
         is_terminal = sys.stderr.isatty()
-        self._write(f"\r\x1b[K{line}" if is_terminal else f"{line}\n")
+        warning, self.warning = self.warning and f"{self.verb}: {self.warning}\n", ""
+        self._write(f"{warning}\r\x1b[K{line}" if is_terminal else f"{warning}{line}\n")
         self.due, self.is_shown = now + (_ON_TERMINAL if is_terminal else _IN_FILE), True
 
     def _write(self, text: str) -> None:

@@ -136,7 +136,8 @@ def test_every_verb_with_progress_reports_by_default():
 def test_a_sweep_says_at_its_start_that_its_table_will_need_pandas(stream, at_once, monkeypatch):
     monkeypatch.setitem(sys.modules, "pandas", None)
     hs.sweep(lambda k: k, {"k": [1]}, workers=1)
-    assert stream.getvalue().splitlines()[0] == "sweep: without pandas, which to_frame needs"
+    warning = "sweep: pandas is not installed: the result has no to_frame (pip install 'hysim[tables]')"
+    assert stream.getvalue().splitlines() == [warning, "sweep: 0 of 1", "sweep: 1 of 1"]
     monkeypatch.setitem(sys.modules, "pandas", SimpleNamespace(__spec__=True))
     hs.sweep(lambda k: k, {"k": [1]}, workers=1)
     assert stream.getvalue().splitlines()[-1] == "sweep: 1 of 1"

@@ -104,7 +104,7 @@ def _advice(value: Any) -> str:
 
 def _check_columns(names: Iterable[str], path: str | Path) -> None:
     """Refuse channels whose names a file of this ending has no place for, or would read in another way."""
-    form = _VARIABLE if ending(path) == ".mat" else _PLAIN_NAME
+    form = _VARIABLE if Path(path).suffix.lower() == ".mat" else _PLAIN_NAME
     for name in names:
         if not form.fullmatch(name) or name in NOTES or name.endswith(UNITS):
             raise ValueError(

@@ -17,7 +17,7 @@ import numpy as np
 
 from hysim._frozen import check_choice
 from hysim._parallel import GLANCE
-from hysim._progress import Progress, Reports, announced_by, reports
+from hysim._progress import Line, Progress, Reports, reports
 from hysim._versions import is_installed
 from hysim.sweeps._chunks import Chunk, Outcome, part_of
 from hysim.sweeps._executors import Workers, workers_of
@@ -98,8 +98,8 @@ def sweep(
     [0.337, 0.299, 0.264, 0.509, 0.442, 0.378]
     """
     check_choice("on_change", on_change, ON_CHANGE)
-    if (announce := announced_by(progress)) is not None and not is_installed("pandas"):
-        announce("without pandas, which to_frame needs")
+    if isinstance(progress, Line) and not is_installed("pandas"):
+        progress.warn("pandas is not installed: the result has no to_frame (pip install 'hysim[tables]')")
     tasks = space_of(space)
     takes_seed = _takes_seed(task, tasks)
     task_seeds = seeds(seed, np.arange(tasks.n_tasks))
