@@ -11,9 +11,8 @@ from types import ModuleType
 from typing import Any
 
 import hysim
-from hysim.models.candidates import is_identifiable
 from hysim.models.law import Law
-from hysim.models.model import every_family
+from hysim.models.model import every_family, is_identifiable
 from hysim.models.protocols import Invertible, StepwiseInvertible
 
 GROUPS = {

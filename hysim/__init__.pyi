@@ -108,8 +108,8 @@ from hysim.laws.magnetic.chan import Chan as Chan
 from hysim.laws.operators.energy_plays import EnergyPlays as EnergyPlays
 from hysim.models.sum import Sum as Sum
 from hysim.models.cascade import Cascade as Cascade
-from hysim.models.channels.dependent import Dependent as Dependent
-from hysim.models.channels.polynomial import ChannelPolynomial as ChannelPolynomial
+from hysim.models.dependent import Dependent as Dependent
+from hysim.models.varying import ChannelPolynomial as ChannelPolynomial
 from hysim.laws.dashpot import Dashpot as Dashpot
 from hysim.laws.friction.lugre import LuGre as LuGre
 from hysim.laws.friction.stribeck import StribeckFriction as StribeckFriction

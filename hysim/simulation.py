@@ -12,7 +12,7 @@ from hysim._printing import extent, printed, summary_text
 from hysim._progress import Reports, along, reports
 from hysim._results import Result, model_of
 from hysim.interop import dataset, frame
-from hysim.models.channels.dependent import on_record
+from hysim.models.dependent import on_record
 from hysim.models.protocols import Remembering, Responding, needs_time
 from hysim.records import Record, check_increasing, even_step
 

@@ -173,7 +173,7 @@ def test_parts_of_a_sum_depend_on_channels():
 
 def test_a_polynomial_of_positive_values_stays_positive_between_them():
     """The parabola through 1, 0.01 and 0.2 dips below zero; one whose values differ in sign may pass through it."""
-    from hysim.models.channels.structure import _comes_near_zero
+    from hysim.models.dependent_structure import _comes_near_zero
 
     at = (0.0, 0.5, 1.0)
     dips = np.array([[1.0, 0.01, 0.2], [1.0, 2.0, 1.0], [-1.0, -0.01, -0.2], [1.0, -1.0, 1.0]])

@@ -15,7 +15,7 @@ import hysim as hs
 from hysim.cli import main
 from hysim.comparison._verdict import contrasts, holm, probability
 from hysim.errors import Interrupted
-from hysim.models import candidates as registry
+from hysim.models import model as registry
 from hysim.models.model import FAMILIES
 
 

@@ -12,7 +12,7 @@ from friction_laws import FAMILIES, backlash, decades, drawn, lugre, maxwell, wa
 from scipy.integrate import solve_ivp
 
 import hysim as hs
-from hysim.models.candidates import candidates
+from hysim.models.model import candidates
 
 compiler = shutil.which("gcc") or shutil.which("clang")
 needs_compiler = pytest.mark.skipif(compiler is None, reason="there is no C compiler here")

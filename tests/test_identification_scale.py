@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import hysim as hs
-from hysim.models.candidates import candidates
+from hysim.models.model import candidates
 
 RNG = np.random.default_rng(0)
 SHARE = np.linspace(0.0, 1.0, 100)

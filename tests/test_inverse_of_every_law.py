@@ -5,7 +5,7 @@ import pytest
 from numba import njit
 
 import hysim as hs
-from hysim.models.inverse_steps import inverse_step
+from hysim.models.inverse_search import inverse_step
 from hysim.models.model import every_family
 from hysim.plants.actuator import is_law
 

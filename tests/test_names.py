@@ -5,8 +5,7 @@ import pytest
 import hysim as hs
 from hysim._names import MODULE_OF, meant, nearest
 from hysim.cli import main
-from hysim.models.candidates import candidates, candidates_named, family_named
-from hysim.models.model import every_family
+from hysim.models.model import candidates, candidates_named, every_family, family_named
 
 RECORD = hs.datasets.table1()
 

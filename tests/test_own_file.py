@@ -16,7 +16,7 @@ from hypothesis import strategies as st
 
 import hysim as hs
 from hysim.cli import main, models
-from hysim.models.candidates import is_identifiable
+from hysim.models.model import is_identifiable
 
 LAW = hs.BoucWen(beta=0.03, gamma=0.02, gain=0.01, feedthrough=0.015)
 COLUMNS = ["--u", "voltage", "--y", "displacement"]

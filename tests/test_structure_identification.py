@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import hysim as hs
-from hysim.models.candidates import candidates
+from hysim.models.model import candidates
 from hysim.models.search_space import Freedom
 
 SAMPLE_TIME = 0.02

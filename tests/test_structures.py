@@ -11,7 +11,7 @@ from scipy.linalg import eigvals, expm
 
 import hysim as hs
 from hysim.laws.friction.rated_law import RatedLaw
-from hysim.models.candidates import every_family
+from hysim.models.model import every_family
 from hysim.models.protocols import Stepwise, needs_time
 
 COMPILED = os.environ.get("NUMBA_DISABLE_JIT", "0") == "0"

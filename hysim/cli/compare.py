@@ -51,7 +51,7 @@ def run(options: argparse.Namespace) -> int:
 
 def _subjects(name: str) -> dict[str, Any]:
     """Subjects of the comparison for a family's name, a file or an import path."""
-    from hysim.models.candidates import candidates_named
+    from hysim.models.model import candidates_named
 
     model = models.model_or_family(name)
     if name.endswith(".json") or models.is_import_path(name):

@@ -75,7 +75,7 @@ class _Structured(Protocol):
 
 def names() -> list[str]:
     """Names of all families that can be compared without further arguments; loads every family."""
-    from hysim.models.candidates import candidates
+    from hysim.models.model import candidates
 
     short = {family: name for name, family in _SHORT.items()}
     families = dict.fromkeys(name.split()[0] for name in candidates() if name.split()[0] in hysim.__all__)
@@ -84,8 +84,7 @@ def names() -> list[str]:
 
 def names_to_identify() -> list[str]:
     """Names of all models that `hysim identify` takes: those to compare, further laws and plants."""
-    from hysim.models.candidates import is_identifiable
-    from hysim.models.model import every_family
+    from hysim.models.model import every_family, is_identifiable
 
     short = {family: name for name, family in _SHORT.items()}
     laws = [
@@ -146,7 +145,7 @@ def is_import_path(text: str) -> bool:
 
 def imported(path: str) -> Any:
     """The family or model at an import path; a ValueError if there is no such name, or it is no law."""
-    from hysim.models.candidates import is_identifiable
+    from hysim.models.model import is_identifiable
     from hysim.models.protocols import Responding
 
     law = resolved(path)

@@ -24,8 +24,8 @@ from hysim.errors import Interrupted, SimulationError
 from hysim.identification import Identification, identify
 from hysim.identification.sharing import sharing
 from hysim.metrics import LoopMetrics, loop_metrics
-from hysim.models.candidates import candidates, candidates_named, is_identifiable, is_searched
-from hysim.models.channels.dependent import on_record
+from hysim.models.dependent import on_record
+from hysim.models.model import candidates, candidates_named, is_identifiable, is_searched
 from hysim.models.protocols import Direct, Responding, needs_time
 from hysim.records import Record, as_record, several
 from hysim.simulation import free_run, models_on, simulate

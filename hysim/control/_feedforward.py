@@ -11,7 +11,7 @@ from hysim.control._sampled import Feedback, SampledController, check_kind, with
 from hysim.kernels import tracking as kernels
 from hysim.kernels.stepping import Step
 from hysim.laws.static import Line
-from hysim.models.inverse_steps import inverse_step
+from hysim.models.inverse_search import inverse_step
 from hysim.models.model import family
 from hysim.models.protocols import CompiledController, needs_time
 from hysim.plants.actuator import Actuator, as_actuator, is_law

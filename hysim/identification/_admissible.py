@@ -35,7 +35,7 @@ from hysim.errors import SimulationError
 from hysim.identification._result import Candidate
 from hysim.identification._search import optima, polish, spread
 from hysim.identification._searched import LocalOptimum, Search
-from hysim.models.channels.dependent import AlongRecord, on_record
+from hysim.models.dependent import AlongRecord, on_record
 from hysim.models.protocols import Responding, needs_time
 from hysim.models.search_space import SearchSpace
 from hysim.records import Record

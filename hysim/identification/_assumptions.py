@@ -28,10 +28,9 @@ from hysim.identification._problem import Problem, problem, problems
 from hysim.identification._search import brief_optima, brief_optimum, optima
 from hysim.laws.operators.reversal_filter import ReversalFilter
 from hysim.metrics.criteria import information
-from hysim.models.channels.structure import DependentStructure
-from hysim.models.protocols import LongerPast, Rescalable, Undecided, Variant
+from hysim.models.dependent_structure import DependentStructure
+from hysim.models.protocols import LongerPast, PartByPart, Rescalable, Undecided, Variant
 from hysim.models.search_space import Freedom, SearchSpace
-from hysim.models.whole.part_by_part import PartByPart
 from hysim.records import Record
 from hysim.simulation import free_run
 

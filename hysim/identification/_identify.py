@@ -28,12 +28,11 @@ from hysim.identification.channels.starts import begun
 from hysim.identification.folds import left_out
 from hysim.identification.swapped import swapped_columns, swapped_for
 from hysim.identification.whole.parts import begun_by_parts
-from hysim.models.candidates import family_named
-from hysim.models.channels.dependent import Dependent, on_record
-from hysim.models.channels.structure import DependentStructure
-from hysim.models.protocols import Direct, Identifiable, Recorded, needs_time, placed
+from hysim.models.dependent import Dependent, on_record
+from hysim.models.dependent_structure import DependentStructure
+from hysim.models.model import family_named
+from hysim.models.protocols import Direct, Identifiable, PartByPart, Recorded, needs_time, placed
 from hysim.models.search_space import Freedom
-from hysim.models.whole.part_by_part import PartByPart
 from hysim.records import Record, several
 
 

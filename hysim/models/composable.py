@@ -24,12 +24,6 @@ def register(operator: str, model: type, structure: type, field: str) -> None:
     _KINDS[operator] = _Kind(model, structure, field)
 
 
-def composed(operator: str, members: tuple[Any, ...]) -> Any:
-    """The model that an operator makes of these members."""
-    kind = _KINDS[operator]
-    return kind.model(**{kind.field: members})
-
-
 class Composable:
     """Base class of what can be a part of a `hysim.Sum` and a stage of a `hysim.Cascade`.
 

@@ -1,6 +1,7 @@
 """The inverse of any law that is known by its step, found by a search on this step (`hysim.kernels.inverses`)."""
 
 import functools
+import math
 from collections.abc import Callable
 from typing import Any
 
@@ -11,7 +12,7 @@ from hysim._parallel import in_pieces
 from hysim.errors import SimulationError
 from hysim.kernels import inverses as kernels
 from hysim.kernels.stepping import drive
-from hysim.models.protocols import UNLIMITED, CompiledLaw, Limits, Stretched
+from hysim.models.protocols import UNLIMITED, CompiledLaw, Limits, StepwiseInvertible, Stretched
 
 _REACH, _WIDER = 1e-6, 16.0  # how far at most the output is looked at to either side of the first input; the ratio
 _SHORTEST = 2.0**-46  # of the first input, or this number
@@ -130,3 +131,22 @@ def _slope(output: Callable[[float], float], here: float) -> float:
         highest = float(np.abs(rises).max())
         reach *= _WIDER
     return float(fallback)
+
+
+def inverse_step(law: Any, u0: float, limits: Limits = UNLIMITED, sample_time: float = math.inf) -> CompiledLaw:
+    """The inverse of a law at rest at `u0`, as a step; see `hysim.Law.compiled_inverse`.
+
+    Raises TypeError if the law cannot be stepped, and ValueError if it has no inverse.
+
+    Examples
+    --------
+    >>> import hysim as hs
+    >>> from hysim.models.inverse_search import inverse_step
+    >>> law = hs.Dahl() + hs.Line(slope=1.0)
+    >>> step, parameters, state = inverse_step(law, 0.0)
+    >>> [round(step(parameters, state, y), 9) for y in law.response([0.0, 0.5, 0.2]).tolist()]
+    [0.0, 0.5, 0.2]
+    """
+    if isinstance(law, StepwiseInvertible):
+        return law.compiled_inverse(u0, limits, sample_time)
+    return searched_inverse(law, CompiledLaw(*law.compiled(u0)), limits=limits)

@@ -123,6 +123,17 @@ def without_repetition(
     )
 
 
+def columns_beside(blocks: Sequence[FloatArray], known: FloatArray | float = 0.0) -> FloatArray:
+    """Blocks (n_sets or 1, n_samples, n_columns + 1) of columns and an output beside them, as one block.
+
+    `known` (1, n_samples, 1) is an output without columns.
+    """
+    n_sets = max([len(block) for block in blocks], default=1)
+    joint = [np.broadcast_to(block, (n_sets, *block.shape[1:])) for block in blocks]
+    beside = sum((block[..., -1:] for block in joint), known)
+    return np.concatenate([*(block[..., :-1] for block in joint), beside], axis=-1)
+
+
 def _alike(space: SearchSpace, shapes: FloatArray) -> list[list[str]]:
     """Groups of linear parameters whose columns (n, n_columns) are multiples of each other."""
     finite = np.isfinite(shapes).all(axis=0)

@@ -1,21 +1,309 @@
-"""Models side by side under one input, such as a law with a dashpot beside it."""
+"""Models side by side under one input, such as a law with a dashpot beside it, and the base class of compositions.
 
+The search for the parameters of a sum has the parts' own spaces side by side. What is linear in a part is linear in the
+sum. A part that cannot be identified adds an output that is known.
+"""
+
+import math
+from abc import abstractmethod
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from functools import reduce
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 import numpy.typing as npt
 
-from hysim._frozen import FloatArray, read_only
+from hysim._frozen import FloatArray, checked, items, read_only
+from hysim.errors import warn_beyond
 from hysim.kernels.stepping import side_by_side
-from hysim.models._composite import Composite, State, continued, known_slopes
-from hysim.models._sum_search import SumStructure
+from hysim.models.by_structure import ByStructure
 from hysim.models.compiled_step import startable
+from hysim.models.composable import Composable
+from hysim.models.inverse_search import inverse_at_rest, inverse_response
+from hysim.models.joint_space import (
+    columns_beside,
+    combined_variants,
+    common_states,
+    declared,
+    together,
+    without_repetition,
+)
 from hysim.models.model import family
-from hysim.models.parts import check_parts, compiled_law, compiled_pair, labels, response_of, startable_pair
-from hysim.models.protocols import CompiledLaw, Startable, placed
+from hysim.models.parts import (
+    check_parts,
+    checked_tuple,
+    compiled_law,
+    compiled_pair,
+    exchanged,
+    labels,
+    own,
+    response_of,
+    startable_pair,
+)
+from hysim.models.protocols import (
+    CompiledLaw,
+    Continuable,
+    Identifiable,
+    Numbered,
+    Placeable,
+    Responding,
+    Startable,
+    Stretched,
+    Variant,
+    needs_time,
+    placed,
+)
+from hysim.models.search_space import ALL_FREE, Freedom, Parameters, SearchSpace
+from hysim.records import Record
 
-__all__ = ["Sum", "SumStructure"]
+State = tuple[Any, ...]
+"""The state of each member."""
+
+
+class Composite(ByStructure, Composable):
+    """Models that make one model: a law, rate-independent, unless one of them depends on time."""
+
+    members_are: ClassVar[str]
+    """Name of the field with the models."""
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, self.members_are, check_parts(self.members, self.members_are))
+
+    @classmethod
+    def candidates(cls) -> dict[str, Any]:
+        """None for `hysim.compare`: a composite has the members that it is given."""
+        return {}
+
+    @property
+    def members(self) -> tuple[Any, ...]:
+        """The models."""
+        members: tuple[Any, ...] = vars(self)[self.members_are]
+        return members
+
+    @abstractmethod
+    def response(self, u: npt.ArrayLike, sample_time: float | None = None) -> FloatArray:
+        """Output (n,) at the samples of `u` (n,), as each member takes it between them.
+
+        Only what depends on time needs the `sample_time` [s]. Raises SimulationError if a member diverges, and
+        ValueError if `u` is not finite or has not one axis, or no time is given where one is needed.
+        """
+
+    @abstractmethod
+    def advance(
+        self, u: npt.ArrayLike, state: State | None = None, *, sample_time: float | None = None
+    ) -> tuple[FloatArray, State]:
+        """As `response`, continued from `state`, the states of the members, and the state after the last sample.
+
+        The bits are those of one uncut input. Raises TypeError if a member cannot be continued.
+        """
+
+    @abstractmethod
+    def compiled(self, u0: float = 0.0, *, sample_time: float | None = None) -> CompiledLaw:
+        """As compiled loops take it, after a first sample at `u0`, or at rest there as far as it depends on time.
+
+        Only what depends on time needs the `sample_time` [s], and raises ValueError without it; TypeError if a member
+        cannot be stepped.
+        """
+
+    @abstractmethod
+    def startable(self, sample_time: float | None = None) -> Startable:
+        """As exports take it, from any first input; TypeError if a member cannot be stepped."""
+
+    @property
+    def u0(self) -> float | None:
+        """Input at which the initial memories hold, that of the first member; None for the first sample."""
+        return self.members[0].u0 if isinstance(self.members[0], Placeable) else None
+
+    @property
+    def u_range(self) -> tuple[float, ...] | None:
+        """Lowest and highest input of the record that the composite was identified on; None if unknown."""
+        return self.members[0].u_range if isinstance(self.members[0], Placeable) else None
+
+    @abstractmethod
+    def placed(self, u0: float | None, u_range: tuple[float, ...] | None = None) -> Any:
+        """The composite with the initial memories at the input `u0`, as far as its members have such an input."""
+
+    @property
+    def dynamic(self) -> bool:
+        """Whether a member depends on time."""
+        return any(needs_time(member) for member in self.members)
+
+    @property
+    def memory_places(self) -> tuple[tuple[int, int], ...]:
+        """First place and length of each stretch of the compiled state that is memory, member after member."""
+        places: list[tuple[int, int]] = []
+        end = 0
+        for member in self.members:
+            size = compiled_law(member, 0.0, None).state.size
+            own = member.memory_places if isinstance(member, Stretched) else ((0, size),)
+            for first, count in own:
+                if places and sum(places[-1]) == end + first:
+                    places[-1] = places[-1][0], places[-1][1] + count
+                else:
+                    places.append((end + first, count))
+            end += size
+        return tuple(places)
+
+    @property
+    def scalars(self) -> dict[str, float]:
+        """Numbers of the members that have names for them, behind their labels, as in ``"bouc_wen.beta"``."""
+        named = zip(labels(self.members), self.members, strict=True)
+        return {
+            f"{label}.{name}": value
+            for label, member in named
+            if isinstance(member, Numbered)
+            for name, value in member.scalars.items()
+        }
+
+    def with_scalars(self, scalars: Mapping[str, float]) -> Any:
+        """The composite with other numbers, by their names in `scalars`."""
+        numbered = {
+            label: member.with_scalars(others)
+            for label, member in zip(labels(self.members), self.members, strict=True)
+            if isinstance(member, Numbered) and (others := own(scalars, label))
+        }
+        return replace(self, **{self.members_are: exchanged(self.members, numbered)})
+
+    @property
+    @abstractmethod
+    def known_slopes(self) -> tuple[float, float]:
+        """Lowest and highest slope dy/du over every input, as far as the members know theirs; else infinite."""
+
+    def inverse_response(self, y: npt.ArrayLike, u0: float | None = None) -> FloatArray:
+        """Input that gives the output `y`, monotone between the samples; see `hysim.Law.inverse_response`.
+
+        It is computed by a bracket in compiled code. Raises TypeError if a member is not a law that can be stepped, and
+        ValueError also if a member depends on time.
+        """
+        outputs = read_only(y, "y", ndim=1)
+        if self.dynamic:
+            raise ValueError("what moves in time has no inverse that depends on the output alone")
+        if not outputs.size:
+            return outputs
+        u = inverse_response(inverse_at_rest(self, float(outputs[0]), self.u0 if u0 is None else u0), outputs)
+        warn_beyond(self.u_range, u, type(self).__name__, stacklevel=3)
+        return u
+
+
+def continued(part: Any, u: FloatArray, sample_time: float | None, state: Any) -> tuple[FloatArray, Any]:
+    """Output of a part from `state` on, None for its first sample, and the state after it."""
+    if not isinstance(part, Continuable):
+        raise TypeError(f"a {type(part).__name__} cannot be continued")
+    time = {"sample_time": sample_time} if isinstance(part, Composite) or needs_time(part) else {}
+    y, end = part.advance(u, state, **time)
+    return np.asarray(y["y"] if isinstance(y, dict) else y), end
+
+
+def known_slopes(members: tuple[Any, ...]) -> list[tuple[float, float]]:
+    """Lowest and highest slope of each member, infinite where they are not known."""
+    return [member.known_slopes if isinstance(member, Stretched) else (-math.inf, math.inf) for member in members]
+
+
+def started(parts: Any, what: str) -> tuple[Any, ...]:
+    """Models and structures as a tuple, of a class the model with its defaults."""
+    members = tuple(part() if isinstance(part, type) else part for part in checked_tuple(parts, what))
+    for member in members:
+        if not isinstance(member, Identifiable | Responding):
+            raise TypeError(f"{what} must hold models or structures, got {type(member).__name__}")
+    return members
+
+
+def time_of(part: Any, record: Record) -> float | None:
+    """The sample time where the part needs one."""
+    return record.sample_time if needs_time(part) else None
+
+
+def assembled(members: Sequence[Any], searched: Mapping[str, Any], parameters: Parameters) -> tuple[Any, ...]:
+    """The models of the members, those that are searched by their labels with their parameters."""
+    parts = zip(labels(members), members, strict=True)
+    return tuple(
+        searched[label].assemble(own(parameters, label)) if label in searched else part for label, part in parts
+    )
+
+
+@checked
+class SumStructure(Identifiable, Composable):
+    """Parts to be identified side by side; see `hysim.Sum.structure`."""
+
+    parts: tuple[Any, ...]
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "parts", started(self.parts, "parts"))
+
+    def search_space(self, record: Record, freedom: Freedom = ALL_FREE) -> SearchSpace:
+        """The parts' spaces side by side; of columns that repeat each other one is free."""
+        found = self._identified
+        spaces = declared(
+            {label: lambda free, part=part: part.search_space(record, free) for label, part in found.items()},  # type: ignore[misc]
+            freedom,
+        )
+        joint = together(spaces)
+        return without_repetition(
+            joint,
+            lambda x: self.regressors(joint.parameters(x), record)[..., :-1],
+            self._values(joint.columns),
+            freedom,
+        )
+
+    def regressors(self, parameters: Parameters, record: Record) -> FloatArray:
+        """The parts' columns one after the other, and the sum of what is known."""
+        found = self._identified
+        known = [part for part in self.parts if not isinstance(part, Identifiable)]
+        fixed = sum((response_of(part, record.u, time_of(part, record)) for part in known), np.zeros(len(record)))
+        blocks = [part.regressors(own(parameters, label), record) for label, part in found.items()]
+        return columns_beside(blocks, fixed[np.newaxis, :, np.newaxis])
+
+    def steady(self, parameters: Parameters, record: Record) -> dict[str, Any]:
+        """The parameters with the parts' states in the steady cycle of which `record` is one period or more."""
+        states: dict[str, Any] = {}
+        moving = record if np.ptp(record.u) else replace(record, u=record.u + np.arange(len(record)))
+        for label, part in self._identified.items():
+            if part.search_space(moving).state:  # which does not depend on how the input moves, but needs it to
+                try:
+                    found = part.steady(own(parameters, label), record)
+                except ValueError as error:
+                    raise ValueError(f"{label}: {error}") from None
+                states |= {f"{label}.{name}": value for name, value in found.items()}
+        return {**parameters, **states}
+
+    def assemble(self, parameters: Mapping[str, float]) -> Any:
+        """The sum with these parameters."""
+        return Sum(parts=assembled(self.parts, self._identified, parameters))
+
+    def notes(self, record: Record, model: Any) -> tuple[str, ...]:
+        """Remarks of the laws among the parts."""
+        return tuple(
+            f"{label}: {note}"
+            for label, part, found in zip(labels(self.parts), self.parts, model.parts, strict=True)
+            if isinstance(part, Identifiable) and not needs_time(found)
+            for note in part.notes(record, found)
+        )
+
+    def assumed_states(self, record: Record) -> tuple[str, ...]:
+        """The states that all parts with a memory leave to the record."""
+        return common_states(self._identified, record)
+
+    def variants(self) -> tuple[Variant, ...]:
+        """The choices of the parts, in every combination."""
+        return combined_variants(self._identified, lambda others: replace(self, parts=exchanged(self.parts, others)))
+
+    @property
+    def _identified(self) -> dict[str, Identifiable]:
+        return {
+            label: part
+            for label, part in zip(labels(self.parts), self.parts, strict=True)
+            if isinstance(part, Identifiable)
+        }
+
+    def _values(self, columns: Sequence[str]) -> dict[str, float]:
+        """The numbers that models have for linear parameters of theirs."""
+        return {
+            f"{label}.{name}": value
+            for label, part in self._identified.items()
+            for name in own(dict.fromkeys(columns), label)
+            if isinstance(value := items(part).get(name), float)
+        }
 
 
 @family
@@ -50,13 +338,7 @@ class Sum(Composite):
 
     parts: tuple[Any, ...]
 
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "parts", check_parts(self.parts, "parts"))
-
-    @classmethod
-    def candidates(cls) -> dict[str, Any]:
-        """None for `hysim.compare`: a sum has the parts that it is given."""
-        return {}
+    members_are: ClassVar[str] = "parts"
 
     @classmethod
     def structure(cls, *parts: Any) -> SumStructure:
@@ -72,14 +354,6 @@ class Sum(Composite):
         ('play.threshold', 'play.gain', 'play.z0', 'line.offset', 'line.slope')
         """
         return SumStructure(parts=parts)
-
-    @property
-    def members(self) -> tuple[Any, ...]:
-        """The parts."""
-        return self.parts
-
-    def with_members(self, members: tuple[Any, ...]) -> "Sum":
-        return Sum(parts=members)
 
     def placed(self, u0: float | None, u_range: tuple[float, ...] | None = None) -> "Sum":
         return Sum(parts=tuple(placed(part, u0, u_range) for part in self.parts))

@@ -13,7 +13,7 @@ import numpy.typing as npt
 
 from hysim._channels import Channels, checked_channels, value_in
 from hysim._frozen import FloatArray, read_only
-from hysim.models.channels.dependent import AlongRecord
+from hysim.models.dependent import AlongRecord
 from hysim.models.model import family
 from hysim.models.parts import check_parts, response_of
 from hysim.models.protocols import Placeable, placed

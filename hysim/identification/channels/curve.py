@@ -7,8 +7,8 @@ from hysim._frozen import FloatArray, frozen
 from hysim._printing import printed, quantity, summary_text
 from hysim.identification._result import Identification
 from hysim.identification.json_forms import Stored
-from hysim.models.channels.dependent import Dependent
-from hysim.models.channels.polynomial import ChannelPolynomial, power_coefficients, weights
+from hysim.models.dependent import Dependent
+from hysim.models.varying import ChannelPolynomial, power_coefficients, weights
 
 _LEVEL = 0.95
 

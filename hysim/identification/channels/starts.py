@@ -15,9 +15,9 @@ from hysim.errors import SimulationError
 from hysim.identification._budget import Budget
 from hysim.identification._problem import problem
 from hysim.identification._search import brief_optimum
-from hysim.models.channels.polynomial import weights
-from hysim.models.channels.structure import DependentStructure
+from hysim.models.dependent_structure import DependentStructure
 from hysim.models.search_space import Freedom
+from hysim.models.varying import weights
 from hysim.records import Record
 
 _MOST_GROUPS = 12

@@ -15,7 +15,7 @@ from hysim._frozen import FloatArray
 from hysim._results import model_of
 from hysim.identification._identify import identify
 from hysim.identification._result import Identification
-from hysim.models.channels.dependent import Dependent
+from hysim.models.dependent import Dependent
 from hysim.models.parameters import Coordinate, space_of
 from hysim.models.protocols import Identifiable
 from hysim.models.search_space import ALL_FREE, Freedom, Parameters, SearchSpace

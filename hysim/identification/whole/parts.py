@@ -30,9 +30,8 @@ from hysim.identification._search import apart, chosen, descended, spread
 from hysim.identification._uncertainty import uncertainty
 from hysim.metrics.criteria import information
 from hysim.models.parts import own
-from hysim.models.protocols import Identifiable, Undecided
+from hysim.models.protocols import Identifiable, PartByPart, Undecided
 from hysim.models.search_space import Freedom
-from hysim.models.whole.part_by_part import PartByPart
 from hysim.records import Record
 
 _THINNED = 500  # samples of the slow record, beside its reversals

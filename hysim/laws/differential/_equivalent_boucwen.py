@@ -70,5 +70,5 @@ class EquivalentBoucWen(BoucWenStep):
         return self.bouc_wen.unreached(sample, y, inverse)
 
     def compiled_inverse(self, u0: float, limits: Limits = UNLIMITED, sample_time: float = math.inf) -> CompiledLaw:
-        """The closed form of the inverse, stepped; see `hysim.models.inverse_steps`."""
+        """The closed form of the inverse, stepped; see `hysim.models.inverse_search`."""
         return self.bouc_wen.compiled_inverse(u0, limits)

@@ -20,9 +20,8 @@ import numpy as np
 from hysim._frozen import FloatArray, checked
 from hysim.models.joint_space import declared, together
 from hysim.models.parts import own
-from hysim.models.protocols import Identifiable
+from hysim.models.protocols import Doubt, Identifiable
 from hysim.models.search_space import ALL_FREE, Freedom, Parameters, SearchSpace
-from hysim.models.whole.part_by_part import Doubt
 from hysim.models.whole.scaled import Scaled
 from hysim.plants.amplifier import Amplifier
 from hysim.plants.creep import Creep

@@ -10,8 +10,8 @@ from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any
 
+from hysim.models.protocols import Doubt
 from hysim.models.search_space import Freedom
-from hysim.models.whole.part_by_part import Doubt
 from hysim.plants.whole.linear_parts import DAMPING, FREQUENCY, GAIN
 
 _PERCENT, _WEIGHT, _SLOPE = 1.0, 0.05, 0.7

@@ -1,7 +1,7 @@
 """A law whose parameters are polynomials of channels, such as a temperature or a supply.
 
 At one value of each channel it is an ordinary law, `Dependent.at`. Along an input on which a channel varies the
-parameters change from sample to sample (`hysim.models.channels.varying`).
+parameters change from sample to sample (`hysim.models.varying`).
 """
 
 import warnings
@@ -14,12 +14,11 @@ import numpy.typing as npt
 
 from hysim._channels import Channels, checked_channels, steady, taken, value_in
 from hysim._frozen import FloatArray, read_only
-from hysim.models.channels.polynomial import ChannelPolynomial
-from hysim.models.channels.structure import DependentStructure
-from hysim.models.channels.varying import response_along
+from hysim.models.dependent_structure import DependentStructure
 from hysim.models.model import family
 from hysim.models.parts import response_of
 from hysim.models.protocols import Numbered, Placeable, Responding, needs_time, placed
+from hysim.models.varying import ChannelPolynomial, response_along
 from hysim.records import Record
 
 _ROUNDING = 1e-9  # of a sample's number
