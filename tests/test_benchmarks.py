@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import hysim as hs
-from hysim.plants.resampling import decimated
+from hysim.plants.equation_of_motion import decimated
 
 COMPILED = os.environ.get("NUMBA_DISABLE_JIT", "0") == "0"
 needs_compiled = pytest.mark.skipif(not COMPILED, reason="millions of steps, which only compiled code does in time")

@@ -8,7 +8,7 @@ import pytest
 
 import hysim as hs
 from hysim.models.search_space import Freedom
-from hysim.plants.resampling import decimated, interpolated, interpolated_record
+from hysim.plants.equation_of_motion import decimated, interpolated, interpolated_record
 
 COMPILED = os.environ.get("NUMBA_DISABLE_JIT", "0") == "0"
 needs_compiled = pytest.mark.skipif(not COMPILED, reason="millions of steps, which only compiled code does in time")

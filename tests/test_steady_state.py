@@ -12,7 +12,7 @@ import hysim as hs
 from hysim.discovery._oscillator_response import Oscillator, Response
 from hysim.kernels import memory_terms
 from hysim.laws.differential.terms import bouc_wen_terms
-from hysim.plants import steady_state
+from hysim.plants.oscillator import attracting_state
 
 COMPILED = os.environ.get("NUMBA_DISABLE_JIT", "0") == "0"
 needs_compiled = pytest.mark.skipif(not COMPILED, reason="hundreds of periods, which only compiled code does in time")
@@ -87,11 +87,11 @@ def test_a_fixed_point_that_does_not_attract_is_not_used():
     """Newton's method finds the fixed point at 1 of both maps; the second one leads away from it."""
     state, scale = np.array([1.5, 1.2, 0.9]), np.ones(3)
     for size, expected in ((0.999, True), (1.001, False)):
-        found = steady_state.attracting_state(lambda x, size=size: 1.0 + size * (x - 1.0), state, scale, 1e-10)
+        found = attracting_state(lambda x, size=size: 1.0 + size * (x - 1.0), state, scale, 1e-10)
         assert (found is not None) == expected
         assert found is None or np.abs(found - 1.0).max() < 1e-9
     with pytest.raises(hs.SimulationError, match="needs damping"):
-        steady_state.attracting_state(lambda x: 2.0 - x, state, scale, 1e-10)
+        attracting_state(lambda x: 2.0 - x, state, scale, 1e-10)
 
 
 @needs_compiled

@@ -30,8 +30,8 @@ from hysim.files import load
 from hysim.models.protocols import needs_time
 from hysim.plants.actuator import Actuator
 from hysim.plants.creep import Creep
-from hysim.plants.modes import mode
 from hysim.plants.sensor import Sensor
+from hysim.plants.state_space import mode
 from hysim.records import Record, step_if_even
 from hysim.simulation import free_run
 

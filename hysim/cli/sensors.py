@@ -8,7 +8,7 @@ import numpy as np
 from hysim.records import Record
 
 if TYPE_CHECKING:
-    from hysim.plants.structures.records import StructureRecord
+    from hysim.plants.structures.search import StructureRecord
 
 _OF_NODES = ("displacement", "velocity", "acceleration")
 _OF_ELEMENTS = ("drift", "force")
@@ -19,7 +19,7 @@ def of_structure(structure: Any, record: Record, columns: Mapping[str, Any]) -> 
 
     A ValueError is raised if the model is no structure, a name is none of its signals, or the record has no time.
     """
-    from hysim.plants.structures.records import StructureRecord
+    from hysim.plants.structures.search import StructureRecord
     from hysim.plants.structures.structure import Structure
 
     if not isinstance(structure, Structure):

@@ -19,7 +19,7 @@ from hysim.models.protocols import Remembering, Responding, standing
 from hysim.plants.actuator import Actuator
 from hysim.plants.actuator import as_actuator as as_actuator
 from hysim.plants.chain import Signals
-from hysim.plants.structures.controlled import Controlled, ControlledStructure
+from hysim.plants.structures.moving import Controlled, ControlledStructure
 from hysim.plants.structures.structure import Structure
 from hysim.records import even_step
 from hysim.simulation import columns_of, dataset_of_signals, frame_of_signals

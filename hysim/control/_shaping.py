@@ -29,8 +29,8 @@ import numpy.typing as npt
 
 from hysim._frozen import FloatArray, check_not_negative, check_positive
 from hysim.models.model import family
-from hysim.plants.modes import mode
 from hysim.plants.sampled import sampled, vibration_stage
+from hysim.plants.state_space import mode
 
 _BOXES = 2  # moving averages in a row: their motion has a bounded acceleration, that of a mode in least time
 

@@ -16,8 +16,8 @@ from hysim.design._result import InputDesign
 from hysim.design._subjects import LawAlone, Subject, sizes_of
 from hysim.design._whole import whole_actuator
 from hysim.models.law import Law
-from hysim.plants.whole.actuator_structure import ActuatorStructure
-from hysim.plants.whole.linear_parts import FREQUENCY
+from hysim.plants.actuator_structure import ActuatorStructure
+from hysim.plants.linear_parts import FREQUENCY
 
 _FASTER = 2.0  # times the frequency of the fastest mode: a multisine that is not told how far to go
 _BELOW_NYQUIST = 0.8  # at most, of half the sampling rate

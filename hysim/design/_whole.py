@@ -16,9 +16,9 @@ from hysim.identification.likelihood.expected import Expected
 from hysim.models.law import Law
 from hysim.models.parts import own
 from hysim.models.search_space import Freedom
+from hysim.plants.actuator_structure import ActuatorStructure
+from hysim.plants.linear_parts import BELOW_NYQUIST, DAMPING, FREQUENCY, GAIN
 from hysim.plants.sensor import Sensor
-from hysim.plants.whole.actuator_structure import ActuatorStructure
-from hysim.plants.whole.linear_parts import BELOW_NYQUIST, DAMPING, FREQUENCY, GAIN
 from hysim.records import Record
 
 _LAW = "hysteresis"

@@ -20,8 +20,7 @@ from hysim.discovery._term_regression import BLOCKS, FLOOR, TermRegression, term
 from hysim.identification.marquardt import Schedule, SumOfSquares, descend
 from hysim.kernels import memory_terms as kernels
 from hysim.laws.differential.terms import RELAXATION, Term, bouc_wen_terms
-from hysim.plants.equation_of_motion import Filter, Linear, Motion, filtering
-from hysim.plants.resampling import interpolated
+from hysim.plants.equation_of_motion import Filter, Linear, Motion, filtering, interpolated
 
 POWERS = (1.0, 2.0, 3.0)
 SHARES = (0.2, 0.5, 0.8)  # of the stiffness of small motions, in A

@@ -24,8 +24,8 @@ from hysim.errors import SimulationError
 from hysim.identification.marquardt import SumOfSquares, descend
 from hysim.kernels import memory_terms as kernels
 from hysim.laws.differential.terms import Term
+from hysim.plants.oscillator import ATTEMPTS, attracting_state
 from hysim.plants.oscillator_structure import OscillatorStructure
-from hysim.plants.steady_state import ATTEMPTS, attracting_state
 from hysim.records import Record
 
 _DIFFERENCES = (3e-4, 3e-5, 3e-6)  # of a parameter, for its slope: the first with which nothing diverges

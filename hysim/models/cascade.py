@@ -2,9 +2,9 @@
 
 The last stage that is not a transfer function carries the gain: what it is linear in stays linear, each of its columns
 passing through the linear stages behind it. A structure of a transfer function before or behind it has the gain one at
-rest, which the data could not tell from the other's (`hysim.plants._unit_gain`); its initial state is linear behind
-the carrier, and zero before it. A stage before the carrier that is not such a structure is taken as it is, and so is a
-transfer function that is given. Of transfer functions alone the first structure carries the gain.
+rest, which the data could not tell from the other's (`hysim.plants._transfer_function_search`); its initial state is
+linear behind the carrier, and zero before it. A stage before the carrier that is not such a structure is taken as it
+is, and so is a transfer function that is given. Of transfer functions alone the first structure carries the gain.
 """
 
 import math

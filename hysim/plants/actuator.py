@@ -25,6 +25,7 @@ from hysim.models.protocols import (
     needs_time,
     placed,
 )
+from hysim.plants.actuator_structure import ActuatorStructure
 from hysim.plants.amplifier import Amplifier
 from hysim.plants.chain import Chain, ChainState, linear_chain
 from hysim.plants.creep import Creep
@@ -32,7 +33,6 @@ from hysim.plants.sampled import Stage, Vibration
 from hysim.plants.sensor import Sensor
 from hysim.plants.state_space import linear_plant
 from hysim.plants.transfer_function import TransferFunction
-from hysim.plants.whole.actuator_structure import ActuatorStructure
 from hysim.records import Record
 
 

@@ -3,9 +3,15 @@
     y = sum_i y_i,        y_i the displacement that the input i makes: amplifier, law, creep and vibration of its own
 
 What is behind the laws is linear, so that parts that the inputs have in common may stand behind each of them.
+
+`InputSum` are its laws in a search, one for each input, w_i = law_i(u_i), where u_i is the record's input for the name
+"u", for others its channel of that name. `ModalGains` stands for them while the modes are searched: each input as it
+is, with a gain in each mode, which are solved for. No record with a resonance shows a law alone, and a law is a line
+and little beside it. Of one input `Scaled` does, a law that is known but for its gain and offset.
 """
 
-from dataclasses import replace
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -13,13 +19,17 @@ import numpy.typing as npt
 
 from hysim._channels import Channels, checked_channels, value_in
 from hysim._frozen import FloatArray, read_only
+from hysim.laws.static import Line
 from hysim.models.dependent import AlongRecord
+from hysim.models.joint_space import columns_beside, declared, together, without_repetition
 from hysim.models.model import family
-from hysim.models.parts import check_parts, response_of
-from hysim.models.protocols import Placeable, placed
+from hysim.models.parts import check_parts, own, response_of
+from hysim.models.protocols import Identifiable, Placeable, Undecided, law_at, needs_time, placed
+from hysim.models.search_space import ALL_FREE, Freedom, Parameters, SearchSpace
 from hysim.records import Record
 
-_MAIN = "u"
+MAIN = "u"
+"""Name of the input that every record has; the others are channels."""
 
 
 @family
@@ -64,25 +74,25 @@ class MultiInputActuator:
         object.__setattr__(self, "actuators", check_parts(self.actuators, "actuators"))
         if len(names) != len(self.actuators):
             raise ValueError(f"each input needs an actuator, got {len(names)} inputs and {len(self.actuators)}")
-        if len(set(names)) < len(names) or _MAIN not in names:
+        if len(set(names)) < len(names) or MAIN not in names:
             raise ValueError(f'inputs must be different names, "u" among them, got {", ".join(names)}')
 
     @property
     def u0(self) -> float | None:
         """Input ``"u"`` at which the memory of its law holds; None for the first sample."""
-        main = self.actuators[self.inputs.index(_MAIN)]
+        main = self.actuators[self.inputs.index(MAIN)]
         return main.u0 if isinstance(main, Placeable) else None
 
     @property
     def u_range(self) -> tuple[float, ...] | None:
         """Lowest and highest input ``"u"`` of the identified record; None if unknown."""
-        main = self.actuators[self.inputs.index(_MAIN)]
+        main = self.actuators[self.inputs.index(MAIN)]
         return main.u_range if isinstance(main, Placeable) else None
 
     def placed(self, u0: float | None, u_range: tuple[float, ...] | None = None) -> "MultiInputActuator":
         """This model with the memory of the law of ``"u"`` at the input `u0`."""
         pairs = zip(self.inputs, self.actuators, strict=True)
-        actuators = [placed(each, u0, u_range) if name == _MAIN else each for name, each in pairs]
+        actuators = [placed(each, u0, u_range) if name == MAIN else each for name, each in pairs]
         return replace(self, actuators=tuple(actuators))
 
     @property
@@ -131,7 +141,7 @@ class MultiInputActuator:
         """
         inputs = read_only(u, "u", ndim=1)
         others = checked_channels(channels or {}, inputs.size)
-        seen = {name: inputs if name == _MAIN else value_in(others, name, "the input") for name in self.inputs}
+        seen = {name: inputs if name == MAIN else value_in(others, name, "the input") for name in self.inputs}
         return {
             name: response_of(part, read_only(np.broadcast_to(seen[name], inputs.shape)), sample_time)
             for name, part in zip(self.inputs, self.actuators, strict=True)
@@ -153,3 +163,125 @@ class MultiInputActuator:
         """
         step = None if record.t is None else record.sample_time
         return self.response(record.u, step, channels=record.channels)
+
+
+@dataclass(frozen=True)
+class InputSum(Identifiable):
+    """Laws by the names of their inputs, in their order; their outputs are added."""
+
+    laws: Mapping[str, Any]
+
+    def search_space(self, record: Record, freedom: Freedom = ALL_FREE) -> SearchSpace:
+        """The laws' spaces side by side; of offsets only the last is free."""
+        seen = {name: seen_by(record, name) for name in self.laws}
+        spaces = {name: lambda free, name=name: self.laws[name].search_space(seen[name], free) for name in self.laws}
+        joint = together(declared(spaces, freedom))
+        return without_repetition(joint, lambda x: self.regressors(joint.parameters(x), record)[..., :-1], {}, freedom)
+
+    def regressors(self, parameters: Parameters, record: Record) -> FloatArray:
+        """The laws' columns one after the other, (n_sets, n_samples, n_columns + 1)."""
+        return columns_beside(
+            [law.regressors(own(parameters, name), seen_by(record, name)) for name, law in self.laws.items()]
+        )
+
+    def assemble(self, parameters: Mapping[str, float]) -> "InputSum":
+        """The laws with these parameters."""
+        return InputSum({name: law.assemble(own(parameters, name)) for name, law in self.laws.items()})
+
+    def steady(self, parameters: Parameters, record: Record) -> dict[str, Any]:
+        """The laws' memories after inputs that stood still at their first values."""
+        found: dict[str, Any] = {}
+        for name, law in self.laws.items():
+            seen = seen_by(record, name)
+            still = replace(seen, u=np.full(len(seen), seen.u[0]))
+            found |= {f"{name}.{state}": value for state, value in law.steady(own(parameters, name), still).items()}
+        return found
+
+    def notes(self, record: Record, model: Any) -> tuple[str, ...]:
+        """None: the laws are seen only through what is behind them."""
+        return ()
+
+
+@dataclass(frozen=True)
+class ModalGains(Identifiable):
+    """Inputs in place of their laws, each with a gain in each of so many modes, and one offset."""
+
+    inputs: tuple[str, ...]
+    modes: int
+
+    def search_space(self, record: Record, freedom: Freedom = ALL_FREE) -> SearchSpace:
+        """No coordinates: all parameters are linear."""
+        columns = (*(self._name(k, name) for k in range(max(self.modes, 1)) for name in self.inputs), "offset")
+        return SearchSpace.without_coordinates(columns)
+
+    def shares(self, gains: Mapping[str, float]) -> dict[str, float]:
+        """The gains of each input but in the first mode, relative to their sum, by mode and input."""
+        sums = {name: sum(gains[self._name(k, name)] for k in range(self.modes)) for name in self.inputs}
+        return {
+            self._name(k, name): gains[self._name(k, name)] / (sums[name] or 1.0)
+            for k in range(1, self.modes)
+            for name in self.inputs
+        }
+
+    def regressors(self, parameters: Parameters, record: Record) -> FloatArray:
+        """One input in front of one mode, one, and zero, (1, n_samples, 3)."""
+        return np.stack([record.u, np.ones(len(record)), np.zeros(len(record))], axis=-1)[np.newaxis]
+
+    def assemble(self, parameters: Mapping[str, float]) -> InputSum:
+        """Lines in place of the laws."""
+        return InputSum({name: Line(slope=1.0) for name in self.inputs})
+
+    def _name(self, k: int, name: str) -> str:
+        return f"gains[{k}].{name}"
+
+
+def checked_laws(laws: Mapping[str, Any]) -> InputSum:
+    """Laws by name as `InputSum`; ValueError or TypeError if a name or a law is none."""
+    if MAIN not in laws:
+        names = ", ".join(map(repr, laws))
+        raise ValueError(
+            f'hysteresis must have a law for the input "{MAIN}" of the record, got laws for {names}: name one of them '
+            f"{MAIN!r}, the others are channels of the record"
+        )
+    begun = {name: law() if isinstance(law, type) else law for name, law in laws.items()}
+    for name, law in begun.items():
+        if not isinstance(law, Identifiable):
+            raise TypeError(f"hysteresis[{name!r}] must be a law that can be identified, got {type(law).__name__}")
+    return InputSum({name: _widest(law) for name, law in begun.items()})
+
+
+def _widest(law: Any) -> Any:
+    """The law with the widest of its choices, such as weights of both signs: no loop of one input alone decides."""
+    variants = law.variants() if isinstance(law, Undecided) else ()
+    return variants[-1].family if variants else law
+
+
+def seen_by(record: Record, name: str) -> Record:
+    """The record with the input of this name as its input; ValueError if it has none."""
+    if name == MAIN:
+        return record
+    values = value_in(record.channels, name, f"the record {record.name!r}" if record.name else "the record")
+    return replace(record, u=read_only(np.broadcast_to(values, len(record))))
+
+
+@dataclass(frozen=True)
+class Scaled(Identifiable):
+    """The output of `law`, or of None the input itself, times a gain, and an offset."""
+
+    law: Any
+
+    def search_space(self, record: Record, freedom: Freedom = ALL_FREE) -> SearchSpace:
+        """No coordinates: both parameters are linear."""
+        return SearchSpace.without_coordinates(("gain", "offset"))
+
+    def regressors(self, parameters: Parameters, record: Record) -> FloatArray:
+        """The law's output, one, and zero, (1, n_samples, 3)."""
+        y = record.u
+        if self.law is not None:
+            law = law_at(self.law, record.sample_time) if needs_time(self.law) else self.law
+            y = response_of(law, record.u, record.sample_time if needs_time(law) else None)
+        return np.stack([y, np.ones_like(y), np.zeros_like(y)], axis=-1)[np.newaxis]
+
+    def assemble(self, parameters: Mapping[str, float]) -> Any:
+        """The law itself."""
+        return self.law

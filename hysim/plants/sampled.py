@@ -19,8 +19,7 @@ from scipy.linalg import matrix_balance
 from hysim._frozen import FloatArray, read_only
 from hysim.plants._linear_response import scaled_companion, transitions
 from hysim.plants.creep import Creep
-from hysim.plants.modes import Modes
-from hysim.plants.state_space import StateSpace, resting_states
+from hysim.plants.state_space import Modes, StateSpace, resting_states
 from hysim.plants.transfer_function import TransferFunction
 
 _WHOLE = 1e-6  # of a sub-step: a delay this close to a whole number of them is one

@@ -1,4 +1,4 @@
-"""Linear plants by their matrices; those of other packages by A, B, C and D, or num and den."""
+"""Linear plants by their matrices, those of other packages by A, B, C and D, or num and den, and resonances."""
 
 import math
 from collections.abc import Sized
@@ -101,3 +101,100 @@ def _polynomial(coefficients: Any) -> tuple[float, ...]:
     if isinstance(coefficients[0], Sized):
         raise ValueError("vibration must have one input and one output, got a matrix of transfer functions")
     return tuple(float(value) for value in np.trim_zeros(np.asarray(coefficients), "f")) or (0.0,)
+
+
+def mode(natural_frequency: float, damping_ratio: float, gain: float = 1.0, *, delay: float = 0.0) -> TransferFunction:
+    """One resonance as a transfer function, ``exp(-delay s) gain w^2 / (s^2 + 2 zeta w s + w^2)``.
+
+    The natural frequency w is positive [rad/s], the damping ratio zeta and the delay [s] are not negative, else
+    ValueError; the gain is that at rest [unit of y / unit of its input].
+
+    Examples
+    --------
+    >>> import hysim as hs
+    >>> hs.mode(2.0, 0.1).den
+    (1.0, 0.4, 4.0)
+    """
+    if not natural_frequency > 0.0:
+        raise ValueError(f"natural_frequency must be positive, got {natural_frequency}")
+    if damping_ratio < 0.0:
+        raise ValueError(f"damping_ratio must not be negative, got {damping_ratio}")
+    stiffness = natural_frequency**2
+    return TransferFunction(
+        num=(gain * stiffness,), den=(1.0, 2.0 * damping_ratio * natural_frequency, stiffness), delay=delay
+    )
+
+
+@family
+class Modes:
+    """Several resonances side by side.
+
+    ::
+
+        G(s) = exp(-delay s) sum_i  g_i w_i^2 / (s^2 + 2 zeta_i w_i s + w_i^2)
+        d/dt (q_i, q_i' / w_i) = w_i [[0, 1], [-1, -2 zeta_i]] (q_i, q_i' / w_i) + (0, w_i v),    y = sum g_i q_i
+
+    Parameters
+    ----------
+    natural_frequencies : sequence of float
+        Positive [rad/s].
+    damping_ratios : sequence of float
+        Not negative.
+    gains : sequence of float
+        Static gains; their sum is the gain at rest [unit of y / unit of the input].
+    delay : float
+        Dead time [s], not negative.
+
+    Raises
+    ------
+    ValueError
+        If lengths differ or a number is outside its range.
+
+    Examples
+    --------
+    >>> import hysim as hs
+    >>> pair = hs.Modes(natural_frequencies=(3.0, 20.0), damping_ratios=(0.01, 0.02), gains=(0.9, 0.1))
+    >>> pair.dc_gain, pair.poles.size
+    (1.0, 4)
+    """
+
+    natural_frequencies: tuple[float, ...]
+    damping_ratios: tuple[float, ...]
+    gains: tuple[float, ...]
+    delay: float = 0.0
+
+    def __post_init__(self) -> None:
+        lengths = len(self.natural_frequencies), len(self.damping_ratios), len(self.gains)
+        if len(set(lengths)) > 1 or not lengths[0]:
+            raise ValueError(
+                "natural_frequencies, damping_ratios and gains must be equally long, and hold a mode, got lengths "
+                f"{lengths[0]}, {lengths[1]} and {lengths[2]}"
+            )
+        if min(self.natural_frequencies) <= 0.0:
+            raise ValueError(f"natural_frequencies must be positive, got {min(self.natural_frequencies)}")
+        if min(self.damping_ratios) < 0.0:
+            raise ValueError(f"damping_ratios must not be negative, got {min(self.damping_ratios)}")
+        if self.delay < 0.0:
+            raise ValueError(f"delay must not be negative, got {self.delay}")
+
+    @property
+    def dc_gain(self) -> float:
+        """Sum of the static gains."""
+        return float(sum(self.gains))
+
+    @property
+    def poles(self) -> npt.NDArray[np.complex128]:
+        """Two of each mode [rad/s]."""
+        w, zeta = np.array(self.natural_frequencies), np.array(self.damping_ratios)
+        apart = np.sqrt(zeta.astype(complex) ** 2 - 1.0)
+        return np.concatenate([w * (-zeta + apart), w * (-zeta - apart)])
+
+    @property
+    def state_space(self) -> StateSpace:
+        """The states (q_i, q_i' / w_i) of each mode."""
+        n = len(self.gains)
+        A, B, C = np.zeros((2 * n, 2 * n)), np.zeros(2 * n), np.zeros(2 * n)
+        for i, (w, zeta) in enumerate(zip(self.natural_frequencies, self.damping_ratios, strict=True)):
+            A[2 * i : 2 * i + 2, 2 * i : 2 * i + 2] = [[0.0, w], [-w, -2.0 * zeta * w]]
+        B[1::2], C[::2] = self.natural_frequencies, self.gains
+        return StateSpace(A=A, B=B, C=C, delay=self.delay)

@@ -23,9 +23,15 @@ from hysim.models.model import family
 from hysim.models.protocols import CompiledLaw, Identifiable, Startable, Variant, needed_time, positive_time
 from hysim.models.search_space import ALL_FREE, Freedom, Parameters, SearchSpace
 from hysim.plants._linear_response import LinearPlants, LinearState, affine_columns
-from hysim.plants._transfer_function_notes import notes
-from hysim.plants._transfer_function_starts import Guess, denominators, guesses, likely_delays, sections
-from hysim.plants._unit_gain import UnitGain
+from hysim.plants._transfer_function_search import (
+    Guess,
+    UnitGain,
+    denominators,
+    guesses,
+    likely_delays,
+    notes,
+    sections,
+)
 from hysim.records import Record
 
 FREQUENCY = (0.1, np.pi)  # box of a section's frequency: rad over the whole record, rad per sample

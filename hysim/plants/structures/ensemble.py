@@ -14,8 +14,7 @@ from hysim.models.compiled_step import compiled_start, compiled_step
 from hysim.models.law import Law
 from hysim.models.protocols import Startable, positive_time
 from hysim.plants.structures import assembly
-from hysim.plants.structures.damping import ModalDamping, Rayleigh, modal_damping
-from hysim.plants.structures.parameters import expanded
+from hysim.plants.structures.parts import ModalDamping, Rayleigh, expanded, modal_damping
 
 Reduction = Literal[
     "peak_drift", "residual_drift", "energy", "peak_force", "peak_displacement", "peak_acceleration"

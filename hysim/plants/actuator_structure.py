@@ -3,13 +3,18 @@
     u -> amplifier -> law -> creep -> modes, delay -> y
 
 Of several inputs each has a law, and the outputs of all are added: creep, frequencies, dampings and delay are common,
-and each input excites the modes by gains of its own (`hysim.plants.whole.input_sum`).
+and each input excites the modes by gains of its own (`hysim.plants.multi_input_actuator`).
 
-What is behind the law is linear: the output is affine in what the law is affine in, and only the law's other
-parameters and those of the parts are searched. The search begins part by part (`hysim.models.whole`): the law where
+What is behind the law is linear: the output is affine in what the law is affine in, and only the law's other parameters
+and those of the parts are searched. The search begins part by part (`hysim.models.protocols.PartByPart`): the law where
 the input is slow, the modes and the delay on the fastest record, beside a creep of 1 % a decade, and then all at once.
+
+A parameter counts as not determined if its standard error is larger than its use: 1 % a decade of creep (or half of
+it), a quarter of a frequency, two samples of a delay (or all of it). It is held where its part has no effect; a mode
+is left out.
 """
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import field, replace
 from functools import partial
@@ -18,26 +23,46 @@ from typing import Any
 import numpy as np
 
 from hysim._frozen import FloatArray, checked
-from hysim.models.joint_space import declared, together
+from hysim.models.joint_space import columns_beside, declared, together
 from hysim.models.parts import own
 from hysim.models.protocols import Doubt, Identifiable
 from hysim.models.search_space import ALL_FREE, Freedom, Parameters, SearchSpace
-from hysim.models.whole.scaled import Scaled
+from hysim.plants.actuator_search import MOST_LATE, as_points, between_samples, columns_through, finer, points
 from hysim.plants.amplifier import Amplifier
 from hysim.plants.creep import Creep
-from hysim.plants.multi_input_actuator import MultiInputActuator
+from hysim.plants.linear_parts import (
+    DAMPING,
+    FREQUENCY,
+    GAIN,
+    CreepBank,
+    LinearParts,
+    Stages,
+    Survey,
+    checked_creep,
+    creep_bank,
+    vibrations_of,
+)
+from hysim.plants.multi_input_actuator import (
+    MAIN,
+    InputSum,
+    ModalGains,
+    MultiInputActuator,
+    Scaled,
+    checked_laws,
+    seen_by,
+)
 from hysim.plants.sensor import Sensor
-from hysim.plants.whole import doubts, starts
-from hysim.plants.whole.columns import columns_through
-from hysim.plants.whole.creep_bank import CreepBank, checked_creep, creep_bank
-from hysim.plants.whole.input_sum import MAIN, InputSum, ModalGains, checked_laws, seen_by, side_by_side
-from hysim.plants.whole.linear_parts import LinearParts, Stages, vibrations_of
-from hysim.plants.whole.survey import Survey
 from hysim.records import Record
 
 MOST_MODES = 3
 MOST_MODES_OF_SEVERAL = 20  # inputs: their gains are solved for, one mode after the other
 _LAW, _OFFSET = "hysteresis", "hysteresis.offset"
+_PERCENT, _WEIGHT, _SLOPE = 1.0, 0.05, 0.7
+_SHARE_OF_FREQUENCY = 0.25
+_GAIN = 0.5
+_USUAL_DAMPING = 0.02
+_SAMPLES = 2.0  # of delay
+_NEAR = 1e-6  # relative distance of a bound
 
 
 @checked
@@ -114,7 +139,7 @@ class ActuatorStructure(Identifiable):
         spaces = declared({_LAW: lambda free: self.law.search_space(scaling, free), **own_spaces}, wished)
         space = together(spaces)
         state = (*space.state, *self._offsets(space.linear)) if self.offsets == "own" else space.state
-        points = np.clip(starts.as_points(space, self.starting), space.lower, space.upper)
+        points = np.clip(as_points(space, self.starting), space.lower, space.upper)
         return replace(space, starts=points, screened=0, regions={}, state=state)
 
     def regressors(self, parameters: Parameters, record: Record) -> FloatArray:
@@ -128,7 +153,7 @@ class ActuatorStructure(Identifiable):
             columns_through(law, shape, parts.of_input(others, name), partial(parts.stages, late=late, name=name), seen)
             for name, law, shape, seen in self._laws(own(parameters, _LAW), record)
         ]
-        return side_by_side(blocks)
+        return columns_beside(blocks)
 
     def steady(self, parameters: Parameters, record: Record) -> dict[str, Any]:
         """The law's memory after an input that stood still; ValueError for one that moved."""
@@ -227,15 +252,15 @@ class ActuatorStructure(Identifiable):
 
     def points(self, space: SearchSpace, known: Sequence[Mapping[str, float]]) -> FloatArray:
         """Points of a space of this structure, spread over its last mode and its delay."""
-        return starts.points(space, self.modes, known)
+        return points(space, self.modes, known)
 
     def finer(self, space: SearchSpace, best: FloatArray) -> FloatArray:
         """Points about the best of `points`, and these."""
-        return starts.finer(space, self.modes, best)
+        return finer(space, self.modes, best)
 
     def beyond(self, space: SearchSpace, end: FloatArray) -> FloatArray:
         """The end of a descent, and points of other delays."""
-        return starts.between_samples(space, end)
+        return between_samples(space, end)
 
     def trials(self) -> Sequence["ActuatorStructure"]:
         """The structure with each delay that samples tell apart, where the output jumps with the command."""
@@ -243,8 +268,7 @@ class ActuatorStructure(Identifiable):
             return [self]
         if isinstance(self.amplifier, Amplifier) and self.amplifier.dynamic:
             return [self]
-        step = self.survey.shortest
-        return [self._delayed(k, step) for k in range(starts.MOST_LATE)]
+        return [self._delayed(k, self.survey.shortest) for k in range(MOST_LATE)]
 
     def begun(self, starting: Sequence[Mapping[str, float]]) -> "ActuatorStructure":
         """The structure with a search that begins at these coordinates by name."""
@@ -252,11 +276,61 @@ class ActuatorStructure(Identifiable):
 
     def smaller(self, freedom: Freedom) -> tuple["ActuatorStructure", str] | None:
         """The structure without its last mode; None where it has none, or the user names one of its parameters."""
-        return doubts.without_last_mode(self, freedom)
+        k = self.modes - 1
+        gains = [self.parts([]).gain_of(k, name) for name in self.inputs]
+        mine = {f"vibration.{name}" for name in (f"{FREQUENCY}[{k}]", f"{DAMPING}[{k}]", *gains)}
+        if k < 0 or self.start is not None or mine & {*freedom.fixed, *freedom.free, *freedom.bounds}:
+            return None
+        box = {each.name: each for each in self.parts([]).boxes()["vibration"][0]}[f"{FREQUENCY}[{k}]"]
+        low, high = box.lower / (2.0 * math.pi), box.upper / (2.0 * math.pi)
+        which = "mode" if not k else "further mode"
+        remark = f"the records show no {which} between {low:.3g} and {high:.3g} Hz: it is left out"
+        known = {name: value for name, value in self.known.items() if name not in mine}
+        return self._remarked(remark, modes=k, known=known), remark
 
     def doubts(self, estimates: Mapping[str, float], freedom: Freedom) -> Sequence[Doubt]:
-        """The parts that the records may not determine at these values of all parameters."""
-        return doubts.doubts(self, estimates, freedom)
+        """The parameters of the parts beside the law that the user does not name; at a bound only some of them."""
+        named = {*freedom.fixed, *freedom.free, *freedom.bounds, *self.known}
+        found = []
+        for part, (box, _) in self.parts([]).boxes().items():
+            for each in box:
+                name = f"{part}.{each.name}"
+                value = estimates[name]
+                at_end = value <= each.lower * (1.0 + _NEAR) or value >= each.upper * (1.0 - _NEAR)
+                if name not in named and (not at_end or FREQUENCY in name or value == 0.0):
+                    found.append(self._doubt(name, value, freedom))
+        return [doubt for doubt in found if doubt is not None]
+
+    def _doubt(self, name: str, value: float, freedom: Freedom) -> Doubt | None:
+        """A reason to doubt one parameter, and the structure without it."""
+        if name == "creep.percent":
+            return Doubt(name, max(_PERCENT, 0.5 * abs(value)), self._held(name, 0.0, "creep from the law"))
+        if name == "creep.slope":
+            return Doubt(name, _SLOPE, self._held(name, 0.0, "how the creep changes from decade to decade"))
+        if name.startswith("creep.weights"):
+            without = self._held(name, 0.0, "this element from the others and the law")
+            return Doubt(name, max(_WEIGHT, abs(value)), without)
+        if name == "vibration.delay":
+            largest = max(_SAMPLES * self.survey.shortest, value)
+            return Doubt(name, largest, self._held(name, 0.0, "a delay from a mode", " s"))
+        if name == "amplifier.time_constant":
+            remark = "the records do not show the time constant of the amplifier: it is left out"
+            return Doubt(name, value, self._remarked(remark, amplifier=None))
+        if DAMPING in name:
+            without = self._held(name, _USUAL_DAMPING, "the damping of a mode")
+            return Doubt(name, value + _USUAL_DAMPING, without)
+        if GAIN in name and len(self.inputs) > 1:  # an input may well leave a mode at rest
+            return None
+        less = self.smaller(freedom)
+        largest = _SHARE_OF_FREQUENCY * value if FREQUENCY in name else _GAIN
+        return None if less is None else Doubt(name, largest, less[0])
+
+    def _held(self, name: str, at: float, why: str, unit: str = "") -> "ActuatorStructure":
+        remark = f"the records do not tell {why}: {name} is held at {at:g}{unit}"
+        return self._remarked(remark, known={**self.known, name: at})
+
+    def _remarked(self, remark: str, **changes: Any) -> "ActuatorStructure":
+        return replace(self, remarks=(*self.remarks, remark), **changes)
 
     def parts(self, records: Sequence[Record]) -> LinearParts:
         """The parts beside the law, for the records that the structure is for or else for these."""
@@ -294,4 +368,4 @@ class ActuatorStructure(Identifiable):
         words = "above 0 s" if not k else f"between {(k - 1) * step:g} and {k * step:g} s"
         remark = f"without a mode the held command shows a delay to a sample only: it is held at {delay:g} s"
         remark += f", {words} all are alike" * bool(k)
-        return replace(self, known={**self.known, "vibration.delay": delay}, remarks=(*self.remarks, remark))
+        return self._remarked(remark, known={**self.known, "vibration.delay": delay})

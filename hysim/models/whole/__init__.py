@@ -1,1 +1,0 @@
-"""Subjects of `hysim.identify` that are searched part by part before all parts are searched at once."""

@@ -1,0 +1,377 @@
+"""Parts of a structure, elements and damping, and its numbers by name.
+
+    mass, stiffness, damping        the number where it is one, or the ratio of a ModalDamping of one ratio;
+                                    else a factor of the whole, 1 as it is
+    mass[1], damping[0]             one of several, the ratio of a mode; likewise influence[2], initial_state[0]
+    damping.mass, damping.stiffness of a Rayleigh damping
+    elements.0.beta                 of the law of an element, by its own names, such as elements.0.thresholds[1]
+    elements.0.bouc_wen.beta        of a part of a sum, or a stage of a cascade
+    elements.*.beta                 one number for all elements whose law has this name
+
+A factor multiplies what the other names leave; a name with a number wins over the one with the star.
+"""
+
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import field, replace
+from typing import Any, NamedTuple, Self
+
+import numpy as np
+
+from hysim._frozen import FloatArray, check_not_negative, check_positive, check_whole, read_only
+from hysim.errors import SimulationError
+from hysim.laws.dashpot import Dashpot
+from hysim.laws.static import Line
+from hysim.models.model import family
+from hysim.models.protocols import Numbered, Rated, Sampled, Stepwise, needs_time
+from hysim.models.sum import Sum
+from hysim.signals import triangle
+
+_SAMPLES = 200  # of a cycle
+_ROUNDING = 1e-9  # of the work of the whole force along the whole drift: less is none
+_MATRICES = ("mass", "stiffness", "damping")
+_TUPLES = ("influence", "initial_state")
+_ELEMENTS, _ALL = "elements", "*"
+_SHOWN = 24  # names in a message
+
+
+@family
+class Element:
+    """Element with memory, whose force is that of a law for its drift.
+
+    Parameters
+    ----------
+    law : law
+        Force [N] for the drift [m]: any rate-independent law, a `hysim.Dashpot`, or a sum of them; friction, such as
+        `hysim.LuGre`, or a `hysim.ElasticBacklash`; a user's own family or `hysim.CustomLaw` too. A positive force
+        resists a positive drift.
+    between : (int, int)
+        Nodes i and j; the drift is ``x_j - x_i``. Node 0 is the ground, the masses are nodes 1, 2, ...
+    direction : tuple of float
+        In place of `between`: the drift is the product of these numbers, one for each mass, with the displacements.
+
+    Raises
+    ------
+    TypeError
+        If the law cannot be stepped, or a node is not a whole number.
+    ValueError
+        If not exactly one of `between` and `direction` is given, the nodes are the same or negative, or the direction
+        is zero.
+
+    Examples
+    --------
+    >>> import hysim as hs
+    >>> hs.Element(hs.Dahl(), between=(0, 1)).between
+    (0, 1)
+    """
+
+    law: Any = field(kw_only=False)
+    between: Any = ()
+    direction: tuple[float, ...] = ()
+
+    def __post_init__(self) -> None:
+        if not isinstance(self.law, Stepwise) or isinstance(self.law, type):
+            name = self.law.__name__ if isinstance(self.law, type) else type(self.law).__name__
+            raise TypeError(f"an element takes a law that can be stepped, got {name}")
+        if isinstance(self.law, Sampled):
+            raise TypeError(f"an element's law must not depend on the sample time, got {type(self.law).__name__}")
+        parted(self.law)
+        nodes = tuple(self.between)
+        if bool(nodes) == bool(self.direction):
+            raise ValueError("an element takes either between=(i, j) or direction=(...)")
+        if nodes:
+            if len(nodes) != 2:
+                raise ValueError(f"between must hold two nodes, got {len(nodes)}")
+            for node in nodes:
+                check_whole(int(node) if isinstance(node, np.integer) else node, "between", least=0)
+            if nodes[0] == nodes[1]:
+                raise ValueError(f"an element is between two different nodes, got {nodes[0]} twice")
+        elif not any(self.direction):
+            raise ValueError("direction must not be zero")
+        object.__setattr__(self, "between", tuple(int(node) for node in nodes))
+
+    @property
+    def highest_node(self) -> int:
+        """Number of the last mass that the element needs."""
+        return max(self.between) if self.between else len(self.direction)
+
+    def drift_row(self, n_nodes: int) -> FloatArray:
+        """Weights of the displacements in the drift, shape (n_nodes,)."""
+        if self.direction:
+            if len(self.direction) != n_nodes:
+                raise ValueError(
+                    f"direction must hold one number for each of {n_nodes} masses, got {len(self.direction)}"
+                )
+            return np.array(self.direction)
+        row = np.zeros(n_nodes + 1)
+        row[list(self.between)] = -1.0, 1.0
+        return row[1:]
+
+
+class Parted(NamedTuple):
+    """A law as a part with memory, and the coefficient of its dashpots."""
+
+    law: Any
+    viscosity: float
+
+
+def parted(law: Any) -> Parted:
+    """The dashpots of a law apart from the rest; TypeError if anything else in it depends on time."""
+    if isinstance(law, Rated):
+        return Parted(law, law.viscosity)
+    if isinstance(law, Dashpot):
+        return Parted(Line(slope=0.0), law.c)
+    if isinstance(law, Sum) and law.dynamic:
+        parts = [parted(part) for part in law.parts]
+        if rated := [type(part.law).__name__ for part in parts if isinstance(part.law, Rated)]:
+            raise TypeError(f"an element takes a {rated[0]} by itself: put the other parts into an element beside it")
+        rests = tuple(each.law for part, each in zip(law.parts, parts, strict=True) if not isinstance(part, Dashpot))
+        rest = Line(slope=0.0) if not rests else rests[0] if len(rests) == 1 else Sum(parts=rests)
+        return Parted(rest, sum(each.viscosity for each in parts))
+    if needs_time(law):
+        raise TypeError(
+            f"of what depends on time an element takes friction and dashpots only, got {type(law).__name__}"
+        )
+    return Parted(law, 0.0)
+
+
+def dissipates(law: Any, stroke: float) -> bool:
+    """Whether the second cycle between plus and minus `stroke` [m], without dashpots, takes energy or none."""
+    drift = stroke * triangle(-1.0, 1.0, cycles=2, samples_per_cycle=_SAMPLES)
+    try:
+        force = parted(law).law.response(drift)
+    except SimulationError:
+        return False
+    work = np.trapezoid(force[-_SAMPLES - 1 :], drift[-_SAMPLES - 1 :])
+    return bool(work >= -_ROUNDING * np.ptp(force) * np.ptp(drift))
+
+
+@family
+class Rayleigh:
+    """Damping ``C = mass M + stiffness K``, with the stiffness K of small motions at the start.
+
+    Parameters
+    ----------
+    mass : float
+        Factor of the mass matrix [1/s].
+    stiffness : float
+        Factor of the stiffness matrix [s].
+
+    Examples
+    --------
+    >>> import hysim as hs
+    >>> damping = hs.Rayleigh.at(0.05, periods=(1.0, 0.2))
+    >>> round(damping.mass, 6), round(damping.stiffness, 6)
+    (0.523599, 0.002653)
+    """
+
+    mass: float = 0.0
+    stiffness: float = 0.0
+
+    @classmethod
+    def at(cls, ratio: float, periods: tuple[float, float]) -> Self:
+        """Damping with a given ratio of modes at two periods.
+
+        Parameters
+        ----------
+        ratio : float
+            Share of the critical damping at both periods.
+        periods : (float, float)
+            [s]
+
+        Returns
+        -------
+        Rayleigh
+
+        Raises
+        ------
+        ValueError
+            If the ratio is negative, or the periods are not two positive and different ones.
+        """
+        check_not_negative(ratio=ratio)
+        if len(periods) != 2 or periods[0] == periods[1]:
+            raise ValueError(f"periods must be two different ones, got {periods}")
+        check_positive(**{"the first period": periods[0], "the second period": periods[1]})
+        first, second = (2.0 * np.pi / period for period in periods)
+        factor = 2.0 * ratio / (first + second)
+        return cls(mass=float(factor * first * second), stiffness=float(factor))
+
+    def matrix(self, mass: FloatArray, stiffness: FloatArray) -> FloatArray:
+        """The damping matrix, shape (n_nodes, n_nodes)."""
+        return self.mass * mass + self.stiffness * stiffness
+
+
+@family
+class ModalDamping:
+    """Damping by the ratio of each mode of small motions at the start.
+
+    Parameters
+    ----------
+    ratio : float, or tuple of float
+        Share of the critical damping: one for all modes, or one for each, that of the longest period first.
+
+    Examples
+    --------
+    >>> import hysim as hs
+    >>> frame = hs.Structure(mass=2.0, stiffness=8.0, damping=hs.ModalDamping(ratio=0.05))
+    >>> frame.damping_matrix.round(12).tolist()
+    [[0.4]]
+    """
+
+    ratio: Any = 0.0
+
+    def __post_init__(self) -> None:
+        ratios = read_only(self.ratio, "ratio")
+        if ratios.ndim > 1:
+            raise ValueError(f"ratio must be a number or have one axis, got shape {ratios.shape}")
+        if (ratios < 0.0).any():
+            raise ValueError(f"ratio must not be negative, got {ratios.min():g}")
+        object.__setattr__(self, "ratio", tuple(ratios.tolist()) if ratios.ndim else float(ratios))
+
+    def matrix(self, mass: FloatArray, stiffness: FloatArray) -> FloatArray:
+        """The damping matrix, shape (n_nodes, n_nodes), or many of them for stacks of matrices.
+
+        Raises ValueError if the number of ratios is not that of the modes, or the stiffness is negative.
+        """
+        if np.ndim(self.ratio) and len(self.ratio) != mass.shape[-1]:
+            raise ValueError(f"ratio must hold one number for each of {mass.shape[-1]} modes, got {len(self.ratio)}")
+        return modal_damping(np.asarray(self.ratio), mass, stiffness)
+
+
+def modal_damping(ratios: FloatArray, mass: FloatArray, stiffness: FloatArray) -> FloatArray:
+    """Damping matrices (..., n, n) with the ratios (..., n) of their modes, or one ratio for all."""
+    root = np.linalg.cholesky(mass)
+    half = np.linalg.solve(root, stiffness)
+    squares, shapes = np.linalg.eigh(np.linalg.solve(root, np.swapaxes(half, -1, -2)))
+    if (squares[..., 0] < -1e-9 * np.abs(squares[..., -1])).any():
+        raise ValueError("the stiffness at the start is negative: modal damping needs modes that swing")
+    scaled = root @ shapes
+    weights = 2.0 * ratios * np.sqrt(np.maximum(squares, 0.0))
+    return np.asarray((scaled * weights[..., np.newaxis, :]) @ np.swapaxes(scaled, -1, -2))
+
+
+def scalars_of(structure: Any) -> dict[str, float]:
+    """Every number of a structure by name."""
+    numbers: dict[str, float] = {}
+    for name in _MATRICES:
+        numbers |= _numbers(name, vars(structure)[name])
+    for name in _TUPLES:
+        numbers |= {f"{name}[{k}]": value for k, value in enumerate(vars(structure)[name])}
+    for k, element in enumerate(structure.elements):
+        own = element.law.scalars if isinstance(element.law, Numbered) else {}
+        numbers |= {f"{_ELEMENTS}.{k}.{name}": float(value) for name, value in own.items()}
+    return numbers
+
+
+def assembled(structure: Any, parameters: Mapping[str, float]) -> Any:
+    """The structure with some numbers exchanged.
+
+    Raises ValueError if a name is unknown, or a constructor refuses a number.
+    """
+    others = expanded(structure.scalars, parameters)
+    changes: dict[str, Any] = {}
+    for name in _MATRICES:
+        if own := {key: value for key, value in others.items() if key.partition("[")[0].partition(".")[0] == name}:
+            changes[name] = _changed(name, vars(structure)[name], own)
+    for name in _TUPLES:
+        if own := {key: value for key, value in others.items() if key.startswith(f"{name}[")}:
+            changes[name] = tuple(_placed(name, np.array(vars(structure)[name]), own).tolist())
+    elements = [_with_law(element, _below(others, f"{_ELEMENTS}.{k}")) for k, element in enumerate(structure.elements)]
+    return replace(structure, **changes, elements=tuple(elements))
+
+
+def expanded(scalars: Mapping[str, float], parameters: Mapping[str, float]) -> dict[str, float]:
+    """Parameters with those of all elements under the name of each; ValueError if a name is unknown."""
+    by_star: dict[str, float] = {}
+    for name, value in parameters.items():
+        if is_shared(name):
+            by_star |= dict.fromkeys(sharing(scalars, name), value)
+    return by_star | {name: _known(scalars, name, value) for name, value in parameters.items() if not is_shared(name)}
+
+
+def is_shared(name: str) -> bool:
+    """Whether a name is that of all elements."""
+    return name.startswith(f"{_ELEMENTS}.{_ALL}.")
+
+
+def sharing(scalars: Mapping[str, float], name: str) -> list[str]:
+    """Names of the elements' numbers that a name of all elements stands for; ValueError if there are none."""
+    last = name.removeprefix(f"{_ELEMENTS}.{_ALL}.")
+    names = [each for each in scalars if each.startswith(f"{_ELEMENTS}.") and each.split(".", 2)[2] == last]
+    if not names:
+        raise unknown(scalars, name)
+    return names
+
+
+def unknown(scalars: Mapping[str, float], name: str) -> ValueError:
+    """The error for a name that no number has."""
+    return ValueError(f"the structure has no parameter {name!r}; its parameters are {_listed(scalars)}")
+
+
+def _listed(scalars: Iterable[str]) -> str:
+    """The names in words, numbers of elements with the star where a law's name is that of several."""
+    names: dict[str, None] = {}
+    every = list(scalars)
+    for name in every:
+        parts = name.split(".", 2)
+        last = parts[2] if parts[0] == _ELEMENTS else ""
+        is_common = last and sum(each.split(".", 2)[2:] == [last] for each in every) > 1
+        names[f"{_ELEMENTS}.k.{last}" if is_common else name] = None
+    more = len(names) - _SHOWN
+    shown = ", ".join(list(names)[:_SHOWN]) + (f" and {more} more" if more > 0 else "")
+    return shown + (
+        f" (k is the place of an element, or {_ALL} for all)" if any(".k." in each for each in names) else ""
+    )
+
+
+def _known(scalars: Mapping[str, float], name: str, value: float) -> float:
+    if name not in scalars:
+        raise unknown(scalars, name)
+    return value
+
+
+def _numbers(name: str, value: Any) -> dict[str, float]:
+    """Numbers of the mass, the stiffness or the damping: itself or its factor, and those in it that have a name."""
+    if isinstance(value, Rayleigh):
+        return {name: 1.0, f"{name}.mass": value.mass, f"{name}.stiffness": value.stiffness}
+    several = np.asarray(value.ratio if isinstance(value, ModalDamping) else value)
+    if several.ndim == 0:
+        return {name: float(several)}
+    return {name: 1.0} | ({f"{name}[{k}]": float(each) for k, each in enumerate(several)} if several.ndim == 1 else {})
+
+
+def _changed(name: str, value: Any, numbers: Mapping[str, float]) -> Any:
+    """The mass, the stiffness or the damping with other numbers."""
+    whole = numbers.get(name)
+    if isinstance(value, Rayleigh):
+        own = [numbers.get(f"{name}.{part}", vars(value)[part]) for part in ("mass", "stiffness")]
+        factor = 1.0 if whole is None else whole
+        return Rayleigh(mass=factor * own[0], stiffness=factor * own[1])
+    make: Callable[[Any], Any] = (
+        (lambda ratio: ModalDamping(ratio=ratio)) if isinstance(value, ModalDamping) else _as_is
+    )
+    several = np.array(value.ratio if isinstance(value, ModalDamping) else value)
+    if several.ndim == 0:
+        return make(whole)
+    changed = _placed(name, several, numbers)
+    return make(changed if whole is None else whole * changed)
+
+
+def _as_is(value: Any) -> Any:
+    return value
+
+
+def _placed(name: str, values: FloatArray, numbers: Mapping[str, float]) -> FloatArray:
+    """A vector with some numbers, ``name[k]``, exchanged."""
+    changed = values.copy()
+    for key, value in numbers.items():
+        if key != name:
+            changed[int(key[len(name) + 1 : -1])] = value
+    return changed
+
+
+def _below(numbers: Mapping[str, float], prefix: str) -> dict[str, float]:
+    return {name[len(prefix) + 1 :]: value for name, value in numbers.items() if name.startswith(f"{prefix}.")}
+
+
+def _with_law(element: Any, numbers: Mapping[str, float]) -> Any:
+    return replace(element, law=element.law.with_scalars(numbers)) if numbers else element
