@@ -10,10 +10,8 @@ import pytest
 from square_dahl import SquareDahl
 
 import hysim as hs
-from hysim.export._c import HELPERS
-from hysim.export._program import entries
-from hysim.export._translate import Translation
-from hysim.export._types import Scalar, Vector
+from hysim.export._c import HELPERS, Scalar, Vector
+from hysim.export._program import Translation, entries
 from hysim.kernels.stepping import complete
 from hysim.models.compiled_step import startable
 from hysim.models.model import every_family

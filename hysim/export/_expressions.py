@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 
 from hysim.export import _c
+from hysim.export._c import Known, Scalar, Several, Type, Vector
 from hysim.export._scope import (
     AND,
     CONDITIONAL,
@@ -30,7 +31,6 @@ from hysim.export._scope import (
     Stretch,
     Value,
 )
-from hysim.export._types import Known, Scalar, Several, Type, Vector
 from hysim.kernels.stepping import borrowed
 from hysim.models.tracing.routine import UntranslatableError, plain
 

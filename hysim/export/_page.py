@@ -1,6 +1,6 @@
 """Pages for a browser: a law's loop that follows sliders, in one HTML file that needs nothing else.
 
-The page computes with the step of the law, as WebAssembly; see `hysim.export._page_modules`. Files of the folder `page`
+The page computes with the step of the law, as WebAssembly; see `hysim.export._compilers`. Files of the folder `page`
 are its parts: markup, style, and script, joined in the order of `_PARTS`.
 """
 
@@ -24,8 +24,8 @@ from hysim._frozen import FloatArray, items
 from hysim._prefixes import label, printed
 from hysim._release import __version__
 from hysim._results import model_of
+from hysim.export._compilers import compressed
 from hysim.export._page_model import Parts, about, heading, node_of, plane_of
-from hysim.export._page_modules import compressed
 from hysim.laws.operators.prandtl_ishlinskii import PrandtlIshlinskii
 from hysim.records import Record
 

@@ -7,8 +7,8 @@ pinned, so that the same sources give the same bytes.
 import sys
 from pathlib import Path
 
+from hysim.export._compilers import FOLDER, Kernels, c_source, compiled, compressed
 from hysim.export._page_model import steps_of
-from hysim.export._page_modules import FOLDER, Kernels, c_source, compiled, compressed
 from hysim.export._page_presets import presets
 
 

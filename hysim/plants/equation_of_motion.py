@@ -1,4 +1,4 @@
-"""The equation of motion of a mass on springs along a displacement, its nearest linear plant, and records at other rates.
+"""A mass on springs along a displacement: its equation, the nearest linear plant, and records at other rates.
 
     m y'' + c y' + k y + z = F
 

@@ -23,7 +23,6 @@ from hysim.models.protocols import CompiledController, needed_time, positive_tim
 from hysim.plants.structures import assembly
 from hysim.plants.structures.assembly import AssembledStructure
 from hysim.plants.structures.parts import parted
-from hysim.plants.structures.structure import Structure
 
 _IMBALANCE = 0.05  # share of the largest work that may be missing
 
@@ -245,7 +244,7 @@ class Controlled(NamedTuple):
 class ControlledStructure:
     """A structure at a sample time [s], as a loop takes it; the force before the first sample is zero."""
 
-    def __init__(self, structure: Structure, sample_time: float, ground_acceleration: FloatArray | None) -> None:
+    def __init__(self, structure: MovingStructure, sample_time: float, ground_acceleration: FloatArray | None) -> None:
         if structure.excitation != "force":
             raise ValueError(
                 'a structure in a loop is moved by the controller\'s force: its excitation must be "force", got '
@@ -298,7 +297,7 @@ class ControlledStructure:
         return Controlled(command, drive, y, signals, lost)
 
 
-def measured(structure: Structure) -> FloatArray:
+def measured(structure: MovingStructure) -> FloatArray:
     """Weights of the output by displacements, velocities, forces of the elements without dashpots, and the force."""
     name, place = structure.place_of(structure.output)
     n, rows = structure.n_nodes, structure.drift_matrix
