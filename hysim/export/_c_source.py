@@ -17,82 +17,12 @@ from hysim.errors import warn_unsafe
 from hysim.export import _c
 from hysim.export._program import Program, program_of, start_of
 
+_FOLDER = Path(__file__).with_name("c")  # templates
 _FEW = 16  # places of a state that are set one by one
-
-_HEADER = """\
-/* $name: $what, exported by hysim $version. C99 with math.h, no allocation, no global state.
-
-   Call ${name}_init once, then ${name}_step $when. The state is a struct that the
-   caller holds, so that one source serves several axes. Every loop ends after a number of rounds that is known
-   beforehand, or when its numbers cease to be finite.
-   Compile without -ffast-math, and with -ffp-contract=off where the numbers shall be those of Python. */
-#ifndef ${NAME}_H
-#define ${NAME}_H
-
-#ifdef __cplusplus
-extern "C" {
-#endif
-
-#define ${NAME}_STATE $n_state /* doubles */
-$defines
-typedef struct {
-    double x[${NAME}_STATE];
-} ${name}_state;
-
-/* $begun */
-void ${name}_init(${name}_state *state$first);
-
-/* $result */
-double ${name}_step(${name}_state *state, $arguments);
-$held_declared
-#ifdef __cplusplus
-}
-#endif
-
-#endif
-"""
-
-_SOURCE = """\
-#include "$name.h"
-
-#include <math.h>
-
-$functions
-$table
-
-void ${name}_init(${name}_state *state$first) {
-$init}
-
-double ${name}_step(${name}_state *state, $arguments) {
-    return step(parameters, state->x, $inputs);
-}
-$held_defined"""
 
 _HELD = """
 /* Number of samples at which an input was not finite (or beyond 1e100) or no command was, and the last one was held. */
 unsigned long ${name}_held(const ${name}_state *state)"""
-
-_MAIN = """\
-/* $name at work: reads $inputs, one sample in each line, and prints $output. */
-#include "$name.h"
-
-#include <stdio.h>
-
-int main(void) {
-    static ${name}_state state;
-    double $inputs;
-    int begun = 0;
-
-    while (scanf("$formats", $places) == $count) {
-        if (!begun) {
-            ${name}_init(&state$begin);
-            begun = 1;
-        }
-        printf("%.17g\\n", ${name}_step(&state, $inputs));
-    }
-    return 0;
-}
-"""
 
 
 @printed
@@ -195,7 +125,8 @@ def to_c(
     thing = model_of(thing)
     program = program_of(thing, sample_time, u0=u0, y0=y0)
     texts = _texts(program, name, type(thing).__name__, *start_of(thing, sample_time or math.inf, u0, y0))
-    header, source, main = (Template(text).substitute(texts) for text in (_HEADER, _SOURCE, _MAIN))
+    templates = (Template((_FOLDER / file).read_text(encoding="utf-8")) for file in ("model.h", "model.c", "main.c"))
+    header, source, main = (template.substitute(texts) for template in templates)
     return CSource(name=name, header=header, source=source, main=main, state_size=program.state.size)
 
 

@@ -42,17 +42,6 @@ _WEB_OPTIONS = (
 _PROCESSORS = MappingProxyType({"amd64": "x86_64", "arm64": "aarch64"})
 _FAT_MAGIC, _FAT_ALIGNMENT = 0xCAFEBABE, 14  # of a Mach-O file for several processors, 2^14 bytes
 FOLDER = "page/wasm"
-_WRAPPER = """
-__attribute__((export_name("begin")))
-void begin(const double *parameters, int n_parameters, double *state, int n_state, double u0) {
-    start(parameters, n_parameters, state, n_state, u0);
-}
-
-__attribute__((export_name("run")))
-void run(const double *parameters, int n_parameters, double *state, int n_state, const double *u, double *y, int n) {
-    for (int k = 0; k < n; k++) y[k] = step(parameters, n_parameters, state, n_state, u[k]);
-}
-"""
 _NO_START = """
 static void start(const double *parameters, int n_parameters, double *state, int n_state, double u0) {
     (void)parameters, (void)n_parameters, (void)state, (void)n_state, (void)u0;
@@ -213,7 +202,8 @@ def compressed(module: bytes) -> bytes:
 def c_source(kernels: Kernels) -> str:
     """C99 text of a module."""
     text, has_start = entries(kernels.step, kernels.start)
-    return f"#include <math.h>\n{text}{'' if has_start else _NO_START}{_WRAPPER}"
+    wrapper = files("hysim.export").joinpath("page/module.c").read_text(encoding="utf-8")
+    return f"#include <math.h>\n{text}{'' if has_start else _NO_START}\n{wrapper}"
 
 
 @lru_cache(maxsize=32)

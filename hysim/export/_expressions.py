@@ -27,6 +27,7 @@ from hysim.export._scope import (
     SUM,
     UNARY,
     Library,
+    Parameter,
     Scope,
     Stretch,
     Value,
@@ -394,7 +395,7 @@ class Expressions:
         returns = Scalar.INT if function.returns is None else function.returns
         return Value(f"{function.name}({', '.join(given)})", returns)
 
-    def _given(self, node: ast.expr, parameter: Any) -> list[str]:
+    def _given(self, node: ast.expr, parameter: Parameter) -> list[str]:
         """An argument as far as the function uses it, and its length where that is used."""
         if not isinstance(parameter.type, Vector):
             return [self.value(node).text] if parameter.is_used else []

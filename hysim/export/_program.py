@@ -23,6 +23,7 @@ from hysim.export import _c
 from hysim.export._body import Body
 from hysim.export._c import Known, Scalar, Several, Type, Vector
 from hysim.export._packing import packing
+from hysim.export._scope import Function, Parameter
 from hysim.kernels.controllers import guarded
 from hysim.kernels.stepping import Start, Step, complete
 from hysim.models.law import Law
@@ -36,24 +37,6 @@ from hysim.plants.sampled import Vibration
 _ANNOTATED = MappingProxyType({"float": Scalar.DOUBLE, "int": Scalar.INT, "bool": Scalar.BOOL})
 _VECTORS = Vector(), Vector()
 _LAW, _CONTROLLER, _FEEDFORWARD = ("u",), ("reference", "measurement"), ("reference",)
-
-
-class Parameter(NamedTuple):
-    """An argument of a C function: its name and type, whether C has it, its lengths, and whether it is written to."""
-
-    name: str
-    type: Type
-    is_used: bool
-    axes: tuple[int, ...]
-    is_written: bool
-
-
-class Function(NamedTuple):
-    """A translated function: its name in C, its arguments, and its result."""
-
-    name: str
-    parameters: tuple[Parameter, ...]
-    returns: Type | None
 
 
 @dataclass

@@ -44,17 +44,22 @@ class Stretch(NamedTuple):
         return Vector(len(self.lengths))
 
 
-class Called(Protocol):
-    """A translated function: its name, which arguments C has, and its result."""
+class Parameter(NamedTuple):
+    """An argument of a C function: its name and type, whether C has it, its lengths, and whether it is written to."""
 
-    @property
-    def name(self) -> str: ...
+    name: str
+    type: Type
+    is_used: bool
+    axes: tuple[int, ...]
+    is_written: bool
 
-    @property
-    def parameters(self) -> tuple[Any, ...]: ...
 
-    @property
-    def returns(self) -> Type | None: ...
+class Function(NamedTuple):
+    """A translated function: its name in C, its arguments, and its result."""
+
+    name: str
+    parameters: tuple[Parameter, ...]
+    returns: Type | None
 
 
 class Library(Protocol):
@@ -62,7 +67,7 @@ class Library(Protocol):
 
     helpers: set[str]
 
-    def function(self, of: Callable[..., Any], types: tuple[Type, ...]) -> Called:
+    def function(self, of: Callable[..., Any], types: tuple[Type, ...]) -> Function:
         """The C function of a kernel for arguments of these types."""
 
     def table(self, name: str, values: Any) -> str:
