@@ -163,7 +163,8 @@ class Composite(ByStructure, Composable):
             for label, member in zip(labels(self.members), self.members, strict=True)
             if isinstance(member, Numbered) and (others := own(scalars, label))
         }
-        return replace(self, **{self.members_are: exchanged(self.members, numbered)})
+        family: Any = type(self)
+        return family(**{self.members_are: exchanged(self.members, numbered)})
 
     @property
     @abstractmethod

@@ -18,8 +18,7 @@ from hysim.kernels.structures.pointers import FOLLOW, addresses
 from hysim.kernels.structures.sweeps import LEAST_DRIFT
 from hysim.models.compiled_step import startable
 from hysim.models.protocols import Rated, Startable, Stretched
-from hysim.plants.structures.parts import ModalDamping, Rayleigh, dissipates, parted
-from hysim.plants.structures.search import OF_ELEMENTS, OF_NODES, SearchedStructure
+from hysim.plants.structures.parts import OF_ELEMENTS, OF_NODES, ModalDamping, Rayleigh, dissipates, parted
 
 PHASE = 2.0  # largest phase of the fastest mode in a base step: above it the sweeps of a slipping element diverge
 HALVINGS = 12
@@ -219,6 +218,12 @@ def motion_at(elements: Elements, laws: Laws, x: FloatArray, n_loads: int) -> Mo
     return motion
 
 
+def peaks_by_name(peaks: FloatArray, n_elements: int, n_nodes: int) -> dict[str, FloatArray]:
+    """Largest sizes by their names, of rows (n, n_peaks) of `Motion.peaks`."""
+    parts = np.split(peaks, np.cumsum([n_elements, n_elements, n_nodes]), axis=1)
+    return dict(zip(("peak_drift", "peak_force", "peak_displacement", "peak_acceleration"), parts, strict=True))
+
+
 def uncertainty(errors: FloatArray, peaks: FloatArray) -> FloatArray:
     """Largest error of a drift in one step as a share of its size, (n_sets,), from rows (n_sets, n_elements)."""
     sizes = np.maximum(peaks, LEAST_DRIFT * peaks.max(axis=1, initial=0.0, keepdims=True))
@@ -227,7 +232,7 @@ def uncertainty(errors: FloatArray, peaks: FloatArray) -> FloatArray:
     return np.asarray(shares.max(axis=1, initial=0.0))
 
 
-class AssembledStructure(SearchedStructure):
+class AssembledStructure:
     """Masses on elements: their matrices, their small motions at the start, and the places of their outputs."""
 
     mass: FloatArray
@@ -237,6 +242,8 @@ class AssembledStructure(SearchedStructure):
     excitation: str
     influence: tuple[float, ...]
     output: str
+    substeps: int | None
+    tolerance: float
     initial_state: tuple[float, ...]
 
     @cached_property
@@ -319,6 +326,7 @@ class AssembledStructure(SearchedStructure):
 
     @property
     def fastest_rate(self) -> float:
+        """Rate of the fastest mode at the start [rad/s]."""
         return float(linear_parts(self.matrices)[2][0])
 
     def dissipative(self, strokes: FloatArray) -> npt.NDArray[np.bool_]:
@@ -328,11 +336,8 @@ class AssembledStructure(SearchedStructure):
 
     @property
     def widths(self) -> dict[str, int]:
+        """Number of columns of each signal."""
         return {name: self._column_count(name) for name in OUTPUTS}
-
-    @property
-    def sensor(self) -> tuple[str, int]:
-        return self.place_of(self.output)
 
     def place_of(self, output: str) -> tuple[str, int]:
         """Name and column of an output; ValueError if there is none of this name."""

@@ -14,14 +14,13 @@ from hysim.models.compiled_step import compiled_start, compiled_step
 from hysim.models.law import Law
 from hysim.models.protocols import Startable, positive_time
 from hysim.plants.structures import assembly
-from hysim.plants.structures.parts import ModalDamping, Rayleigh, expanded, modal_damping
+from hysim.plants.structures.parts import MATRICES, ModalDamping, Rayleigh, expanded, modal_damping
 
 Reduction = Literal[
     "peak_drift", "residual_drift", "energy", "peak_force", "peak_displacement", "peak_acceleration"
 ]  # fmt: skip
 
 REDUCTIONS = get_args(Reduction)
-_MATRICES = ("mass", "stiffness", "damping")
 _AT_ONCE = 2_000_000  # samples that a call of the kernel computes, or one structure
 
 
@@ -86,15 +85,12 @@ def _reduced(
     structure: Any, values: Mapping[str, FloatArray], u: FloatArray, n_sets: int, sample_time: float, reduce: Reduction
 ) -> FloatArray:
     """The measure of each set, a row each."""
-    n_elements, n = len(structure.elements), structure.n_nodes
+    n_elements = len(structure.elements)
     results = _computed(structure, values, u, n_sets, sample_time, with_accelerations=reduce == "peak_acceleration")
     peaks = results.peaks
     unresolved = assembly.uncertainty(results.errors, peaks[:, :n_elements]) > assembly.LEAST_CERTAIN
     measures = {
-        "peak_drift": peaks[:, :n_elements],
-        "peak_force": peaks[:, n_elements : 2 * n_elements],
-        "peak_displacement": peaks[:, 2 * n_elements : 2 * n_elements + n],
-        "peak_acceleration": peaks[:, 2 * n_elements + n :],
+        **assembly.peaks_by_name(peaks, n_elements, structure.n_nodes),
         "residual_drift": results.drifts,
         "energy": results.work,
     }
@@ -142,7 +138,7 @@ def _stacked(structure: Any, values: Mapping[str, FloatArray], n_sets: int) -> _
     places = {name: int(name.split(".")[1]) for name in numbers if name.startswith("elements.")}
     varied = [structure.elements[place].law for place in places.values()]
     has_table = all(isinstance(law, Law) and law.u0 is None for law in varied)  # else a law first moves from its u0
-    if has_table and all(name in places or name in _MATRICES for name in numbers):
+    if has_table and all(name in places or name in MATRICES for name in numbers):
         return _by_tables(structure, numbers, n_sets)
     return _one_by_one(structure, numbers, n_sets)
 

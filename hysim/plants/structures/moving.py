@@ -3,7 +3,7 @@
 In a loop the force is a controller's, held between samples.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import cached_property
 from typing import Any, NamedTuple
 
@@ -15,7 +15,7 @@ from hysim._parallel import in_pieces
 from hysim._progress import Progress
 from hysim.errors import SimulationError
 from hysim.kernels.controllers import CONTROLLER
-from hysim.kernels.structures.layout import Motion, Plant, Tracks
+from hysim.kernels.structures.layout import Elements, Flows, Motion, Plant, Steps, Tracks
 from hysim.kernels.structures.loop import close
 from hysim.kernels.structures.path import follow
 from hysim.kernels.structures.pointers import addresses
@@ -37,8 +37,6 @@ class StructureState(NamedTuple):
 
 class MovingStructure(AssembledStructure):
     """A structure that moves sample by sample."""
-
-    tolerance: float
 
     def response(self, u: npt.ArrayLike, sample_time: float) -> FloatArray:
         """Output y at the samples of an input that is linear between them.
@@ -104,7 +102,7 @@ class MovingStructure(AssembledStructure):
         """The state before the first sample."""
         x = np.array(self.initial_state or np.zeros(2 * self.n_nodes))
         motion = assembly.motion_at(self.kernel_elements, self.laws, x, len(self.force_directions))
-        return StructureState(motion, False, self._stored(x[np.newaxis])[0])
+        return StructureState(motion, False, float(np.sum(self._energies(x[np.newaxis]))))
 
     def advance(
         self,
@@ -131,29 +129,28 @@ class MovingStructure(AssembledStructure):
         positive_time(sample_time)
         before = state or self.start()
         motion = Motion(*(part.copy() for part in before.motion))
-        A, loads, rates = assembly.linear_parts(self.matrices)
-        pushing = np.array([float(self.excitation == "force")])
-        plant = Plant(A[0], loads[0], np.array(self.damping_matrix), np.array(self.force_directions), pushing)
-        steps = assembly.steps_of(float(rates[0]), sample_time, self.substeps, self.tolerance)
-        elements, flows = self.kernel_elements, assembly.flows_of(self.kernel_elements, plant, steps)
-        n, tracks = u.size, assembly.empty_tracks(u.size, motion, with_laws=with_laws)
+        arguments = self.kernel_arguments(self.force_directions, [float(self.excitation == "force")], sample_time)
         inputs, room = np.ascontiguousarray(u[:, np.newaxis]), assembly.room_for(motion)
 
-        def run(k: slice) -> int:
-            rows = Tracks(*(part[k] for part in tracks))
+        def run(k: slice, rows: Tracks) -> int:
             is_first = k.start == 0 and not before.started
-            lost = int(follow(elements, flows, plant, steps, is_first, inputs[k], motion, room, rows))
-            if progress is not None:
-                progress(k.stop, n)
-            return lost
+            return int(follow(*arguments, is_first, inputs[k], motion, room, rows))
 
-        with np.errstate(all="ignore"):
-            lost = in_pieces(run, n)
+        lost, tracks = moved(run, u.size, motion, progress, with_laws=with_laws)
         if lost >= 0:
             hint = "; if it should not, use more substeps, or substeps=None" if self.substeps else ""
             raise SimulationError(f"the motion diverges at t = {lost * sample_time:g}{hint}")
         self.check_resolved(motion)
-        return StructureState(motion, before.started or n > 0, before.stored), tracks
+        return StructureState(motion, before.started or u.size > 0, before.stored), tracks
+
+    def kernel_arguments(
+        self, directions: FloatArray, pushing: Sequence[float], sample_time: float
+    ) -> tuple[Elements, Flows, Plant, Steps]:
+        """What the kernels move the structure with, under loads in the directions (n_loads, n_nodes)."""
+        A, loads, rates = assembly.linear_parts(self.matrices._replace(directions=directions[np.newaxis]))
+        plant = Plant(A[0], loads[0], np.array(self.damping_matrix), np.array(directions), np.array(pushing))
+        steps = assembly.steps_of(float(rates[0]), sample_time, self.substeps, self.tolerance)
+        return self.kernel_elements, assembly.flows_of(self.kernel_elements, plant, steps), plant, steps
 
     def check_resolved(self, motion: Motion) -> None:
         """Refuse a motion with steps whose sweeps do not agree, which could not be divided further."""
@@ -167,8 +164,7 @@ class MovingStructure(AssembledStructure):
 
     def signals_of(self, u: FloatArray, state: StructureState, tracks: Tracks) -> dict[str, FloatArray]:
         """Signals by name of tracks under the inputs `u`, which end in `state`."""
-        n, n_elements = self.n_nodes, len(self.elements)
-        x, (force, _, drift, rate, _) = tracks.x, np.moveaxis(tracks.carry, 1, 0)
+        n, x, (force, _, drift, rate, _) = self.n_nodes, tracks.x, np.moveaxis(tracks.carry, 1, 0)
         kinetic, elastic = self._energies(x)
         work = tracks.work[:, 2:]
         slopes = self.elastic_slopes
@@ -182,10 +178,7 @@ class MovingStructure(AssembledStructure):
             "acceleration": self._accelerations(x, force, u),
             "drift": drift,
             "force": force + viscous,
-            "peak_drift": tracks.peaks[:, :n_elements],
-            "peak_force": tracks.peaks[:, n_elements : 2 * n_elements],
-            "peak_displacement": tracks.peaks[:, 2 * n_elements : 2 * n_elements + n],
-            "peak_acceleration": tracks.peaks[:, 2 * n_elements + n :],
+            **assembly.peaks_by_name(tracks.peaks, len(self.elements), n),
             "kinetic": kinetic,
             "elastic": elastic,
             "damping_loss": tracks.work[:, 1],
@@ -204,12 +197,8 @@ class MovingStructure(AssembledStructure):
         arrays = {"y": signals[name][:, place], **signals}
         return {each: np.ascontiguousarray(values) for each, values in arrays.items()}
 
-    def _stored(self, x: FloatArray) -> FloatArray:
-        """Kinetic and elastic energy of states (k, m), shape (k,)."""
-        kinetic, elastic = self._energies(x)
-        return kinetic + elastic
-
     def _energies(self, x: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Kinetic and elastic energy of states (k, m), shape (k,) each."""
         n = self.n_nodes
         kinetic = 0.5 * np.einsum("ki,ij,kj->k", x[:, n:], self.mass_matrix, x[:, n:])
         elastic = 0.5 * np.einsum("ki,ij,kj->k", x[:, :n], self.stiffness_matrix, x[:, :n])
@@ -225,6 +214,22 @@ class MovingStructure(AssembledStructure):
         inner = x[:, :n] @ self.stiffness_matrix.T + x[:, n:] @ self.damping_matrix.T + force @ self.drift_matrix
         outer = u[:, np.newaxis] * self.force_directions if self.excitation == "force" else 0.0
         return np.asarray(np.linalg.solve(self.mass_matrix, (outer - inner).T).T)
+
+
+def moved(
+    run: Callable[[slice, Tracks], int], n: int, motion: Motion, progress: Progress | None, *, with_laws: bool = False
+) -> tuple[int, Tracks]:
+    """The first sample that is lost, or -1, and all `n` samples, which `run` computes piece by piece."""
+    tracks = assembly.empty_tracks(n, motion, with_laws=with_laws)
+
+    def piece(k: slice) -> int:
+        lost = run(k, Tracks(*(part[k] for part in tracks)))
+        if progress is not None:
+            progress(k.stop, n)
+        return lost
+
+    with np.errstate(all="ignore"):
+        return in_pieces(piece, n), tracks
 
 
 class Controlled(NamedTuple):
@@ -254,10 +259,8 @@ class ControlledStructure:
         directions = [structure.force_directions[0]]
         if ground_acceleration is not None:
             directions.append(-structure.mass_matrix.sum(axis=1))
-        A, loads, rates = assembly.linear_parts(structure.matrices._replace(directions=np.array([directions])))
-        pushing = np.array([1.0, 0.0][: len(directions)])
-        self.plant = Plant(A[0], loads[0], np.array(structure.damping_matrix), np.array(directions), pushing)
-        self.steps = assembly.steps_of(float(rates[0]), sample_time, structure.substeps, structure.tolerance)
+        pushing = [1.0, 0.0][: len(directions)]
+        self.arguments = structure.kernel_arguments(np.array(directions), pushing, sample_time)
         self.weights = measured(structure)
         before = structure.start()
         self.begin = StructureState(before.motion._replace(loads=np.zeros(len(directions))), False, before.stored)
@@ -271,23 +274,18 @@ class ControlledStructure:
     def run(self, controller: CompiledController, reference: FloatArray, progress: Progress | None) -> Controlled:
         """The loop with a controller, whose state moves along."""
         n, motion = reference.size, Motion(*(part.copy() for part in self.begin.motion))
-        elements, room = self.structure.kernel_elements, assembly.room_for(motion)
-        flows = assembly.flows_of(elements, self.plant, self.steps)
         (address,), follow = addresses([controller.step], CONTROLLER), assembly.follow_address()
         inputs = np.column_stack([reference] if self.ground is None else [reference, self.ground])
-        samples, tracks = np.empty((n, 3)), assembly.empty_tracks(n, motion)
+        samples, room = np.empty((n, 3)), assembly.room_for(motion)
 
-        def run(k: slice) -> int:
+        def run(k: slice, rows: Tracks) -> int:
             lost = close(
-                address, controller.parameters, controller.state, follow, elements, flows, self.plant, self.steps,
-                k.start == 0, self.weights, inputs[k], motion, room, samples[k], Tracks(*(part[k] for part in tracks)),
+                address, controller.parameters, controller.state, follow, *self.arguments,
+                k.start == 0, self.weights, inputs[k], motion, room, samples[k], rows,
             )  # fmt: skip
-            if progress is not None:
-                progress(k.stop, n)
             return int(lost)
 
-        with np.errstate(all="ignore"):
-            lost = in_pieces(run, n)
+        lost, tracks = moved(run, n, motion, progress)
         command, drive, y = samples.T.copy()
         if lost >= 0:
             return Controlled(command, drive, y, {}, lost)

@@ -11,7 +11,7 @@
 A factor multiplies what the other names leave; a name with a number wins over the one with the star.
 """
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import field, replace
 from typing import Any, NamedTuple, Self
 
@@ -22,13 +22,18 @@ from hysim.errors import SimulationError
 from hysim.laws.dashpot import Dashpot
 from hysim.laws.static import Line
 from hysim.models.model import family
+from hysim.models.parts import own
 from hysim.models.protocols import Numbered, Rated, Sampled, Stepwise, needs_time
 from hysim.models.sum import Sum
 from hysim.signals import triangle
 
+OF_NODES = ("displacement", "velocity", "acceleration")
+OF_ELEMENTS = ("drift", "force")
+"""Names of signals with a column for each mass, and for each element."""
+
 _SAMPLES = 200  # of a cycle
 _ROUNDING = 1e-9  # of the work of the whole force along the whole drift: less is none
-_MATRICES = ("mass", "stiffness", "damping")
+MATRICES = ("mass", "stiffness", "damping")
 _TUPLES = ("influence", "initial_state")
 _ELEMENTS, _ALL = "elements", "*"
 _SHOWN = 24  # names in a message
@@ -252,13 +257,13 @@ def modal_damping(ratios: FloatArray, mass: FloatArray, stiffness: FloatArray) -
 def scalars_of(structure: Any) -> dict[str, float]:
     """Every number of a structure by name."""
     numbers: dict[str, float] = {}
-    for name in _MATRICES:
+    for name in MATRICES:
         numbers |= _numbers(name, vars(structure)[name])
     for name in _TUPLES:
         numbers |= {f"{name}[{k}]": value for k, value in enumerate(vars(structure)[name])}
     for k, element in enumerate(structure.elements):
-        own = element.law.scalars if isinstance(element.law, Numbered) else {}
-        numbers |= {f"{_ELEMENTS}.{k}.{name}": float(value) for name, value in own.items()}
+        scalars = element.law.scalars if isinstance(element.law, Numbered) else {}
+        numbers |= {f"{_ELEMENTS}.{k}.{name}": float(value) for name, value in scalars.items()}
     return numbers
 
 
@@ -269,23 +274,31 @@ def assembled(structure: Any, parameters: Mapping[str, float]) -> Any:
     """
     others = expanded(structure.scalars, parameters)
     changes: dict[str, Any] = {}
-    for name in _MATRICES:
-        if own := {key: value for key, value in others.items() if key.partition("[")[0].partition(".")[0] == name}:
-            changes[name] = _changed(name, vars(structure)[name], own)
+    for name in MATRICES:
+        if mine := {key: value for key, value in others.items() if key.partition("[")[0].partition(".")[0] == name}:
+            changes[name] = _changed(name, vars(structure)[name], mine)
     for name in _TUPLES:
-        if own := {key: value for key, value in others.items() if key.startswith(f"{name}[")}:
-            changes[name] = tuple(_placed(name, np.array(vars(structure)[name]), own).tolist())
-    elements = [_with_law(element, _below(others, f"{_ELEMENTS}.{k}")) for k, element in enumerate(structure.elements)]
+        if mine := {key: value for key, value in others.items() if key.startswith(f"{name}[")}:
+            changes[name] = tuple(_placed(name, np.array(vars(structure)[name]), mine).tolist())
+    elements = list(structure.elements)
+    for k, element in enumerate(elements):
+        if numbers := own(others, f"{_ELEMENTS}.{k}"):
+            elements[k] = replace(element, law=element.law.with_scalars(numbers))
     return replace(structure, **changes, elements=tuple(elements))
 
 
 def expanded(scalars: Mapping[str, float], parameters: Mapping[str, float]) -> dict[str, float]:
     """Parameters with those of all elements under the name of each; ValueError if a name is unknown."""
-    by_star: dict[str, float] = {}
+    shared: dict[str, float] = {}
+    single: dict[str, float] = {}
     for name, value in parameters.items():
         if is_shared(name):
-            by_star |= dict.fromkeys(sharing(scalars, name), value)
-    return by_star | {name: _known(scalars, name, value) for name, value in parameters.items() if not is_shared(name)}
+            shared |= dict.fromkeys(sharing(scalars, name), value)
+        elif name in scalars:
+            single[name] = value
+        else:
+            raise unknown(scalars, name)
+    return shared | single
 
 
 def is_shared(name: str) -> bool:
@@ -323,12 +336,6 @@ def _listed(scalars: Iterable[str]) -> str:
     )
 
 
-def _known(scalars: Mapping[str, float], name: str, value: float) -> float:
-    if name not in scalars:
-        raise unknown(scalars, name)
-    return value
-
-
 def _numbers(name: str, value: Any) -> dict[str, float]:
     """Numbers of the mass, the stiffness or the damping: itself or its factor, and those in it that have a name."""
     if isinstance(value, Rayleigh):
@@ -346,18 +353,12 @@ def _changed(name: str, value: Any, numbers: Mapping[str, float]) -> Any:
         own = [numbers.get(f"{name}.{part}", vars(value)[part]) for part in ("mass", "stiffness")]
         factor = 1.0 if whole is None else whole
         return Rayleigh(mass=factor * own[0], stiffness=factor * own[1])
-    make: Callable[[Any], Any] = (
-        (lambda ratio: ModalDamping(ratio=ratio)) if isinstance(value, ModalDamping) else _as_is
-    )
-    several = np.array(value.ratio if isinstance(value, ModalDamping) else value)
-    if several.ndim == 0:
-        return make(whole)
-    changed = _placed(name, several, numbers)
-    return make(changed if whole is None else whole * changed)
-
-
-def _as_is(value: Any) -> Any:
-    return value
+    is_modal = isinstance(value, ModalDamping)
+    several = np.array(value.ratio if is_modal else value)
+    changed: Any = whole
+    if several.ndim:
+        changed = _placed(name, several, numbers) * (1.0 if whole is None else whole)
+    return ModalDamping(ratio=changed) if is_modal else changed
 
 
 def _placed(name: str, values: FloatArray, numbers: Mapping[str, float]) -> FloatArray:
@@ -367,11 +368,3 @@ def _placed(name: str, values: FloatArray, numbers: Mapping[str, float]) -> Floa
         if key != name:
             changed[int(key[len(name) + 1 : -1])] = value
     return changed
-
-
-def _below(numbers: Mapping[str, float], prefix: str) -> dict[str, float]:
-    return {name[len(prefix) + 1 :]: value for name, value in numbers.items() if name.startswith(f"{prefix}.")}
-
-
-def _with_law(element: Any, numbers: Mapping[str, float]) -> Any:
-    return replace(element, law=element.law.with_scalars(numbers)) if numbers else element

@@ -18,13 +18,11 @@ its noise; the input is repeated for each of them.
 """
 
 import math
-from abc import abstractmethod
 from collections.abc import Mapping, Sequence
 from dataclasses import field, replace
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
 from hysim._frozen import FloatArray, checked, frozen, read_only
 from hysim._parallel import in_chunks
@@ -33,11 +31,10 @@ from hysim.errors import SimulationError
 from hysim.models.parameters import Coordinate, free_coordinate, space_of
 from hysim.models.protocols import Identifiable
 from hysim.models.search_space import ALL_FREE, Freedom, Parameters, SearchSpace
-from hysim.plants.structures.parts import expanded, is_shared, sharing, unknown
+from hysim.plants.structures.moving import MovingStructure
+from hysim.plants.structures.parts import OF_ELEMENTS, OF_NODES, expanded, is_shared, scalars_of, sharing, unknown
 from hysim.records import Record, check_increasing, even_step
 
-OF_NODES = ("displacement", "velocity", "acceleration")
-OF_ELEMENTS = ("drift", "force")
 _LEAST = 1e-6  # of the size of a signal: its residual is not taken for smaller, however exact the fit
 
 Sensor = tuple[str, int]
@@ -203,38 +200,13 @@ def laid(record: Record | StructureRecord, widths: Mapping[str, int], output: Se
     )
 
 
-class SearchedStructure(Identifiable):
+class SearchedStructure(MovingStructure, Identifiable):
     """Base class of a structure whose named numbers `hysim.identify` searches, beginning with its own."""
 
-    substeps: int | None
-
     @property
-    @abstractmethod
     def scalars(self) -> dict[str, float]:
-        """Every number by name."""
-
-    @property
-    @abstractmethod
-    def widths(self) -> dict[str, int]:
-        """Number of columns of each signal."""
-
-    @property
-    @abstractmethod
-    def sensor(self) -> tuple[str, int]:
-        """Signal and column of the output y."""
-
-    @property
-    @abstractmethod
-    def fastest_rate(self) -> float:
-        """Rate of the fastest mode at the start [rad/s]."""
-
-    @abstractmethod
-    def dissipative(self, strokes: FloatArray) -> npt.NDArray[np.bool_]:
-        """Whether each element is no source of energy in cycles between plus and minus its stroke [m]."""
-
-    @abstractmethod
-    def with_substeps(self, substeps: int) -> Any:
-        """The structure with other substeps."""
+        """Every number by name, such as ``"damping"`` and ``"elements.0.beta"``; see `assemble`."""
+        return scalars_of(self)
 
     @classmethod
     def candidates(cls) -> dict[str, Any]:
@@ -281,8 +253,9 @@ class SearchedStructure(Identifiable):
     def _strokes(self, record: Record) -> FloatArray | None:
         """Largest drift of each element at the start, (n_elements,); None if the motion diverges."""
         try:
-            structure = self.with_substeps(self.search_substeps(record.sample_time))
-            return np.asarray(np.abs(structure.signals(_input(record), record.sample_time)["drift"]).max(axis=0))
+            structure: Any = self
+            coarse = replace(structure, substeps=self.search_substeps(record.sample_time))
+            return np.asarray(np.abs(coarse.signals(_input(record), record.sample_time)["drift"]).max(axis=0))
         except SimulationError:
             return None
 
@@ -340,7 +313,7 @@ class SearchedStructure(Identifiable):
             for k in range(begin, end):
                 others = {name: value for name, value in sets[k].items() if own.get(name) != value}
                 try:
-                    signals = self.assemble(others).with_substeps(substeps).signals(u, sample_time)
+                    signals = replace(self.assemble(others), substeps=substeps).signals(u, sample_time)
                 except (SimulationError, ValueError):  # a motion that diverges, or numbers that are no structure
                     continue
                 for row, (name, column), scale in zip(outputs[k], sensors, scales, strict=True):
@@ -365,7 +338,7 @@ class SearchedStructure(Identifiable):
         if not isinstance(several, Sequence) or not any(isinstance(each, StructureRecord) for each in several):
             return records
         return [
-            laid(each, self.widths, self.sensor) if isinstance(each, Record | StructureRecord) else each
+            laid(each, self.widths, self.place_of(self.output)) if isinstance(each, Record | StructureRecord) else each
             for each in several
         ]
 

@@ -76,15 +76,6 @@ class StaticResponse:
         )
 
 
-class Frame(NamedTuple):
-    """Constants of slow motions: stiffness (n, n), drifts (n_elements, n), the laws and their slopes at the start."""
-
-    stiffness: FloatArray
-    rows: FloatArray
-    laws: Laws
-    slopes: FloatArray
-
-
 class _Equilibrium(NamedTuple):
     """Displacements, loads by the pattern, forces of the elements, and the share out of balance."""
 
@@ -133,24 +124,24 @@ class _Columns:
 class _Push:
     """A structure that is pushed along."""
 
-    def __init__(self, frame: Frame, x: FloatArray, pattern: FloatArray, row: FloatArray) -> None:
-        self.frame, self.pattern, self.row = frame, pattern, row
-        self.columns = _Columns(frame.laws, frame.slopes, frame.rows @ x)
-        elastic = frame.stiffness + frame.rows.T @ (frame.slopes[:, np.newaxis] * frame.rows)
-        self.unit = float(np.abs(elastic).max()) or 1.0
-        self.direction = self.correction(frame.slopes, np.zeros(x.size), 1.0)[0]
+    def __init__(self, structure: AssembledStructure, x: FloatArray, pattern: FloatArray, row: FloatArray) -> None:
+        self.stiffness, self.rows = structure.stiffness_matrix, structure.drift_matrix
+        self.slopes, self.pattern, self.row = structure.elastic_slopes, pattern, row
+        self.columns = _Columns(structure.laws, self.slopes, self.rows @ x)
+        self.unit = float(np.abs(structure.initial_stiffness).max()) or 1.0
+        self.direction = self.correction(self.slopes, np.zeros(x.size), 1.0)[0]
         self.largest = 0.0
         self.now = self.balance(x, 0.0)
 
     def balance(self, x: FloatArray, factor: float) -> _Equilibrium:
         """Displacements and loads with the forces, and how far these are from balance."""
-        at = _Equilibrium(x, factor, self.columns.forces(self.frame.rows @ x), 0.0)
+        at = _Equilibrium(x, factor, self.columns.forces(self.rows @ x), 0.0)
         size = self.size(at)
         return at._replace(residual=float(np.abs(self.out_of_balance(at)).max()) / size) if size else at
 
     def size(self, at: _Equilibrium) -> float:
         """The largest force so far: of a load, of linear springs at a mass, or of an element."""
-        parts = (at.factor * self.pattern, self.frame.stiffness @ at.x, at.force)
+        parts = (at.factor * self.pattern, self.stiffness @ at.x, at.force)
         return max(self.largest, *(float(np.abs(part).max(initial=0.0)) for part in parts))
 
     def allowed(self, at: _Equilibrium) -> float:
@@ -160,14 +151,14 @@ class _Push:
 
     def out_of_balance(self, at: _Equilibrium) -> FloatArray:
         """Loads less resisting forces, shape (n,)."""
-        resisted = self.frame.stiffness @ at.x + self.frame.rows.T @ at.force
+        resisted = self.stiffness @ at.x + self.rows.T @ at.force
         return np.asarray(at.factor * self.pattern - resisted)
 
     def correction(self, tangents: FloatArray, off: FloatArray, rise: float) -> tuple[FloatArray, float]:
         """Changes of displacements and factor that balance `off` and raise the control by `rise`."""
-        rows, n = self.frame.rows, off.size
+        rows, n = self.rows, off.size
         matrix = np.zeros((n + 1, n + 1))
-        matrix[:n, :n] = (self.frame.stiffness + rows.T @ (tangents[:, np.newaxis] * rows)) / self.unit
+        matrix[:n, :n] = (self.stiffness + rows.T @ (tangents[:, np.newaxis] * rows)) / self.unit
         largest = np.abs(self.pattern).max() or 1.0
         matrix[:n, n], matrix[n, :n] = -self.pattern / largest, self.row
         wanted = np.append(off / self.unit, rise)
@@ -184,7 +175,7 @@ class _Push:
             if at.residual <= _BALANCED or not np.isfinite(at.residual):
                 break
             off = self.out_of_balance(at)
-            change, rise = self.correction(self.columns.tangents(self.frame.rows @ at.x), off, 0.0)
+            change, rise = self.correction(self.columns.tangents(self.rows @ at.x), off, 0.0)
             size = float(np.abs(off).max())
             for cut in range(_MOST_CUTS):
                 share = 0.5**cut
@@ -202,51 +193,19 @@ class _Push:
         x = begin.x + rise * self.direction
         best = self.corrected(x, begin.factor)
         if not best.residual <= self.allowed(best):
-            change, factor = self.correction(self.frame.slopes, np.zeros(x.size), rise)
+            change, factor = self.correction(self.slopes, np.zeros(x.size), rise)
             best = self.corrected(begin.x + change, begin.factor + factor)
         if best.residual <= self.allowed(best):
             if rise:
                 self.direction = (best.x - begin.x) / rise
             self.now = best
             self.largest = self.size(best)
-            self.columns.keep(self.frame.rows @ best.x)
+            self.columns.keep(self.rows @ best.x)
             return True
         middle = control - 0.5 * rise
         if halvings == _MOST_HALVINGS or not min(control, control - rise) < middle < max(control, control - rise):
             return False
         return self.to(middle, halvings + 1) and self.to(control, halvings + 1)
-
-
-def pushed(
-    frame: Frame, x: FloatArray, pattern: FloatArray, row: FloatArray, control: Callable[[float], FloatArray]
-) -> StaticResponse:
-    """Equilibria at the values of ``control(begin)``, begun at the displacements `x`.
-
-    Raises ValueError if the pattern is zero, and SimulationError where no equilibrium is found.
-    """
-    if not pattern.any():
-        raise ValueError("pattern must not be zero")
-    push = _Push(frame, x, pattern, row)
-    values, found = control(float(row @ x)), []
-    for k, value in enumerate(values.tolist()):
-        with np.errstate(all="ignore"):
-            reached = push.to(value)
-        if not reached:
-            raise SimulationError(
-                f"no equilibrium was found at control value {k} ({value:g} m): control a displacement that grows all "
-                "along, or use smaller steps"
-            )
-        found.append(push.now)
-    n, n_elements = x.size, len(frame.rows)
-    return StaticResponse(
-        control=values,
-        factor=np.array([each.factor for each in found]),
-        pattern=pattern,
-        displacement=np.array([each.x for each in found]).reshape(len(found), n),
-        drift=np.array([frame.rows @ each.x for each in found]).reshape(len(found), n_elements),
-        force=np.array([each.force for each in found]).reshape(len(found), n_elements),
-        residual=np.array([each.residual for each in found]),
-    )
 
 
 def strokes(turns: Any, begin: float, steps: int) -> FloatArray:
@@ -296,11 +255,8 @@ class PushedStructure(AssembledStructure):
         >>> push.base_shear.round(6).tolist()
         [0.6, 1.03125, 1.21875]
         """
-        loads = read_only(pattern, "pattern", ndim=1)
-        if loads.size != self.n_nodes:
-            raise ValueError(f"pattern must hold one number for each of {self.n_nodes} masses, got {loads.size}")
         values = read_only(control, "control", ndim=1)
-        return pushed(self._at_rest, self._first_displacements, loads, self._controlled(at), lambda begin: values)
+        return self._pushed(pattern, at, lambda begin: values)
 
     def cyclic(
         self,
@@ -338,19 +294,39 @@ class PushedStructure(AssembledStructure):
         ([0.0, 0.01, 0.02, 0.0, -0.02, -0.01, 0.0], [0.0, 1.0, 1.1, -0.9, -1.1, -0.1, 0.9])
         """
         check_whole(steps, "steps")
-        turns, row = read_only(protocol, "protocol", ndim=1), self._controlled(at)
+        turns = read_only(protocol, "protocol", ndim=1)
+        return self._pushed(pattern, at, lambda begin: strokes(turns, begin, steps))
+
+    def _pushed(self, pattern: npt.ArrayLike | None, at: str, control: Callable[[float], FloatArray]) -> StaticResponse:
+        """Equilibria at the values of ``control(begin)``."""
+        row = self._controlled(at)
         loads = row if pattern is None else read_only(pattern, "pattern", ndim=1)
-        if loads.size != self.n_nodes:
-            raise ValueError(f"pattern must hold one number for each of {self.n_nodes} masses, got {loads.size}")
-        return pushed(self._at_rest, self._first_displacements, loads, row, lambda begin: strokes(turns, begin, steps))
-
-    @property
-    def _at_rest(self) -> Frame:
-        return Frame(self.stiffness_matrix, self.drift_matrix, self.laws, self.elastic_slopes)
-
-    @property
-    def _first_displacements(self) -> FloatArray:
-        return np.array(self.initial_state[: self.n_nodes] or np.zeros(self.n_nodes))
+        n, n_elements = self.n_nodes, len(self.elements)
+        if loads.size != n:
+            raise ValueError(f"pattern must hold one number for each of {n} masses, got {loads.size}")
+        if not loads.any():
+            raise ValueError("pattern must not be zero")
+        x = np.array(self.initial_state[:n] or np.zeros(n))
+        push = _Push(self, x, loads, row)
+        values, found = control(float(row @ x)), []
+        for k, value in enumerate(values.tolist()):
+            with np.errstate(all="ignore"):
+                reached = push.to(value)
+            if not reached:
+                raise SimulationError(
+                    f"no equilibrium was found at control value {k} ({value:g} m): control a displacement that grows "
+                    "all along, or use smaller steps"
+                )
+            found.append(push.now)
+        return StaticResponse(
+            control=values,
+            factor=np.array([each.factor for each in found]),
+            pattern=loads,
+            displacement=np.array([each.x for each in found]).reshape(len(found), n),
+            drift=np.array([push.rows @ each.x for each in found]).reshape(len(found), n_elements),
+            force=np.array([each.force for each in found]).reshape(len(found), n_elements),
+            residual=np.array([each.residual for each in found]),
+        )
 
     def _controlled(self, at: str) -> FloatArray:
         """Direction of a displacement or a drift, shape (n_nodes,)."""

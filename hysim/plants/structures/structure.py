@@ -8,7 +8,6 @@ the influence. The input is linear between the samples. How it is integrated: `h
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
 from typing import Any, ClassVar
 
 import numpy as np
@@ -18,15 +17,15 @@ from scipy.linalg import LinAlgError, cholesky
 from hysim._frozen import FloatArray, check_choice, check_whole, read_only
 from hysim.models.model import family
 from hysim.plants.structures.ensemble import Reduction, responses
-from hysim.plants.structures.moving import MovingStructure
-from hysim.plants.structures.parts import Element, ModalDamping, Rayleigh, assembled, scalars_of
+from hysim.plants.structures.parts import Element, ModalDamping, Rayleigh, assembled
+from hysim.plants.structures.search import SearchedStructure
 from hysim.plants.structures.static import PushedStructure
 
 _LOOSEST = 1e-3  # tolerance
 
 
 @family
-class Structure(MovingStructure, PushedStructure):
+class Structure(SearchedStructure, PushedStructure):
     """Masses on linear and hysteretic elements, under a moving base or a force.
 
     ``M x'' + C x' + K x + sum b f(b . x) = -M r a(t)`` or ``= r u(t)``.
@@ -120,11 +119,6 @@ class Structure(MovingStructure, PushedStructure):
         self.place_of(self.output)
         self.matrices  # noqa: B018  # raises what its parts raise
 
-    @property
-    def scalars(self) -> dict[str, float]:
-        """Every number by name, such as ``"damping"`` and ``"elements.0.beta"``; see `assemble`."""
-        return scalars_of(self)
-
     def assemble(self, parameters: Mapping[str, float]) -> "Structure":
         """The structure with some numbers exchanged.
 
@@ -156,9 +150,6 @@ class Structure(MovingStructure, PushedStructure):
         """
         structure: Structure = assembled(self, parameters)
         return structure
-
-    def with_substeps(self, substeps: int | None) -> "Structure":
-        return replace(self, substeps=substeps)
 
     def responses(
         self,
