@@ -4,7 +4,7 @@ With den monic the plant's states are x_j = s^j / den(s) u, j = 0 ... n - 1, in 
 coefficients of den at most one. The steps between samples are exact (`hysim.kernels.linear`).
 """
 
-from typing import NamedTuple, Self
+from typing import Any, NamedTuple, Self
 
 import numpy as np
 import numpy.typing as npt
@@ -39,10 +39,8 @@ def affine_columns(
     n_sets, n = monic.shape
     out = np.empty((n_sets, u.size, n + 2 + (n if zeros is None else zeros)))
     with np.errstate(all="ignore"):
-        F, rate, scaled = scaled_companion(monic, sample_time)
         late = np.minimum(np.broadcast_to(delay, n_sets) / sample_time, float(u.size))
-        lags, parts = np.floor(late).astype(np.int64), late % 1.0
-        A, B0, B1 = transitions(F, rate * sample_time * np.stack([parts, 1.0 - parts], axis=1))
+        (A, B0, B1, lags, parts), rate, scaled = _stepped(monic, late, sample_time)
         back = rate ** -np.arange(n + 1.0)
     level = np.append(0.0, u)
     rise = np.append(0.0, np.diff(u, append=u[-1:])) if hold == "foh" else np.zeros_like(level)
@@ -83,13 +81,10 @@ class LinearPlants(NamedTuple):
         """From denominators (n_sets, n), numerators (n_sets, n + 1) and dead times (n_sets,), in seconds."""
         n = monic.shape[1]
         with np.errstate(all="ignore"):
-            F, rate, _ = scaled_companion(monic, sample_time)
-            late = np.minimum(delays / sample_time, _NEVER)
-            lags, parts = np.floor(late).astype(np.int64), late % 1.0
-            A, B0, B1 = transitions(F, rate * sample_time * np.stack([parts, 1.0 - parts], axis=1))
+            stepped, rate, _ = _stepped(monic, np.minimum(delays / sample_time, _NEVER), sample_time)
             D = numerators[:, 0]
             C = (numerators[:, 1:] - D[:, np.newaxis] * monic)[:, ::-1] * rate ** -np.arange(n, 0.0, -1.0)
-        return cls(A, B0, B1, lags, parts, C, D, rate)
+        return cls(*stepped, C, D, rate)
 
     def filtered(self, u: FloatArray, *, hold: str, sample: str) -> FloatArray:
         """Outputs (n_sets, n_inputs, n_samples) from rest for the inputs `u` of this shape, or (1, ...)."""
@@ -141,6 +136,14 @@ class LinearPlants(NamedTuple):
         state[0], state[2], state[state.size - ring :] = u0, ring, u0
         if n:
             state[kernels.N_BEFORE] = level * self.rate[0, 0] ** n
+
+
+def _stepped(monic: FloatArray, late: FloatArray, sample_time: float) -> tuple[tuple[Any, ...], FloatArray, FloatArray]:
+    """A, B0, B1, lags and parts of plants that are `late` (n_sets,) [samples]; rates and scaled coefficients."""
+    F, rate, scaled = scaled_companion(monic, sample_time)
+    parts = late % 1.0
+    matrices = transitions(F, rate * sample_time * np.stack([parts, 1.0 - parts], axis=1))
+    return (*matrices, np.floor(late).astype(np.int64), parts), rate, scaled
 
 
 def scaled_companion(monic: FloatArray, sample_time: float) -> tuple[FloatArray, FloatArray, FloatArray]:

@@ -215,30 +215,25 @@ class UnitGain:
 
     def filtered_sets(self, parameters: Parameters, signals: FloatArray, sample_time: float) -> FloatArray:
         """Outputs (n_sets, n_signals, n_samples) for the inputs `signals` of this shape, or (1, ...)."""
-        monic = self._monic(parameters)
+        monic = self.structure.monic(parameters)
         numerators = np.zeros((len(monic), monic.shape[1] + 1))
         for name in (*self.shape, f"num[{self.structure.zeros}]"):
             place = monic.shape[1] - self.structure.zeros + int(name[4:-1])
             numerators[:, place] = parameters[name]
-        plants = LinearPlants.of(monic, numerators, self._delays(parameters, len(monic)), sample_time)
+        delay = parameters["delay"] if self.structure.delay is None else self.structure.delay
+        delays = np.broadcast_to(np.asarray(delay, dtype=float), len(monic))
+        plants = LinearPlants.of(monic, numerators, delays, sample_time)
         return plants.filtered(signals, hold=self.structure.hold, sample=self.structure.sample)
 
     def free_responses(self, parameters: Parameters, record: Record) -> FloatArray:
         """Columns of the initial state, (n_sets, n_samples, n)."""
-        monic = self._monic(parameters)
+        monic = self.structure.monic(parameters)
         hold, sample = self.structure.hold, self.structure.sample
         return affine_columns(monic, record.u, record.sample_time, zeros=0, hold=hold, sample=sample)[..., 1:-1]
 
     def assemble(self, parameters: Mapping[str, float]) -> Any:
         """The transfer function with these parameters."""
         return self.structure.assemble(parameters)
-
-    def _monic(self, parameters: Parameters) -> FloatArray:
-        return np.stack([np.atleast_1d(parameters[name]) for name in self.structure.denominator], axis=1)
-
-    def _delays(self, parameters: Parameters, n_sets: int) -> FloatArray:
-        delay = parameters["delay"] if self.structure.delay is None else self.structure.delay
-        return np.broadcast_to(np.asarray(delay, dtype=float), n_sets)
 
     def _parameters(self, found: dict[str, FloatArray], shape: FloatArray) -> dict[str, FloatArray]:
         """With the numerator; it is den_n in front of the last power."""

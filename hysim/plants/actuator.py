@@ -27,7 +27,7 @@ from hysim.models.protocols import (
 )
 from hysim.plants.actuator_structure import ActuatorStructure
 from hysim.plants.amplifier import Amplifier
-from hysim.plants.chain import Chain, ChainState, linear_chain
+from hysim.plants.chain import Chain, ChainState, Stages, linear_chain
 from hysim.plants.creep import Creep
 from hysim.plants.sampled import Stage, Vibration
 from hysim.plants.sensor import Sensor
@@ -412,15 +412,7 @@ class Actuator:
         """The actuator as it is stepped at a sample time [s]."""
         if sample_time is None:
             raise ValueError("an actuator that moves in time needs sample_time")
-        return Chain(
-            amplifier=self.amplifier,
-            hysteresis=self.hysteresis,
-            creep=self.creep,
-            vibration=self.vibration,
-            sensor=self.sensor,
-            sample_time=sample_time,
-            substeps=substeps,
-        )
+        return Chain(Stages(**items(self)), sample_time, substeps)
 
     def linear(self, sample_time: float) -> tuple[Stage, float]:
         """From command to measurement with a law of the slope one, without limits; and its dead time [s]."""

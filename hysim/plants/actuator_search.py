@@ -23,8 +23,8 @@ from hysim._parallel import in_chunks
 from hysim.kernels.actuators import columns as kernels
 from hysim.models.search_space import Parameters, SearchSpace
 from hysim.plants.amplifier import Amplifier
-from hysim.plants.chain import Chain
-from hysim.plants.linear_parts import DAMPING, FREQUENCY, GAIN, Stages
+from hysim.plants.chain import Chain, Stages
+from hysim.plants.linear_parts import DAMPING, FREQUENCY, GAIN
 from hysim.records import Record
 
 Rows = npt.NDArray[np.intp]
@@ -103,14 +103,7 @@ def _distinct(parameters: Parameters, n_sets: int) -> tuple[list[dict[str, float
 @functools.lru_cache(maxsize=64)
 def _chain(stages: Stages, step: float) -> Chain:
     """The stages at a sample time; where inputs are compared, they are the same for all of them."""
-    return Chain(
-        amplifier=stages.amplifier,
-        hysteresis=None,
-        creep=stages.creep,
-        vibration=stages.vibration,
-        sensor=None,
-        sample_time=step,
-    )
+    return Chain(stages, step)
 
 
 def _voltage(chain: Chain, u: FloatArray) -> FloatArray:

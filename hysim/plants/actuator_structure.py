@@ -166,10 +166,11 @@ class ActuatorStructure(Identifiable):
         """The actuator with these parameters."""
         parts, law = self.parts([]), self.law.assemble(own(parameters, _LAW))
         if not isinstance(law, InputSum):
-            return self.family(hysteresis=law, sensor=self.sensor, **parts.stages(parameters)._asdict())
+            stages = parts.stages(parameters)._replace(hysteresis=law, sensor=self.sensor)
+            return self.family(**stages._asdict())
+        several = {name: parts.stages(parameters, name=name) for name in law.laws}
         actuators = [
-            self.family(hysteresis=each, **parts.stages(parameters, name=name)._asdict())
-            for name, each in law.laws.items()
+            self.family(**several[name]._replace(hysteresis=each)._asdict()) for name, each in law.laws.items()
         ]
         return MultiInputActuator(inputs=self.inputs, actuators=tuple(actuators))
 

@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from hysim._frozen import FloatArray, read_only
+from hysim._frozen import FloatArray, check_not_negative, check_positive, read_only
 from hysim.models.model import family
 
 
@@ -64,8 +64,7 @@ class Amplifier:
             raise ValueError(f"limits must be (lowest, highest), got {self.limits}")
         if self.slew_rate is not None and not self.slew_rate > 0.0:
             raise ValueError(f"slew_rate must be positive, got {self.slew_rate}; None takes the bound away")
-        if self.time_constant < 0.0:
-            raise ValueError(f"time_constant must not be negative, got {self.time_constant}")
+        check_not_negative(time_constant=self.time_constant)
 
     @classmethod
     def non_inverting(
@@ -90,15 +89,10 @@ class Amplifier:
         >>> hs.Amplifier.non_inverting(feedback_resistance=9e3, input_resistance=1e3, slew_rate=0.5e6).gain
         10.0
         """
-        if not input_resistance > 0.0:
-            raise ValueError(f"input_resistance must be positive, got {input_resistance}")
-        for name, value in (
-            ("feedback_resistance", feedback_resistance),
-            ("output_resistance", output_resistance),
-            ("capacitance", capacitance),
-        ):
-            if value < 0.0:
-                raise ValueError(f"{name} must not be negative, got {value}")
+        check_positive(input_resistance=input_resistance)
+        check_not_negative(
+            feedback_resistance=feedback_resistance, output_resistance=output_resistance, capacitance=capacitance
+        )
         return cls(
             gain=1.0 + feedback_resistance / input_resistance,
             limits=limits,
@@ -128,8 +122,7 @@ class Amplifier:
         >>> round(ua741.full_power_bandwidth(5.0)), round(ua741.full_power_bandwidth(50.0))
         (15915, 1592)
         """
-        if not amplitude > 0.0:
-            raise ValueError(f"amplitude must be positive, got {amplitude}")
+        check_positive(amplitude=amplitude)
         return math.inf if self.slew_rate is None else self.slew_rate / (2.0 * math.pi * amplitude)
 
     def voltage(self, u: npt.ArrayLike) -> FloatArray:

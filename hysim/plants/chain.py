@@ -11,13 +11,13 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from hysim._frozen import FloatArray, read_only
+from hysim._frozen import FloatArray, check_count, read_only
 from hysim._progress import Progress
 from hysim.kernels import controllers
 from hysim.kernels import loop as kernels
 from hysim.laws.static import Line
 from hysim.models.compiled_step import startable
-from hysim.models.protocols import CompiledController, CompiledLaw, Startable, law_at
+from hysim.models.protocols import CompiledController, CompiledLaw, Startable, law_at, positive_time
 from hysim.plants.amplifier import Amplifier
 from hysim.plants.creep import Creep
 from hysim.plants.sampled import (
@@ -39,6 +39,16 @@ _chain_start = functools.lru_cache(maxsize=256)(kernels.chain_start)
 _CHUNK = 1_000_000
 _PER_TIME_CONSTANT = 4  # sub-steps
 _FEWEST, _MOST = 4, 64  # sub-steps of a sample
+
+
+class Stages(NamedTuple):
+    """The stages of an `Actuator`, in their order."""
+
+    amplifier: Amplifier | None = None
+    hysteresis: Any = None
+    creep: Creep | None = None
+    vibration: Vibration | None = None
+    sensor: Sensor | None = None
 
 
 class ChainState(NamedTuple):
@@ -75,19 +85,9 @@ class Signals(NamedTuple):
 class Chain:
     """The stages of an `Actuator` at the sample time [s] of a controller or of a held voltage."""
 
-    def __init__(
-        self,
-        *,
-        amplifier: Amplifier | None,
-        hysteresis: Any,
-        creep: Creep | None,
-        vibration: Vibration | None,
-        sensor: Sensor | None,
-        sample_time: float,
-        substeps: int | None = None,
-    ) -> None:
-        if not 0.0 < sample_time < math.inf:
-            raise ValueError(f"sample_time must be positive and finite, got {sample_time}")
+    def __init__(self, stages: Stages, sample_time: float, substeps: int | None = None) -> None:
+        amplifier, hysteresis, creep, vibration, sensor = stages
+        positive_time(sample_time)
         self.amplifier, self.sensor = amplifier or Amplifier(), sensor or Sensor()
         self.substeps = _substeps(self.amplifier, sample_time, substeps)
         self.step = sample_time / self.substeps
@@ -159,9 +159,7 @@ class Chain:
         n = reference.size
         law = state.law._replace(state=state.law.state.copy())
         parts = (state.voltages, state.x, state.past, state.readings)
-        plant_state = np.concatenate(parts)
-        noise = self.sensor.noise_samples(state.samples + n)[state.samples :]
-        inputs = read_only(np.stack([reference, noise]), finite=False)
+        plant_state, inputs = np.concatenate(parts), self._inputs(state, reference)
         samples, path = np.empty((4, n)), np.empty((2, n * self.substeps))
         lost = -1
         for start in range(0, n, _CHUNK):
@@ -188,17 +186,19 @@ class Chain:
         Each runs from the state `state` of the chain; the second result is -1 where all are finite.
         """
         n, m = reference.size, len(controllers)
-        noise = self.sensor.noise_samples(state.samples + n)[state.samples :]
-        inputs = read_only(np.stack([reference, noise]), finite=False)
         parameters = np.stack([each.parameters for each in controllers])
         states = np.stack([each.state for each in controllers])
         plant = np.concatenate([state.voltages, state.x, state.past, state.readings])
         y, lost = np.empty((m, n)), np.empty(m, dtype=np.int64)
         kernels.close_each(
             controllers[0].step, parameters, states, state.law.step, state.law.parameters, state.law.state,
-            self._parameters, plant, inputs, y, lost,
+            self._parameters, plant, self._inputs(state, reference), y, lost,
         )  # fmt: skip
         return y, lost
+
+    def _inputs(self, state: ChainState, reference: FloatArray) -> FloatArray:
+        noise = self.sensor.noise_samples(state.samples + reference.size)[state.samples :]
+        return read_only(np.stack([reference, noise]), finite=False)
 
     def driven(self, u: FloatArray, state: ChainState) -> tuple[Signals, ChainState]:
         """Run the commands `u` themselves."""
@@ -267,11 +267,10 @@ def linear_chain(amplifier: Amplifier | None, creep: Creep | None, vibration: Vi
 
 
 def _substeps(amplifier: Amplifier, sample_time: float, substeps: int | None) -> int:
-    if substeps is not None and (not isinstance(substeps, int) or substeps < 1):
-        raise ValueError(f"substeps must be an integer of at least 1, got {substeps}")
+    if substeps is not None:
+        check_count("substeps", substeps)
+        return substeps if amplifier.dynamic else 1
     if not amplifier.dynamic:
         return 1
-    if substeps is not None:
-        return substeps
     wanted = _PER_TIME_CONSTANT * sample_time / amplifier.time_constant if amplifier.time_constant else 0.0
     return min(max(_FEWEST, math.ceil(min(wanted, _MOST))), _MOST)

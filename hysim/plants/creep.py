@@ -9,7 +9,7 @@ import math
 import numpy as np
 import numpy.typing as npt
 
-from hysim._frozen import FloatArray
+from hysim._frozen import FloatArray, check_count, check_positive
 from hysim.models.model import family
 from hysim.plants.state_space import StateSpace
 
@@ -59,8 +59,7 @@ class Creep:
                 f"time_constants and weights must be equally long, got {len(self.time_constants)} and "
                 f"{len(self.weights)}"
             )
-        if min(self.time_constants, default=1.0) <= 0.0:
-            raise ValueError(f"time_constants must be positive, got {min(self.time_constants)}")
+        check_positive(time_constants=min(self.time_constants, default=1.0))
 
     @classmethod
     def per_decade(
@@ -109,8 +108,7 @@ class Creep:
             raise ValueError(f"band must rise from a positive time [s], got {band}")
         if not 0.0 < reference_time < math.inf:
             raise ValueError(f"reference_time must be positive, got {reference_time}")
-        if not isinstance(per_decade_elements, int) or per_decade_elements < 1:
-            raise ValueError(f"per_decade_elements must be an integer of at least 1, got {per_decade_elements}")
+        check_count("per_decade_elements", per_decade_elements)
         decades = math.log10(high / low)
         time_constants = np.geomspace(low, high, 1 + math.ceil(decades * per_decade_elements - 1e-9))
         times = np.geomspace(low, high, 1 + math.ceil(decades * _TIMES_PER_DECADE))

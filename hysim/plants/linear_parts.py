@@ -22,7 +22,7 @@ Of the first two the step response is one at t_0, so that the law keeps the gain
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
@@ -30,9 +30,9 @@ from hysim._frozen import FloatArray, read_only
 from hysim.models.parameters import Coordinate, space_of
 from hysim.models.search_space import Freedom, Parameters, SearchSpace
 from hysim.plants.amplifier import Amplifier
+from hysim.plants.chain import Stages
 from hysim.plants.creep import Creep
 from hysim.plants.multi_input_actuator import MAIN, MultiInputActuator
-from hysim.plants.sampled import Vibration
 from hysim.plants.state_space import Modes
 from hysim.plants.transfer_function import TransferFunction
 from hysim.records import Record
@@ -112,16 +112,12 @@ def creep_bank(creep: Any, shortest: float, longest: float) -> CreepBank | Creep
         whole = Creep.per_decade(1.0, band=(_BAND[0], max(_BAND[1], longest)))
         return CreepBank(whole.time_constants, whole.weights)
     if isinstance(creep, int):
-        return _even_bank(creep, shortest, longest)
+        taus = np.geomspace(shortest, longest, creep + 2)[1:-1]
+        decades = math.log10(longest / shortest) / (creep + 1)
+        reference = float(np.clip(_REFERENCE, taus[0], taus[-1]))
+        return CreepBank(tuple(taus.tolist()), (0.01 * decades,) * creep, reference, sloped=creep > 1)
     slow = [k for k, tau in enumerate(creep) if tau > _BEYOND * longest or tau < shortest / _BEYOND]
     return CreepBank(tuple(creep), None, idle=tuple(slow))
-
-
-def _even_bank(n: int, shortest: float, longest: float) -> CreepBank:
-    taus = np.geomspace(shortest, longest, n + 2)[1:-1]
-    decades = math.log10(longest / shortest) / (n + 1)
-    reference = float(np.clip(_REFERENCE, taus[0], taus[-1]))
-    return CreepBank(tuple(taus.tolist()), (0.01 * decades,) * n, reference, sloped=n > 1)
 
 
 def checked_creep(creep: Any) -> Any:
@@ -189,14 +185,6 @@ def _even_step(record: Record, k: int, n: int) -> float:
         raise ValueError(f"{owner} is not sampled evenly: use Record.resample ({error})") from None
 
 
-class Stages(NamedTuple):
-    """Linear parts of an actuator beside its law."""
-
-    amplifier: Amplifier | None
-    creep: Creep | None
-    vibration: Vibration | None
-
-
 @dataclass(frozen=True)
 class LinearParts:
     """The parts that are searched, and those that are known."""
@@ -211,9 +199,12 @@ class LinearParts:
 
     def spaces(self, freedom: Mapping[str, Freedom]) -> dict[str, SearchSpace]:
         """The search space of each part by its name."""
-        return {
-            name: _space(box, defaults, freedom.get(name, Freedom())) for name, (box, defaults) in self.boxes().items()
-        }
+        spaces = {}
+        for name, (box, defaults) in self.boxes().items():
+            wish = freedom.get(name, Freedom())
+            held = wish.held(defaults)
+            spaces[name] = space_of(box, (), defaults, held, wish.limits(defaults, held))
+        return spaces
 
     def boxes(self) -> dict[str, tuple[tuple[Coordinate, ...], dict[str, float]]]:
         """Coordinates and defaults of each part that has something to be searched."""
@@ -240,9 +231,10 @@ class LinearParts:
         delay = late + (values["vibration.delay"] if self.delay else 0.0)
         if not self.modes:
             through = TransferFunction(num=(1.0,), den=(1.0,), delay=delay) if self.delay or delay else None
-            return Stages(amplifier, creep, through)
+            return Stages(amplifier, creep=creep, vibration=through)
         others = [values[f"vibration.{self.gain_of(k, name)}"] for k in range(1, self.modes)]
-        return Stages(amplifier, creep, self._modes(values, range(self.modes), (1.0 - sum(others), *others), delay))
+        vibration = self._modes(values, range(self.modes), (1.0 - sum(others), *others), delay)
+        return Stages(amplifier, creep=creep, vibration=vibration)
 
     def one_mode(self, values: Mapping[str, float], k: int) -> Stages:
         """The stages with one of the modes, of the gain one."""
@@ -328,8 +320,3 @@ def vibrations_of(start: Any, inputs: Sequence[str], modes: int) -> dict[str, Mo
             n = len(each.gains) if isinstance(each, Modes) else 0
             raise ValueError(f"start has {n} modes behind {name}, and modes={modes}: the search grows none beside them")
     return found
-
-
-def _space(box: tuple[Coordinate, ...], defaults: dict[str, float], freedom: Freedom) -> SearchSpace:
-    held = freedom.held(defaults)
-    return space_of(box, (), defaults, held, freedom.limits(defaults, held))

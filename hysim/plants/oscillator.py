@@ -37,7 +37,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy.linalg import expm
 
-from hysim._frozen import FloatArray, check_choice, check_whole, items, read_only, whole_substeps
+from hysim._frozen import FloatArray, check_choice, check_positive, check_whole, items, read_only, whole_substeps
 from hysim.errors import SimulationError
 from hysim.kernels import oscillator as kernels
 from hysim.kernels.boucwen import prepare
@@ -45,7 +45,7 @@ from hysim.kernels.charts import N_WORK
 from hysim.laws.differential.boucwen import BoucWen
 from hysim.laws.differential.polynomial_boucwen import PolynomialBoucWen
 from hysim.models.model import family
-from hysim.models.protocols import needed_time
+from hysim.models.protocols import needed_time, positive_time
 from hysim.plants.equation_of_motion import METHODS
 from hysim.plants.oscillator_structure import OscillatorStructure
 
@@ -197,8 +197,7 @@ class BoucWenOscillator:
     dynamic: ClassVar[bool] = True
 
     def __post_init__(self) -> None:
-        if self.mass <= 0.0:
-            raise ValueError(f"mass must be positive, got {self.mass}")
+        check_positive(mass=self.mass)
         if not isinstance(self.law, BoucWen | PolynomialBoucWen):
             raise TypeError(f"law must be a BoucWen or a PolynomialBoucWen, got {type(self.law).__name__}")
         options = {"excitation": ("force", "base"), "hold": ("foh", "zoh"), "method": METHODS}
@@ -267,8 +266,7 @@ class BoucWenOscillator:
         inputs = read_only(u, "u", ndim=1)
         if not inputs.size:
             raise ValueError("u must hold one period, got no samples")
-        if not tolerance > 0.0:
-            raise ValueError(f"tolerance must be positive, got {tolerance}")
+        check_positive(tolerance=tolerance)
         state = self._start(float(inputs[-1]))
         motion, largest = np.full((inputs.size, 3), np.nan), np.zeros(3)
 
@@ -433,8 +431,7 @@ class BoucWenOscillator:
     ) -> tuple[FloatArray, FloatArray]:
         """Inputs, and what the kernel carries at their samples, shape (n, 6)."""
         inputs = read_only(u, "u", ndim=1)
-        if not 0.0 < sample_time < math.inf:
-            raise ValueError(f"sample_time must be positive and finite, got {sample_time}")
+        positive_time(sample_time)
         states, done = np.empty((inputs.size, 6)), 0
         if state is None and inputs.size:
             state, done = self._start(float(inputs[0])), 1

@@ -3,7 +3,7 @@
 import numpy as np
 import numpy.typing as npt
 
-from hysim._frozen import FloatArray, check_whole, items, read_only
+from hysim._frozen import FloatArray, check_not_negative, check_whole, read_only
 from hysim.models.model import family
 
 
@@ -43,9 +43,7 @@ class Sensor:
     seed: int = 0
 
     def __post_init__(self) -> None:
-        for name in ("quantum", "noise", "delay"):
-            if items(self)[name] < 0.0:
-                raise ValueError(f"{name} must not be negative, got {items(self)[name]}")
+        check_not_negative(quantum=self.quantum, noise=self.noise, delay=self.delay)
         check_whole(self.seed, "seed", least=0)
 
     def noise_samples(self, n: int) -> FloatArray:

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from hysim._frozen import FloatArray
+from hysim._frozen import FloatArray, check_not_negative, check_positive
 from hysim.models.model import family
 from hysim.plants.transfer_function import TransferFunction
 
@@ -55,8 +55,7 @@ class StateSpace:
                 f"A, B and C must have the shapes (n, n), (n,) and (n,), got {self.A.shape}, {self.B.shape} and "
                 f"{self.C.shape}"
             )
-        if self.delay < 0.0:
-            raise ValueError(f"delay must not be negative, got {self.delay}")
+        check_not_negative(delay=self.delay)
 
     @property
     def poles(self) -> npt.NDArray[np.complex128]:
@@ -115,10 +114,8 @@ def mode(natural_frequency: float, damping_ratio: float, gain: float = 1.0, *, d
     >>> hs.mode(2.0, 0.1).den
     (1.0, 0.4, 4.0)
     """
-    if not natural_frequency > 0.0:
-        raise ValueError(f"natural_frequency must be positive, got {natural_frequency}")
-    if damping_ratio < 0.0:
-        raise ValueError(f"damping_ratio must not be negative, got {damping_ratio}")
+    check_positive(natural_frequency=natural_frequency)
+    check_not_negative(damping_ratio=damping_ratio)
     stiffness = natural_frequency**2
     return TransferFunction(
         num=(gain * stiffness,), den=(1.0, 2.0 * damping_ratio * natural_frequency, stiffness), delay=delay
@@ -170,12 +167,8 @@ class Modes:
                 "natural_frequencies, damping_ratios and gains must be equally long, and hold a mode, got lengths "
                 f"{lengths[0]}, {lengths[1]} and {lengths[2]}"
             )
-        if min(self.natural_frequencies) <= 0.0:
-            raise ValueError(f"natural_frequencies must be positive, got {min(self.natural_frequencies)}")
-        if min(self.damping_ratios) < 0.0:
-            raise ValueError(f"damping_ratios must not be negative, got {min(self.damping_ratios)}")
-        if self.delay < 0.0:
-            raise ValueError(f"delay must not be negative, got {self.delay}")
+        check_positive(natural_frequencies=min(self.natural_frequencies))
+        check_not_negative(damping_ratios=min(self.damping_ratios), delay=self.delay)
 
     @property
     def dc_gain(self) -> float:

@@ -16,7 +16,7 @@ from typing import ClassVar
 import numpy as np
 import numpy.typing as npt
 
-from hysim._frozen import FloatArray, checked, read_only
+from hysim._frozen import FloatArray, check_not_negative, checked, read_only
 from hysim.errors import SimulationError
 from hysim.models.composable import Composable
 from hysim.models.model import family
@@ -102,8 +102,7 @@ class TransferFunction(Composable):
             raise ValueError(f"num and den over the first of den must be finite, got {self.num} and {self.den}")
         if len(self.num) > len(self.den):
             raise ValueError(f"the numerator's degree {len(self.num) - 1} is above the denominator's {self.order}")
-        if self.delay < 0.0:
-            raise ValueError(f"delay must not be negative, got {self.delay}")
+        check_not_negative(delay=self.delay)
         if len(self.initial_state) not in (0, self.order):
             raise ValueError(f"initial_state must be empty or hold {self.order} numbers, got {len(self.initial_state)}")
 
@@ -309,8 +308,7 @@ class TransferFunctionStructure(Identifiable, Composable):
             raise TypeError(f"numbers of poles and zeros must be int, got {self!r}")
         if not 0 <= self.zeros <= self.poles or self.poles < 1:
             raise ValueError(f"there must be at least one pole, and no more zeros than poles, got {self!r}")
-        if self.delay is not None and self.delay < 0.0:
-            raise ValueError(f"delay must not be negative, got {self.delay}")
+        check_not_negative(delay=self.delay)
 
     def __str__(self) -> str:
         poles, zeros = (
@@ -381,10 +379,13 @@ class TransferFunctionStructure(Identifiable, Composable):
 
     def regressors(self, parameters: Parameters, record: Record) -> FloatArray:
         """Columns of the numerator and of the initial state, and zero, (n_sets, n_samples, n_columns + 1)."""
-        monic = np.stack([np.atleast_1d(parameters[name]) for name in self.denominator], axis=1)
         delay = parameters["delay"] if self.delay is None else self.delay
         options = {"hold": self.hold, "sample": self.sample}
-        return affine_columns(monic, record.u, record.sample_time, delay, zeros=self.zeros, **options)
+        return affine_columns(self.monic(parameters), record.u, record.sample_time, delay, zeros=self.zeros, **options)
+
+    def monic(self, parameters: Parameters) -> FloatArray:
+        """Denominators without their leading one, (n_sets, n)."""
+        return np.stack([np.atleast_1d(parameters[name]) for name in self.denominator], axis=1)
 
     def assumed_states(self, record: Record) -> tuple[str, ...]:
         """Rest where input and output begin at zero, else what the record says; none where the structure says it."""
