@@ -141,7 +141,7 @@ def test_the_package_has_the_modules_of_all_steps_and_no_others(all_steps):
 def test_the_modules_of_the_package_are_made_of_the_steps_as_they_are(all_steps):
     for name, kernels in all_steps.items():
         module = gzip.decompress(WASM.joinpath(f"{name}.wasm.gz").read_bytes())
-        assert module.endswith(mark(c_source(kernels))), f"{name} has changed: python -m hysim.export.build_pages"
+        assert module.endswith(mark(c_source(kernels))), f"{name} has changed: python .ci/build_pages.py"
 
 
 def test_the_command_writes_the_same_page(tmp_path, monkeypatch, capsys):

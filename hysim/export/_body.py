@@ -3,22 +3,25 @@
 import ast
 from typing import Any
 
-from hysim.export._c import Known, Scalar, Several, Type, Vector, joined
-from hysim.export._expressions import Expressions
-from hysim.export._scope import (
-    PRIMARY,
-    SUM,
-    UNARY,
+from hysim.export import _c
+from hysim.export._c import (
+    Known,
     Library,
+    Scalar,
     Scope,
+    Several,
     Stretch,
+    Type,
     Value,
+    Vector,
     assignments,
     counters_used_elsewhere,
     homes,
+    joined,
     reads,
     targets,
 )
+from hysim.export._expressions import Expressions
 from hysim.models.tracing.routine import Routine
 
 _STEP = "    "
@@ -149,7 +152,7 @@ class Body:
         begin, stop = (Value("0", Scalar.INT), places[0]) if len(places) == 1 else places[:2]
         self.scope.types[node.target.id] = Scalar.INT
         name = self.scope.c_name(node.target.id)
-        end = stop.within(SUM)
+        end = stop.within(_c.SUM)
         hoisted = ""
         if not end.isdigit() and _changes(node, call):
             end, hoisted = f"{name}_end", f", {name}_end = {stop.text}"
@@ -219,7 +222,7 @@ class Body:
     ) -> list[str]:
         """One assignment; a name that is not read is left out."""
         if isinstance(target, ast.Name) and not self.scope.is_used(target.id):
-            return [f"{indent}(void){self.of.value(node).within(UNARY)};"] if self.of.writes(node) else []
+            return [f"{indent}(void){self.of.value(node).within(_c.UNARY)};"] if self.of.writes(node) else []
         if isinstance(node, ast.Call) and ast.unparse(node.func) == "np.empty" and isinstance(target, ast.Name):
             return [indent + self._room(target, node)]
         value = self.of.any(ast.Name(node.id, ast.Load()) if loaded and isinstance(node, ast.Name) else node)
@@ -304,12 +307,12 @@ class Body:
     def _unpacked(self, target: ast.Tuple, node: ast.expr, declared: set[str]) -> list[str]:
         """Results of a function."""
         if (shaped := self.of.shape(node)) is not None:
-            lengths = [Value(length(), Scalar.INT, SUM) for length in shaped.lengths]
+            lengths = [Value(length(), Scalar.INT, _c.SUM) for length in shaped.lengths]
             return self._numbers(list(zip(target.elts, lengths, strict=True)), declared)
         value: Any = self.of.any(node)
         if isinstance(value, Stretch) and len(value.lengths) == 1:
             numbers = [
-                Value(f"{value.text if value.binds == PRIMARY else f'({value.text})'}[{k}]", Scalar.DOUBLE)
+                Value(f"{value.text if value.binds == _c.PRIMARY else f'({value.text})'}[{k}]", Scalar.DOUBLE)
                 for k in range(len(target.elts))
             ]
             return self._numbers(list(zip(target.elts, numbers, strict=True)), declared)

@@ -1,15 +1,21 @@
-"""C99 for the translator: types, numbers and tables as text, and the functions of Python that C lacks.
+"""C99 for the translator: types, expressions and tables as text, the functions of Python that C lacks, and names.
 
 Types are numbers, vectors of doubles, functions known in advance, and tuples of numbers.
+
+A name is declared in the innermost block that holds all its places. A block within another is taken only if it assigns
+the name before anything else: otherwise the name may keep a value from one pass through a loop to the next.
 """
 
+import ast
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from enum import IntEnum
 from types import MappingProxyType
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, Protocol
 
 import numpy as np
+
+from hysim.models.tracing.routine import Routine
 
 HELPERS = MappingProxyType(
     {
@@ -54,6 +60,10 @@ MATHEMATICS = frozenset(
 """Functions of `math` that C has; the last three are whole numbers in Python, as doubles they do not overflow."""
 TESTS = frozenset(("isfinite", "isinf", "isnan"))
 """Functions of `math` with a truth value."""
+CONDITIONAL, OR, AND, EQUALITY, RELATION, SUM, PRODUCT, UNARY, PRIMARY = range(9)
+"""How strongly the operators of C bind."""
+Place = tuple[int, int]
+"""Identity of a list of statements, and the number of the statement in it."""
 
 
 def number(value: float) -> str:
@@ -132,3 +142,229 @@ def joined(first: Type | None, second: Type) -> Type | None:
     if isinstance(first, Several) and isinstance(second, Several) and len(first.members) == len(second.members):
         return Several(tuple(max(pair) for pair in zip(first.members, second.members, strict=True)))
     return None
+
+
+class Value(NamedTuple):
+    """An expression in C: its text, its type, and how strongly its operator binds."""
+
+    text: str
+    type: Type
+    binds: int = PRIMARY
+
+    def within(self, binds: int) -> str:
+        """Text as an operand of an operator that binds as strongly as this."""
+        return self.text if self.binds >= binds else f"({self.text})"
+
+
+class Stretch(NamedTuple):
+    """An array, or a part of one: the pointer, its lengths as text once they are asked for, and where it lies."""
+
+    text: str
+    lengths: tuple[Callable[[], str], ...]
+    roots: frozenset[str]
+    binds: int = PRIMARY
+
+    @property
+    def type(self) -> Vector:
+        """Its type."""
+        return Vector(len(self.lengths))
+
+
+class Parameter(NamedTuple):
+    """An argument of a C function: its name and type, whether C has it, its lengths, and whether it is written to."""
+
+    name: str
+    type: Type
+    is_used: bool
+    axes: tuple[int, ...]
+    is_written: bool
+
+
+class Function(NamedTuple):
+    """A translated function: its name in C, its arguments, and its result."""
+
+    name: str
+    parameters: tuple[Parameter, ...]
+    returns: Type | None
+
+
+class Library(Protocol):
+    """Collection of functions, tables and helpers."""
+
+    helpers: set[str]
+
+    def function(self, of: Callable[..., Any], types: tuple[Type, ...]) -> Function:
+        """The C function of a kernel for arguments of these types."""
+
+    def table(self, name: str, values: Any) -> str:
+        """Name of a constant vector."""
+
+
+class Uses(NamedTuple):
+    """Everything that one pass through a function has learnt; see `Scope`."""
+
+    types: dict[str, Type]
+    roots: dict[str, frozenset[str]]
+    lengths: set[tuple[str, int]]
+    written: set[str]
+    used: set[str]
+
+
+class Scope:
+    """Names of a function while it is translated, and what was learnt about them.
+
+    Parameters
+    ----------
+    source, arguments : Routine and dict
+        The function, and the types of its arguments.
+
+    Attributes
+    ----------
+    types : dict
+        Type of each local name, as far as it is known.
+    lengths : set of (str, int)
+        Arrays and their axes whose length is used.
+    written, used : set of str
+        Arrays that are written to, and names that are read.
+    roots : dict
+        Arrays in which a local array lies.
+    before : Uses, optional
+        What the last pass has learnt.
+    """
+
+    def __init__(self, source: Routine, arguments: dict[str, Type]) -> None:
+        self.source = source
+        self.types: dict[str, Type] = dict(arguments)
+        self.roots: dict[str, frozenset[str]] = {}
+        self.lengths: set[tuple[str, int]] = set()
+        self.written: set[str] = set()
+        self.used: set[str] = set()
+        self.before: Uses | None = None
+
+    def again(self) -> bool:
+        """Begin another pass; False if the last one has learnt nothing new."""
+        uses = Uses(dict(self.types), dict(self.roots), self.lengths, self.written, self.used)
+        settled, self.before = uses == self.before, uses
+        self.lengths, self.written, self.used = set(), set(), set()
+        return not settled
+
+    def is_used(self, name: str) -> bool:
+        """Whether a name was read in the last pass."""
+        return self.before is None or name in self.before.used
+
+    def is_written(self, name: str) -> bool:
+        """Whether an array was written to in the last pass."""
+        return self.before is not None and bool((self.roots.get(name, frozenset()) | {name}) & self.before.written)
+
+    def axes(self, name: str) -> tuple[int, ...]:
+        """Axes of an array whose lengths were used in the last pass."""
+        return () if self.before is None else tuple(sorted(axis for each, axis in self.before.lengths if each == name))
+
+    def assign(self, name: str, type_: Type, node: ast.AST) -> None:
+        """Note that a name gets a value of this type."""
+        known = joined(self.types.get(name), type_)
+        if known is None:
+            raise self.source.refusal(node, f"{name} cannot be both {self.types[name]} and {type_}")
+        self.types[name] = known
+
+    def write(self, name: str) -> None:
+        """Note that a vector is written to."""
+        self.written |= {name} | self.roots.get(name, frozenset())
+
+    def c_name(self, name: str) -> str:
+        """The name in C, which is none of a function that an expression may call."""
+        plain_name = name.strip("_") or "ignored"
+        return f"{plain_name}_" if plain_name in RESERVED | HELPERS.keys() | MATHEMATICS | TESTS else plain_name
+
+
+def homes(body: list[ast.stmt], arguments: Iterable[str]) -> Mapping[Place, list[str]]:
+    """Names that are declared at each statement, in the order in which they appear."""
+    local = assignments(body).keys() - set(arguments)
+    names = {name: None for statement in body for name in _mentioned(statement) if name in local}
+    placed: dict[Place, list[str]] = {}
+    for name in names:
+        if (home := _home(body, name)) is not None:
+            placed.setdefault(home, []).append(name)
+    return placed
+
+
+def assignments(body: list[ast.stmt]) -> Mapping[str, int]:
+    """The number of statements that assign each name."""
+    counts: dict[str, int] = {}
+    for node in (node for statement in body for node in ast.walk(statement)):
+        if isinstance(node, ast.Name) and isinstance(node.ctx, ast.Store):
+            counts[node.id] = counts.get(node.id, 0) + 1
+    return counts
+
+
+def counters_used_elsewhere(body: list[ast.stmt]) -> list[ast.For]:
+    """Loops whose counting name is assigned within them, or has another use outside such loops."""
+    loops = [node for statement in body for node in ast.walk(statement) if isinstance(node, ast.For)]
+    outside = {name for statement in body for name in _mentioned(statement)}
+    return [
+        loop
+        for loop in loops
+        if isinstance(loop.target, ast.Name)
+        and (loop.target.id in assignments(loop.body) or loop.target.id in outside - {"_"})
+    ]
+
+
+def targets(statement: ast.stmt) -> list[str]:
+    """Names that a statement assigns, if it is a plain assignment."""
+    if not isinstance(statement, ast.Assign):
+        return []
+    each = [
+        part for target in statement.targets for part in (target.elts if isinstance(target, ast.Tuple) else [target])
+    ]
+    return [target.id for target in each if isinstance(target, ast.Name)]
+
+
+def reads(node: ast.AST) -> set[str]:
+    """Names that are read in an expression or a statement."""
+    return {each.id for each in ast.walk(node) if isinstance(each, ast.Name) and isinstance(each.ctx, ast.Load)}
+
+
+def _home(block: list[ast.stmt], name: str) -> Place | None:
+    numbers = [k for k, statement in enumerate(block) if name in _mentioned(statement)]
+    if not numbers:
+        return None
+    if len(numbers) == 1:
+        within = [inner for inner in _blocks(block[numbers[0]]) if any(name in _mentioned(each) for each in inner)]
+        if len(within) == 1 and name not in _headed(block[numbers[0]]) and _begins_with(within[0], name):
+            return _home(within[0], name)
+    return id(block), numbers[0]
+
+
+def _begins_with(block: list[ast.stmt], name: str) -> bool:
+    """Whether the first statement with the name assigns it, or holds a block that does."""
+    first = next(statement for statement in block if name in _mentioned(statement))
+    if name in targets(first):
+        assert isinstance(first, ast.Assign)
+        return name not in reads(first.value)
+    within = [inner for inner in _blocks(first) if any(name in _mentioned(each) for each in inner)]
+    others = sum(name in _mentioned(statement) for statement in block) > 1
+    return len(within) == 1 and not others and name not in _headed(first) and _begins_with(within[0], name)
+
+
+def _blocks(statement: ast.stmt) -> list[list[ast.stmt]]:
+    if isinstance(statement, ast.If):
+        return [statement.body, statement.orelse]
+    return [statement.body] if isinstance(statement, ast.For | ast.While) else []
+
+
+def _headed(statement: ast.stmt) -> set[str]:
+    """Names in the head of a compound statement."""
+    if isinstance(statement, ast.For):
+        return set(_mentioned(statement.iter))
+    return set(_mentioned(statement.test)) if isinstance(statement, ast.If | ast.While) else set()
+
+
+def _mentioned(node: ast.AST) -> dict[str, None]:
+    """Names in a statement in their order, without those that a `for` in it counts with."""
+    if isinstance(node, ast.For):
+        assert isinstance(node.target, ast.Name)
+        inner = {name: None for statement in node.body for name in _mentioned(statement) if name != node.target.id}
+        return {**_mentioned(node.iter), **inner}
+    if isinstance(node, ast.Name):
+        return {node.id: None}
+    return {name: None for child in ast.iter_child_nodes(node) for name in _mentioned(child)}

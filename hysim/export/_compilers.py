@@ -8,7 +8,7 @@ and exports
     run(parameters, n_parameters, state, n_state, u, y, n)                            n outputs, the state moves along
 
 where all but the sizes and `u0` are addresses of doubles. The modules of hysim's own laws are files of the package,
-compressed, and each says of which C text it was made; ``python -m hysim.export.build_pages`` writes them anew. A step
+compressed, and each says of which C text it was made; ``python .ci/build_pages.py`` writes them anew. A step
 of the user is compiled when a page is written, which needs the extra `export`.
 """
 

@@ -15,31 +15,20 @@ from typing import Any
 import numpy as np
 
 from hysim.export import _c
-from hysim.export._c import Known, Scalar, Several, Type, Vector
-from hysim.export._scope import (
-    AND,
-    CONDITIONAL,
-    EQUALITY,
-    OR,
-    PRIMARY,
-    PRODUCT,
-    RELATION,
-    SUM,
-    UNARY,
-    Library,
-    Parameter,
-    Scope,
-    Stretch,
-    Value,
-)
+from hysim.export._c import Known, Library, Parameter, Scalar, Scope, Several, Stretch, Type, Value, Vector
 from hysim.kernels.stepping import borrowed
 from hysim.models.tracing.routine import UntranslatableError, plain
 
-_OPERATORS = MappingProxyType({ast.Add: ("+", SUM), ast.Sub: ("-", SUM), ast.Mult: ("*", PRODUCT)})
+_OPERATORS = MappingProxyType({ast.Add: ("+", _c.SUM), ast.Sub: ("-", _c.SUM), ast.Mult: ("*", _c.PRODUCT)})
 _COMPARED = MappingProxyType(
     {
-        **{ast.Lt: ("<", RELATION), ast.LtE: ("<=", RELATION), ast.Gt: (">", RELATION), ast.GtE: (">=", RELATION)},
-        **{ast.Eq: ("==", EQUALITY), ast.NotEq: ("!=", EQUALITY)},
+        **{
+            ast.Lt: ("<", _c.RELATION),
+            ast.LtE: ("<=", _c.RELATION),
+            ast.Gt: (">", _c.RELATION),
+            ast.GtE: (">=", _c.RELATION),
+        },
+        **{ast.Eq: ("==", _c.EQUALITY), ast.NotEq: ("!=", _c.EQUALITY)},
     }
 )
 
@@ -64,7 +53,7 @@ class Expressions:
         result = self.value(node)
         if result.type is Scalar.BOOL:
             return result
-        return Value(f"{result.within(EQUALITY + 1)} != 0", Scalar.BOOL, EQUALITY)
+        return Value(f"{result.within(_c.EQUALITY + 1)} != 0", Scalar.BOOL, _c.EQUALITY)
 
     def index(self, node: ast.expr) -> Value:
         """An integer."""
@@ -107,9 +96,9 @@ class Expressions:
         if isinstance(value, bool | np.bool_):
             return Value(str(int(value)), Scalar.BOOL)
         if isinstance(value, int | np.integer):
-            return Value(str(int(value)), Scalar.INT, PRIMARY if value >= 0 else UNARY)
+            return Value(str(int(value)), Scalar.INT, _c.PRIMARY if value >= 0 else _c.UNARY)
         if isinstance(value, float):
-            return Value(_c.number(value), Scalar.DOUBLE, UNARY if math.copysign(1.0, value) < 0.0 else PRIMARY)
+            return Value(_c.number(value), Scalar.DOUBLE, _c.UNARY if math.copysign(1.0, value) < 0.0 else _c.PRIMARY)
         if value is None or callable(plain(value)):
             return Value("", Known(None if value is None else plain(value)))
         if _c.is_table(value):
@@ -142,7 +131,7 @@ class Expressions:
 
     def _attribute(self, node: ast.Attribute) -> Value | Stretch:
         if node.attr == "size" and isinstance(self._type(node.value), Vector):
-            return Value(self._vector(node.value, quietly=True).lengths[0](), Scalar.INT, SUM)
+            return Value(self._vector(node.value, quietly=True).lengths[0](), Scalar.INT, _c.SUM)
         owner = self._module(node.value)
         if owner is None or node.attr not in vars(owner):
             raise self._refusal(node, f"{ast.unparse(node)} is unknown")
@@ -177,13 +166,13 @@ class Expressions:
             sign, binds = _OPERATORS[type(node.op)]
             return Value(f"{left.within(binds)} {sign} {right.within(binds + 1)}", kind, binds)
         if isinstance(node.op, ast.Div):
-            first = left.within(PRODUCT) if kind is Scalar.DOUBLE else f"(double){left.within(UNARY)}"
-            return Value(f"{first} / {right.within(PRODUCT + 1)}", Scalar.DOUBLE, PRODUCT)
+            first = left.within(_c.PRODUCT) if kind is Scalar.DOUBLE else f"(double){left.within(_c.UNARY)}"
+            return Value(f"{first} / {right.within(_c.PRODUCT + 1)}", Scalar.DOUBLE, _c.PRODUCT)
         if isinstance(node.op, ast.Pow):
             return self._power(node, left, right)
         if isinstance(node.op, ast.BitAnd | ast.BitOr) and kind is Scalar.INT:
             sign = "&" if isinstance(node.op, ast.BitAnd) else "|"
-            return Value(f"({left.within(UNARY)} {sign} {right.within(UNARY)})", max(types))
+            return Value(f"({left.within(_c.UNARY)} {sign} {right.within(_c.UNARY)})", max(types))
         if isinstance(node.op, ast.FloorDiv | ast.Mod) and kind is Scalar.INT:
             helper = "floor_quotient" if isinstance(node.op, ast.FloorDiv) else "floor_rest"
             return self._helped(helper, Scalar.INT, left, right)
@@ -193,26 +182,26 @@ class Expressions:
         constant = node.right.value if isinstance(node.right, ast.Constant) else None
         if constant in (2, 3, 4) and isinstance(constant, int):
             if constant == 2 and isinstance(node.left, ast.Name):
-                return Value(f"{base.text} * {base.text}", base.type, PRODUCT)
+                return Value(f"{base.text} * {base.text}", base.type, _c.PRODUCT)
             return self._helped(f"power_{constant}", Scalar.DOUBLE, base)
         return Value(f"pow({base.text}, {exponent.text})", Scalar.DOUBLE)
 
     def _unary(self, node: ast.UnaryOp) -> Value:
         if isinstance(node.op, ast.Not):
-            return Value(f"!{self.condition(node.operand).within(UNARY + 1)}", Scalar.BOOL, UNARY)
+            return Value(f"!{self.condition(node.operand).within(_c.UNARY + 1)}", Scalar.BOOL, _c.UNARY)
         operand = self.value(node.operand)
         if isinstance(node.op, ast.USub):
-            return Value(f"-{operand.within(UNARY + 1)}", max(operand.type, Scalar.INT), UNARY)
+            return Value(f"-{operand.within(_c.UNARY + 1)}", max(operand.type, Scalar.INT), _c.UNARY)
         if isinstance(node.op, ast.UAdd):
             return operand
         raise self._refusal(node, f"{ast.unparse(node)} has no translation")
 
     def _junction(self, node: ast.BoolOp) -> Value:
-        sign, binds = ("&&", AND) if isinstance(node.op, ast.And) else ("||", OR)
+        sign, binds = ("&&", _c.AND) if isinstance(node.op, ast.And) else ("||", _c.OR)
         parts = [self.value(each) for each in node.values]
         if any(part.type is not Scalar.BOOL for part in parts):
             raise self._refusal(node, "`and` and `or` join truth values")
-        return Value(f" {sign} ".join(part.within(EQUALITY) for part in parts), Scalar.BOOL, binds)
+        return Value(f" {sign} ".join(part.within(_c.EQUALITY) for part in parts), Scalar.BOOL, binds)
 
     def _comparison(self, node: ast.Compare) -> Value:
         if (known := self.known(node)) is not None:
@@ -221,26 +210,26 @@ class Expressions:
         parts = [self._compared(node, *each) for each in pairs]
         if len(parts) == 1:
             return parts[0]
-        return Value(" && ".join(part.within(EQUALITY) for part in parts), Scalar.BOOL, AND)
+        return Value(" && ".join(part.within(_c.EQUALITY) for part in parts), Scalar.BOOL, _c.AND)
 
     def _compared(self, node: ast.AST, left: ast.expr, right: ast.expr, operator: ast.cmpop) -> Value:
         if isinstance(operator, ast.In | ast.NotIn) and isinstance(right, ast.Tuple):
-            sign, join, binds = ("==", " || ", OR) if isinstance(operator, ast.In) else ("!=", " && ", AND)
-            first = self.value(left).within(SUM)
+            sign, join, binds = ("==", " || ", _c.OR) if isinstance(operator, ast.In) else ("!=", " && ", _c.AND)
+            first = self.value(left).within(_c.SUM)
             return Value(
-                join.join(f"{first} {sign} {self.value(e).within(SUM)}" for e in right.elts), Scalar.BOOL, binds
+                join.join(f"{first} {sign} {self.value(e).within(_c.SUM)}" for e in right.elts), Scalar.BOOL, binds
             )
         if type(operator) not in _COMPARED:
             raise self._refusal(node, "this comparison has no translation")
         sign, binds = _COMPARED[type(operator)]
-        return Value(f"{self.value(left).within(SUM)} {sign} {self.value(right).within(SUM)}", Scalar.BOOL, binds)
+        return Value(f"{self.value(left).within(_c.SUM)} {sign} {self.value(right).within(_c.SUM)}", Scalar.BOOL, binds)
 
     def _choice(self, node: ast.IfExp) -> Value | Stretch:
         if (known := self.known(node.test)) is not None:
             return self.any(node.body if known else node.orelse)
         test, first, second = self.condition(node.test), self.value(node.body), self.value(node.orelse)
         kind = max(first.type, second.type)
-        return Value(f"{test.within(OR)} ? {first.within(OR)} : {second.text}", kind, CONDITIONAL)
+        return Value(f"{test.within(_c.OR)} ? {first.within(_c.OR)} : {second.text}", kind, _c.CONDITIONAL)
 
     # ------------------------------------------------------------------------------ vectors
 
@@ -254,13 +243,14 @@ class Expressions:
         if (shaped := self.shape(node.value)) is not None:
             if not isinstance(node.slice, ast.Constant) or not isinstance(node.slice.value, int):
                 raise self._refusal(node, "the axis of a shape is a number")
-            return Value(shaped.lengths[node.slice.value](), Scalar.INT, SUM)
+            return Value(shaped.lengths[node.slice.value](), Scalar.INT, _c.SUM)
         if not isinstance(node.slice, ast.Slice):
             whole = self.any(node.value)
             if isinstance(whole, Value):
                 return self._member(node, whole)
             return Value(
-                f"{whole.text if whole.binds == PRIMARY else f'({whole.text})'}{self.place(node, whole)}", Scalar.DOUBLE
+                f"{whole.text if whole.binds == _c.PRIMARY else f'({whole.text})'}{self.place(node, whole)}",
+                Scalar.DOUBLE,
             )
         whole = self.stretch(node.value)
         if node.slice.step is not None:
@@ -269,17 +259,17 @@ class Expressions:
         upper = node.slice.upper
 
         def length() -> str:
-            stop = Value(whole.lengths[0](), Scalar.INT, SUM) if upper is None else self.index(upper)
-            return stop.text if first is None else f"{stop.within(SUM)} - {first.within(SUM + 1)}"
+            stop = Value(whole.lengths[0](), Scalar.INT, _c.SUM) if upper is None else self.index(upper)
+            return stop.text if first is None else f"{stop.within(_c.SUM)} - {first.within(_c.SUM + 1)}"
 
         lengths = (length, *whole.lengths[1:])
         if first is None:
             return whole._replace(lengths=lengths)
         offset = first
         for each in whole.lengths[1:]:
-            row = Value(each(), Scalar.INT, SUM).within(PRODUCT + 1)
-            offset = Value(f"{offset.within(PRODUCT)} * {row}", Scalar.INT, PRODUCT)
-        return Stretch(f"{whole.text} + {offset.within(SUM + 1)}", lengths, whole.roots, SUM)
+            row = Value(each(), Scalar.INT, _c.SUM).within(_c.PRODUCT + 1)
+            offset = Value(f"{offset.within(_c.PRODUCT)} * {row}", Scalar.INT, _c.PRODUCT)
+        return Stretch(f"{whole.text} + {offset.within(_c.SUM + 1)}", lengths, whole.roots, _c.SUM)
 
     def _member(self, node: ast.Subscript, several: Value) -> Value:
         """One of the numbers that a function returns together."""
@@ -301,9 +291,9 @@ class Expressions:
             if total.text == "0":
                 total = self.index(part)
                 continue
-            times = Value(length(), Scalar.INT, SUM).within(PRODUCT + 1)
-            text = f"{total.within(PRODUCT)} * {times} + {self.index(part).within(SUM + 1)}"
-            total = Value(text, Scalar.INT, SUM)
+            times = Value(length(), Scalar.INT, _c.SUM).within(_c.PRODUCT + 1)
+            text = f"{total.within(_c.PRODUCT)} * {times} + {self.index(part).within(_c.SUM + 1)}"
+            total = Value(text, Scalar.INT, _c.SUM)
         return f"[{total.text}]"
 
     # ------------------------------------------------------------------------------ calls
@@ -348,14 +338,14 @@ class Expressions:
     def _builtin(self, node: ast.Call, called: Any) -> Value | None:
         """A call of a function that C has, or that is a helper; None for another one."""
         if called is len:
-            return Value(self.quietly(node.args[0]).lengths[0](), Scalar.INT, SUM)
+            return Value(self.quietly(node.args[0]).lengths[0](), Scalar.INT, _c.SUM)
         name = called.__name__ if isinstance(called, BuiltinFunctionType) and called.__module__ == "math" else ""
         if called in (float, int, bool, abs, min, max) or name:
             values = [self.value(each) for each in node.args]
         if called in (float, int):
             kind = Scalar.DOUBLE if called is float else Scalar.INT
             (value,) = values
-            return value if value.type is kind else Value(f"({kind.c_type}){value.within(UNARY)}", kind, UNARY)
+            return value if value.type is kind else Value(f"({kind.c_type}){value.within(_c.UNARY)}", kind, _c.UNARY)
         if called is bool:
             return self.condition(node.args[0])
         if called is abs:
@@ -366,7 +356,7 @@ class Expressions:
         if called in (min, max):
             return self._extreme("smaller" if called is min else "larger", values)
         if name in _c.TESTS:
-            return Value(f"{name}({values[0].text}) != 0", Scalar.BOOL, EQUALITY)
+            return Value(f"{name}({values[0].text}) != 0", Scalar.BOOL, _c.EQUALITY)
         if name in _c.MATHEMATICS:
             return Value(f"{name}({', '.join(value.text for value in values)})", Scalar.DOUBLE)
         return None

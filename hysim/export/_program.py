@@ -21,9 +21,8 @@ from hysim._frozen import FloatArray, frozen, read_only
 from hysim.control import Controller, InverseFeedforward, RestingPlant, TrackingController, begun, preview
 from hysim.export import _c
 from hysim.export._body import Body
-from hysim.export._c import Known, Scalar, Several, Type, Vector
+from hysim.export._c import Function, Known, Parameter, Scalar, Several, Type, Vector
 from hysim.export._packing import packing
-from hysim.export._scope import Function, Parameter
 from hysim.kernels.controllers import guarded
 from hysim.kernels.stepping import Start, Step, complete
 from hysim.models.law import Law

@@ -1,4 +1,4 @@
-"""Compile the steps of all laws of the registry to WebAssembly: ``python -m hysim.export.build_pages [FOLDER]``.
+"""Compile the steps of all laws of the registry to WebAssembly: ``python .ci/build_pages.py [FOLDER]``.
 
 It writes the modules that pages embed, by default into the package. It needs the extra `export`, whose ziglang is
 pinned, so that the same sources give the same bytes.
@@ -10,6 +10,8 @@ from pathlib import Path
 from hysim.export._compilers import FOLDER, Kernels, c_source, compiled, compressed
 from hysim.export._page_model import steps_of
 from hysim.export._page_presets import presets
+
+ROOT = Path(__file__).resolve().parent.parent
 
 
 def kernels() -> list[Kernels]:
@@ -28,4 +30,4 @@ def main(folder: Path) -> None:
 
 
 if __name__ == "__main__":
-    main(Path(sys.argv[1]) if len(sys.argv) > 1 else Path(__file__).parent / FOLDER)
+    main(Path(sys.argv[1]) if len(sys.argv) > 1 else ROOT / "hysim/export" / FOLDER)
