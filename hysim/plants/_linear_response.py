@@ -4,7 +4,7 @@ With den monic the plant's states are x_j = s^j / den(s) u, j = 0 ... n - 1, in 
 coefficients of den at most one. The steps between samples are exact (`hysim.kernels.linear`).
 """
 
-from typing import Any, NamedTuple, Self
+from typing import NamedTuple, Self
 
 import numpy as np
 import numpy.typing as npt
@@ -16,6 +16,7 @@ from hysim.kernels.stepping import complete
 from hysim.models.protocols import Startable
 
 Indices = npt.NDArray[np.int64]
+_Stepped = tuple[FloatArray, FloatArray, FloatArray, Indices, FloatArray]
 
 _NEVER = 2.0**53  # samples
 _SAMPLES_PER_THREAD = 20_000  # a millisecond: fewer are not worth a thread
@@ -138,7 +139,7 @@ class LinearPlants(NamedTuple):
             state[kernels.N_BEFORE] = level * self.rate[0, 0] ** n
 
 
-def _stepped(monic: FloatArray, late: FloatArray, sample_time: float) -> tuple[tuple[Any, ...], FloatArray, FloatArray]:
+def _stepped(monic: FloatArray, late: FloatArray, sample_time: float) -> tuple[_Stepped, FloatArray, FloatArray]:
     """A, B0, B1, lags and parts of plants that are `late` (n_sets,) [samples]; rates and scaled coefficients."""
     F, rate, scaled = scaled_companion(monic, sample_time)
     parts = late % 1.0

@@ -201,8 +201,8 @@ class OscillatorStructure(Identifiable):
         }
         for name, allowed in options.items():
             check_choice(name, items(self)[name], allowed)
-        for name, number in {"oversampling": self.oversampling, "period": self.period or 1}.items():
-            check_whole(number, name)
+        check_whole(self.oversampling, "oversampling")
+        check_whole(self.period or 1, "period")
         for factor in self.decimation:
             check_whole(factor, "decimation")
         if self.decimation and np.prod(self.decimation) != self.oversampling:
@@ -249,9 +249,10 @@ class OscillatorStructure(Identifiable):
 
         def simulate(begin: int, end: int) -> None:
             for k in range(begin, end):
-                plant = self.assemble(dict(zip(NAMES, sets[k].tolist(), strict=True)))
+                plant = replace(self.assemble(dict(zip(NAMES, sets[k].tolist(), strict=True))), substeps=1)
+                run = plant.response if self.period is None else plant.periodic_response
                 try:
-                    y = self._fine_output(replace(plant, substeps=1), force, step)
+                    y = run(force, step)
                 except SimulationError:
                     continue
                 outputs[k, :, 0] = np.resize(self.sampled(y), len(record))
@@ -307,10 +308,6 @@ class OscillatorStructure(Identifiable):
             return np.repeat(u, factor) if self.period else np.repeat(u, factor)[: 1 - factor or None]
         places = np.arange(u.size * factor if self.period else (u.size - 1) * factor + 1) / factor
         return np.asarray(np.interp(places, np.arange(u.size + 1), np.append(u, u[0])))
-
-    def _fine_output(self, plant: Any, force: FloatArray, step: float) -> FloatArray:
-        run = plant.response if self.period is None else plant.periodic_response
-        return np.asarray(run(force, step))
 
     def sampled(self, y: FloatArray) -> FloatArray:
         """The record's samples of an output at the ends of the steps."""

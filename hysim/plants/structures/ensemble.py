@@ -55,7 +55,8 @@ def responses(
     n_sets = next(iter(sizes.values()), 1)
     if unequal := {name: size for name, size in sizes.items() if size != n_sets}:
         raise ValueError(f"every parameter needs one value, or one for each of {n_sets} sets, got {unequal}")
-    out = np.empty((n_sets, _width(structure, reduce)))
+    of_nodes = reduce in ("peak_displacement", "peak_acceleration")
+    out = np.empty((n_sets, structure.n_nodes if of_nodes else len(structure.elements)))
 
     def work(start: int, stop: int) -> None:
         rows = slice(start, stop)
@@ -75,10 +76,6 @@ def _values(structure: Any, given: Mapping[str, npt.ArrayLike] | npt.ArrayLike) 
         name: read_only(np.atleast_1d(np.asarray(column, dtype=float)), name, ndim=1)
         for name, column in {**scales, **expanded(structure.scalars, others)}.items()
     }
-
-
-def _width(structure: Any, reduce: Reduction) -> int:
-    return int(structure.n_nodes if reduce in ("peak_displacement", "peak_acceleration") else len(structure.elements))
 
 
 def _reduced(

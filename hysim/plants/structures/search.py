@@ -235,8 +235,9 @@ class SearchedStructure(MovingStructure, Identifiable):
         strokes = self._strokes(record)
         box = [self._coordinate(name, own[name], freedom, strokes) for name in freedom.free]
         order = {name: own[name] for name in (*freedom.free, *held)}
-        space = space_of(box, (), order, held, freedom.limits(order, held), screened=0)
-        return space_of(box, (), order, held, freedom.limits(order, held), [self._begun(record, space)], screened=0)
+        limits = freedom.limits(order, held)
+        space = space_of(box, (), order, held, limits, screened=0)
+        return space_of(box, (), order, held, limits, [self._begun(record, space)], screened=0)
 
     def _known(self, freedom: Freedom) -> dict[str, float]:
         """Every number by name; with the star those that the user names, the means of what they stand for."""
