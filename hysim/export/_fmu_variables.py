@@ -5,6 +5,7 @@ from collections.abc import Iterable, Mapping
 from types import MappingProxyType
 from typing import NamedTuple
 from xml.etree import ElementTree
+from xml.etree.ElementTree import Element
 
 from hysim._prefixes import prefixed
 from hysim._release import __version__
@@ -145,22 +146,11 @@ def variables_of(program: Program, units: Mapping[str, str], u0: float) -> list[
     if math.isfinite(program.sample_time):
         time, text = program.sample_time, "Time between two samples of the model."
         variables.append(Variable("sample_time", output + 2, "local", "constant", "exact", "s", time, description=text))
-    tunable = is_tunable(program)
-    variables += [
-        Variable(
-            each.name,
-            output + 3 + k,
-            "parameter",
-            "tunable" if tunable else "fixed",
-            "exact",
-            label(each.unit, units),
-            each.value,
-            min(each.lower, each.value),
-            max(each.upper, each.value),
-            _TUNED if tunable else "",
-        )
-        for k, each in enumerate(program.fields)
-    ]
+    kind, text = ("tunable", _TUNED) if is_tunable(program) else ("fixed", "")
+    for k, each in enumerate(program.fields):
+        role = ("parameter", kind, "exact", label(each.unit, units), each.value)
+        limits = min(each.lower, each.value), max(each.upper, each.value)
+        variables.append(Variable(each.name, output + 3 + k, *role, *limits, text))
     names = [each.name for each in variables]
     if double := next((name for name in [*names, "time"] if [*names, "time"].count(name) > 1), None):
         raise ValueError(f"two variables of the unit would be called {double!r}: rename the parameter of the law")
@@ -169,35 +159,33 @@ def variables_of(program: Program, units: Mapping[str, str], u0: float) -> list[
 
 def description(program: Program, variables: list[Variable], name: str, version: str, token: str) -> str:
     """The text of ``modelDescription.xml``."""
-    sampled = math.isfinite(program.sample_time)
-    root = ElementTree.Element(
-        "fmiModelDescription",
-        {
-            "fmiVersion": version,
-            "modelName": name,
-            "guid" if version == "2.0" else "instantiationToken": token,
-            "description": _sentences(program),
-            "generationTool": f"hysim {__version__}",
-            "variableNamingConvention": "flat",
-        },
+    sampled, is_2 = math.isfinite(program.sample_time), version == "2.0"
+    step = repr(program.sample_time)
+    common = {"modelIdentifier": name, "canHandleVariableCommunicationStepSize": "true"}
+    saves = {f"can{what}FMU{'s' if is_2 else 'S'}tate": "true" for what in ("GetAndSet", "Serialize")}
+    others = (
+        {"canNotUseMemoryManagementFunctions": "true"} if is_2 else {"fixedInternalStepSize": step} if sampled else {}
     )
-    if version == "2.0":
-        _interface(
-            root, "canGetAndSetFMUstate", "canSerializeFMUstate", name, canNotUseMemoryManagementFunctions="true"
-        )
-        files = ElementTree.SubElement(root[0], "SourceFiles")
-        ElementTree.SubElement(files, "File", {"name": f"{name}.c"})
-    else:
-        internal = {"fixedInternalStepSize": repr(program.sample_time)} if sampled else {}
-        _interface(root, "canGetAndSetFMUState", "canSerializeFMUState", name, **internal)
-    _units(root, variables)
-    categories = ElementTree.SubElement(root, "LogCategories")
-    ElementTree.SubElement(categories, "Category", {"name": "logStatusError", "description": "Reasons of errors."})
-    if sampled:
-        ElementTree.SubElement(root, "DefaultExperiment", {"startTime": "0.0", "stepSize": repr(program.sample_time)})
-    _variables(root, variables, version)
-    _structure(root, variables, version)
-    return _text(root)
+    files = [_element("SourceFiles", {}, _element("File", {"name": f"{name}.c"}))] if is_2 else []
+    experiment = [_element("DefaultExperiment", {"startTime": "0.0", "stepSize": step})] if sampled else []
+    category = _element("Category", {"name": "logStatusError", "description": "Reasons of errors."})
+    attributes = {
+        "fmiVersion": version,
+        "modelName": name,
+        "guid" if is_2 else "instantiationToken": token,
+        "description": _sentences(program),
+        "generationTool": f"hysim {__version__}",
+        "variableNamingConvention": "flat",
+    }
+    parts = [
+        _element("CoSimulation", common | saves | others, *files),
+        *_units(variables),
+        _element("LogCategories", {}, category),
+        *experiment,
+        _element("ModelVariables", {}, *_variables(variables, is_2)),
+        _element("ModelStructure", {}, *_structure(variables, is_2)),
+    ]
+    return _text(_element("fmiModelDescription", attributes, *parts))
 
 
 def _sentences(program: Program) -> str:
@@ -210,58 +198,46 @@ def _sentences(program: Program) -> str:
 
 def build_description(name: str) -> str:
     """The text of ``buildDescription.xml``, which FMI 3.0 asks for beside sources."""
-    root = ElementTree.Element("fmiBuildDescription", {"fmiVersion": "3.0"})
-    build = ElementTree.SubElement(root, "BuildConfiguration", {"modelIdentifier": name})
-    sources = ElementTree.SubElement(build, "SourceFileSet", {"language": "C99"})
-    ElementTree.SubElement(sources, "SourceFile", {"name": f"{name}.c"})
-    return _text(root)
+    sources = _element("SourceFileSet", {"language": "C99"}, _element("SourceFile", {"name": f"{name}.c"}))
+    build = _element("BuildConfiguration", {"modelIdentifier": name}, sources)
+    return _text(_element("fmiBuildDescription", {"fmiVersion": "3.0"}, build))
 
 
-def _interface(root: ElementTree.Element, saves: str, serializes: str, name: str, **others: str) -> None:
-    common = {"modelIdentifier": name, "canHandleVariableCommunicationStepSize": "true"}
-    ElementTree.SubElement(root, "CoSimulation", {**common, saves: "true", serializes: "true", **others})
-
-
-def _units(root: ElementTree.Element, variables: Iterable[Variable]) -> None:
-    labels = list(dict.fromkeys(each.unit for each in variables if each.unit))
-    if not labels:
-        return
-    definitions = ElementTree.SubElement(root, "UnitDefinitions")
-    for each in labels:
-        unit = ElementTree.SubElement(definitions, "Unit", {"name": each})
+def _units(variables: Iterable[Variable]) -> list[Element]:
+    units = []
+    for each in dict.fromkeys(variable.unit for variable in variables if variable.unit):
+        units.append(unit := _element("Unit", {"name": each}))
         if (base := base_unit(each)) is not None:
             exponents = {name: str(n) for name, n in zip(BASE_UNITS, base.exponents, strict=True) if n}
             factor = {"factor": repr(10.0**base.power)} if base.power else {}
-            ElementTree.SubElement(unit, "BaseUnit", exponents | factor)
+            unit.append(_element("BaseUnit", exponents | factor))
+    return [_element("UnitDefinitions", {}, *units)] if units else []
 
 
-def _variables(root: ElementTree.Element, variables: Iterable[Variable], version: str) -> None:
-    place = ElementTree.SubElement(root, "ModelVariables")
-    if version == "2.0":
-        for each in variables:
-            scalar = ElementTree.SubElement(place, "ScalarVariable", each.attributes())
-            ElementTree.SubElement(scalar, "Real", each.numbers())
-        return
+def _variables(variables: Iterable[Variable], is_2: bool) -> list[Element]:
+    if is_2:
+        return [_element("ScalarVariable", v.attributes(), _element("Real", v.numbers())) for v in variables]
     time = {"name": "time", "valueReference": "0", "causality": "independent", "variability": "continuous"}
-    ElementTree.SubElement(place, "Float64", time)
-    for each in variables:
-        ElementTree.SubElement(place, "Float64", each.attributes() | each.numbers())
+    return [_element("Float64", time), *(_element("Float64", v.attributes() | v.numbers()) for v in variables)]
 
 
-def _structure(root: ElementTree.Element, variables: list[Variable], version: str) -> None:
+def _structure(variables: list[Variable], is_2: bool) -> list[Element]:
     """The output, which follows from earlier inputs only, and at the start from the input at once."""
-    structure = ElementTree.SubElement(root, "ModelStructure")
     index, output = next((k, each) for k, each in enumerate(variables, 1) if each.causality == "output")
-    if version == "2.0":
-        for name, others in (("Outputs", {"dependencies": ""}), ("InitialUnknowns", {})):
-            unknowns = ElementTree.SubElement(structure, name)
-            ElementTree.SubElement(unknowns, "Unknown", {"index": str(index), **others})
-        return
-    reference = {"valueReference": str(output.reference)}
-    ElementTree.SubElement(structure, "Output", {**reference, "dependencies": ""})
-    ElementTree.SubElement(structure, "InitialUnknown", reference)
+    place = {"index": str(index)} if is_2 else {"valueReference": str(output.reference)}
+    later = place | {"dependencies": ""}
+    if is_2:
+        unknowns = {"Outputs": later, "InitialUnknowns": place}
+        return [_element(name, {}, _element("Unknown", each)) for name, each in unknowns.items()]
+    return [_element("Output", later), _element("InitialUnknown", place)]
 
 
-def _text(root: ElementTree.Element) -> str:
+def _element(tag: str, attributes: dict[str, str], *children: Element) -> Element:
+    element = Element(tag, attributes)
+    element.extend(children)
+    return element
+
+
+def _text(root: Element) -> str:
     ElementTree.indent(root)
     return '<?xml version="1.0" encoding="UTF-8"?>\n' + ElementTree.tostring(root, encoding="unicode") + "\n"

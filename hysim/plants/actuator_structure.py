@@ -29,6 +29,7 @@ from hysim.models.protocols import Doubt, Identifiable
 from hysim.models.search_space import ALL_FREE, Freedom, Parameters, SearchSpace
 from hysim.plants.actuator_search import MOST_LATE, as_points, between_samples, columns_through, finer, points
 from hysim.plants.amplifier import Amplifier
+from hysim.plants.chain import Stages
 from hysim.plants.creep import Creep
 from hysim.plants.linear_parts import (
     DAMPING,
@@ -36,7 +37,6 @@ from hysim.plants.linear_parts import (
     GAIN,
     CreepBank,
     LinearParts,
-    Stages,
     Survey,
     checked_creep,
     creep_bank,
