@@ -124,7 +124,7 @@ from hysim.plants.structures.parts import Element as Element
 from hysim.plants.structures.parts import Rayleigh as Rayleigh
 from hysim.plants.structures.parts import ModalDamping as ModalDamping
 from hysim.plants.structures.structure import shear_frame as shear_frame
-from hysim.plants.structures.static import StaticResponse as StaticResponse
+from hysim.plants.structures.structure import StaticResponse as StaticResponse
 from hysim.plants.transfer_function import TransferFunction as TransferFunction
 from hysim.plants.state_space import StateSpace as StateSpace
 from hysim.plants.state_space import Modes as Modes

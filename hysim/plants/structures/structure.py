@@ -5,27 +5,232 @@
 
 x are the displacements relative to the ground; b is the direction of an element, f its law for the drift b . x, and r
 the influence. The input is linear between the samples. How it is integrated: `hysim.kernels.structures.path`.
+
+Pushed slowly, under displacement control, it has
+
+    K x + sum over elements of b f(b . x) = factor p,        c . x = control
+
+p is the pattern of the loads, c the direction whose displacement is told. The unknowns of each control value are x and
+the factor, so that the path goes on where the factor falls. Laws move from one control value to the next along straight
+drifts. Newton's method has the slopes of the laws along these strokes, by differences; its steps are shortened until
+the forces out of balance fall, and a stroke on which that does not help is halved.
 """
 
-from collections.abc import Mapping, Sequence
-from typing import Any, ClassVar
+import itertools
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 from scipy.linalg import LinAlgError, cholesky
 
-from hysim._frozen import FloatArray, check_choice, check_whole, read_only
+from hysim._frozen import FloatArray, check_choice, check_whole, frozen, read_only
+from hysim._printing import extent, printed, summary_text
+from hysim.errors import SimulationError
 from hysim.models.model import family
+from hysim.plants.structures.assembly import AssembledStructure, Laws
 from hysim.plants.structures.ensemble import Reduction, responses
 from hysim.plants.structures.parts import Element, ModalDamping, Rayleigh, assembled
 from hysim.plants.structures.search import SearchedStructure
-from hysim.plants.structures.static import PushedStructure
 
+_BALANCED = 1e-12  # force out of balance, as a share of the largest force so far
+_ENOUGH = 1e-10  # as `_BALANCED`, where no further step helps
+_WORST = 1e-8  # as `_BALANCED`, with stiff elements
+_ROUNDING = 8.0 * 2.0**-52  # of displacements, by the largest stiffness: forces cannot be balanced better
+_MOST_STEPS = 40  # of Newton's method
+_MOST_CUTS = 10  # halvings of one of its steps
+_MOST_HALVINGS = 26  # of a stroke
+_DIFFERENCE = 1e-5  # share of a stroke: central differences then err at about 1e-10
 _LOOSEST = 1e-3  # tolerance
 
 
+@printed
+@frozen
+class StaticResponse:
+    """Equilibria of a structure that is pushed slowly.
+
+    Parameters
+    ----------
+    control : array, shape (n,)
+        Displacement that was told [m].
+    factor : array, shape (n,)
+        Loads by the pattern: the forces at the masses are `factor` times `pattern`.
+    pattern : array, shape (n_nodes,)
+        Pattern of the loads [N].
+    displacement : array, shape (n, n_nodes)
+        [m]
+    drift, force : array, shape (n, n_elements)
+        Of the elements [m], [N]; dashpots have none.
+    residual : array, shape (n,)
+        Largest force out of balance, as a share of the largest force so far; at most 1e-10, or what the rounding of
+        displacements comes to with stiff elements.
+    """
+
+    control: FloatArray
+    factor: FloatArray
+    pattern: FloatArray
+    displacement: FloatArray
+    drift: FloatArray
+    force: FloatArray
+    residual: FloatArray
+
+    @property
+    def base_shear(self) -> FloatArray:
+        """Sum of the loads, which the ground takes if every mass moves along one axis, shape (n,) [N]."""
+        return np.asarray(self.factor * self.pattern.sum())
+
+    def __str__(self) -> str:
+        return summary_text(
+            [f"StaticResponse: {self.control.size} equilibria"],
+            {
+                "control": extent(self.control, "m"),
+                "base shear": extent(self.base_shear, "N"),
+                "residual": f"{self.residual.max(initial=0.0):.1e}",
+            },
+        )
+
+
+class _Equilibrium(NamedTuple):
+    """Displacements, loads by the pattern, forces of the elements, and the share out of balance."""
+
+    x: FloatArray
+    factor: float
+    force: FloatArray
+    residual: float
+
+
+class _Columns:
+    """The laws of the elements, each after the last equilibrium."""
+
+    def __init__(self, laws: Laws, slopes: FloatArray, drifts: FloatArray) -> None:
+        self.members = [law.started(float(d)) for law, d in zip(laws.steppers, drifts, strict=True)]
+        self.places = laws.places
+        self.slopes, self.drifts = slopes, drifts
+        self.saved = [law.state[place] for law, place in zip(self.members, self.places, strict=True)]
+        self.keep(drifts)
+
+    def force(self, e: int, drift: float) -> float:
+        """Force of an element after a stroke from the last equilibrium."""
+        law = self.members[e]
+        law.state[self.places[e]] = self.saved[e]
+        return float(law.step(law.parameters, law.state, drift))
+
+    def forces(self, drifts: FloatArray) -> FloatArray:
+        """Forces of all elements."""
+        return np.array([self.force(e, float(d)) for e, d in enumerate(drifts)])
+
+    def tangents(self, drifts: FloatArray) -> FloatArray:
+        """Slopes of the forces at the end of strokes."""
+        slopes = self.slopes.copy()
+        for e, (drift, begin) in enumerate(zip(drifts, self.drifts, strict=True)):
+            d = _DIFFERENCE * abs(drift - begin)
+            if drift + d > drift - d:
+                slopes[e] = (self.force(e, drift + d) - self.force(e, drift - d)) / ((drift + d) - (drift - d))
+        return slopes
+
+    def keep(self, drifts: FloatArray) -> None:
+        """Move all laws to an equilibrium."""
+        self.drifts = drifts
+        self.forces(drifts)
+        self.saved = [law.state[place] for law, place in zip(self.members, self.places, strict=True)]
+
+
+class _Push:
+    """A structure that is pushed along."""
+
+    def __init__(self, structure: AssembledStructure, x: FloatArray, pattern: FloatArray, row: FloatArray) -> None:
+        self.stiffness, self.rows = structure.stiffness_matrix, structure.drift_matrix
+        self.slopes, self.pattern, self.row = structure.elastic_slopes, pattern, row
+        self.columns = _Columns(structure.laws, self.slopes, self.rows @ x)
+        self.unit = float(np.abs(structure.initial_stiffness).max()) or 1.0
+        self.direction = self.correction(self.slopes, np.zeros(x.size), 1.0)[0]
+        self.largest = 0.0
+        self.now = self.balance(x, 0.0)
+
+    def balance(self, x: FloatArray, factor: float) -> _Equilibrium:
+        """Displacements and loads with the forces, and how far these are from balance."""
+        at = _Equilibrium(x, factor, self.columns.forces(self.rows @ x), 0.0)
+        size = self.size(at)
+        return at._replace(residual=float(np.abs(self.out_of_balance(at)).max()) / size) if size else at
+
+    def size(self, at: _Equilibrium) -> float:
+        """The largest force so far: of a load, of linear springs at a mass, or of an element."""
+        parts = (at.factor * self.pattern, self.stiffness @ at.x, at.force)
+        return max(self.largest, *(float(np.abs(part).max(initial=0.0)) for part in parts))
+
+    def allowed(self, at: _Equilibrium) -> float:
+        """Largest residual of an equilibrium."""
+        rounding, size = _ROUNDING * self.unit * float(np.abs(at.x).max()), self.size(at)
+        return min(max(_ENOUGH, rounding / size), _WORST) if size else _ENOUGH
+
+    def out_of_balance(self, at: _Equilibrium) -> FloatArray:
+        """Loads less resisting forces, shape (n,)."""
+        resisted = self.stiffness @ at.x + self.rows.T @ at.force
+        return np.asarray(at.factor * self.pattern - resisted)
+
+    def correction(self, tangents: FloatArray, off: FloatArray, rise: float) -> tuple[FloatArray, float]:
+        """Changes of displacements and factor that balance `off` and raise the control by `rise`."""
+        rows, n = self.rows, off.size
+        matrix = np.zeros((n + 1, n + 1))
+        matrix[:n, :n] = (self.stiffness + rows.T @ (tangents[:, np.newaxis] * rows)) / self.unit
+        largest = np.abs(self.pattern).max() or 1.0
+        matrix[:n, n], matrix[n, :n] = -self.pattern / largest, self.row
+        wanted = np.append(off / self.unit, rise)
+        try:
+            change = np.linalg.solve(matrix, wanted)
+        except np.linalg.LinAlgError:
+            change = np.linalg.lstsq(matrix, wanted)[0]
+        return change[:n], float(change[n] * self.unit / largest)
+
+    def corrected(self, x: FloatArray, factor: float) -> _Equilibrium:
+        """The equilibrium near displacements that have the control value; out of balance where none is found."""
+        at = self.balance(x, factor)
+        for _ in range(_MOST_STEPS):
+            if at.residual <= _BALANCED or not np.isfinite(at.residual):
+                break
+            off = self.out_of_balance(at)
+            change, rise = self.correction(self.columns.tangents(self.rows @ at.x), off, 0.0)
+            size = float(np.abs(off).max())
+            for cut in range(_MOST_CUTS):
+                share = 0.5**cut
+                tried = self.balance(at.x + share * change, at.factor + share * rise)
+                if float(np.abs(self.out_of_balance(tried)).max()) < size:
+                    break
+            else:
+                break
+            at = tried
+        return at
+
+    def to(self, control: float, halvings: int = 0) -> bool:
+        """Move to a control value; whether an equilibrium is there."""
+        begin, rise = self.now, control - float(self.row @ self.now.x)
+        x = begin.x + rise * self.direction
+        best = self.corrected(x, begin.factor)
+        if not best.residual <= self.allowed(best):
+            change, factor = self.correction(self.slopes, np.zeros(x.size), rise)
+            best = self.corrected(begin.x + change, begin.factor + factor)
+        if best.residual <= self.allowed(best):
+            if rise:
+                self.direction = (best.x - begin.x) / rise
+            self.now = best
+            self.largest = self.size(best)
+            self.columns.keep(self.rows @ best.x)
+            return True
+        middle = control - 0.5 * rise
+        if halvings == _MOST_HALVINGS or not min(control, control - rise) < middle < max(control, control - rise):
+            return False
+        return self.to(middle, halvings + 1) and self.to(control, halvings + 1)
+
+
+def strokes(turns: Any, begin: float, steps: int) -> FloatArray:
+    """Control values from `begin` along turning points, `steps` of them on each stroke."""
+    points = [begin, *np.asarray(turns, dtype=float).tolist()]
+    parts = [np.linspace(a, b, steps + 1)[1:] for a, b in itertools.pairwise(points) if a != b]
+    return np.concatenate([[begin], *parts])
+
+
 @family
-class Structure(SearchedStructure, PushedStructure):
+class Structure(SearchedStructure):
     """Masses on linear and hysteretic elements, under a moving base or a force.
 
     ``M x'' + C x' + K x + sum b f(b . x) = -M r a(t)`` or ``= r u(t)``.
@@ -201,6 +406,123 @@ class Structure(SearchedStructure, PushedStructure):
         (2, 2)
         """
         return responses(self, parameters_or_scales, ground_accelerations, sample_time, reduce, workers)
+
+    def pushover(self, pattern: npt.ArrayLike, control: npt.ArrayLike, *, at: str = "displacement") -> StaticResponse:
+        """Equilibria under loads that grow slowly, told by a displacement.
+
+        ``K x + sum b f(b . x) = factor pattern``. The factor follows from the control, so that the path goes on where
+        the structure softens. Between two control values each drift moves straight: dashpots and masses do nothing.
+
+        Parameters
+        ----------
+        pattern : array, shape (n_nodes,)
+            Loads at the masses for a factor of one [N].
+        control : array, shape (n,)
+            Displacements of what `at` names, one behind the other; the structure begins at `initial_state` [m].
+        at : str
+            What is controlled: ``"displacement.k"`` of the mass k, by default the last one, or ``"drift.k"``.
+
+        Returns
+        -------
+        StaticResponse
+
+        Raises
+        ------
+        SimulationError
+            If no equilibrium is found, as where the structure would snap through while the control rests; it names the
+            control value.
+        ValueError
+            If the pattern has not one number for each mass or is zero, a number is not finite, or `at` names neither a
+            displacement nor a drift.
+
+        Examples
+        --------
+        >>> import hysim as hs
+        >>> column = hs.MaxwellSlip(stiffness=(90.0,), slips=(0.01,), feedthrough=10.0)
+        >>> frame = hs.shear_frame([1.0, 1.0], laws=column)
+        >>> push = frame.pushover([1.0, 2.0], [0.01, 0.02, 0.04])
+        >>> push.base_shear.round(6).tolist()
+        [0.6, 1.03125, 1.21875]
+        """
+        values = read_only(control, "control", ndim=1)
+        return self._pushed(pattern, at, lambda begin: values)
+
+    def cyclic(
+        self,
+        protocol: npt.ArrayLike,
+        pattern: npt.ArrayLike | None = None,
+        *,
+        at: str = "displacement",
+        steps: int = 50,
+    ) -> StaticResponse:
+        """Equilibria along slow cycles, as of a test with a jack.
+
+        Parameters
+        ----------
+        protocol : array, shape (n,)
+            Turning points of what `at` names, such as 0, 1, -1, 2, -2, 0 times the displacement at yield [m].
+        pattern : array, shape (n_nodes,), optional
+            Loads at the masses for a factor of one; by default a jack at what is controlled: one newton at the mass,
+            or at both ends of the element.
+        at : str
+            As of `pushover`.
+        steps : int
+            Equal steps of each stroke.
+
+        Returns
+        -------
+        StaticResponse
+            It begins with the displacement of `initial_state`. Errors are those of `pushover`.
+
+        Examples
+        --------
+        >>> import hysim as hs
+        >>> column = hs.MaxwellSlip(stiffness=(90.0,), slips=(0.01,), feedthrough=10.0)
+        >>> test = hs.shear_frame([1.0], laws=column).cyclic([0.02, -0.02, 0.0], steps=2)
+        >>> test.control.tolist(), test.factor.round(6).tolist()
+        ([0.0, 0.01, 0.02, 0.0, -0.02, -0.01, 0.0], [0.0, 1.0, 1.1, -0.9, -1.1, -0.1, 0.9])
+        """
+        check_whole(steps, "steps")
+        turns = read_only(protocol, "protocol", ndim=1)
+        return self._pushed(pattern, at, lambda begin: strokes(turns, begin, steps))
+
+    def _pushed(self, pattern: npt.ArrayLike | None, at: str, control: Callable[[float], FloatArray]) -> StaticResponse:
+        """Equilibria at the values of ``control(begin)``."""
+        row = self._controlled(at)
+        loads = row if pattern is None else read_only(pattern, "pattern", ndim=1)
+        n, n_elements = self.n_nodes, len(self.elements)
+        if loads.size != n:
+            raise ValueError(f"pattern must hold one number for each of {n} masses, got {loads.size}")
+        if not loads.any():
+            raise ValueError("pattern must not be zero")
+        x = np.array(self.initial_state[:n] or np.zeros(n))
+        push = _Push(self, x, loads, row)
+        values, found = control(float(row @ x)), []
+        for k, value in enumerate(values.tolist()):
+            with np.errstate(all="ignore"):
+                reached = push.to(value)
+            if not reached:
+                raise SimulationError(
+                    f"no equilibrium was found at control value {k} ({value:g} m): control a displacement that grows "
+                    "all along, or use smaller steps"
+                )
+            found.append(push.now)
+        return StaticResponse(
+            control=values,
+            factor=np.array([each.factor for each in found]),
+            pattern=loads,
+            displacement=np.array([each.x for each in found]).reshape(len(found), n),
+            drift=np.array([push.rows @ each.x for each in found]).reshape(len(found), n_elements),
+            force=np.array([each.force for each in found]).reshape(len(found), n_elements),
+            residual=np.array([each.residual for each in found]),
+        )
+
+    def _controlled(self, at: str) -> FloatArray:
+        """Direction of a displacement or a drift, shape (n_nodes,)."""
+        name, place = self.place_of(at)
+        if name not in ("displacement", "drift"):
+            raise ValueError(f'what is controlled must be a "displacement" or a "drift", got {at!r}')
+        return np.asarray(self.drift_matrix[place] if name == "drift" else np.eye(self.n_nodes)[place])
 
 
 def _elements(values: Any) -> tuple[Element, ...]:
