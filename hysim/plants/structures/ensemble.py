@@ -12,6 +12,7 @@ from hysim.kernels.structures.ensembles import Results, Sets, follow_each
 from hysim.kernels.structures.layout import Plant, Steps
 from hysim.models.compiled_step import compiled_start, compiled_step
 from hysim.models.law import Law
+from hysim.models.parts import own
 from hysim.models.protocols import Startable, positive_time
 from hysim.plants.structures import assembly
 from hysim.plants.structures.parts import MATRICES, ModalDamping, Rayleigh, expanded, modal_damping
@@ -82,51 +83,34 @@ def _reduced(
     structure: Any, values: Mapping[str, FloatArray], u: FloatArray, n_sets: int, sample_time: float, reduce: Reduction
 ) -> FloatArray:
     """The measure of each set, a row each."""
-    n_elements = len(structure.elements)
-    results = _computed(structure, values, u, n_sets, sample_time, with_accelerations=reduce == "peak_acceleration")
-    peaks = results.peaks
-    unresolved = assembly.uncertainty(results.errors, peaks[:, :n_elements]) > assembly.LEAST_CERTAIN
-    measures = {
-        **assembly.peaks_by_name(peaks, n_elements, structure.n_nodes),
-        "residual_drift": results.drifts,
-        "energy": results.work,
-    }
-    return np.where(unresolved[:, np.newaxis], np.inf, measures[reduce])
-
-
-def _computed(
-    structure: Any,
-    values: Mapping[str, FloatArray],
-    u: FloatArray,
-    n_sets: int,
-    sample_time: float,
-    *,
-    with_accelerations: bool,
-) -> Results:
-    """Results of the kernel for the sets of one chunk."""
     laws, parameters, states, slopes, matrices = _stacked(structure, values, n_sets)
     A, loads, rates = assembly.linear_parts(matrices)
-    n_elements, m = len(structure.elements), 2 * structure.n_nodes
+    n_elements, n = len(structure.elements), structure.n_nodes
     elements = assembly.elements_of(laws, structure.drift_matrix, slopes[0])
     halvings = 0 if structure.substeps else assembly.HALVINGS
     steps = Steps(float(sample_time), 0.0, structure.substeps or 0, halvings, structure.tolerance)
-    motion = assembly.empty_motion(m, states.shape[1], n_elements, with_accelerations=with_accelerations)
-    E, P, flows = assembly.empty_flows(halvings, m, 1, n_elements)
+    with_accelerations = reduce == "peak_acceleration"
+    motion = assembly.empty_motion(2 * n, states.shape[1], n_elements, with_accelerations=with_accelerations)
+    E, P, flows = assembly.empty_flows(halvings, 2 * n, 1, n_elements)
     results = Results(np.empty((n_sets, motion.peaks.size)), *(np.empty((n_sets, n_elements)) for _ in range(3)))
     sets = Sets(
         A, loads, np.ascontiguousarray(rates), slopes, parameters, states,
         np.array(np.broadcast_to(values.get("scale", np.ones(1)), n_sets)),
     )  # fmt: skip
-    square, none = np.zeros((structure.n_nodes, structure.n_nodes)), np.zeros((0, structure.n_nodes))
-    plant = Plant(A[0], loads[0], square, none, np.array([float(structure.excitation == "force")]))
-    x = read_only(structure.initial_state or np.zeros(m))
+    plant = Plant(
+        A[0], loads[0], np.zeros((n, n)), np.zeros((0, n)), np.array([float(structure.excitation == "force")])
+    )
+    x = read_only(structure.initial_state or np.zeros(2 * n))
     with np.errstate(all="ignore"):
         follow_each(
             assembly.follow_address(), elements, laws.starts, sets, plant, steps, assembly.PHASE, x,
             np.ascontiguousarray(u), E, P, flows, motion, assembly.room_for(motion), assembly.empty_tracks(0, motion),
             results,
         )  # fmt: skip
-    return results
+    peaks = assembly.peaks_by_name(results.peaks, n_elements, n)
+    unresolved = assembly.uncertainty(results.errors, peaks["peak_drift"]) > assembly.LEAST_CERTAIN
+    measures = {**peaks, "residual_drift": results.drifts, "energy": results.work}
+    return np.where(unresolved[:, np.newaxis], np.inf, measures[reduce])
 
 
 def _stacked(structure: Any, values: Mapping[str, FloatArray], n_sets: int) -> _Stack:
@@ -143,9 +127,8 @@ def _stacked(structure: Any, values: Mapping[str, FloatArray], n_sets: int) -> _
 def _by_tables(structure: Any, numbers: Mapping[str, FloatArray], n_sets: int) -> _Stack:
     steppers, parameters, states = [], [], []
     for e, (element, law) in enumerate(zip(structure.elements, structure.laws.steppers, strict=True)):
-        prefix = f"elements.{e}."
-        own = {name.removeprefix(prefix): column for name, column in numbers.items() if name.startswith(prefix)}
-        stepper, constants, memory = _tabled(element.law, own) if own else (law, law.parameters, law.state)
+        varied = own(numbers, f"elements.{e}")
+        stepper, constants, memory = _tabled(element.law, varied) if varied else (law, law.parameters, law.state)
         steppers.append(stepper)
         parameters.append(np.broadcast_to(constants, (n_sets, constants.shape[-1])))
         states.append(np.broadcast_to(memory, (n_sets, memory.shape[-1])))
@@ -157,16 +140,16 @@ def _by_tables(structure: Any, numbers: Mapping[str, FloatArray], n_sets: int) -
     return _Stack(laws, constants, memories, slopes, _matrices(structure, numbers, slopes, n_sets))
 
 
-def _tabled(law: Law, own: Mapping[str, FloatArray]) -> tuple[Startable, FloatArray, FloatArray]:
+def _tabled(law: Law, varied: Mapping[str, FloatArray]) -> tuple[Startable, FloatArray, FloatArray]:
     """Laws of one family: their kernels, and the parameters and states, one a row."""
     kind = type(law)
-    n_sets = max(column.size for column in own.values())
-    tables = law.exchanged({name: column[:, np.newaxis] for name, column in own.items()})
+    n_sets = max(column.size for column in varied.values())
+    tables = law.exchanged({name: column[:, np.newaxis] for name, column in varied.items()})
     wide = {name: np.broadcast_to(table, (n_sets, *table.shape[1:])) for name, table in tables.items()}
     kind.check(wide := kind.completed(wide))
     packed = kind.pack(wide)
-    varies = set(own) & set(law.structural)
-    step, start, workspace = (kind.step, kind.start, kind.workspace) if varies else law.stepping
+    is_general = bool(set(varied) & set(law.structural))
+    step, start, workspace = (kind.step, kind.start, kind.workspace) if is_general else law.stepping
     states = np.concatenate([packed.memory, np.zeros((len(packed.memory), workspace))], axis=1)
     stepper = Startable(compiled_step(step), packed.parameters[0], states[0], compiled_start(start))
     return stepper, packed.parameters, states
@@ -189,14 +172,14 @@ def _matrices(structure: Any, numbers: Mapping[str, FloatArray], slopes: FloatAr
     factors = numbers.get("damping", np.ones(1))
     if isinstance(damping, Rayleigh):
         tall = factors[:, np.newaxis, np.newaxis]
-        own = (tall * damping.mass) * mass + (tall * damping.stiffness) * stiffness
+        damped = (tall * damping.mass) * mass + (tall * damping.stiffness) * stiffness
     elif isinstance(damping, ModalDamping):
         several = np.ndim(damping.ratio) or "damping" not in numbers
         ratios = factors[:, np.newaxis] * np.asarray(damping.ratio) if several else factors[:, np.newaxis]
-        own = modal_damping(ratios, mass, stiffness)
+        damped = modal_damping(ratios, mass, stiffness)
     else:
-        own = scaled("damping", damping, structure.own_damping)
-    full = own + rows.T @ (structure.viscosities[:, np.newaxis] * rows)
+        damped = scaled("damping", damping, structure.own_damping)
+    full = damped + rows.T @ (structure.viscosities[:, np.newaxis] * rows)
     directions = structure.force_directions
     if structure.excitation == "base":
         directions = -(mass @ np.array(structure.influence or np.ones(structure.n_nodes)))[:, np.newaxis, :]
