@@ -58,10 +58,13 @@ MATHEMATICS = frozenset(
     """.split()  # noqa: SIM905
 )
 """Functions of `math` that C has; the last three are whole numbers in Python, as doubles they do not overflow."""
+
 TESTS = frozenset(("isfinite", "isinf", "isnan"))
 """Functions of `math` with a truth value."""
+
 CONDITIONAL, OR, AND, EQUALITY, RELATION, SUM, PRODUCT, UNARY, PRIMARY = range(9)
 """How strongly the operators of C bind."""
+
 Place = tuple[int, int]
 """Identity of a list of statements, and the number of the statement in it."""
 

@@ -58,6 +58,7 @@ _PREDICTED = 0.3  # largest part of the last change that the linear map may miss
 
 Period = Callable[[FloatArray], FloatArray]
 """State (3,) after a period, from that before; SimulationError if it diverges."""
+
 _ANGLE = 0.1  # largest phase of the mode in a default step: errors of 1e-7 of the output on the Noel-Schoukens system
 _CHUNK = 1 << 16
 _SETTLING_CHUNK = 1 << 13

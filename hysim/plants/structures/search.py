@@ -39,6 +39,7 @@ _LEAST = 1e-6  # of the size of a signal: its residual is not taken for smaller,
 
 Sensor = tuple[str, int]
 """Name of a signal, and its column."""
+
 _DECADE = 10.0
 _PHASE = 0.8  # of the fastest mode in a substep [rad]
 _PARTS = (0.01, 0.05, 0.2, 0.5)  # of the integral of the squared input
