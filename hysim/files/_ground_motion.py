@@ -6,6 +6,7 @@ order; else it is a table with a column of times.
 """
 
 import re
+from io import BytesIO
 from itertools import islice
 from typing import Any, Literal, NamedTuple
 
@@ -15,13 +16,11 @@ from hysim._frozen import FloatArray
 from hysim._prefixes import power_of_ten
 from hysim.files._accelerations import check_unit, in_si, stated_unit, unit_of_column
 from hysim.files._delimited import delimited
-from hysim.files._layout import DECIMALS
-from hysim.files._load import file_named, table_of
+from hysim.files._load import Source, opened, options_of_a_text, table_of
 from hysim.files._number_lists import NumberList, number_list
-from hysim.files._source import Source, opened
 from hysim.files._stated_values import TOP, StatedValues, block_below, check_quantity, cosmos_blocks, peer_header
-from hysim.files._table import Column, Table, UnreadableError, listed, require, shown
-from hysim.files._text import COMMENTS, Text
+from hysim.files._table import COMMENTS, Column, Table, UnreadableError, listed, require, shown
+from hysim.files._text import Text
 from hysim.records import step_if_even
 from hysim.signals import sample_times
 
@@ -121,9 +120,9 @@ def load_ground_motion(
     _check_arguments(sample_time, units, t, skip, delimiter, decimal)
     choice = _Choice(t, acceleration, sample_time, units)
     for_text = {"delimiter": delimiter, "decimal": decimal, "encoding": encoding}
-    with opened(path) as source, file_named(source):
+    with opened(path) as source:
         if source.format == "text":
-            text = Text(source.content, source.name, encoding).whole()
+            text = Text(source.content, source.name, source.encoding or encoding).whole()
             step, values = _of_text(text, choice, skip, delimiter, decimal)
         else:
             require(not skip, f"skip is for text, this is a file of the format {source.format}: leave it out")
@@ -137,16 +136,17 @@ def load_ground_motion(
 
 def is_at2(path: Source, encoding: str | None = None) -> bool:
     """Whether a file is a text whose header states NPTS and DT; errors as `hysim.load` has them."""
-    with opened(path) as source, file_named(source):
+    with opened(path) as source:
         if source.format != "text":
             return False
-        return peer_header([*islice(Text(source.content, source.name, encoding).top(), TOP)]) is not None
+        lines = Text(source.content, source.name, source.encoding or encoding).lines()
+        return peer_header([*islice((line for each in lines for line in each.texts), TOP)]) is not None
 
 
 def column_names(path: Source, **for_text: Any) -> tuple[str, ...]:
     """Names of the columns of a file, with the options for texts and the errors of `hysim.load`."""
     for_text = {**dict.fromkeys(("delimiter", "decimal", "encoding")), **for_text, "skip": for_text.get("skip") or None}
-    with opened(path) as source, file_named(source), table_of(source, for_text) as table:
+    with opened(path) as source, table_of(source, for_text) as table:
         return tuple(table.labels)
 
 
@@ -160,10 +160,7 @@ def _check_arguments(
         raise ValueError("give either sample_time or the column t, not both")
     if skip < 0:
         raise ValueError(f"skip must not be negative, got {skip}")
-    if delimiter is not None and len(delimiter) != 1:
-        raise ValueError(f"delimiter must be one character, got {delimiter!r}")
-    if decimal is not None and decimal not in DECIMALS:
-        raise ValueError(f'decimal must be "." or ",", got {decimal!r}')
+    options_of_a_text(delimiter, decimal, None, skip, None)
 
 
 _Motion = tuple[tuple[float, float], FloatArray]
@@ -195,7 +192,7 @@ def _of_text(text: str, choice: _Choice, skip: int, delimiter: str | None, decim
 def _table_below_titles(text: str, delimiter: str | None, decimal: str | None) -> Table:
     """The table in a text, below any number of lines of text."""
     try:
-        return delimited(Text(text), delimiter, decimal)
+        return delimited(Text(BytesIO(text.encode())), delimiter, decimal)
     except ValueError as error:
         lines, first_error = text.split("\n"), error
     titles = _titles(lines)
@@ -203,7 +200,7 @@ def _table_below_titles(text: str, delimiter: str | None, decimal: str | None) -
         dropped = titles[: max(0, len(titles) - kept)]
         try:
             below = "\n".join("" if k in dropped else line for k, line in enumerate(lines))
-            return delimited(Text(below), delimiter, decimal)
+            return delimited(Text(BytesIO(below.encode())), delimiter, decimal)
         except ValueError:
             continue
     raise first_error

@@ -12,8 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from hysim._frozen import FloatArray
-from hysim.files._table import require, shown
-from hysim.files._text import COMMENTS
+from hysim.files._table import COMMENTS, require, shown
 
 _EXPONENT = r"[EeDd][+-]?(?:\d{1,3}(?![\d.])|\d{2}(?=[\d.]))"  # two digits where the next number follows at once
 _NUMBER = re.compile(
