@@ -205,7 +205,7 @@ def corpus() -> dict[str, tuple[bytes, str]]:
         "bomb.npz": (npz({"u": lying(most // 8, long), "y": Y}, zipfile.ZIP_DEFLATED), "its header says 3,000,000,000"),
         "huge.npz": (_claimed(10**12), r"array 'u' is too large: it says it has 1,000,000,000,000 numbers"),
         "long.npz": (_claimed(5, declared=168, actual=long), "the NPZ file is damaged"),
-        "bzip.npz": (npz({"u": U, "y": Y}, zipfile.ZIP_BZIP2), "array 'u' is compressed in another way"),
+        "bzip.npz": (npz({"u": U, "y": Y}, zipfile.ZIP_BZIP2), "array 'u' is encrypted or packed in another way"),
         "header.npz": (npz({"u": b"\x93NUMPY\2\0\0\0\0\x10", "y": Y}), "the NPZ file is damaged: .*reading array header"),
         "code.npz": (npz({"u": lying(0, b"", "__import__('os').abort()"), "y": Y}), "the NPZ file is damaged: .*malformed"),
         "twice.npz": (archive({"u.npy": npy(U), "y.npy": npy(Y)}, twice=True), "2 arrays are called 'u'"),

@@ -147,15 +147,13 @@ class Arrays:
         with damaged(self.format):
             numbers = {id(array): array.numbers() for array in {id(c.place[0]): c.place[0] for c in columns}.values()}
         values = [numbers[id(array)][(slice(None), *index)] for array, index in (column.place for column in columns)]
-        if len({column.size for column in values}) > 1:
-            sizes = ", ".join(f"{shown(c.label)} {v.size}" for c, v in zip(columns, values, strict=True))
-            raise ValueError(f"the columns have unequal numbers of samples: {sizes}")
+        sizes = ", ".join(f"{shown(c.label)} {v.size}" for c, v in zip(columns, values, strict=True))
+        is_even = len({column.size for column in values}) == 1
+        require(is_even, f"the columns have unequal numbers of samples: {sizes}")
         for column, each in zip(columns, values, strict=True):
-            if np.isinf(each).any():
-                k = int(np.argmax(np.isinf(each)))
-                raise ValueError(
-                    f"{self.place(k)}, column {shown(column.label)}: expected a finite number, got {each[k]}"
-                )
+            for k in np.flatnonzero(np.isinf(each)):
+                name = f"{self.place(k)}, column {shown(column.label)}"
+                raise ValueError(f"{name}: expected a finite number, got {each[k]}")
         return np.stack(values)
 
     def place(self, sample: int) -> str:
@@ -206,11 +204,8 @@ def npz(file: BinaryIO) -> Arrays:
     archive = zipfile.ZipFile(file)
     entries = [entry for entry in archive.infolist() if entry.filename.endswith(_ENDING)]
     names = shown(", ".join(archive.namelist()[:3]))
-    require(
-        entries,
-        f"the zip archive holds no array of NumPy but {names}; save a workbook as CSV, and take the files out of an "
-        "archive",
-    )
+    advice = "save a workbook as CSV, and take the files out of an archive"
+    require(entries, f"the zip archive holds no array of NumPy but {names}; {advice}")
     return with_notes([_entry(archive, entry) for entry in entries], "NPZ")
 
 
@@ -229,9 +224,9 @@ def npy(file: BinaryIO) -> Arrays:
 
 def _entry(archive: zipfile.ZipFile, entry: zipfile.ZipInfo) -> Array:
     label = entry.filename.removesuffix(_ENDING)
-    require(not entry.flag_bits & 1, f"array {shown(label)} is encrypted: save it without a password")
-    is_known = entry.compress_type in (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED)  # unpacked piece by piece
-    require(is_known, f"array {shown(label)} is compressed in another way than NumPy does: save it anew")
+    is_plain = entry.compress_type in (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED)  # which are unpacked piece by piece
+    is_plain = is_plain and not entry.flag_bits & 1
+    require(is_plain, f"array {shown(label)} is encrypted or packed in another way than NumPy does: save it anew")
     array, length, rest = _array(label, partial(archive.open, entry), entry.file_size)
     require(
         array.kind != NUMBERS or length == rest,

@@ -177,10 +177,9 @@ def _check_arguments(
     sample_time: float | None, units: str | None, t: object, skip: int, delimiter: str | None, decimal: str | None
 ) -> None:
     check_unit(units)
-    if sample_time is not None and not 0.0 < sample_time < np.inf:
-        raise ValueError(f"sample_time must be positive and finite, got {sample_time}")
-    if sample_time is not None and t is not None:
-        raise ValueError("give either sample_time or the column t, not both")
+    is_step = sample_time is None or 0.0 < sample_time < np.inf
+    require(is_step, f"sample_time must be positive and finite, got {sample_time}")
+    require(sample_time is None or t is None, "give either sample_time or the column t, not both")
     options_of_a_text(delimiter, decimal, None, skip, None)
 
 
@@ -266,12 +265,12 @@ def _of_stated(text: str, header: StatedValues, choice: _Choice, skip: int, deci
 def _of_cosmos(text: str, blocks: list[StatedValues], choice: _Choice, decimal: str | None) -> _Motion:
     """The only block of accelerations of a file that may hold velocities and displacements too."""
     first, *others = blocks
-    if others:
-        lines = ", ".join(str(block.line) for block in blocks)
-        raise ValueError(
-            f"the file holds {len(blocks)} accelerations, in lines {lines}: save each to a file, or pass the number of "
-            "lines above the last one as skip="
-        )
+    lines = ", ".join(str(block.line) for block in blocks)
+    require(
+        not others,
+        f"the file holds {len(blocks)} accelerations, in lines {lines}: save each to a file, or pass the number of "
+        "lines above the last one as skip=",
+    )
     unit = choice.units or stated_unit(text.split("\n")[first.line - 1])
     require(unit is not None, f"line {first.line} states no unit of its accelerations: pass units=")
     return _of_stated(block_below(text, first.line), first, choice._replace(units=unit), 0, decimal)

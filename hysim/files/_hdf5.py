@@ -14,6 +14,7 @@ Source of the heaps: The HDF Group, HDF5 File Format Specification, Version 3.0,
 
 import math
 import mmap
+import struct
 import zlib
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
@@ -50,7 +51,7 @@ def hdf5(file: BinaryIO, path: Path | None, *, matlab: bool) -> Iterator[Arrays]
             texts = _has_sound_heaps(file)
             root = stack.enter_context(h5py.File(file, "r") if path is None else h5py.File(path, "r", locking=False))
             reader = _Reader(h5py, matlab, texts and root.id.get_create_plist().get_sizes() == _WORDS)
-            arrays = [reader.array(label, dataset) for label, dataset in reader.datasets(root, "", set())]
+            arrays = [reader.array(label, dataset) for label, dataset in reader.datasets(root)]
             notes = {name: reader.attribute(root, name) for name in (*NOTES, f"t{UNITS}")}
             units = (f"{name}{UNITS}" for name in notes_in(notes, {}).channels)
             notes |= {name: reader.attribute(root, name) for name in units}
@@ -65,20 +66,13 @@ class _Reader(NamedTuple):
     matlab: bool
     texts: bool
 
-    def datasets(self, group: Any, path: str, visited: set[int]) -> Iterator[tuple[str, Any]]:
-        """Paths and datasets below a group, in the order of their names, each group once."""
-        address = self.h5py.h5o.get_info(group.id).addr
-        if address in visited:
-            return
-        visited.add(address)
-        for name in group:
-            if name.startswith("#") or not isinstance(group.get(name, getlink=True), self.h5py.HardLink):
-                continue  # MATLAB's own groups, and links
-            item = group[name]
-            if isinstance(item, self.h5py.Group):
-                yield from self.datasets(item, path + name + ("." if self.matlab else "/"), visited)
-            elif isinstance(item, self.h5py.Dataset) and item.shape is not None:
-                yield path + name, item
+    def datasets(self, root: Any) -> Iterator[tuple[str, Any]]:
+        """Paths and datasets, in the order of their names, each once; links and MATLAB's own groups are left out."""
+        items: list[tuple[str, Any]] = []
+        root.visititems(lambda path, item: items.append((path, item)))
+        for path, item in items:
+            if isinstance(item, self.h5py.Dataset) and item.shape is not None and "/#" not in f"/{path}":
+                yield path.replace("/", ".") if self.matlab else path, item
 
     def array(self, label: str, dataset: Any) -> Array:
         """The properties of a dataset."""
@@ -171,17 +165,13 @@ def _has_sound_heaps(file: BinaryIO) -> bool:
 def _check_heaps(content: bytes | mmap.mmap) -> None:
     start, total = -1, 0
     while (start := content.find(b"GCOL\x01", start + 1)) >= 0:
-        length, at = _number(content, start + 8), start + _HEAD_BYTES
+        (length,), at = struct.unpack_from("<Q", content, start + 8), start + _HEAD_BYTES
         end = start + length if _LEAST_HEAP <= length <= len(content) - start else at
         total += end - at
         require(total <= len(content), "the HDF5 file is damaged: its heaps overlap")
         while at + _HEAD_BYTES <= end:
-            length, is_used = _number(content, at + 8), content[at : at + 2] != b"\0\0"
-            step = length + -length % 8 + (_HEAD_BYTES if is_used else 0)
+            number, length = struct.unpack_from("<H6xQ", content, at)
+            step = length + -length % 8 + (_HEAD_BYTES if number else 0)
             is_inside = 0 < step <= end - at
             require(is_inside, "the HDF5 file is damaged: a text in it has no length, or too great a one")
             at += step
-
-
-def _number(content: bytes | mmap.mmap, at: int) -> int:
-    return int.from_bytes(content[at : at + 8], "little")

@@ -7,7 +7,6 @@ numbers of the chosen columns become a record, or several, with gaps where a val
 import itertools
 import os
 import re
-import stat
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
 from io import BytesIO
@@ -23,7 +22,7 @@ from hysim._resolution import output_quantum
 from hysim.files._arrays import NUMBERS, Arrays, mat, npy, npz
 from hysim.files._delimited import Delimited, delimited
 from hysim.files._hdf5 import hdf5
-from hysim.files._table import Column, Frame, Table, damaged, shown
+from hysim.files._table import Column, Frame, Table, damaged, require, shown
 from hysim.files._text import DECIMALS, THOUSANDS, Text
 from hysim.interop import table_in
 from hysim.records import Record
@@ -170,8 +169,8 @@ def load(
     ([0.0, 5.0, 10.0], {'u': 'V', 'y': 'um'})
     """
     check_choice("on_missing", on_missing, ON_MISSING)
-    if isinstance(resolution, str) and resolution != "detect":
-        raise ValueError(f'resolution must be a number or "detect", got {resolution!r}')
+    is_known = not isinstance(resolution, str) or resolution == "detect"
+    require(is_known, f'resolution must be a number or "detect", got {resolution!r}')
     for_text = options_of_a_text(delimiter, decimal, thousands, skip, encoding)
     with opened(path) as source:
         with table_of(source, for_text, progress or None) as table:
@@ -206,17 +205,13 @@ def options_of_a_text(
     delimiter: str | None, decimal: str | None, thousands: str | None, skip: int, encoding: str | None
 ) -> dict[str, Any]:
     """Options for a text by name, None where nothing is asked for; ValueError if one is no option for any text."""
-    if delimiter is not None and len(delimiter) != 1:
-        raise ValueError(f"delimiter must be one character, got {delimiter!r}")
-    if decimal is not None and decimal not in DECIMALS:
-        raise ValueError(f'decimal must be "." or ",", got {decimal!r}')
-    if skip < 0:
-        raise ValueError(f"skip must be a number of lines, got {skip}")
-    if thousands is not None and (thousands not in tuple(THOUSANDS) or thousands == decimal):
-        raise ValueError(
-            "thousands must be a point, a comma, an apostrophe or a space that is not the decimal sign, got "
-            f"{thousands!r}"
-        )
+    require(delimiter is None or len(delimiter) == 1, f"delimiter must be one character, got {delimiter!r}")
+    require(decimal in (None, *DECIMALS), f'decimal must be "." or ",", got {decimal!r}')
+    require(skip >= 0, f"skip must be a number of lines, got {skip}")
+    require(
+        thousands is None or (thousands in (*THOUSANDS,) and thousands != decimal),
+        f"thousands must be a point, a comma, an apostrophe or a space that is not the decimal sign, got {thousands!r}",
+    )
     return {
         "delimiter": delimiter, "decimal": decimal, "thousands": thousands, "skip": skip or None, "encoding": encoding,
     }  # fmt: skip
@@ -255,7 +250,7 @@ def opened(source: Source) -> Iterator[Opened]:
         if isinstance(source, (str, os.PathLike)):
             path = Path(source)
             file = stack.enter_context(path.open("rb"))
-            is_regular = stat.S_ISREG(os.fstat(file.fileno()).st_mode)  # not a pipe or a device
+            is_regular = path.is_file()  # not a pipe or a device
             content = _regular(path, file) if is_regular else _stream(path.name, file)
         elif isinstance(source, _Readable):
             content = _stream(Path(str(source.name)).name if isinstance(source, _Named) else "stream", source)
@@ -285,10 +280,10 @@ def format_of(head: bytes) -> str:
 
 def _regular(path: Path, file: BinaryIO) -> Opened:
     form = format_of(file.read(_HEAD))
+    size = file.seek(0, 2)
+    if form == "text":
+        _check_size(path.name, size)
     file.seek(0)
-    size = os.fstat(file.fileno()).st_size
-    if form == "text" and size > MOST_TEXT:
-        raise ValueError(_too_large(path.name, str(size)))
     return Opened(path.name, form, file, path)
 
 
@@ -297,20 +292,21 @@ def _stream(name: str, source: Any) -> Opened:
     size = 0
     while piece := source.read(_PIECE):
         size += len(piece)
-        if size > MOST_TEXT:
-            raise ValueError(_too_large(name, "more"))
+        _check_size(name, size)
         pieces.append(piece)
-    if pieces and isinstance(pieces[0], str):
-        content = "".join(pieces).encode(errors="replace")
-        return Opened(name, "model" if _MODEL.match(content[:_HEAD]) else "text", BytesIO(content), None, "utf-8")
-    content = b"".join(pieces)
-    return Opened(name, format_of(content[:_HEAD]), BytesIO(content))
+    is_text = bool(pieces) and isinstance(pieces[0], str)
+    content = "".join(pieces).encode(errors="replace") if is_text else b"".join(pieces)
+    form = format_of(content[:_HEAD])
+    if is_text and form != "model":
+        form = "text"
+    return Opened(name, form, BytesIO(content), None, "utf-8" if is_text else None)
 
 
-def _too_large(name: str, size: str) -> str:
-    return (
+def _check_size(name: str, size: int) -> None:
+    require(
+        size <= MOST_TEXT,
         f"{name} is too large: a text or a stream may have {MOST_TEXT:,} bytes, got {size}; cut it, or save its "
-        "columns as NPZ, MAT or HDF5 and pass the path"
+        "columns as NPZ, MAT or HDF5 and pass the path",
     )
 
 
@@ -323,12 +319,10 @@ def table_of(source: Opened, for_text: Mapping[str, Any], progress: Progress | N
         text = Text(source.content, source.name, encoding, for_text.get("skip") or 0, reading)
         yield delimited(text, for_text["delimiter"], for_text["decimal"], for_text.get("thousands"))
         return
-    if source.format == "model":
-        raise ValueError(f"{source.name} is a model: read it with hs.load_model")
+    require(source.format != "model", f"{source.name} is a model: read it with hs.load_model")
+    form = source.name if source.format == "frame" else f"a file of the format {source.format}"
     for argument, value in for_text.items():
-        if value is not None:
-            form = source.name if source.format == "frame" else f"a file of the format {source.format}"
-            raise ValueError(f"{argument} is for text, this is {form}: leave it out")
+        require(value is None, f"{argument} is for text, this is {form}: leave it out")
     if source.format == "frame":
         yield source.content
     elif source.format in ("hdf5", "mat7.3"):
@@ -385,35 +379,26 @@ def _parts(
     is_cut = on_missing == "split"
     parts = np.split(samples, np.flatnonzero(np.diff(samples) > 1) + 1 if is_cut else [])
     long_enough = [part for part in parts if part.size >= 2]
-    if not long_enough:
-        longest = max(part.size for part in parts)
-        raise ValueError(f"a record needs at least 2 samples, there are {longest}{' in a row' if is_cut else ''}")
-    if "t" in columns:
-        for part in long_enough:
-            _check_time(table, values[[*columns].index("t")], part)
+    longest = max(part.size for part in parts)
+    in_a_row = " in a row" if is_cut else ""
+    require(long_enough, f"a record needs at least 2 samples, there are {longest}{in_a_row}")
+    times = values[[*columns].index("t")] if "t" in columns else np.arange(float(values.shape[1]))
+    for part in long_enough:
+        for wrong in np.flatnonzero(np.diff(times[part]) <= 0):
+            before, k = part[wrong : wrong + 2]
+            raise ValueError(
+                f"{table.place(k)}: time must increase, got {times[k]} after {times[before]}; sort the samples, "
+                "remove repeated ones, or load without time: t=False"
+            )
     return long_enough
-
-
-def _check_time(table: Table, times: FloatArray, part: npt.NDArray[np.intp]) -> None:
-    wrong = np.flatnonzero(np.diff(times[part]) <= 0)
-    if wrong.size:
-        before, k = part[wrong[0]], part[wrong[0] + 1]
-        raise ValueError(
-            f"{table.place(k)}: time must increase, got {times[k]} after {times[before]}; sort the samples, remove "
-            "repeated ones, or load without time: t=False"
-        )
 
 
 def _channels(
     table: Table, channels: Sequence[str] | Mapping[str, str | int | float] | None
 ) -> dict[str, Column | float]:
     """The column of each channel, or its number where it is constant; by default those that the file names."""
-    if channels is None:
-        keys: Mapping[str, str | int | float] = table.notes.channels
-    elif isinstance(channels, Mapping):
-        keys = channels
-    else:
-        keys = dict(zip(*[(channels,) if isinstance(channels, str) else channels] * 2, strict=True))
+    names = [channels] if isinstance(channels, str) else table.notes.channels if channels is None else channels
+    keys = names if isinstance(names, Mapping) else {name: name for name in names}
     return {label: key if isinstance(key, float) else table.column(key) for label, key in keys.items()}
 
 

@@ -72,14 +72,15 @@ class Text(NamedTuple):
         try:
             while piece := stream.read(_AT_ONCE) + stream.readline():
                 if "\0" in piece:
-                    raise ValueError(_no_text(self.name, "text"))
+                    raise ValueError(self._no_text("", "it holds zero bytes"))
                 texts = (piece.removeprefix("\ufeff") if number == 1 else piece).removesuffix("\n").split("\n")
                 hidden = max(0, self.skip + 1 - number)
                 yield Lines(range(number, number + len(texts)), [""] * len(texts[:hidden]) + texts[hidden:])
                 number, before, at = number + len(texts), at, self.content.tell()
                 self.reading(at - before)
         except UnicodeError as error:
-            raise ValueError(self._undecoded(marked, error)) from None
+            reason = error.reason if isinstance(error, UnicodeDecodeError) else str(error)
+            raise ValueError(self._no_text(f"{(self.encoding or marked).upper()} ", reason)) from None
         finally:
             with suppress(ValueError):  # of a file that was closed before an unfinished reading of it
                 stream.detach()
@@ -98,23 +99,11 @@ class Text(NamedTuple):
         """All of the text."""
         return "\n".join(line for lines in self.lines() for line in lines.texts)
 
-    def _undecoded(self, marked: str, error: UnicodeError) -> str:
-        """The message about a file that is not text in its encoding, or in that of its mark."""
-        self.content.seek(0)
-        if self.encoding is None and marked == "utf-8" and b"\0" in self.content.read():
-            return _no_text(self.name, "UTF-8 text")
-        reason = error.reason if isinstance(error, UnicodeDecodeError) else str(error)
+    def _no_text(self, encoding: str, reason: str) -> str:
         return (
-            f"{self.name} is not a {(self.encoding or marked).upper()} text file: {reason}; pass its encoding, for "
-            'instance encoding="latin-1"'
+            f"{self.name} is not a {encoding}text file: {reason}; and it does not begin as NPZ, NPY, MAT (-v7, -v7.3) "
+            'or HDF5 files do; if it is text, pass its encoding, for instance encoding="latin-1"'
         )
-
-
-def _no_text(name: str, kind: str) -> str:
-    return (
-        f"{name} is not a {kind} file: it holds zero bytes; and it does not begin as NPZ, NPY, MAT (-v7, -v7.3) or "
-        "HDF5 files do (pass its encoding if it is text)"
-    )
 
 
 class Signs(NamedTuple):
