@@ -5,24 +5,30 @@ score is the share of the lines that have the most common number of cells, at le
 that are numbers or missing. The best score wins, of equal ones the first in the order tab, semicolon, comma, white
 space, with a decimal point before a decimal comma.
 
+Signs between thousands are an apostrophe or a space, and the point or comma that is not the decimal sign where a cell
+can mean nothing else: ``1.000,5`` and ``1.000.000``, but not ``1.000``, unless that sign is given.
+
 A column holds numbers if at least half of its cells below the first line do. The first line is a header if it has
 text in such columns and no number; a line of text in all of them right below the header holds the units.
 """
 
+import codecs
 import csv
+import io
 import itertools
+import math
 import re
 from collections import Counter
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
-from typing import Any
+from typing import BinaryIO, NamedTuple
 
 import numpy as np
 
 from hysim._frozen import FloatArray
 from hysim._printing import text_in_cell
-from hysim.files._table import COMMENTS, Column, Notes, column_of, json_value, notes_in, require
-from hysim.files._text import DECIMALS, MISSING, Lines, Signs, Text, numbers, parse, plain_numbers
+from hysim.files._table import COMMENTS, Column, Notes, column_of, json_value, notes_in, require, shown
 from hysim.interop import heading
 
 DELIMITERS = {"\t": "tab", ";": "semicolon", ",": "comma", " ": "white space"}
@@ -32,15 +38,199 @@ _EXCEL = re.compile(r"sep=(.)", re.IGNORECASE)  # a first line for Excel, which 
 _WORD = re.compile(r"[^\s\[(]+(?:\s*[\[(][^\[\]()]*[\])])?|\S+")
 _NOTE = re.compile(r"[#%] *(name|resolution|units|channels) *:")
 
+DECIMALS = (".", ",")
+
+MISSING = frozenset({"", "nan", "na", "n/a", "null", "none"})
+"""Cells that stand for a missing value, in upper or lower case."""
+
+THOUSANDS = ".,'\u2019 \u00a0\u2009\u202f"
+"""Signs that may stand between thousands: a point, a comma, apostrophes and spaces of some widths."""
+
+_MARKS = {
+    codecs.BOM_UTF32_LE: "utf-32",  # begins with the mark of UTF-16, so it is looked for first
+    codecs.BOM_UTF32_BE: "utf-32",
+    codecs.BOM_UTF16_LE: "utf-16",
+    codecs.BOM_UTF16_BE: "utf-16",
+}
+_AT_ONCE = 1 << 18  # letters: their lines take some megabytes
+_GROUPED = re.compile(
+    rf"(?P<sign>[+-]?)(?P<whole>\d{{1,3}}(?P<mark>[{THOUSANDS}])\d{{3}}(?:(?P=mark)\d{{3}})*)(?P<rest>(?P<point>[.,])?\d*)"
+)
+_CLOCK = re.compile(r"(\S+[ T])?\d{1,2}:\d\d(:\d\d([.,]\d*)?)?")
+
+
+class Lines(NamedTuple):
+    """Some lines of a text, with their numbers from 1."""
+
+    numbers: Sequence[int]
+    texts: list[str]
+
+
+class Text(NamedTuple):
+    """The text in a file of this name, which is read anew, some lines at a time, whenever it is asked for.
+
+    A ValueError is raised where it is read if it is not text in its encoding. The first `skip` lines are empty.
+    `reading(n_bytes)` is called after each piece.
+    """
+
+    content: BinaryIO
+    name: str = ""
+    encoding: str | None = None
+    skip: int = 0
+    reading: Callable[[int], None] = lambda n_bytes: None
+
+    def lines(self) -> Iterator[Lines]:
+        """All lines, without the signs at their ends."""
+        self.content.seek(0)
+        head = self.content.read(4)
+        marked = next((known for mark, known in _MARKS.items() if head.startswith(mark)), "utf-8")
+        self.content.seek(0)
+        number, at = 1, 0
+        try:
+            stream = io.TextIOWrapper(self.content, self.encoding or marked)
+        except LookupError:
+            raise ValueError(f"{self.name}: encoding must be one that Python knows, got {self.encoding!r}") from None
+        try:
+            while piece := stream.read(_AT_ONCE) + stream.readline():
+                if "\0" in piece:
+                    raise ValueError(self._no_text("", "it holds zero bytes"))
+                texts = (piece.removeprefix("\ufeff") if number == 1 else piece).removesuffix("\n").split("\n")
+                hidden = max(0, self.skip + 1 - number)
+                yield Lines(range(number, number + len(texts)), [""] * len(texts[:hidden]) + texts[hidden:])
+                number, before, at = number + len(texts), at, self.content.tell()
+                self.reading(at - before)
+        except UnicodeError as error:
+            reason = error.reason if isinstance(error, UnicodeDecodeError) else str(error)
+            raise ValueError(self._no_text(f"{(self.encoding or marked).upper()} ", reason)) from None
+        finally:
+            with suppress(ValueError):  # of a file that was closed before an unfinished reading of it
+                stream.detach()
+
+    def samples(self) -> Iterator[Lines]:
+        """The lines that are neither blank nor comments."""
+        for numbers, texts in self.lines():
+            begins = {line[:1] for line in texts}
+            if not any(sign in ("", *COMMENTS) or sign.isspace() for sign in begins):
+                yield Lines(numbers, texts)
+                continue
+            kept = [k for k, line in enumerate(texts) if line.strip() and not line.lstrip().startswith(COMMENTS)]
+            yield Lines([numbers[k] for k in kept], [texts[k] for k in kept])
+
+    def whole(self) -> str:
+        """All of the text."""
+        return "\n".join(line for lines in self.lines() for line in lines.texts)
+
+    def _no_text(self, encoding: str, reason: str) -> str:
+        return (
+            f"{self.name} is not a {encoding}text file: {reason}; and it does not begin as NPZ, NPY, MAT (-v7, -v7.3) "
+            'or HDF5 files do; if it is text, pass its encoding, for instance encoding="latin-1"'
+        )
+
+
+class Signs(NamedTuple):
+    """The delimiter of a text, its decimal sign, and the sign between its thousands if it is given."""
+
+    delimiter: str
+    decimal: str
+    thousands: str | None = None
+
+    def number(self, cell: str) -> float | None:
+        """The number in a cell, or None if it holds none."""
+        cell = cell.strip().replace("\u2212", "-")  # the minus sign of typesetters
+        grouped = _GROUPED.fullmatch(cell)
+        if grouped and grouped["mark"] != self.decimal and grouped["point"] in (None, self.decimal):
+            mark, whole = grouped["mark"], grouped["whole"]
+            if mark not in ".," or grouped["point"] or whole.count(mark) > 1 or mark == self.thousands:
+                cell = grouped["sign"] + whole.replace(mark, "") + grouped["rest"]
+        if self.decimal == ",":
+            cell = "" if "." in cell or cell.endswith(",") else cell.replace(",", ".")
+        try:
+            return None if "_" in cell else float(cell)  # Python would take 1_0 for 10
+        except ValueError:
+            return None
+
+    def kind(self, cell: str) -> str:
+        """Whether a cell is "missing", a "number", or "text"."""
+        return "missing" if cell.strip().lower() in MISSING else "text" if self.number(cell) is None else "number"
+
+    def cells(self, line: str, *, strict: bool = False) -> list[str]:
+        """The cells of a line; one that cannot be split is a csv.Error if `strict`, or else a single cell."""
+        if '"' not in line:
+            cells = line.split() if self.delimiter == " " else line.strip(" ").split(self.delimiter)
+        else:
+            try:
+                cells = next(csv.reader([line.strip()], delimiter=self.delimiter, skipinitialspace=True, strict=strict))
+            except csv.Error:
+                if strict:
+                    raise
+                cells = [line]
+        return [text_in_cell(cell.strip()) for cell in cells]
+
+    def rows(self, lines: Lines) -> list[list[str]]:
+        """The cells of some lines; ValueError with the number of one that cannot be split."""
+        rows = []
+        for number, line in zip(*lines, strict=True):
+            try:
+                rows.append(self.cells(line, strict=True))
+            except csv.Error as error:
+                raise ValueError(f"line {number}: a quoted cell is not closed or too long ({error})") from None
+        return rows
+
+    def names(self, line: str) -> list[str]:
+        """Names of columns; between blanks a unit in brackets belongs to the name before it."""
+        return _WORD.findall(line) if self.delimiter == " " and '"' not in line else self.cells(line)
+
+    def score(self, lines: list[str]) -> float:
+        """How well these signs fit some lines, from 0 to 1."""
+        rows = [self.cells(line) for line in lines]
+        width, cells = _most_common(rows), [cell for row in rows for cell in row]
+        plain = sum(self.kind(cell) != "text" for cell in cells)
+        return (width > 1) * sum(len(row) == width for row in rows) / len(rows) * plain / len(cells)
+
+    def numbers(self, cells: list[str], lines: Sequence[int], label: str) -> FloatArray:
+        """The numbers of a column, nan where one is missing; `lines` are the numbers of the cells' lines."""
+        values = [self.number(cell) for cell in cells]
+        for cell, value, line in zip(cells, values, lines, strict=True):
+            is_known = cell.lower() in MISSING if value is None else not math.isinf(value)
+            if not is_known:
+                place, advice = f"line {line}, column {shown(label)}", self.advice(cell)
+                raise ValueError(f"{place}: expected a finite number, got {shown(cell)}{advice}")
+        return np.array(values, dtype=np.float64)  # None is nan
+
+    def advice(self, cell: str) -> str:
+        """Advice on a cell that is a time of day, or whose point or comma has the other meaning."""
+        if _CLOCK.fullmatch(cell):
+            return " (a time of day: write it in seconds, or load without time: t=False)"
+        other, name = {".": (",", "comma"), ",": (".", "point")}[self.decimal]
+        grouped, advice = _GROUPED.fullmatch(cell), list[str]()
+        if cell.count(other) == 1 and self.decimal not in cell:
+            advice.append(f'decimal="{other}" if the {name} is the decimal sign')
+        if grouped and grouped["mark"] == other:
+            advice.append(f'thousands="{other}" if the {name} stands between thousands')
+        is_number = self.number(cell.replace(other, "")) is not None
+        return f" (pass {', '.join(advice)})" if advice and is_number else ""
+
+
+def plain_numbers(lines: list[str], places: list[int], signs: Signs) -> FloatArray | None:
+    """Columns of lines, shape (n_columns, n_lines), None unless all are finite numbers; faster than `Signs.numbers`."""
+    text, swapped = "".join(lines), signs.decimal == ","
+    if signs.thousands or "_" in text or '"' in text or (swapped and (signs.delimiter == "," or "." in text)):
+        return None
+    lines = [line.replace(",", ".") for line in lines] if swapped else lines
+    delimiter = None if signs.delimiter == " " else signs.delimiter
+    with suppress(ValueError):
+        values = np.loadtxt(lines, delimiter=delimiter, usecols=places, comments=None, ndmin=2)
+        return np.ascontiguousarray(values.T) if np.isfinite(values).all() else None
+    return None
+
 
 @dataclass(frozen=True)
 class Delimited:
-    """The columns of a text, its delimiter, the signs in its numbers, the lines of its header, and its samples."""
+    """The columns of a text, its signs, and the numbers of the lines of its header and of its samples."""
 
     text: Text
     notes: Notes
     columns: list[Column]
-    delimiter: str
     signs: Signs
     head: int
     n_samples: int
@@ -56,18 +246,17 @@ class Delimited:
 
     def values(self, columns: list[Column]) -> FloatArray:
         """The numbers of the columns, shape (n_columns, n_samples), nan where one is missing."""
-        values, at = np.empty((len(columns), self.n_samples)), 0
+        result, at = np.empty((len(columns), self.n_samples)), 0
         for lines in self._samples():
-            values[:, at : at + len(lines.texts)] = self._values(lines, columns)
+            values = plain_numbers(lines.texts, [column.place for column in columns], self.signs)
+            if values is None:
+                rows = self.signs.rows(lines)
+                cells = [[row[column.place] for row in rows] for column in columns]
+                named = zip(cells, columns, strict=True)
+                values = np.stack([self.signs.numbers(each, lines.numbers, column.label) for each, column in named])
+            result[:, at : at + len(lines.texts)] = values
             at += len(lines.texts)
-        return values
-
-    def _values(self, lines: Lines, columns: list[Column]) -> FloatArray:
-        values = plain_numbers(lines.texts, [column.place for column in columns], self.delimiter, self.signs)
-        if values is not None:
-            return values
-        rows = _rows(lines, self.delimiter)
-        return np.stack([numbers([row[c.place] for row in rows], lines.numbers, c.label, self.signs) for c in columns])
+        return result
 
     def place(self, sample: int) -> str:
         """The sample's line."""
@@ -84,17 +273,17 @@ class Delimited:
 
     def check_widths(self) -> None:
         """Raise a ValueError with the number of the first line that has another number of cells."""
+        delimiter, width = self.signs.delimiter, len(self.columns)
         for lines in self._samples():
             if any('"' in line for line in lines.texts):
-                widths = [len(row) for row in _rows(lines, self.delimiter)]
-            elif self.delimiter == " ":
+                widths = [len(row) for row in self.signs.rows(lines)]
+            elif delimiter == " ":
                 widths = [len(line.split()) for line in lines.texts]
             else:
-                widths = [line.count(self.delimiter) + 1 for line in lines.texts]
-            width = len(self.columns)
+                widths = [line.count(delimiter) + 1 for line in lines.texts]
             if widths.count(width) < len(widths):
                 k = next(k for k, cells in enumerate(widths) if cells != width)
-                between = DELIMITERS.get(self.delimiter, repr(self.delimiter))
+                between = DELIMITERS.get(delimiter, repr(delimiter))
                 raise ValueError(
                     f"line {lines.numbers[k]}: expected {width} cells, got {widths[k]} (separated by {between}); "
                     "correct the line, begin it with # if it is no sample, pass the number of lines of a header "
@@ -122,15 +311,14 @@ def delimited(text: Text, delimiter: str | None, decimal: str | None, thousands:
     if lines and (said := _EXCEL.fullmatch(lines[0].strip())) is not None and first == 1:
         return delimited(text._replace(skip=1), delimiter or said[1], decimal, thousands)
     require(lines, "the file is empty, there is no header and no sample")
-    delimiter, signs = _signs(lines + rest.texts, delimiter, decimal, thousands)
-    rows = _rows(Lines([*top.numbers, *rest.numbers], lines + rest.texts), delimiter)
+    signs = _signs(lines + rest.texts, delimiter, decimal, thousands)
+    rows = signs.rows(Lines([*top.numbers, *rest.numbers], lines + rest.texts))
     width = _most_common(rows)
-    below = [row for row in rows[1:] if len(row) == width]
-    has_header, has_units = _heads(rows[:2], below, first, width, signs)
+    has_header, has_units = _heads(rows[:2], [row for row in rows[1:] if len(row) == width], first, signs)
     head = has_header + has_units
     require(head < n_lines, "there is a header, but no sample")
     above = list(itertools.islice(itertools.chain.from_iterable(each.texts for each in text.lines()), first - 1))
-    names = _names(lines[0], delimiter) if has_header else _commented(above, delimiter, width, signs)
+    names = signs.names(lines[0]) if has_header else _commented(above, width, signs)
     is_named = len(names) == width
     require(
         is_named,
@@ -140,88 +328,50 @@ def delimited(text: Text, delimiter: str | None, decimal: str | None, thousands:
     columns = [Column(place, *heading(label)) for place, label in enumerate(names)]
     if has_units:
         columns = [c._replace(unit=c.unit or _unit(cell)) for c, cell in zip(columns, rows[1], strict=True)]
-    table = Delimited(text, _notes(above), columns, delimiter, signs, head, n_lines - head)
+    table = Delimited(text, _notes(above), columns, signs, head, n_lines - head)
     table.check_widths()
     return table
 
 
 def _notes(above: list[str]) -> Notes:
     """The name, resolution, units and channels in the comments above a text, as `hysim.save_record` writes them."""
-    notes: dict[str, Any] = {}
+    notes: dict[str, object] = {}
     for line in itertools.takewhile(lambda line: line.startswith(COMMENTS), above):
         if note := _NOTE.match(line):
             notes[note[1]] = line[note.end() :].strip()
     name, units = (json_value(notes.get(each, "")) for each in ("name", "units"))
-    notes["resolution"] = parse(notes.get("resolution", ""), Signs("."))
+    notes["resolution"] = Signs(",", ".").number(notes.get("resolution", ""))
     notes["name"] = name if isinstance(name, str) else notes.get("name")
     return notes_in(notes, units if isinstance(units, dict) else {})
 
 
-def _signs(sample: list[str], delimiter: str | None, decimal: str | None, thousands: str | None) -> tuple[str, Signs]:
-    """The delimiter and the signs in numbers; delimiter and decimal sign are detected where they are None."""
-    quoted = any('"' in line for line in sample)
+def _signs(lines: list[str], delimiter: str | None, decimal: str | None, thousands: str | None) -> Signs:
+    """The signs of some lines; delimiter and decimal sign are detected where they are None."""
+    quoted = any('"' in line for line in lines)
     candidates = [
-        (between, Signs(point, thousands))
+        Signs(between, point, thousands)
         for between in ([delimiter] if delimiter else DELIMITERS)
         for point in ([decimal] if decimal else DECIMALS)
         if (between != point or quoted) and point != thousands
     ]
     require(candidates, f"delimiter and decimal sign must differ, both are {delimiter!r}")
-    best = max(candidates, key=lambda signs: _score(sample, *signs))
-    if _score(sample, *best) == 0.0 and delimiter is None:
-        present = (between for between in DELIMITERS if any(between in line.strip() for line in sample))
-        return next(present, " "), candidates[0][1]
+    best = max(candidates, key=lambda signs: signs.score(lines))
+    if best.score(lines) == 0.0 and delimiter is None:
+        present = (between for between in DELIMITERS if any(between in line.strip() for line in lines))
+        return candidates[0]._replace(delimiter=next(present, " "))
     return best
 
 
-def _score(lines: list[str], delimiter: str, signs: Signs) -> float:
-    rows = [_cells(line, delimiter, strict=False) for line in lines]
-    width = _most_common(rows)
-    if width < 2:
-        return 0.0
-    cells = [cell for row in rows for cell in row]
-    plain = sum(_kind(cell, signs) != "text" for cell in cells)
-    return sum(len(row) == width for row in rows) / len(rows) * plain / len(cells)
-
-
-def _rows(lines: Lines, delimiter: str) -> list[list[str]]:
-    rows = []
-    for number, line in zip(*lines, strict=True):
-        try:
-            rows.append(_cells(line, delimiter))
-        except csv.Error as error:
-            raise ValueError(f"line {number}: a quoted cell is not closed or too long ({error})") from None
-    return rows
-
-
-def _cells(line: str, delimiter: str, *, strict: bool = True) -> list[str]:
-    """The cells of a line; one that cannot be split is a csv.Error, or unless `strict` a single cell."""
-    if '"' not in line:
-        cells = line.split() if delimiter == " " else line.strip(" ").split(delimiter)
-        return [text_in_cell(cell.strip()) for cell in cells]
-    try:
-        cells = next(csv.reader([line.strip()], delimiter=delimiter, skipinitialspace=True, strict=strict))
-    except csv.Error:
-        if strict:
-            raise
-        cells = [line]
-    return [text_in_cell(cell.strip()) for cell in cells]
-
-
-def _names(line: str, delimiter: str) -> list[str]:
-    """Names of columns; between blanks a unit in brackets belongs to the name before it."""
-    return _WORD.findall(line) if delimiter == " " and '"' not in line else _cells(line, delimiter, strict=False)
-
-
-def _heads(rows: list[list[str]], below: list[list[str]], line: int, width: int, signs: Signs) -> tuple[bool, bool]:
+def _heads(rows: list[list[str]], below: list[list[str]], line: int, signs: Signs) -> tuple[bool, bool]:
     """Whether the first line is a header, and whether the second one holds units."""
-    columns = [[_kind(row[place], signs) for row in below] for place in range(width)]
+    width = len(below[0]) if below else len(rows[0])
+    columns = [[signs.kind(row[place]) for row in below] for place in range(width)]
     numeric = {place for place, kinds in enumerate(columns) if kinds.count("number") >= max(1, kinds.count("text"))}
     if not numeric:  # nothing below to compare with
-        kinds_above = [_kind(cell, signs) for cell in rows[0]]
+        kinds_above = [signs.kind(cell) for cell in rows[0]]
         return "text" in kinds_above or "number" not in kinds_above, False
     kinds_of = [
-        {place: _kind(cell, signs) for place, cell in enumerate(row) if len(row) != width or place in numeric}
+        {place: signs.kind(cell) for place, cell in enumerate(row) if len(row) != width or place in numeric}
         for row in rows
     ]
     texts, counts = ([place for place, kind in kinds_of[0].items() if kind == one] for one in ("text", "number"))
@@ -234,15 +384,11 @@ def _heads(rows: list[list[str]], below: list[list[str]], line: int, width: int,
     return bool(texts), has_units
 
 
-def _kind(cell: str, signs: Signs) -> str:
-    return "missing" if cell.strip().lower() in MISSING else "text" if parse(cell, signs) is None else "number"
-
-
-def _commented(above: list[str], delimiter: str, width: int, signs: Signs) -> list[str]:
+def _commented(above: list[str], width: int, signs: Signs) -> list[str]:
     """Names in the last comment above the first sample, if they are as many as the columns; else their numbers."""
     comment = next((line for line in reversed(above) if line.strip()), "")
-    names = _names(comment.strip().lstrip("".join(COMMENTS)), delimiter)
-    is_named = len(names) == width and all(_kind(name, signs) == "text" for name in names)
+    names = signs.names(comment.strip().lstrip("".join(COMMENTS)))
+    is_named = len(names) == width and all(signs.kind(name) == "text" for name in names)
     return names if is_named else [str(k) for k in range(width)]
 
 

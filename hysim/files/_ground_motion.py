@@ -14,7 +14,7 @@ import numpy as np
 
 from hysim._frozen import FloatArray
 from hysim._prefixes import power_of_ten
-from hysim.files._delimited import delimited
+from hysim.files._delimited import Text, delimited
 from hysim.files._load import Source, opened, options_of_a_text, table_of
 from hysim.files._number_lists import (
     TOP,
@@ -27,7 +27,6 @@ from hysim.files._number_lists import (
     peer_header,
 )
 from hysim.files._table import COMMENTS, Column, Table, UnreadableError, listed, require, shown
-from hysim.files._text import Text
 from hysim.records import step_if_even
 from hysim.signals import sample_times
 

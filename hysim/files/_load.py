@@ -20,10 +20,9 @@ from hysim._frozen import FloatArray, check_choice
 from hysim._progress import Progress, Reports, reports
 from hysim._resolution import output_quantum
 from hysim.files._arrays import NUMBERS, Arrays, mat, npy, npz
-from hysim.files._delimited import Delimited, delimited
+from hysim.files._delimited import DECIMALS, THOUSANDS, Delimited, Text, delimited
 from hysim.files._hdf5 import hdf5
 from hysim.files._table import Column, Frame, Table, damaged, require, shown
-from hysim.files._text import DECIMALS, THOUSANDS, Text
 from hysim.interop import table_in
 from hysim.records import Record
 
