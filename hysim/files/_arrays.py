@@ -151,9 +151,10 @@ class Arrays:
         is_even = len({column.size for column in values}) == 1
         require(is_even, f"the columns have unequal numbers of samples: {sizes}")
         for column, each in zip(columns, values, strict=True):
-            for k in np.flatnonzero(np.isinf(each)):
-                name = f"{self.place(k)}, column {shown(column.label)}"
-                raise ValueError(f"{name}: expected a finite number, got {each[k]}")
+            if np.isinf(each).any():
+                k = int(np.argmax(np.isinf(each)))
+                place = f"{self.place(k)}, column {shown(column.label)}"
+                raise ValueError(f"{place}: expected a finite number, got {each[k]}")
         return np.stack(values)
 
     def place(self, sample: int) -> str:

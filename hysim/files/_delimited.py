@@ -335,13 +335,14 @@ def delimited(text: Text, delimiter: str | None, decimal: str | None, thousands:
 
 def _notes(above: list[str]) -> Notes:
     """The name, resolution, units and channels in the comments above a text, as `hysim.save_record` writes them."""
-    notes: dict[str, object] = {}
+    texts: dict[str, str] = {}
     for line in itertools.takewhile(lambda line: line.startswith(COMMENTS), above):
         if note := _NOTE.match(line):
-            notes[note[1]] = line[note.end() :].strip()
-    name, units = (json_value(notes.get(each, "")) for each in ("name", "units"))
-    notes["resolution"] = Signs(",", ".").number(notes.get("resolution", ""))
-    notes["name"] = name if isinstance(name, str) else notes.get("name")
+            texts[note[1]] = line[note.end() :].strip()
+    name, units, channels = (json_value(texts.get(each, "")) for each in ("name", "units", "channels"))
+    name = name if isinstance(name, str) else texts.get("name")
+    resolution = Signs(",", ".").number(texts.get("resolution", ""))
+    notes = {"name": name, "resolution": resolution, "channels": channels}
     return notes_in(notes, units if isinstance(units, dict) else {})
 
 

@@ -161,14 +161,13 @@ def notes_in(stated: Mapping[str, Any], units: Mapping[Any, Any]) -> Notes:
     name, resolution, channels = (stated.get(note) for note in ("name", "resolution", "channels"))
     if isinstance(channels, str):
         channels = json_value(channels)
-    known = isinstance(channels, Mapping) and all(isinstance(each, (str, int, float)) for each in channels.values())
+    if not isinstance(channels, Mapping) or not all(isinstance(each, (str, int, float)) for each in channels.values()):
+        channels = {}
     return Notes(
         units={str(label): unit for label, unit in units.items() if isinstance(unit, str)},
         resolution=resolution if isinstance(resolution, float) and 0.0 < resolution < math.inf else None,
         name=name if isinstance(name, str) else None,
-        channels={str(label): each if isinstance(each, str) else float(each) for label, each in channels.items()}
-        if known
-        else {},
+        channels={str(label): each if isinstance(each, str) else float(each) for label, each in channels.items()},
     )
 
 
