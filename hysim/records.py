@@ -22,7 +22,7 @@ from hysim._frozen import FloatArray, checked, wrong_axes
 from hysim._prefixes import power_of_ten
 from hysim._printing import extent, listed, printed, quantity, summary_text
 from hysim._resolution import output_quantum
-from hysim.interop import channels_of, frame, table_in, told_by, unit_in
+from hysim.interop import channels_of, frame, table_in, told_by
 
 T = TypeVar("T", float, FloatArray)
 
@@ -484,11 +484,11 @@ def as_record(value: Any, verb: str) -> Record | None:
             f"{verb} takes a table with the columns u and y, got a {table.kind} without {listed(missing)}, with "
             f"{listed(table.labels)}: name the columns by hs.load(table, u=..., y=...)"
         )
-    places = {name: table.labels.index(name) for name in ("u", "y", "t") if name in table.labels}
+    signals = {name: table.read(table.labels.index(name)) for name in ("u", "y", "t") if name in table.labels}
     channels = channels_of(table)
-    units = dict(table.units) | {name: unit for name, place in places.items() if (unit := unit_in(table, place))}
+    units = dict(table.units) | {name: unit for name, (_, unit) in signals.items() if unit}
     return Record(
-        **{name: table.read(place) for name, place in places.items()},
+        **{name: values for name, (values, _) in signals.items()},
         units={name: unit for name, unit in units.items() if name in ("t", "u", "y", *channels)},
         resolution=table.notes.get("resolution"),
         name=table.notes.get("name", ""),

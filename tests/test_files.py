@@ -156,7 +156,7 @@ def test_numbers_of_npz_that_have_changed_are_refused_by_their_checksum():
 def test_encrypted_npz_is_refused():
     content = npz({"u": U, "y": Y})
     at = content.index(b"PK\x01\x02") + 8  # the flags of the first entry in the directory
-    with pytest.raises(ValueError, match="array 'u' is encrypted: save it without a password"):
+    with pytest.raises(ValueError, match="array 'u' is encrypted or packed in another way"):
         load(content[:at] + b"\1" + content[at + 1 :])
 
 
@@ -175,9 +175,9 @@ def test_the_first_of_several_arrays_in_one_npy_file_is_read():
     ids=lambda shape: shape[:12],
 )
 def test_a_shape_that_is_none_is_one_clear_line(shape):
-    with pytest.raises(ValueError, match=r"array 'u' (has a header that cannot be read|is damaged)") as refused:
+    with pytest.raises(ValueError, match=r"(array 'u'|the NPZ file) is damaged") as refused:
         load(npz({"u": lying(0, U.tobytes(), shape), "y": Y}))
-    assert len(str(refused.value)) < 200
+    assert len(str(refused.value)) < 300
 
 
 @settings(max_examples=20)

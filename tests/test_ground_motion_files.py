@@ -277,7 +277,7 @@ def test_a_decimal_comma_is_seen_where_it_can_be_nothing_else():
         (PEER, {"units": "V"}, "units must be a unit of acceleration: expected"),
         (PEER, {"sample_time": 0.0}, "sample_time must be positive and finite, got 0"),
         (PEER, {"sample_time": 1.0, "t": 0}, "either sample_time or the column t"),
-        (PEER, {"skip": -1}, "skip must not be negative"),
+        (PEER, {"skip": -1}, "skip must be a number of lines, got -1"),
         (PEER, {"delimiter": ", "}, "delimiter must be one character"),
         (PEER, {"decimal": "'"}, "decimal must be"),
         (".1;.2\n", {"sample_time": 1.0, "delimiter": ";"}, "a list of numbers needs none"),

@@ -1,11 +1,9 @@
 """Records from files and into files."""
 
-from hysim.files._columns import FileColumn, list_columns
 from hysim.files._ground_motion import column_names, is_at2, load_ground_motion
-from hysim.files._load import load
-from hysim.files._save import ending, packed, save_record
+from hysim.files._load import FileColumn, list_columns, load
+from hysim.files._save import ending, join_records, packed, save_record
 from hysim.files._table import Notes
-from hysim.files._two_files import join_records
 
 __all__ = [
     "FileColumn",

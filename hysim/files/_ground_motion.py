@@ -6,6 +6,7 @@ order; else it is a table with a column of times.
 """
 
 import re
+from io import BytesIO
 from itertools import islice
 from typing import Any, Literal, NamedTuple
 
@@ -13,18 +14,38 @@ import numpy as np
 
 from hysim._frozen import FloatArray
 from hysim._prefixes import power_of_ten
-from hysim.files._accelerations import check_unit, in_si, stated_unit, unit_of_column
-from hysim.files._delimited import delimited
-from hysim.files._layout import DECIMALS
-from hysim.files._load import file_named, table_of
-from hysim.files._number_lists import NumberList, number_list
-from hysim.files._source import Source, opened
-from hysim.files._stated_values import TOP, StatedValues, block_below, check_quantity, cosmos_blocks, peer_header
-from hysim.files._table import Column, Table, UnreadableError, listed, require, shown
-from hysim.files._text import COMMENTS, Text
+from hysim.files._delimited import Text, delimited
+from hysim.files._load import Source, opened, options_of_a_text, table_of
+from hysim.files._number_lists import (
+    TOP,
+    NumberList,
+    StatedValues,
+    block_below,
+    check_quantity,
+    cosmos_blocks,
+    number_list,
+    peer_header,
+)
+from hysim.files._table import COMMENTS, Column, Table, UnreadableError, listed, require, shown
 from hysim.records import step_if_even
 from hysim.signals import sample_times
 
+STANDARD_GRAVITY = 9.80665
+"""The g of files [m/s^2]."""
+
+_SCALES = {
+    "g": (STANDARD_GRAVITY, 1.0), "mg": (STANDARD_GRAVITY, 1000.0), "%g": (STANDARD_GRAVITY, 100.0),
+    "m/s2": (1.0, 1.0), "cm/s2": (1.0, 100.0), "mm/s2": (1.0, 1000.0), "gal": (1.0, 100.0),
+    "in/s2": (0.0254, 1.0), "ft/s2": (0.3048, 1.0),
+}  # fmt: skip
+"""Factor and divisor from each unit to m/s^2."""
+
+_KNOWN = 'expected "m/s^2", "cm/s^2", "mm/s^2", "gal", "g", "mg", "in/s^2" or "ft/s^2"'
+_PER_SECOND_SQUARED = re.compile(r"(/s/s|/\(?s2\)?|s-2|/\(?ss\)?)$")
+_STATED = re.compile(r"\bunits?\b\s*(?:(?:of|are|is|in)\b|[=:])?\s*([^\s,;:=()]+)", re.IGNORECASE)
+_BRACKETS = re.compile(r"[\[(]([^\[\]()]*)[\])]")
+_IN = re.compile(r"\bin\s+([^\s,;:()]+)", re.IGNORECASE)
+_ENDS_IN_UNIT = re.compile(r"acc[a-z]*[_ ]+(?:in[_ ]+)?(\S+)", re.IGNORECASE)
 _TIME_NAME = re.compile(r"t|s|sec|seconds?|time\b.*|time_.*|zeit", re.IGNORECASE)
 _MOTION_NAME = re.compile(r"u|a|a_?g|acc.*|ground.?(acc.*|motion)", re.IGNORECASE)
 _FEW_LINES, _MANY_LINES = 3, 8  # 8 numbers without order increase once in 40 000 times
@@ -121,9 +142,9 @@ def load_ground_motion(
     _check_arguments(sample_time, units, t, skip, delimiter, decimal)
     choice = _Choice(t, acceleration, sample_time, units)
     for_text = {"delimiter": delimiter, "decimal": decimal, "encoding": encoding}
-    with opened(path) as source, file_named(source):
+    with opened(path) as source:
         if source.format == "text":
-            text = Text(source.content, source.name, encoding).whole()
+            text = Text(source.content, source.name, source.encoding or encoding).whole()
             step, values = _of_text(text, choice, skip, delimiter, decimal)
         else:
             require(not skip, f"skip is for text, this is a file of the format {source.format}: leave it out")
@@ -137,16 +158,17 @@ def load_ground_motion(
 
 def is_at2(path: Source, encoding: str | None = None) -> bool:
     """Whether a file is a text whose header states NPTS and DT; errors as `hysim.load` has them."""
-    with opened(path) as source, file_named(source):
+    with opened(path) as source:
         if source.format != "text":
             return False
-        return peer_header([*islice(Text(source.content, source.name, encoding).top(), TOP)]) is not None
+        lines = Text(source.content, source.name, source.encoding or encoding).lines()
+        return peer_header([*islice((line for each in lines for line in each.texts), TOP)]) is not None
 
 
 def column_names(path: Source, **for_text: Any) -> tuple[str, ...]:
     """Names of the columns of a file, with the options for texts and the errors of `hysim.load`."""
     for_text = {**dict.fromkeys(("delimiter", "decimal", "encoding")), **for_text, "skip": for_text.get("skip") or None}
-    with opened(path) as source, file_named(source), table_of(source, for_text) as table:
+    with opened(path) as source, table_of(source, for_text) as table:
         return tuple(table.labels)
 
 
@@ -154,16 +176,10 @@ def _check_arguments(
     sample_time: float | None, units: str | None, t: object, skip: int, delimiter: str | None, decimal: str | None
 ) -> None:
     check_unit(units)
-    if sample_time is not None and not 0.0 < sample_time < np.inf:
-        raise ValueError(f"sample_time must be positive and finite, got {sample_time}")
-    if sample_time is not None and t is not None:
-        raise ValueError("give either sample_time or the column t, not both")
-    if skip < 0:
-        raise ValueError(f"skip must not be negative, got {skip}")
-    if delimiter is not None and len(delimiter) != 1:
-        raise ValueError(f"delimiter must be one character, got {delimiter!r}")
-    if decimal is not None and decimal not in DECIMALS:
-        raise ValueError(f'decimal must be "." or ",", got {decimal!r}')
+    is_step = sample_time is None or 0.0 < sample_time < np.inf
+    require(is_step, f"sample_time must be positive and finite, got {sample_time}")
+    require(sample_time is None or t is None, "give either sample_time or the column t, not both")
+    options_of_a_text(delimiter, decimal, None, skip, None)
 
 
 _Motion = tuple[tuple[float, float], FloatArray]
@@ -194,19 +210,16 @@ def _of_text(text: str, choice: _Choice, skip: int, delimiter: str | None, decim
 
 def _table_below_titles(text: str, delimiter: str | None, decimal: str | None) -> Table:
     """The table in a text, below any number of lines of text."""
-    try:
-        return delimited(Text(text), delimiter, decimal)
-    except ValueError as error:
-        lines, first_error = text.split("\n"), error
+    lines, errors = text.split("\n"), list[ValueError]()
     titles = _titles(lines)
-    for kept in (2, 1, 0):  # names and units, names, or neither
+    for kept in (len(titles), 2, 1, 0):  # all, names and units, names, or none
         dropped = titles[: max(0, len(titles) - kept)]
+        below = "\n".join("" if k in dropped else line for k, line in enumerate(lines))
         try:
-            below = "\n".join("" if k in dropped else line for k, line in enumerate(lines))
-            return delimited(Text(below), delimiter, decimal)
-        except ValueError:
-            continue
-    raise first_error
+            return delimited(Text(BytesIO(below.encode(errors="replace"))), delimiter, decimal)
+        except ValueError as error:
+            errors.append(error)
+    raise errors[0]
 
 
 def _titles(lines: list[str]) -> list[int]:
@@ -251,12 +264,12 @@ def _of_stated(text: str, header: StatedValues, choice: _Choice, skip: int, deci
 def _of_cosmos(text: str, blocks: list[StatedValues], choice: _Choice, decimal: str | None) -> _Motion:
     """The only block of accelerations of a file that may hold velocities and displacements too."""
     first, *others = blocks
-    if others:
-        lines = ", ".join(str(block.line) for block in blocks)
-        raise ValueError(
-            f"the file holds {len(blocks)} accelerations, in lines {lines}: save each to a file, or pass the number of "
-            "lines above the last one as skip="
-        )
+    lines = ", ".join(str(block.line) for block in blocks)
+    require(
+        not others,
+        f"the file holds {len(blocks)} accelerations, in lines {lines}: save each to a file, or pass the number of "
+        "lines above the last one as skip=",
+    )
     unit = choice.units or stated_unit(text.split("\n")[first.line - 1])
     require(unit is not None, f"line {first.line} states no unit of its accelerations: pass units=")
     return _of_stated(block_below(text, first.line), first, choice._replace(units=unit), 0, decimal)
@@ -378,3 +391,56 @@ def _even(table: Table, times: FloatArray) -> tuple[float, float]:
         )
     decimal = float(f"{step:.6g}")
     return float(times[0]), decimal if abs(decimal - step) <= _SAME_DECIMAL * step else step
+
+
+def in_si(values: FloatArray, unit: str) -> FloatArray:
+    """Accelerations in m/s^2, infinite where too large, from those in a unit; ValueError if it is unknown."""
+    name = _name(unit)
+    if name is None:
+        raise ValueError(f"{shown(unit)} is no known unit of acceleration: {_KNOWN}; pass the file's unit as units=")
+    factor, divisor = _SCALES[name]
+    with np.errstate(over="ignore"):
+        return np.asarray(values * factor / divisor)
+
+
+def check_unit(unit: str | None) -> None:
+    """Raise a ValueError if a unit is given that is none of acceleration."""
+    if unit is not None and _name(unit) is None:
+        raise ValueError(f"units must be a unit of acceleration: {_KNOWN}, got {unit!r}")
+
+
+def stated_unit(header: str) -> str | None:
+    """The unit that the text above some numbers states, None if it states none; ValueError if it is not understood.
+
+    First the word behind "unit", then what is in brackets or behind "in", then words that can be nothing else, such as
+    cm/sec2.
+    """
+    behind = [match.strip(".") for match in _STATED.findall(header)]
+    words = [word.strip("().:") for word in re.split(r"[\s,;]+", header)]
+    lone = [word for word in words if (name := _name(word)) and "/s2" in name]
+    after_in = [word.strip(".") for word in _IN.findall(header)]
+    for candidate in (*behind, *_BRACKETS.findall(header), *after_in, *lone):
+        if _name(candidate):
+            return str(candidate)
+    if behind:
+        raise ValueError(f"the header states the unit {shown(behind[0])}, which is unknown: pass units=, {_KNOWN}")
+    return None
+
+
+def unit_of_column(label: str, unit: str) -> str:
+    """The unit of a column, m/s^2 if its header states none; ValueError if the name may end in a unit."""
+    if unit:
+        return unit
+    end = _ENDS_IN_UNIT.fullmatch(label.strip())
+    if end and (name := _name(end[1])) and name != "m/s2":
+        raise ValueError(f'column {shown(label)} may be in {end[1]}: pass units="{end[1]}", or units="m/s^2"')
+    return "m/s^2"
+
+
+def _name(unit: str) -> str | None:
+    """The key of a unit in the table of scales, whatever its spelling."""
+    text = unit.strip().lower().replace("²", "2").replace("**", "").replace("^", "").replace("'", "")
+    text = re.sub(r"sec(ond)?s?", "s", re.sub(r"[\s*·.]+", "", text))
+    text = {"gs": "g", "gals": "gal"}.get(text, text)
+    text = _PER_SECOND_SQUARED.sub("/s2", text)
+    return text if text in _SCALES else None

@@ -7,13 +7,14 @@ files, are not followed.
 h5py reads the file. Three things that its library does not check are checked before: sizes; compressed chunks, which
 may unpack into any amount of memory; and heaps, which hold texts of variable length. A heap is ``GCOL``, a version, its
 length, and objects one behind the other, each with a number, which is 0 for free space, a count, and a length. At an
-object of length zero the library loops for ever, and no signal stops it.
+object of length zero the library loops for ever, and no signal stops it (HDF5 2.0).
 
 Source of the heaps: The HDF Group, HDF5 File Format Specification, Version 3.0, III.E.
 """
 
 import math
 import mmap
+import struct
 import zlib
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
@@ -27,19 +28,17 @@ import numpy.typing as npt
 
 from hysim._versions import optional
 from hysim.files._arrays import KINDS, MOST_BYTES, NOTES, TEXT, UNITS, Array, Arrays, with_notes
-from hysim.files._table import UnreadableError, channels_in, damaged, require
+from hysim.files._table import UnreadableError, damaged, notes_in, require
 
 MOST_SEARCHED = 500_000_000
 """Most bytes of a file whose heaps are looked for; in longer ones texts of variable length are left unread."""
 
 _DEFLATE, _SHUFFLE, _FLETCHER32, _LZF = 1, 2, 3, 32000
-_FILTERS = frozenset({_DEFLATE, _SHUFFLE, _FLETCHER32, _LZF})
 _CHECKSUM = 4  # bytes
 _SLACK = 1024  # bytes by which a packed chunk may be longer than its content
 _LONGEST_ATTRIBUTE = 10_000  # bytes
 _WORDS = (8, 8)  # bytes of an address and a length
 _HEAD_BYTES, _LEAST_HEAP = 16, 4096  # bytes: head of a heap or an object, smallest heap
-_KINDS = KINDS | {"O": "references or texts"}
 
 
 @contextmanager
@@ -52,9 +51,9 @@ def hdf5(file: BinaryIO, path: Path | None, *, matlab: bool) -> Iterator[Arrays]
             texts = _has_sound_heaps(file)
             root = stack.enter_context(h5py.File(file, "r") if path is None else h5py.File(path, "r", locking=False))
             reader = _Reader(h5py, matlab, texts and root.id.get_create_plist().get_sizes() == _WORDS)
-            arrays = [reader.array(label, dataset) for label, dataset in reader.datasets(root, "", set())]
-            notes = {name: reader.attribute(root, name) for name in (*NOTES, "t_units")}
-            units = (f"{name}{UNITS}" for name in channels_in(notes["channels"]))
+            arrays = [reader.array(label, dataset) for label, dataset in reader.datasets(root)]
+            notes = {name: reader.attribute(root, name) for name in (*NOTES, f"t{UNITS}")}
+            units = (f"{name}{UNITS}" for name in notes_in(notes, {}).channels)
             notes |= {name: reader.attribute(root, name) for name in units}
             table = with_notes(arrays, form, {name: value for name, value in notes.items() if value is not None})
         yield table
@@ -67,26 +66,18 @@ class _Reader(NamedTuple):
     matlab: bool
     texts: bool
 
-    def datasets(self, group: Any, path: str, visited: set[int]) -> Iterator[tuple[str, Any]]:
-        """Paths and datasets below a group, in the order of their names, each group once."""
-        address = self.h5py.h5o.get_info(group.id).addr
-        if address in visited:
-            return
-        visited.add(address)
-        for name in group:
-            if name.startswith("#") or not isinstance(group.get(name, getlink=True), self.h5py.HardLink):
-                continue  # MATLAB's own groups, and links
-            item = group[name]
-            if isinstance(item, self.h5py.Group):
-                yield from self.datasets(item, path + name + ("." if self.matlab else "/"), visited)
-            elif isinstance(item, self.h5py.Dataset) and item.shape is not None:
-                yield path + name, item
+    def datasets(self, root: Any) -> Iterator[tuple[str, Any]]:
+        """Paths and datasets, in the order of their names, each once; links and MATLAB's own groups are left out."""
+        items: list[tuple[str, Any]] = []
+        root.visititems(lambda path, item: items.append((path, item)))
+        for path, item in items:
+            if isinstance(item, self.h5py.Dataset) and item.shape is not None and "/#" not in f"/{path}":
+                yield path.replace("/", ".") if self.matlab else path, item
 
     def array(self, label: str, dataset: Any) -> Array:
         """The properties of a dataset."""
         shape = tuple(map(int, dataset.shape[::-1] if self.matlab else dataset.shape))
-        if "MATLAB_empty" in dataset.attrs:
-            shape = (0,)
+        shape = (0,) if "MATLAB_empty" in dataset.attrs else shape
         kind, unit = self.kind(dataset, shape), self.attribute(dataset, "units")
         read = partial(self.values, dataset, shape, kind)
         return Array(label, shape, kind, dataset.dtype.itemsize, read, unit if isinstance(unit, str) else None)
@@ -96,13 +87,11 @@ class _Reader(NamedTuple):
         matlab_class, size = self.attribute(dataset, "MATLAB_class"), math.prod(shape)
         if dataset.is_virtual or dataset.external:
             return "values that lie in another file"
-        if "MATLAB_object_decode" in dataset.attrs or "MATLAB_sparse" in dataset.attrs:
-            return "an object"
-        if matlab_class == "cell":
-            return "cells"
+        if matlab_class == "cell" or {"MATLAB_object_decode", "MATLAB_sparse"} & {*dataset.attrs}:
+            return "cells or an object"
         if matlab_class == "char" or (size == 1 and self.is_text(dataset.dtype)):
             return TEXT if size in (*shape, 0, 1) else "several texts"
-        return _KINDS.get(dataset.dtype.kind, "no numbers")
+        return "references or texts" if dataset.dtype.kind == "O" else KINDS.get(dataset.dtype.kind, "no numbers")
 
     def is_text(self, dtype: np.dtype) -> bool:
         """Whether a type is that of texts which can be read."""
@@ -121,12 +110,12 @@ class _Reader(NamedTuple):
         plain = np.asarray(item.attrs[name]).item()
         return float(plain) if is_number else _decoded(plain)
 
-    def values(self, dataset: Any, shape: tuple[int, ...], kind: str) -> npt.NDArray[np.generic] | str:
+    def values(self, dataset: Any, shape: tuple[int, ...], kind: str) -> npt.NDArray[Any] | str:
         """The numbers or the text of a dataset."""
         if not math.prod(shape):
             return "" if kind == TEXT else np.empty(shape)
         _check_chunks(dataset)
-        values: npt.NDArray[np.generic] = np.asarray(dataset[()])
+        values: npt.NDArray[Any] = np.asarray(dataset[()])
         if kind != TEXT:
             return values.T if self.matlab else values
         if values.dtype.kind in "iu":  # as MATLAB has it
@@ -142,33 +131,23 @@ def _check_chunks(dataset: Any) -> None:
     """Refuse chunks that are not as long as the dataset says, or packed in a way that cannot be looked into."""
     if dataset.chunks is None:
         return
-    plan = dataset.id.get_create_plist()
+    plan, stored = dataset.id.get_create_plist(), list[Any]()
     filters = [plan.get_filter(k)[0] for k in range(plan.get_nfilters())]
-    after = filters[filters.index(_DEFLATE) + 1 :] if _DEFLATE in filters else []
-    is_known = _FILTERS.issuperset(filters) and {_FLETCHER32}.issuperset(after)
+    is_known = {_DEFLATE, _SHUFFLE, _FLETCHER32, _LZF}.issuperset(filters)
     require(is_known, f"its chunks are packed by the filters {filters}: rewrite the file with gzip compression")
     plain = math.prod(dataset.chunks) * dataset.dtype.itemsize
     require(plain <= MOST_BYTES, f"a chunk of {plain:,} bytes is too large: at most {MOST_BYTES:,} are read")
-    stored: list[Any] = []
     dataset.id.chunk_iter(stored.append)
     for chunk in stored:
         applied = [number for k, number in enumerate(filters) if not chunk.filter_mask >> k & 1]
-        is_sound = _is_sound(dataset, chunk, applied, plain)
+        length = chunk.size if chunk.size <= 2 * plain + _SLACK else 0
+        if length and _DEFLATE in applied:
+            packed = dataset.id.read_direct_chunk(chunk.chunk_offset)[1]
+            length = len(zlib.decompressobj().decompress(packed, plain + _CHECKSUM + 1))
+        elif length and _LZF in applied:  # which unpacks to less than 100 times its length
+            length = plain
+        is_sound = plain <= length <= plain + _CHECKSUM
         require(is_sound, f"the file is damaged: a chunk does not have the {plain:,} bytes it says")
-
-
-def _is_sound(dataset: Any, chunk: Any, filters: list[int], plain: int) -> bool:
-    """Whether a chunk has this length when unpacked, or a checksum more."""
-    most, length = plain + _CHECKSUM * filters.count(_FLETCHER32), chunk.size
-    if {_DEFLATE, _LZF} & {*filters} and not 0 < length <= 2 * most + _SLACK:
-        return False
-    if _LZF in filters:  # it unpacks to less than 100 times its length
-        return True
-    if _DEFLATE in filters:
-        stream = zlib.decompressobj()
-        length = len(stream.decompress(dataset.id.read_direct_chunk(chunk.chunk_offset)[1], most + 1))
-        return stream.eof and plain <= length <= most
-    return bool(plain <= length <= most)
 
 
 def _has_sound_heaps(file: BinaryIO) -> bool:
@@ -186,17 +165,13 @@ def _has_sound_heaps(file: BinaryIO) -> bool:
 def _check_heaps(content: bytes | mmap.mmap) -> None:
     start, total = -1, 0
     while (start := content.find(b"GCOL\x01", start + 1)) >= 0:
-        length, at = _number(content, start + 8), start + _HEAD_BYTES
+        (length,), at = struct.unpack_from("<Q", content, start + 8), start + _HEAD_BYTES
         end = start + length if _LEAST_HEAP <= length <= len(content) - start else at
         total += end - at
         require(total <= len(content), "the HDF5 file is damaged: its heaps overlap")
         while at + _HEAD_BYTES <= end:
-            length, is_used = _number(content, at + 8), content[at : at + 2] != b"\0\0"
-            step = length + -length % 8 + (_HEAD_BYTES if is_used else 0)
+            number, length = struct.unpack_from("<H6xQ", content, at)
+            step = length + -length % 8 + (_HEAD_BYTES if number else 0)
             is_inside = 0 < step <= end - at
             require(is_inside, "the HDF5 file is damaged: a text in it has no length, or too great a one")
             at += step
-
-
-def _number(content: bytes | mmap.mmap, at: int) -> int:
-    return int.from_bytes(content[at : at + 8], "little")

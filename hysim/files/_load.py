@@ -1,13 +1,17 @@
-"""The verb `load`: a record from a file.
+"""The verbs `load` and `list_columns`: a record from a file, and what there is to choose from.
 
 A file is read in three steps: its first bytes say its format; the format gives a table of named columns; and the
 numbers of the chosen columns become a record, or several, with gaps where a value is missing.
 """
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+import itertools
+import os
+import re
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import ExitStack, contextmanager
+from io import BytesIO
 from pathlib import Path
-from typing import Any, Literal, TypedDict, Unpack, overload
+from typing import Any, BinaryIO, Literal, NamedTuple, Protocol, TextIO, TypedDict, Unpack, overload, runtime_checkable
 
 import numpy as np
 import numpy.typing as npt
@@ -15,19 +19,26 @@ import numpy.typing as npt
 from hysim._frozen import FloatArray, check_choice
 from hysim._progress import Progress, Reports, reports
 from hysim._resolution import output_quantum
-from hysim.files._cells import THOUSANDS
-from hysim.files._delimited import delimited
-from hysim.files._frames import Frame
+from hysim.files._arrays import NUMBERS, Arrays, mat, npy, npz
+from hysim.files._delimited import DECIMALS, THOUSANDS, Delimited, Text, delimited
 from hysim.files._hdf5 import hdf5
-from hysim.files._layout import DECIMALS
-from hysim.files._mat import mat
-from hysim.files._npz import npy, npz
-from hysim.files._source import Opened, Source, opened
-from hysim.files._table import Column, Table, shown
-from hysim.files._text import Text
+from hysim.files._table import Column, Frame, Table, damaged, require, shown
+from hysim.interop import table_in
 from hysim.records import Record
 
-_TIMES = 3
+Source = str | os.PathLike[str] | TextIO | BinaryIO | Any  # Any stands for tables of other libraries
+
+MOST_TEXT = 500_000_000
+"""Most bytes of a text file, and of any stream."""
+
+_HEAD = 640  # bytes: HDF5 may begin behind a block of 512
+_MODEL = re.compile(rb'\s*\{(.*[{,])?\s*"family"\s*:', re.DOTALL)
+_HDF5 = b"\x89HDF\r\n\x1a\n"
+_PIECE = 1 << 20  # bytes that are read of a stream at once
+_TIMES = 3  # that a text is read: its layout is found, it is checked, and its numbers are read
+_MOST_OF_AN_ARRAY = 100  # columns
+_AT_ONCE = 5_000_000  # numbers of a text
+
 ON_MISSING = ("error", "drop", "split")
 SIGNALS = {"u": "input", "y": "output"}
 
@@ -157,15 +168,11 @@ def load(
     ([0.0, 5.0, 10.0], {'u': 'V', 'y': 'um'})
     """
     check_choice("on_missing", on_missing, ON_MISSING)
-    if delimiter is not None and len(delimiter) != 1:
-        raise ValueError(f"delimiter must be one character, got {delimiter!r}")
-    if decimal is not None and decimal not in DECIMALS:
-        raise ValueError(f'decimal must be "." or ",", got {decimal!r}')
-    if isinstance(resolution, str) and resolution != "detect":
-        raise ValueError(f'resolution must be a number or "detect", got {resolution!r}')
+    is_known = not isinstance(resolution, str) or resolution == "detect"
+    require(is_known, f'resolution must be a number or "detect", got {resolution!r}')
     for_text = options_of_a_text(delimiter, decimal, thousands, skip, encoding)
-    with opened(path) as source, file_named(source):
-        with table_of(source, for_text, progress) as table:
+    with opened(path) as source:
+        with table_of(source, for_text, progress or None) as table:
             columns = _columns(table, {"u": u, "y": y, "t": t})
             signals, places = [*columns], _channels(table, channels)
             constants = {label: place for label, place in places.items() if isinstance(place, float)}
@@ -178,11 +185,17 @@ def load(
         elif resolution is None and columns["y"].label == "y":
             resolution = table.notes.resolution
         if name is None:
-            unstated = "" if isinstance(source.content, Frame) else Path(source.name).stem
+            unstated = "" if source.format == "frame" else Path(source.name).stem
             name = unstated if table.notes.name is None else table.notes.name
         records = tuple(
-            _record(signals, places, dict(zip(columns, values[:, part], strict=True)), labels, resolution, name)
-            for part in parts
+            Record(
+                **{signal: chosen[signal] for signal in signals},
+                channels={label: chosen.get(label, place) for label, place in places.items()},
+                units=labels,
+                resolution=resolution,
+                name=name,
+            )
+            for chosen in (dict(zip(columns, values[:, part], strict=True)) for part in parts)
         )
     return records if on_missing == "split" else records[0]
 
@@ -191,65 +204,146 @@ def options_of_a_text(
     delimiter: str | None, decimal: str | None, thousands: str | None, skip: int, encoding: str | None
 ) -> dict[str, Any]:
     """Options for a text by name, None where nothing is asked for; ValueError if one is no option for any text."""
-    if skip < 0:
-        raise ValueError(f"skip must be a number of lines, got {skip}")
-    if thousands is not None and (thousands not in tuple(THOUSANDS) or thousands == decimal):
-        raise ValueError(
-            "thousands must be a point, a comma, an apostrophe or a space that is not the decimal sign, got "
-            f"{thousands!r}"
-        )
+    require(delimiter is None or len(delimiter) == 1, f"delimiter must be one character, got {delimiter!r}")
+    require(decimal in (None, *DECIMALS), f'decimal must be "." or ",", got {decimal!r}')
+    require(skip >= 0, f"skip must be a number of lines, got {skip}")
+    require(
+        thousands is None or (thousands in (*THOUSANDS,) and thousands != decimal),
+        f"thousands must be a point, a comma, an apostrophe or a space that is not the decimal sign, got {thousands!r}",
+    )
     return {
         "delimiter": delimiter, "decimal": decimal, "thousands": thousands, "skip": skip or None, "encoding": encoding,
     }  # fmt: skip
 
 
-@contextmanager
-def file_named(source: Opened) -> Iterator[None]:
-    """Make every message about a file one line that begins with its name."""
-    try:
-        yield
-    except ValueError as error:
-        line = " ".join(str(error).split())
-        raise ValueError(line if line.startswith(source.name) else f"{source.name}: {line}") from None
+class Opened(NamedTuple):
+    """Name, format and content of a source, its path if it is a file with one, and its encoding if that is known.
+
+    The content of a DataFrame or the like is its table.
+    """
+
+    name: str
+    format: str
+    content: Any
+    path: Path | None = None
+    encoding: str | None = None
+
+
+@runtime_checkable
+class _Readable(Protocol):
+    def read(self, size: int, /) -> Any: ...
+
+
+@runtime_checkable
+class _Named(Protocol):
+    name: Any
 
 
 @contextmanager
-def table_of(source: Opened, for_text: Mapping[str, Any], progress: Reports = None) -> Iterator[Table]:
+def opened(source: Source) -> Iterator[Opened]:
+    """Open a source to read from, and make every message about it one line that begins with its name.
+
+    OSError, TypeError or ValueError if it cannot be read or is too large.
+    """
+    with ExitStack() as stack:
+        if isinstance(source, (str, os.PathLike)):
+            path = Path(source)
+            file = stack.enter_context(path.open("rb"))
+            is_regular = path.is_file()  # not a pipe or a device
+            content = _regular(path, file) if is_regular else _stream(path.name, file)
+        elif isinstance(source, _Readable):
+            content = _stream(Path(str(source.name)).name if isinstance(source, _Named) else "stream", source)
+        elif (table := table_in(source)) is not None:
+            content = Opened(f"the {table.kind}", "frame", Frame(table))
+        else:
+            raise TypeError(f"load takes a path, an open file or a DataFrame, got {type(source).__name__}")
+        try:
+            yield content
+        except ValueError as error:
+            line = " ".join(str(error).split())
+            raise ValueError(line if line.startswith(content.name) else f"{content.name}: {line}") from None
+
+
+def format_of(head: bytes) -> str:
+    """The format of a file that begins so: "npz", "npy", "mat", "mat7.3", "hdf5", "model" or "text"."""
+    if head.startswith((b"PK\x03\x04", b"PK\x05\x06")):
+        return "npz"
+    if head.startswith(b"\x93NUMPY"):
+        return "npy"
+    if head.startswith(_HDF5) or head[512:520] == _HDF5:
+        return "mat7.3" if head.startswith(b"MATLAB") else "hdf5"
+    if head.startswith(b"MATLAB 5.0") or head[124:128] in (b"\x00\x01IM", b"\x01\x00MI"):
+        return "mat"
+    return "model" if _MODEL.match(head) else "text"
+
+
+def _regular(path: Path, file: BinaryIO) -> Opened:
+    form = format_of(file.read(_HEAD))
+    size = file.seek(0, 2)
+    if form == "text":
+        _check_size(path.name, size)
+    file.seek(0)
+    return Opened(path.name, form, file, path)
+
+
+def _stream(name: str, source: Any) -> Opened:
+    pieces: list[Any] = []
+    size = 0
+    while piece := source.read(_PIECE):
+        size += len(piece)
+        _check_size(name, size)
+        pieces.append(piece)
+    is_text = bool(pieces) and isinstance(pieces[0], str)
+    content = "".join(pieces).encode(errors="replace") if is_text else b"".join(pieces)
+    form = format_of(content[:_HEAD])
+    if is_text and form != "model":
+        form = "text"
+    return Opened(name, form, BytesIO(content), None, "utf-8" if is_text else None)
+
+
+def _check_size(name: str, size: int) -> None:
+    require(
+        size <= MOST_TEXT,
+        f"{name} is too large: a text or a stream may have {MOST_TEXT:,} bytes, got {size}; cut it, or save its "
+        "columns as NPZ, MAT or HDF5 and pass the path",
+    )
+
+
+@contextmanager
+def table_of(source: Opened, for_text: Mapping[str, Any], progress: Progress | None = None) -> Iterator[Table]:
     """The table that a source holds, open to be read from."""
     if source.format == "text":
-        reading = _Reading(progress or None, source.content)
-        text = Text(source.content, source.name, for_text["encoding"], for_text.get("skip") or 0, reading)
+        encoding = source.encoding or for_text["encoding"]
+        reading = _reading(progress, _TIMES * source.content.seek(0, 2))
+        text = Text(source.content, source.name, encoding, for_text.get("skip") or 0, reading)
         yield delimited(text, for_text["delimiter"], for_text["decimal"], for_text.get("thousands"))
         return
-    if source.format == "model":
-        raise ValueError(f"{source.name} is a model: read it with hs.load_model")
+    require(source.format != "model", f"{source.name} is a model: read it with hs.load_model")
+    form = source.name if source.format == "frame" else f"a file of the format {source.format}"
     for argument, value in for_text.items():
-        if value is not None:
-            form = source.name if isinstance(source.content, Frame) else f"a file of the format {source.format}"
-            raise ValueError(f"{argument} is for text, this is {form}: leave it out")
-    if isinstance(source.content, Frame):
+        require(value is None, f"{argument} is for text, this is {form}: leave it out")
+    if source.format == "frame":
         yield source.content
     elif source.format in ("hdf5", "mat7.3"):
         with hdf5(source.content, source.path, matlab=source.format != "hdf5") as table:
             yield table
     else:
-        yield _READERS[source.format](source.content)
+        with damaged(source.format.upper()):
+            arrays = {"npz": npz, "npy": npy, "mat": mat}[source.format](source.content)
+        yield arrays
 
 
-class _Reading:
-    """Progress by the bytes of a text that is read `_TIMES` times: its layout is found and checked, then it is read."""
+def _reading(progress: Progress | None, total: int) -> Callable[[int], None]:
+    """A function that is told how many bytes have been read since its last call, and reports them of all."""
+    done = 0
 
-    def __init__(self, progress: Progress | None, content: Any) -> None:
-        self.progress, self.done = progress, 0
-        self.total = 0 if progress is None or isinstance(content, str) else _TIMES * content.seek(0, 2)
+    def report(n_bytes: int) -> None:
+        nonlocal done
+        done += n_bytes
+        if progress is not None:
+            progress(min(done, total), total)
 
-    def __call__(self, n_bytes: int) -> None:
-        self.done += n_bytes
-        if self.progress is not None:
-            self.progress(min(self.done, self.total), self.total)
-
-
-_READERS = {"npz": npz, "npy": npy, "mat": mat}
+    return report
 
 
 def _columns(table: Table, keys: Mapping[str, str | int | None]) -> dict[str, Column]:
@@ -284,53 +378,27 @@ def _parts(
     is_cut = on_missing == "split"
     parts = np.split(samples, np.flatnonzero(np.diff(samples) > 1) + 1 if is_cut else [])
     long_enough = [part for part in parts if part.size >= 2]
-    if not long_enough:
-        longest = max(part.size for part in parts)
-        raise ValueError(f"a record needs at least 2 samples, there are {longest}{' in a row' if is_cut else ''}")
-    if "t" in columns:
-        for part in long_enough:
-            _check_time(table, values[[*columns].index("t")], part)
+    longest = max(part.size for part in parts)
+    in_a_row = " in a row" if is_cut else ""
+    require(long_enough, f"a record needs at least 2 samples, there are {longest}{in_a_row}")
+    times = values[[*columns].index("t")] if "t" in columns else np.arange(float(values.shape[1]))
+    for part in long_enough:
+        for wrong in np.flatnonzero(np.diff(times[part]) <= 0):
+            before, k = part[wrong : wrong + 2]
+            raise ValueError(
+                f"{table.place(k)}: time must increase, got {times[k]} after {times[before]}; sort the samples, "
+                "remove repeated ones, or load without time: t=False"
+            )
     return long_enough
-
-
-def _check_time(table: Table, times: FloatArray, part: npt.NDArray[np.intp]) -> None:
-    wrong = np.flatnonzero(np.diff(times[part]) <= 0)
-    if wrong.size:
-        before, k = part[wrong[0]], part[wrong[0] + 1]
-        raise ValueError(
-            f"{table.place(k)}: time must increase, got {times[k]} after {times[before]}; sort the samples, remove "
-            "repeated ones, or load without time: t=False"
-        )
 
 
 def _channels(
     table: Table, channels: Sequence[str] | Mapping[str, str | int | float] | None
 ) -> dict[str, Column | float]:
     """The column of each channel, or its number where it is constant; by default those that the file names."""
-    if channels is None:
-        keys: Mapping[str, str | int | float] = table.notes.channels
-    elif isinstance(channels, Mapping):
-        keys = channels
-    else:
-        keys = dict(zip(*[(channels,) if isinstance(channels, str) else channels] * 2, strict=True))
+    names = [channels] if isinstance(channels, str) else table.notes.channels if channels is None else channels
+    keys = names if isinstance(names, Mapping) else {name: name for name in names}
     return {label: key if isinstance(key, float) else table.column(key) for label, key in keys.items()}
-
-
-def _record(
-    signals: Sequence[str],
-    channels: Mapping[str, Column | float],
-    values: Mapping[str, FloatArray],
-    units: Mapping[str, str],
-    resolution: float | None,
-    name: str,
-) -> Record:
-    return Record(
-        **{signal: values[signal] for signal in signals},
-        channels={label: values.get(label, place) for label, place in channels.items()},
-        units=units,
-        resolution=resolution,
-        name=name,
-    )
 
 
 def _units(table: Table, columns: Mapping[str, Column], constants: Iterable[str]) -> dict[str, str]:
@@ -340,3 +408,104 @@ def _units(table: Table, columns: Mapping[str, Column], constants: Iterable[str]
     if "t" not in columns and "t" not in table.labels:
         units["t"] = table.notes.units.get("t")
     return {signal: unit for signal, unit in units.items() if unit is not None}
+
+
+class FileColumn(NamedTuple):
+    """A column of a file, by the name, and the number if it has one, that `hysim.load` takes.
+
+    `n_samples` counts those with a value, `n_missing` the others. The lowest and the highest value are nan, and
+    `problem` says why, where a column cannot be read; it is empty where it can.
+    """
+
+    name: str
+    number: int | None
+    unit: str
+    n_samples: int
+    n_missing: int
+    lowest: float
+    highest: float
+    increases: bool
+    problem: str = ""
+
+
+def list_columns(
+    path: Source,
+    *,
+    delimiter: str | None = None,
+    decimal: str | None = None,
+    thousands: str | None = None,
+    skip: int = 0,
+    encoding: str | None = None,
+) -> tuple[FileColumn, ...]:
+    """List the columns of a file that `hysim.load` reads.
+
+    Parameters
+    ----------
+    path : str, path or open file
+        As of `hysim.load`.
+    delimiter, decimal, thousands, skip, encoding : optional
+        As of `hysim.load`, for a text.
+
+    Returns
+    -------
+    tuple of FileColumn
+        In the order of the file; of an array with several axes the first 100 columns.
+
+    Raises
+    ------
+    FileNotFoundError, TypeError, ValueError
+        As `hysim.load`, for the file; a column that cannot be read is listed with its problem.
+
+    Examples
+    --------
+    >>> import io
+    >>> import hysim as hs
+    >>> text = io.StringIO("t [s], voltage [V], note\\n0, 0.0, a\\n1, 5.0, b\\n")
+    >>> [(each.name, each.unit, each.highest) for each in hs.list_columns(text)]
+    [('t', 's', 1.0), ('voltage', 'V', 5.0), ('note', '', nan)]
+    """
+    for_text = options_of_a_text(delimiter, decimal, thousands, skip, encoding)
+    with opened(path) as source, table_of(source, for_text) as table:
+        keys = [*_keys(table)]  # of a text many at once, because it is split into all of its cells each time
+        size = max(1, _AT_ONCE // table.n_samples) if isinstance(table, Delimited) else 1
+        starts = range(0, len(keys), size)
+        return tuple(each for start in starts for each in _together(table, keys[start : start + size]))
+
+
+_Key = tuple[str, int | None]
+
+
+def _keys(table: Table) -> Iterator[_Key]:
+    """Name and number of each column, None for one of several axes."""
+    if not isinstance(table, Arrays):
+        yield from zip(table.labels, itertools.count())
+        return
+    for place, array in enumerate(table.arrays):
+        if array.is_vector or array.kind != NUMBERS:
+            yield array.label, place
+        else:
+            is_only = len(table.arrays) == 1 and len(array.shape) == 2
+            for k, index in enumerate(itertools.islice(np.ndindex(array.shape[1:]), _MOST_OF_AN_ARRAY)):
+                yield f"{array.label}[{','.join(map(str, index))}]", k if is_only else None
+
+
+def _together(table: Table, keys: list[_Key]) -> list[FileColumn]:
+    """Columns that are read at once; where one of them cannot be read, each half of them is."""
+    try:
+        columns = [table.column(name if number is None else number) for name, number in keys]
+        values = table.values(columns)
+    except ValueError as error:
+        if len(keys) > 1:
+            half = len(keys) // 2
+            return _together(table, keys[:half]) + _together(table, keys[half:])
+        return [FileColumn(*keys[0], "", 0, 0, np.nan, np.nan, False, " ".join(str(error).split()))]
+    return [_column(table, key, *column) for key, *column in zip(keys, columns, values, strict=True)]
+
+
+def _column(table: Table, key: _Key, column: Column, values: FloatArray) -> FileColumn:
+    name, number = key
+    known = values[~np.isnan(values)]
+    low, high = (float(known.min()), float(known.max())) if known.size else (np.nan, np.nan)
+    unit = table.notes.units.get(name, column.unit)
+    increases = bool(known.size > 1 and (np.diff(known) > 0.0).all())
+    return FileColumn(name, number, unit, known.size, values.size - known.size, low, high, increases)

@@ -2,15 +2,22 @@
 
 import json
 import math
+import operator
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple, Protocol
 
+import numpy as np
+
 from hysim._frozen import FloatArray
-from hysim._names import nearest as nearest_of
+from hysim._names import meant
+from hysim.interop import ForeignTable
 
 _LONGEST_REASON = 200  # letters
+
+COMMENTS = ("#", "%")
+"""Signs with which a comment begins in a text."""
 
 
 class Column(NamedTuple):
@@ -55,6 +62,38 @@ class Table(Protocol):
         """Place of the sample in the file: "line 12"."""
 
 
+@dataclass(frozen=True)
+class Frame:
+    """Columns of a DataFrame or the like."""
+
+    table: ForeignTable
+
+    @property
+    def notes(self) -> Notes:
+        """Units, resolution, name and channels in the notes of the frame."""
+        return notes_in(self.table.notes, self.table.units)
+
+    @property
+    def labels(self) -> Sequence[str]:
+        """Names of the columns; the last one is the index, where it holds times."""
+        return self.table.labels
+
+    def column(self, key: str | int) -> Column:
+        """The column of this name, with or without its unit, or of this number from 0."""
+        columns = [Column(k, label, self.table.units.get(label, "")) for k, label in enumerate(self.labels)]
+        number, label, _ = column_of(key, columns)
+        values, unit = self.table.read(number)
+        return Column(values, label, unit)
+
+    def values(self, columns: list[Column]) -> FloatArray:
+        """The numbers of the columns, shape (n_columns, n_samples), nan where one is missing."""
+        return np.stack([column.place for column in columns])
+
+    def place(self, sample: int) -> str:
+        """The sample's row, counted from 0 whatever the index holds."""
+        return f"row {sample}"
+
+
 class UnreadableError(ValueError):
     """A file that cannot be read, with a message that needs no further explanation."""
 
@@ -73,10 +112,10 @@ def damaged(form: str) -> Iterator[None]:
     except UnreadableError:
         raise
     except MemoryError:
-        raise UnreadableError(f"the {form} file needs more memory than there is") from None
+        raise UnreadableError(f"the {form} file is damaged, or needs more memory than there is") from None
     except Exception as error:
         reason = f"{type(error).__name__} {error}"[:_LONGEST_REASON].strip()
-        raise UnreadableError(f"the {form} file is damaged: {reason}") from None
+        raise UnreadableError(f"the {form} file is damaged: {reason}; copy or save it again") from None
 
 
 def number_of(key: str, kind: str, *names: Sequence[str]) -> int | None:
@@ -94,6 +133,18 @@ def number_of(key: str, kind: str, *names: Sequence[str]) -> int | None:
     return None
 
 
+def column_of(key: str | int, columns: Sequence[Column]) -> Column:
+    """The column of this name, with or without its unit, or of this number from 0."""
+    labels = [column.label for column in columns]
+    if not isinstance(key, str):
+        require(0 <= operator.index(key) < len(columns), f"no column {key}, there are columns 0 to {len(columns) - 1}")
+        return columns[key]
+    number = number_of(key, "columns", labels, [f"{column.label} [{column.unit}]" for column in columns])
+    if number is None:
+        raise ValueError(f"no column {key!r}, the columns are: {listed(labels)}{meant(key, labels)}")
+    return columns[number]
+
+
 def shown(text: str, longest: int = 40) -> str:
     """A name or a cell from a file, in one line."""
     return repr(text if len(text) <= longest else text[: longest - 3] + "...")
@@ -105,22 +156,24 @@ def listed(names: Sequence[str], most: int = 20) -> str:
     return ", ".join(plain) + (f" and {len(names) - most} more" if len(names) > most else "")
 
 
-def nearest(key: str, names: Sequence[str]) -> str:
-    """The name that may be meant by a key, as the end of a message; an empty text if none is near."""
-    near = nearest_of(key, names)
-    return "" if near is None else f"; did you mean {shown(near)}?"
+def notes_in(stated: Mapping[str, Any], units: Mapping[Any, Any]) -> Notes:
+    """The notes about a record among the values that a file states; what is of another kind is left out."""
+    name, resolution, channels = (stated.get(note) for note in ("name", "resolution", "channels"))
+    if isinstance(channels, str):
+        channels = json_value(channels)
+    if not isinstance(channels, Mapping) or not all(isinstance(each, (str, int, float)) for each in channels.values()):
+        channels = {}
+    return Notes(
+        units={str(label): unit for label, unit in units.items() if isinstance(unit, str)},
+        resolution=resolution if isinstance(resolution, float) and 0.0 < resolution < math.inf else None,
+        name=name if isinstance(name, str) else None,
+        channels={str(label): each if isinstance(each, str) else float(each) for label, each in channels.items()},
+    )
 
 
-def channels_in(text: Any) -> dict[str, str | float]:
-    """The channels that a text in JSON names; none if it does not."""
+def json_value(text: str) -> Any:
+    """The value that a text in JSON holds; None if it is none."""
     try:
-        channels = json.loads(text)
-    except (TypeError, ValueError, RecursionError):
-        return {}
-    known = isinstance(channels, dict) and all(type(each) in (str, int, float) for each in channels.values())
-    return {name: each if isinstance(each, str) else float(each) for name, each in channels.items()} if known else {}
-
-
-def positive(value: float | None) -> float | None:
-    """A resolution that a file states, None if it is not positive and finite."""
-    return value if value is not None and 0.0 < value < math.inf else None
+        return json.loads(text)
+    except (ValueError, RecursionError):
+        return None
