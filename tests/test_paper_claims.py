@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 
 import hysim as hs
-from hysim.paper import printed
-from hysim.paper.claims import RULES, VERDICTS, Claim, _loops, _values, claims, evidence
-from hysim.paper.claims._judge import Entry, Value, judged, table
-from hysim.paper.claims.rounding import Spread, exactly, half_unit, spread, stands_for
+from hysim.paper import claim_values, printed
+from hysim.paper.claim_values import FUNCTIONS, Value
+from hysim.paper.claims import RULES, VERDICTS, Claim, Entry, claims, evidence, judged, table
+from hysim.paper.rounding import Spread, exactly, half_unit, spread, stands_for
 
 MISSED, NO, CONTRADICTION, UNKNOWN, REACHED, YES = VERDICTS
 
@@ -121,7 +121,7 @@ def test_claims_are_complete_and_told_apart_by_their_ids(reproduction):
 
 def test_the_table_uses_every_function_and_no_other():
     used = {entry.value[0] for entry in table().values() if entry.value}
-    assert used == set(_values.FUNCTIONS) | set(_loops.FUNCTIONS)
+    assert used == set(FUNCTIONS)
     for name, entry in table().items():
         assert entry.rule in (*RULES, "missing"), name
         assert bool(entry.value) == (entry.rule != "missing") == (not entry.needs), name
@@ -364,7 +364,7 @@ def test_another_model_of_table_1_is_judged_otherwise(monkeypatch, of, name, tex
 
 def test_a_model_with_memory_would_be_one_of_hysteresis(monkeypatch, of):
     slow = hs.TransferFunction(num=(0.022 / 500.0,), den=(1.0, 1.0 / 500.0))
-    monkeypatch.setattr(_values, "EQUATION_1", slow)
+    monkeypatch.setattr(claim_values, "EQUATION_1", slow)
     assert verdicts(of, "eq1-has-hysteresis") == {"eq1-has-hysteresis": YES}
 
 
@@ -443,7 +443,7 @@ def test_a_program_of_table_2_s_period_would_agree(monkeypatch, of):
 
 
 def test_a_part_for_50_v_would_deliver_them(monkeypatch, of):
-    monkeypatch.setattr(_values, "UA741_SUPPLY_SPAN", 60.0)
+    monkeypatch.setattr(claim_values, "UA741_SUPPLY_SPAN", 60.0)
     assert verdicts(of, "amplifier-supply") == {"amplifier-supply": YES}
 
 
@@ -456,20 +456,20 @@ def test_a_part_for_50_v_would_deliver_them(monkeypatch, of):
     ],
 )
 def test_other_loops_are_judged_otherwise(monkeypatch, of, name, value, changed):
-    monkeypatch.setattr(_loops, name, value)
+    monkeypatch.setattr(claim_values, name, value)
     assert verdicts(of, *changed) == changed
 
 
 def test_a_loop_that_is_slower_than_the_plant_is_said_to_be(monkeypatch, of):
-    faster = replace(_loops._open_step(), rise_time=0.1)
-    monkeypatch.setattr(_loops, "_open_step", lambda: faster)
+    faster = replace(claim_values._open_step(), rise_time=0.1)
+    monkeypatch.setattr(claim_values, "_open_step", lambda: faster)
     assert verdicts(of, "proportional-rise-time") == {"proportional-rise-time": NO}
 
 
 def test_a_controller_with_another_integral_is_not_17(monkeypatch, of):
     from hysim.paper.equations import pid_standard
 
-    monkeypatch.setattr(_loops, "pid_standard", lambda Kp, Ti, Td, **rest: pid_standard(Kp, 2.0 * Ti, Td, **rest))
+    monkeypatch.setattr(claim_values, "pid_standard", lambda Kp, Ti, Td, **rest: pid_standard(Kp, 2.0 * Ti, Td, **rest))
     assert verdicts(of, "eq17-three-terms") == {"eq17-three-terms": NO}
 
 

@@ -9,23 +9,31 @@ import pytest
 import hysim.paper
 from hysim.control import to_control
 from hysim.paper import printed
-from hysim.paper.amplifier import UA741_SUPPLY_SPAN, full_power_bandwidth, resistor_ratio, voltage_gain
-from hysim.paper.approximations import approximations, matched_second_order, step_fit
 from hysim.paper.equations import (
     EQUATION_1,
     EQUATION_4,
     EQUATION_6,
     EQUATION_7,
+    EQUATIONS_7_8,
+    EQUATIONS_13_14,
+    UA741_SUPPLY_SPAN,
+    approximations,
+    array,
     characteristics,
+    companion,
+    full_power_bandwidth,
     in_time_unit,
+    matched_second_order,
     pid_standard,
+    resistor_ratio,
     second_order,
     settling_window,
+    step_fit,
     step_response,
     unit_step,
+    voltage_gain,
 )
-from hysim.paper.resolution import quantum
-from hysim.paper.state_space import EQUATIONS_7_8, EQUATIONS_13_14, array, companion
+from hysim.paper.reidentification import quantum
 from hysim.plants.transfer_function import TransferFunction
 
 MODELS = {"(1)": EQUATION_1, "(4)": EQUATION_4, "(6)": EQUATION_6, "(7)": EQUATION_7}

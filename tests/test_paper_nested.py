@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from hysim.paper.nested import nested_errors, of_discovered
+from hysim.paper.preference import nested_errors, of_discovered
 
 RESULT = Path(__file__).parent.parent / "experiments" / "results" / "nested_table1" / "result.json"
 

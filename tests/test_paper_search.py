@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 import hysim as hs
-from hysim.paper.camera import _width
-from hysim.paper.chapters.camera import needed
+from hysim.paper.camera import _width, needed
 from hysim.paper.equations import EQUATION_1, EQUATION_4
 from hysim.paper.loops import law_plant
 from hysim.paper.search import (

@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import hysim as hs
-from hysim.rig._scene import MARGIN, Scene
+from hysim.rig._camera import MARGIN, Scene
 
 SMALL = hs.rig.Camera(shape=(24, 40))
 QUIET = replace(SMALL, shot_noise=False, read_noise=0.0)

@@ -9,9 +9,7 @@ from scipy.optimize import brentq
 
 from hysim.control import to_control
 from hysim.metrics import step_metrics
-from hysim.paper import approximations
-from hysim.paper.approximations import step_fit
-from hysim.paper.claims import _loops
+from hysim.paper import claim_values, equations
 from hysim.paper.equations import (
     EQUATION_1,
     EQUATION_4,
@@ -19,6 +17,7 @@ from hysim.paper.equations import (
     EQUATION_7,
     characteristics,
     second_order,
+    step_fit,
     unit_step,
 )
 from hysim.paper.step_reading import step_reading
@@ -34,7 +33,7 @@ NAMES = {
 
 def test_the_rise_times_of_the_report_are_those_of_a_fine_grid():
     """0.714 in the loop and 0.916 alone; python-control's own coarse samples give 0.663 and 0.862."""
-    claim = _loops.proportional_rise(None)
+    claim = claim_values.proportional_rise(None)
     assert claim.value == pytest.approx(0.714, abs=5e-4)
     assert claim.facts["open"] == pytest.approx(0.916, abs=5e-4)
 
@@ -95,7 +94,7 @@ def test_the_reports_sampled_responses_read_like_the_exact_ones(name, step, dura
 def test_a_finer_grid_changes_no_fit_of_a_step(monkeypatch):
     pairs = (EQUATION_1, EQUATION_7), (EQUATION_4, EQUATION_6)
     coarse = [step_fit(*pair) for pair in pairs]
-    monkeypatch.setattr(approximations, "_INTERVALS", 4 * approximations._INTERVALS)
+    monkeypatch.setattr(equations, "_INTERVALS", 4 * equations._INTERVALS)
     assert coarse == pytest.approx([step_fit(*pair) for pair in pairs], abs=1e-3)
 
 
@@ -119,6 +118,6 @@ def test_a_system_without_a_final_value_is_refused(num, den, message):
 
 def test_the_claims_read_with_the_filter_of_the_derivative():
     """Its pole at 100 rad/s is the fastest mode, which sets the samples."""
-    found = _loops._loop_step(math.inf, _loops.DERIVATIVE_TIME)
+    found = claim_values._loop_step(math.inf, claim_values.DERIVATIVE_TIME)
     assert found.overshoot_percent == pytest.approx(54.1714, abs=1e-4)
     assert found.settling_time == pytest.approx(16.6630, abs=1e-4)

@@ -9,10 +9,14 @@ sensitivity of 2, the frame of delay included. The figures come from another noi
 displacement and of the measured one: the triangle's from the mean width of the last `MEASURED` of ten cycles, since the
 width of a single noisy one is an accident; the step's is the median over `NOISES` noises of the least of its three
 reductions.
+
+The reduction of the hysteresis also depends on the triangle's period and on the controller's sample time, so that it is
+a curve and not a number: the largest closed width sits in the corner where the triangle turns, and is about the
+reference's rate times the time that the loop needs. A slower triangle, or a faster loop, gives any reduction.
 """
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -22,12 +26,11 @@ from hysim import signals
 from hysim._frozen import FloatArray, frozen
 from hysim.control import PID, RestingPlant, as_actuator, open_loop
 from hysim.datasets import PIXEL
-from hysim.metrics import VibrationReduction, reduction_percent, rmse, vibration_reduction
+from hysim.metrics import VibrationReduction, loop_metrics, reduction_percent, rmse, vibration_reduction
 from hysim.paper.equations import EQUATION_4
-from hysim.paper.loops import ABOUT_34_V, HIGH, PERIOD, SAMPLE_TIME, SUPPLY, law_plant
+from hysim.paper.loops import ABOUT_34_V, HIGH, PERIOD, REDUCTIONS, SAMPLE_TIME, SUPPLY, HysteresisCase, law_plant
 from hysim.paper.reidentification import SAMPLE_SECONDS
 from hysim.paper.search import Found, Task, search, step_task, triangle_task
-from hysim.plants.actuator import Actuator
 from hysim.plants.sensor import Sensor
 
 FRAME_RATES = (10.0, 30.0, 100.0, 1000.0)
@@ -36,6 +39,11 @@ SENSORS = ((0.0, 0.0), (0.1, 0.0), (0.1, 0.03), (0.1, 0.1), (1.0, 0.0), (1.0, 0.
 CYCLES, MEASURED = 10, 5
 NOISES = 15  # of a step
 LOW = 0.1  # of the triangle [um]
+PERIODS = (13.0, 26.0, 52.0, 104.0, 260.0, 520.0)
+"""Of the triangle, in the curves [s]."""
+
+TARGETS = {"bouc-wen+eq7": ("90 % of the hysteresis", 89.5), "eq4": ("97 % of the vibration", 96.5)}
+"""The two headline figures by their plant, and what rounds to them [%]."""
 
 _Effort = tuple[int, int, int]
 _FIRST: _Effort = (30, 6, 250)  # generations, population and polish of an ideal sensor's search
@@ -48,6 +56,8 @@ _RECORD = 160.0  # of a step [samples of Table 2]
 _SEED = 10  # of the first noise that is measured; the search has those from 0 on
 _AGAIN = 9  # noises behind which controllers are compared in the end
 _FEW = 3  # at 1000 Hz, and behind which those of a step are searched below 100 Hz
+_CURVE_CYCLES = 3  # of the curves; the last one is steady: no loop needs more than a second
+_OPEN_SAMPLES = 1300  # of a cycle in open loop
 
 
 @frozen
@@ -69,8 +79,6 @@ class CameraLoop:
         Of the true displacement [um].
     saturated_percent : float
         Share of samples at a limit [%].
-    reference, y : array, shape (n,)
-        The last cycle or the step, and the true displacement [um].
     """
 
     plant: str
@@ -82,21 +90,65 @@ class CameraLoop:
     measured_reduction_percent: float
     tracking_rms: float
     saturated_percent: float
-    reference: FloatArray
-    y: FloatArray
 
 
 def hysteresis_cameras(law: Any) -> list[CameraLoop]:
     """Every camera on the hysteresis of a law before (7); laws as `loops` takes them."""
-    return _Triangle(law).loops()
+    plant = law_plant(law)
+    in_a_cycle = round(PERIOD / SAMPLE_TIME)
+    opened = open_loop(plant, _triangle(in_a_cycle), SAMPLE_TIME, in_a_cycle)
+    open_width = _width(opened.y, in_a_cycle)
+
+    def task(frame: float) -> Task:
+        cycles, skip = (1, _SKIPPED) if frame < _SHORT else (2, 0.0)
+        return triangle_task(
+            plant, low=LOW, high=HIGH, period=PERIOD, limits=SUPPLY, sample_time=frame, cycles=cycles, skip=skip,
+            tracking=1.0,
+        )  # fmt: skip
+
+    def measured(task: Task, pid: PID) -> dict[str, float]:
+        samples = round(PERIOD / task.sample_time)
+        reference, last = _triangle(samples), slice(-MEASURED * samples, None)
+        before = np.interp(task.sample_time * np.arange(reference.size), opened.t, opened.y)
+        run, seen = next(_runs(task, pid, reference, before))
+        return {
+            "true_reduction_percent": reduction_percent(open_width, _width(run.y, samples)),
+            "measured_reduction_percent": reduction_percent(_width(seen, samples), _width(run.measurement, samples)),
+            "tracking_rms": rmse(reference[last], run.y[last]),
+            "saturated_percent": 100.0 * float(np.mean(run.drive != run.command)),
+        }
+
+    return _cameras("bouc-wen+eq7", 1.0, 1, task, measured)
 
 
 def vibration_cameras() -> list[CameraLoop]:
     """Every camera on the vibration of (4)."""
-    return _Step().loops()
+    plant = as_actuator(EQUATION_4)
+    decay = float(np.min(-EQUATION_4.poles.real))
+
+    def task(frame: float) -> Task:
+        return step_task(plant, step=-1.0, limits=ABOUT_34_V, duration=_RECORD, sample_time=frame)
+
+    def measured(task: Task, pid: PID) -> dict[str, float]:
+        t = task.sample_time * np.arange(round(_RECORD / task.sample_time) + 1)
+        reference = np.full(t.size, -1.0)
+        opened = RestingPlant(plant, task.sample_time).driven(reference / plant.dc_gain)
+        figures = []
+        for run, seen in _runs(task, pid, reference, opened):
+            pairs = ((opened, run.y), (seen, run.measurement))
+            figures.append([_least(vibration_reduction(t, *pair, decay_rate=decay)) for pair in pairs])
+        true, by_camera = (_middle([row[k] for row in figures]) for k in range(2))
+        return {
+            "true_reduction_percent": true,
+            "measured_reduction_percent": by_camera,
+            "tracking_rms": rmse(reference, run.y),
+            "saturated_percent": 100.0 * float(np.mean(run.drive != run.command)),
+        }
+
+    return _cameras("eq4", SAMPLE_SECONDS, _FEW, task, measured)
 
 
-def camera_measures(loops: Sequence[CameraLoop]) -> list[dict[str, Any]]:
+def camera_rows(loops: Sequence[CameraLoop]) -> list[dict[str, Any]]:
     """The rows under "camera" in `summary.json`."""
     return [
         {
@@ -116,61 +168,112 @@ def camera_measures(loops: Sequence[CameraLoop]) -> list[dict[str, Any]]:
     ]
 
 
-class _Cameras:
-    """Base of both references: a controller for every camera, searched near those of its neighbours."""
+def needed(plant: str, cameras: Sequence[CameraLoop]) -> str:
+    """The slowest and coarsest sensor tried that reaches a headline figure, in a sentence."""
+    name, least = TARGETS[plant]
+    rows = [each for each in cameras if each.plant == plant]
+    enough = [each for each in rows if each.true_reduction_percent >= least]
+    what = (
+        f"an ideal sensor of {min(each.frame_rate for each in enough):g} Hz" if enough else "more than any sensor tried"
+    )
+    if real := [each for each in enough if each.quantum > 0.0]:
+        worst = max(real, key=lambda each: (-each.frame_rate, each.shake, each.quantum))
+        shaking = f"shakes by {worst.shake:g} pixel" if worst.shake else "does not shake"
+        what = (
+            f"readings in steps of {worst.quantum:.4f} µm ({worst.quantum / PIXEL:g} pixel), "
+            f"{worst.frame_rate:g} times a second, of an image that {shaking}"
+        )
+    quantum, shake = SENSORS[-1]
+    own = [each for each in rows if (each.quantum, each.shake) == (quantum * PIXEL, shake)]
+    settled = [each for each in own if math.isfinite(each.true_reduction_percent)]
+    camera = "let no loop settle"
+    if settled:
+        best = max(settled, key=lambda each: each.true_reduction_percent)
+        camera = f"reach {best.true_reduction_percent:.0f} % at best, at {best.frame_rate:g} frames a second"
+    return f"{name} needs {what}; the paper's own pixels and shake {camera}."
 
-    name: str
-    unit: float  # of time [s]
-    task: Callable[[Actuator, float], Task]
-    judged: Callable[[float, float, float, Found, Any], CameraLoop]
-    plant: Actuator
-    searched = 1  # noises behind which a controller is searched
 
-    def loops(self) -> list[CameraLoop]:
-        """Every frame rate with every sensor."""
-        rows: list[CameraLoop] = []
-        slower: list[PID] = []
-        for rate in FRAME_RATES:
-            found = self.found(rate, slower)
-            slower = [self.kept(each.controller, rate) for each in found]
-            rows += [
-                self.judged(rate, *sensor, best, self.with_camera(rate, *sensor, _SEED))
-                for sensor, best in zip(SENSORS, found, strict=True)
-            ]
-        return rows
+def period_rows(law: Any, fast: HysteresisCase, cameras: Sequence[CameraLoop]) -> list[dict[str, float]]:
+    """Reductions over the period of the triangle, with an ideal sensor and no delay [%].
 
-    def found(self, rate: float, slower: Sequence[PID]) -> list[Found]:
-        """A search for every sensor, and then the best of all that were found, behind several noises.
+    The controllers are that of 10 ms, and those that were searched for ideal cameras of up to 100 Hz.
+    """
+    plant = law_plant(law)
+    cycle = signals.triangle(LOW, HIGH, cycles=_CURVE_CYCLES, samples_per_cycle=_OPEN_SAMPLES)
+    open_widths = [
+        open_loop(plant, cycle, period / _OPEN_SAMPLES, _OPEN_SAMPLES).loop.relative_width for period in PERIODS
+    ]
 
-        `slower` are the controllers of a camera of a smaller rate.
-        """
-        ideal, is_fast = self.task(self.plant, self.frame(rate)), rate > 100.0
+    def closed_width(pid: PID, sample_time: float, period: float) -> float:
+        samples = 2 * round(0.5 * period / sample_time)
+        reference = signals.triangle(LOW, HIGH, cycles=_CURVE_CYCLES, samples_per_cycle=samples)
+        y = RestingPlant(plant, sample_time).run(pid, reference).y
+        return loop_metrics(reference[-samples - 1 :], y[-samples - 1 :]).relative_width
+
+    ideal = [each for each in cameras if each.plant == fast.plant and not (each.quantum or each.shake)]
+    controllers = [
+        (SAMPLE_TIME, fast.found.controller),
+        *((1.0 / each.frame_rate, each.found.controller) for each in ideal if each.frame_rate <= 100.0),
+    ]
+    return [
+        {
+            "sample_time_s": sample_time,
+            "period_s": period,
+            "reduction_percent": reduction_percent(before, closed_width(pid, sample_time, period)),
+        }
+        for sample_time, pid in controllers
+        for period, before in zip(PERIODS, open_widths, strict=True)
+    ]
+
+
+def _cameras(
+    plant: str,
+    unit: float,
+    noises: int,
+    make_task: Callable[[float], Task],
+    measured: Callable[[Task, PID], dict[str, float]],
+) -> list[CameraLoop]:
+    """Every frame rate with every sensor, in a unit of time [s]; each controller is searched near its neighbours'.
+
+    In the end the best of all that were found is taken, behind several noises.
+    """
+    loops: list[CameraLoop] = []
+    slower: list[PID] = []  # controllers of the camera of a smaller rate
+    for rate in FRAME_RATES:
+        frame = 1.0 / (rate * unit)
+        ideal, is_fast = replace(make_task(frame), with_delay=False), rate > 100.0
         pids: list[PID] = []
         for k, sensor in enumerate(SENSORS):
-            starts = _scaled([*pids[:1], *pids[-1:], *slower[k : k + 1], *slower[:1]])
+            neighbours = [*pids[:1], *pids[-1:], *slower[k : k + 1], *slower[:1]]
+            starts = [
+                replace(pid, kp=part * pid.kp, ki=part * pid.ki, kd=part * pid.kd)
+                for part in _SCALES
+                for pid in neighbours
+            ]
             effort = _FAST if is_fast else _NEXT if pids else _FIRST
-            task = self.seen(ideal, rate, *sensor, 1 if rate >= 100.0 else self.searched)
-            pids.append(_searched(task, starts, effort).controller)
-        tasks = [self.seen(ideal, rate, *sensor, _FEW if is_fast else _AGAIN) for sensor in SENSORS]
-        return [_searched(task, [*pids, *slower[k : k + 1]], _COMPARED) for k, task in enumerate(tasks)]
+            pids.append(_searched(_behind(ideal, sensor, 1 if rate >= 100.0 else noises), starts, effort).controller)
+        tasks = [_behind(ideal, sensor, _FEW if is_fast else _AGAIN) for sensor in SENSORS]
+        found = [_searched(task, [*pids, *slower[k : k + 1]], _COMPARED) for k, task in enumerate(tasks)]
+        pids = [best.controller for best in found]  # next the derivative as smooth, at many times the rate
+        slower = [replace(pid, derivative_filter=pid.derivative_filter + 0.7 * frame) for pid in pids]
+        for (quantum, shake), best in zip(SENSORS, found, strict=True):
+            task = _behind(ideal, (quantum, shake), NOISES, seed=_SEED)
+            figures, step = measured(task, best.controller), quantum * PIXEL
+            loops.append(CameraLoop(plant=plant, frame_rate=rate, quantum=step, shake=shake, found=best, **figures))
+    return loops
 
-    def seen(self, task: Task, rate: float, quantum: float, shake: float, noises: int) -> Task:
-        """A task behind a camera, with several noises if it shakes."""
-        plants = [self.with_camera(rate, quantum, shake, seed) for seed in range(noises if shake else 1)]
-        return replace(task, plant=plants[0], again=tuple(plants[1:]))
 
-    def kept(self, pid: PID, rate: float) -> PID:
-        """The controller for a camera of many times the rate, its derivative as smooth as before."""
-        return replace(pid, derivative_filter=pid.derivative_filter + 0.7 * self.frame(rate))
-
-    def frame(self, rate: float) -> float:
-        """Time from frame to frame [the plant's unit]."""
-        return 1.0 / (rate * self.unit)
-
-    def with_camera(self, rate: float, quantum: float, shake: float, seed: int) -> Actuator:
-        """The plant behind this camera."""
-        sensor = Sensor(quantum=quantum * PIXEL, noise=shake * PIXEL, delay=self.frame(rate), seed=seed)
-        return replace(self.plant, sensor=sensor)
+def _behind(task: Task, sensor: tuple[float, float], noises: int, seed: int = 0) -> Task:
+    """A task behind a camera, with several noises if it shakes."""
+    quantum, shake = sensor
+    first, *others = (
+        replace(
+            task.plant,
+            sensor=Sensor(quantum=quantum * PIXEL, noise=shake * PIXEL, delay=task.sample_time, seed=seed + k),
+        )
+        for k in range(noises if shake else 1)
+    )
+    return replace(task, plant=first, again=tuple(others))
 
 
 def _searched(task: Task, starts: Sequence[PID], effort: _Effort) -> Found:
@@ -178,51 +281,15 @@ def _searched(task: Task, starts: Sequence[PID], effort: _Effort) -> Found:
     return search(task, starts=starts, exact=False, generations=generations, population=population, polish=polish)
 
 
-def _scaled(neighbours: Sequence[PID]) -> list[PID]:
-    """Controllers to start from: of the ideal sensor, of the sensor before, and of the slower camera's sensors."""
-    return [
-        replace(pid, kp=part * pid.kp, ki=part * pid.ki, kd=part * pid.kd) for part in _SCALES for pid in neighbours
-    ]
+def _runs(task: Task, pid: PID, reference: FloatArray, opened: FloatArray) -> Iterator[tuple[Any, FloatArray]]:
+    """The loop behind each noise of a task, and what its camera sees of the open loop."""
+    for plant in (task.plant, *task.again):
+        run = RestingPlant(plant, task.sample_time).run(pid, reference)
+        yield run, replace(plant.sensor or Sensor(), delay=0.0).measure(np.append(opened[:1], opened[:-1]))
 
 
-class _Triangle(_Cameras):
-    def __init__(self, law: Any) -> None:
-        self.name, self.unit, self.plant = "bouc-wen+eq7", 1.0, law_plant(law)
-        samples = round(PERIOD / SAMPLE_TIME)
-        reference = signals.triangle(LOW, HIGH, cycles=CYCLES, samples_per_cycle=samples)
-        opened = open_loop(self.plant, reference, SAMPLE_TIME, samples)
-        self.open_t, self.open_y = opened.t, opened.y
-        self.open_width = _width(self.open_y, samples)
-
-    def task(self, plant: Actuator, frame: float) -> Task:
-        cycles, skip = (1, _SKIPPED) if frame < _SHORT else (2, 0.0)
-        task = triangle_task(
-            plant, low=LOW, high=HIGH, period=PERIOD, limits=SUPPLY, sample_time=frame, cycles=cycles, skip=skip,
-            tracking=1.0,
-        )  # fmt: skip
-        return replace(task, with_delay=False)
-
-    def judged(self, rate: float, quantum: float, shake: float, found: Found, plant: Actuator) -> CameraLoop:
-        frame = self.frame(rate)
-        samples = round(PERIOD / frame)
-        reference = signals.triangle(LOW, HIGH, cycles=CYCLES, samples_per_cycle=samples)
-        run = RestingPlant(plant, frame).run(found.controller, reference)
-        opened = np.interp(frame * np.arange(reference.size), self.open_t, self.open_y)
-        seen = replace(plant.sensor or Sensor(), delay=0.0).measure(np.append(opened[:1], opened[:-1]))
-        last = slice(-samples - 1, None)
-        return CameraLoop(
-            plant=self.name,
-            frame_rate=rate,
-            quantum=quantum * PIXEL,
-            shake=shake,
-            found=found,
-            true_reduction_percent=reduction_percent(self.open_width, _width(run.y, samples)),
-            measured_reduction_percent=reduction_percent(_width(seen, samples), _width(run.measurement, samples)),
-            tracking_rms=rmse(reference[-MEASURED * samples :], run.y[-MEASURED * samples :]),
-            saturated_percent=100.0 * float(np.mean(run.drive != run.command)),
-            reference=reference[last],
-            y=run.y[last],
-        )
+def _triangle(samples: int) -> FloatArray:
+    return signals.triangle(LOW, HIGH, cycles=CYCLES, samples_per_cycle=samples)
 
 
 def _width(y: FloatArray, samples: int) -> float:
@@ -233,45 +300,6 @@ def _width(y: FloatArray, samples: int) -> float:
     return float(np.mean(widths / np.ptp(cycles, axis=1)))
 
 
-class _Step(_Cameras):
-    searched = _FEW
-
-    def __init__(self) -> None:
-        self.name, self.unit, self.plant = "eq4", SAMPLE_SECONDS, as_actuator(EQUATION_4)
-        self.decay = float(np.min(-EQUATION_4.poles.real))
-
-    def task(self, plant: Actuator, frame: float) -> Task:
-        task = step_task(plant, step=-1.0, limits=ABOUT_34_V, duration=_RECORD, sample_time=frame)
-        return replace(task, with_delay=False)
-
-    def judged(self, rate: float, quantum: float, shake: float, found: Found, plant: Actuator) -> CameraLoop:
-        frame = self.frame(rate)
-        t = frame * np.arange(round(_RECORD / frame) + 1)
-        reference = np.full(t.size, -1.0)
-        opened = RestingPlant(self.plant, frame).driven(reference / self.plant.dc_gain)
-        figures = []
-        for noise in range(NOISES if shake else 1):
-            sensor = replace(plant.sensor or Sensor(), seed=_SEED + noise)
-            run = RestingPlant(replace(plant, sensor=sensor), frame).run(found.controller, reference)
-            seen = replace(sensor, delay=0.0).measure(np.append(opened[:1], opened[:-1]))
-            pairs = ((opened, run.y), (seen, run.measurement))
-            figures.append([_least(vibration_reduction(t, *pair, decay_rate=self.decay)) for pair in pairs])
-        true, measured = (_middle([row[k] for row in figures]) for k in range(2))
-        return CameraLoop(
-            plant=self.name,
-            frame_rate=rate,
-            quantum=quantum * PIXEL,
-            shake=shake,
-            found=found,
-            true_reduction_percent=true,
-            measured_reduction_percent=measured,
-            tracking_rms=rmse(reference, run.y),
-            saturated_percent=100.0 * float(np.mean(run.drive != run.command)),
-            reference=reference,
-            y=run.y,
-        )
-
-
 def _middle(figures: Sequence[float]) -> float:
     """The median, a loop that does not settle counted as the worst; nan if the median is one of these."""
     middle = float(np.median([-math.inf if math.isnan(figure) else figure for figure in figures]))
@@ -280,12 +308,4 @@ def _middle(figures: Sequence[float]) -> float:
 
 def _least(reduction: VibrationReduction) -> float:
     """The least of the three figures; nan where the loop does not settle within 2 %."""
-    return float(
-        np.min(
-            [
-                reduction.overshoot_reduction_percent,
-                reduction.residual_rms_reduction_percent,
-                reduction.settling_time_reduction_percent,
-            ]
-        )
-    )
+    return float(np.min([vars(reduction)[name] for name in REDUCTIONS]))

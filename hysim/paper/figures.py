@@ -1,7 +1,8 @@
 """The report's figures: the paper's, regenerated, and the models and loops in pictures."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -11,11 +12,9 @@ from hysim._frozen import FloatArray
 from hysim.comparison import Comparison
 from hysim.datasets import PIXEL
 from hysim.discovery import Discovery
-from hysim.metrics import LoopMetrics, loop_metrics
-from hysim.paper.camera import CameraLoop
-from hysim.paper.dwell import DwellWidth
-from hysim.paper.loops import PERIOD, HysteresisCase, SquareCase, StepCase
-from hysim.paper.periods import PERIODS, PeriodCurve
+from hysim.metrics import loop_metrics
+from hysim.paper.camera import FRAME_RATES, PERIODS, CameraLoop
+from hysim.paper.loops import PERIOD, Case, HysteresisCase, SquareCase, StepCase
 from hysim.posterior import Evidence
 from hysim.records import Record
 
@@ -25,12 +24,9 @@ _SAMPLES = {"t": "samples", "y": "um"}
 _SECONDS = {"t": "s", "y": "um"}
 
 
-@plot.house_style()
 def input_and_output(record: Record) -> plot.Figure:
     """Displacement and voltage against time: the paper's Figures 3 and 9."""
-    canvas = plot.figure(height=4.2)
-    plot.history(record, plot.panels(canvas, 2))
-    return canvas
+    return _drawn(4.2, lambda canvas: plot.history(record, plot.panels(canvas, 2)))
 
 
 @plot.house_style()
@@ -38,19 +34,25 @@ def figure4(record: Record) -> plot.Figure:
     """The hysteresis loop, its widest place marked."""
     canvas = plot.figure(height=4.4)
     ax = plot.loop(record, ax=canvas.add_subplot())
-    measured = loop_metrics(record.u, record.y)
-    _mark_widest(ax, measured)
-    _name_branches(ax, measured)
+    loop = loop_metrics(record.u, record.y)
+    k = int(np.argmin(np.abs(loop.u - loop.max_width_at)))
+    lower, upper = (loop.u[k], loop.loading[k]), (loop.u[k], loop.unloading[k])
+    ax.annotate("", xy=lower, xytext=upper, arrowprops={"arrowstyle": "<->", "color": _MARK, "linewidth": 1.2})
+    text = f"widest: {loop.max_width:.3f} µm at {loop.max_width_at:g} V"
+    ax.annotate(text, xy=lower, xytext=(6, -20), textcoords="offset points", color=_MARK)
+    k = (2 * loop.u.size) // 3
+    for name, branch, offset, side in (
+        ("loading", loop.loading, (8, -14), "left"),
+        ("unloading", loop.unloading, (-8, 8), "right"),
+    ):
+        ax.annotate(name, xy=(loop.u[k], branch[k]), xytext=offset, textcoords="offset points", ha=side)
     return canvas
 
 
-@plot.house_style()
 def opening(comparison: Comparison) -> plot.Figure:
     """Table 1 with the printed linear model and the asymmetric Bouc-Wen law."""
-    canvas = plot.figure(height=3.6)
     chosen = replace(comparison, rows=tuple(comparison[name] for name in ("eq1-printed", "bouc-wen-asymmetric")))
-    plot.loops(chosen, plot.panels(canvas, 2, columns=2, sharey=True))
-    return canvas
+    return _drawn(3.6, lambda canvas: plot.loops(chosen, plot.panels(canvas, 2, columns=2, sharey=True)))
 
 
 @plot.house_style()
@@ -62,36 +64,24 @@ def step_responses(responses: Mapping[str, tuple[FloatArray, FloatArray]], time_
     return canvas
 
 
-@plot.house_style()
 def model_loops(comparison: Comparison) -> plot.Figure:
     """Each model's loop over the measured points."""
-    canvas = plot.figure(height=9.0)
-    plot.loops(comparison, plot.panels(canvas, len(comparison.rows), columns=2, sharey=True))
-    return canvas
+    return _drawn(9.0, lambda canvas: plot.loops(comparison, _by_model(canvas, comparison)))
 
 
-@plot.house_style()
 def model_residuals(comparison: Comparison) -> plot.Figure:
     """Each model's residuals in pixels."""
-    canvas = plot.figure(height=9.0)
-    plot.residuals(comparison, plot.panels(canvas, len(comparison.rows), columns=2, sharey=True), quanta="pixels")
-    return canvas
+    return _drawn(9.0, lambda canvas: plot.residuals(comparison, _by_model(canvas, comparison), quanta="pixels"))
 
 
-@plot.house_style()
 def model_widths(comparison: Comparison) -> plot.Figure:
     """Loop width against voltage, measured and modelled."""
-    canvas = plot.figure(height=4.8)
-    plot.widths(comparison, canvas.add_subplot())
-    return canvas
+    return _drawn(4.8, lambda canvas: plot.widths(comparison, canvas.add_subplot()))
 
 
-@plot.house_style()
 def discovery_path(discovery: Discovery) -> plot.Figure:
     """The fit against the number of terms."""
-    canvas = plot.figure(height=4.4)
-    plot.selection(discovery, plot.panels(canvas, 2))
-    return canvas
+    return _drawn(4.4, lambda canvas: plot.selection(discovery, plot.panels(canvas, 2)))
 
 
 @plot.house_style()
@@ -102,12 +92,7 @@ def step_figure(case: StepCase, duration: float, *, seconds: bool) -> plot.Figur
     closed, units = case.assessment.closed, _SECONDS if seconds else _SAMPLES
     shown = _thinned(closed.t <= duration)
     t = closed.t[shown]
-    series = {
-        "reference": closed.reference,
-        "with PID": closed.y,
-        "without": case.assessment.open_y,
-    }
-    plot.traces({name: (t, y[shown]) for name, y in series.items()}, upper, units=units)
+    plot.traces({name: (t, y[shown]) for name, y in _outputs(case).items()}, upper, units=units)
     plot.traces({"voltage": (t, closed.u[shown])}, lower, units={**units, "y": "V"})
     return canvas
 
@@ -121,12 +106,12 @@ def figure13(cases: Sequence[SquareCase]) -> plot.Figure:
         closed = case.assessment.closed
         begin = closed.t[-1] - 2.0 * (case.period or 0.0)
         shown = _thinned(closed.t >= begin)
-        series = {"reference": closed.reference, "with PID": closed.y, "without": case.assessment.open_y}
-        plot.traces({name: (closed.t[shown] - begin, y[shown]) for name, y in series.items()}, ax, units=_SAMPLES)
+        t = closed.t[shown] - begin
+        plot.traces({name: (t, y[shown]) for name, y in _outputs(case).items()}, ax, units=_SAMPLES)
         ax.set_title(f"period {case.period:g} samples")
         ax.set_xlabel(ax.get_xlabel() if ax is axes[-1] else "")
-        if ax is not axes[0] and (legend := ax.get_legend()):
-            legend.remove()
+    for ax in axes[1:]:
+        _without_legend(ax)
     return canvas
 
 
@@ -137,31 +122,25 @@ def hysteresis_figure(case: HysteresisCase) -> plot.Figure:
     upper, lower = plot.panels(canvas, 2)
     closed = case.assessment.closed
     shown = _thinned(closed.t >= closed.t[-1] - PERIOD)
-    reference = closed.reference[shown]
-    outputs = {"with PID": closed.y[shown], "without": case.assessment.open_y[shown]}
-    plot.traces({name: (reference, y) for name, y in outputs.items()}, upper)
-    plot.traces({name: (reference, y - reference) for name, y in outputs.items()}, lower)
+    reference, *outputs = (y[shown] for y in _outputs(case).values())
+    for ax, origin in ((upper, 0.0), (lower, reference)):
+        series = dict(zip(("with PID", "without"), ((reference, y - origin) for y in outputs), strict=True))
+        plot.traces(series, ax)
     upper.set(xlabel="", ylabel="Displacement [µm]")
     lower.set(xlabel="Reference [µm]", ylabel="Displacement less reference [µm]")
-    lower.legend().remove()
+    _without_legend(lower)
     return canvas
 
 
 @plot.house_style()
-def dwell_figure(widths: Sequence[DwellWidth]) -> plot.Figure:
+def dwell_figure(rows: Sequence[Mapping[str, float]]) -> plot.Figure:
     """Largest loop width against dwell."""
     canvas = plot.figure(height=4.0)
-    dwells = np.array([width.dwell for width in widths])
-    series = {
-        "(1)": [width.linear for width in widths],
-        "(1), read at the start": [width.linear_at_start for width in widths],
-        "Bouc-Wen": [width.law for width in widths],
-        "Bouc-Wen and (7)": [width.law_and_dynamics for width in widths],
-    }
-    ax = plot.traces({name: (dwells, np.array(values)) for name, values in series.items()}, canvas.add_subplot())
-    ax.set(xscale="log", xlabel="Dwell [s]", ylabel="Largest loop width [µm]", xticks=dwells)
-    ax.set_xticks(dwells, [f"{dwell:g}" for dwell in dwells])
-    ax.minorticks_off()
+    names = ("(1)", "(1), read at the start", "Bouc-Wen", "Bouc-Wen and (7)")
+    dwells, *widths = np.array([list(row.values()) for row in rows]).T
+    ax = plot.traces(dict(zip(names, ((dwells, each) for each in widths), strict=True)), canvas.add_subplot())
+    _log_axis(ax, dwells)
+    ax.set(xlabel="Dwell [s]", ylabel="Largest loop width [µm]")
     return canvas
 
 
@@ -169,68 +148,69 @@ def dwell_figure(widths: Sequence[DwellWidth]) -> plot.Figure:
 def camera_figure(cameras: Sequence[CameraLoop]) -> plot.Figure:
     """True reduction against the frame rate, a curve for each sensor; the hysteresis above, the vibration below."""
     canvas = plot.figure(height=6.4)
+    panels = plot.panels(canvas, 2)
     for ax, (plant, target, name) in zip(
-        plot.panels(canvas, 2),
-        (("bouc-wen+eq7", 90.0, "Hysteresis"), ("eq4", 97.0, "Vibration")),
-        strict=True,
+        panels, (("bouc-wen+eq7", 90.0, "Hysteresis"), ("eq4", 97.0, "Vibration")), strict=True
     ):
-        series: dict[str, tuple[list[float], list[float]]] = {}
+        series: dict[str, list[float]] = {}
         for each in (each for each in cameras if each.plant == plant):
-            rates, values = series.setdefault(f"{each.quantum / PIXEL:g} px, shake {each.shake:g}", ([], []))
-            rates.append(each.frame_rate)
-            values.append(float(np.nan_to_num(max(each.true_reduction_percent, 0.0))))
-        plot.traces({key: (np.array(x), np.array(y)) for key, (x, y) in series.items()}, ax)
+            reduction = float(np.nan_to_num(max(each.true_reduction_percent, 0.0)))
+            series.setdefault(f"{each.quantum / PIXEL:g} px, shake {each.shake:g}", []).append(reduction)
+        plot.traces({key: (np.array(FRAME_RATES), np.array(values)) for key, values in series.items()}, ax)
         ax.axhline(target, color=_MARK, linestyle="--", linewidth=1.0)
-        rates = [each.frame_rate for each in cameras if each.plant == plant]
-        ax.set(xscale="log", ylim=(0.0, 102.0), xlabel="Frames a second", ylabel=f"{name}: reduction [%]")
-        ax.set_xticks(sorted(set(rates)), [f"{rate:g}" for rate in sorted(set(rates))])
-        ax.minorticks_off()
-        if plant == "eq4" and (legend := ax.get_legend()):
-            legend.remove()
+        _log_axis(ax, FRAME_RATES)
+        ax.set(ylim=(0.0, 102.0), xlabel="Frames a second", ylabel=f"{name}: reduction [%]")
+    _without_legend(panels[1])
     return canvas
 
 
 @plot.house_style()
-def periods_figure(curves: Sequence[PeriodCurve]) -> plot.Figure:
-    """Reduction against the period of the triangle, a curve for each controller."""
+def periods_figure(rows: Sequence[Mapping[str, float]]) -> plot.Figure:
+    """Reduction against the period of the triangle, a curve for each controller; the first one is that of 10 ms."""
     canvas = plot.figure(height=3.8)
     ax = canvas.add_subplot()
-    names = ["10 ms", *(f"camera of {1.0 / curve.sample_time:g} Hz" for curve in curves[1:])]
-    series = {name: (np.array(PERIODS), np.array(curve.reductions)) for name, curve in zip(names, curves, strict=True)}
-    plot.traces(series, ax)
+    curves = np.reshape([row["reduction_percent"] for row in rows], (-1, len(PERIODS)))
+    names = [f"camera of {1.0 / row['sample_time_s']:g} Hz" for row in rows[:: len(PERIODS)]]
+    plot.traces(dict(zip(["10 ms", *names[1:]], ((np.array(PERIODS), each) for each in curves), strict=True)), ax)
     ax.axhline(90.0, color=_MARK, linestyle="--", linewidth=1.0)
-    ax.set(xscale="log", xlabel="Period of the triangle [s]", ylabel="Reduction [%]")
-    ax.set_xticks(PERIODS, [f"{period:g}" for period in PERIODS])
-    ax.minorticks_off()
+    _log_axis(ax, PERIODS)
+    ax.set(xlabel="Period of the triangle [s]", ylabel="Reduction [%]")
     return canvas
+
+
+def evidence_figure(found: Evidence) -> plot.Figure:
+    """ln of the evidence of each model, for each size of the boxes."""
+    return _drawn(1.3 + 0.34 * len(found.rows), lambda canvas: plot.evidence(found, canvas.add_subplot()))
 
 
 @plot.house_style()
-def evidence_figure(found: Evidence) -> plot.Figure:
-    """ln of the evidence of each model, for each size of the boxes."""
-    canvas = plot.figure(height=1.3 + 0.34 * len(found.rows))
-    plot.evidence(found, canvas.add_subplot())
+def _drawn(height: float, draw: Callable[[plot.Figure], Any]) -> plot.Figure:
+    canvas = plot.figure(height=height)
+    draw(canvas)
     return canvas
+
+
+def _by_model(canvas: plot.Figure, comparison: Comparison) -> npt.NDArray[np.object_]:
+    return plot.panels(canvas, len(comparison.rows), columns=2, sharey=True)
+
+
+def _outputs(case: Case[Any]) -> dict[str, FloatArray]:
+    closed = case.assessment.closed
+    return {"reference": closed.reference, "with PID": closed.y, "without": case.assessment.open_y}
+
+
+def _log_axis(ax: plot.Axes, ticks: Sequence[float] | FloatArray) -> None:
+    ax.set_xscale("log")
+    ax.set_xticks(ticks, [f"{tick:g}" for tick in ticks])
+    ax.minorticks_off()
+
+
+def _without_legend(ax: plot.Axes) -> None:
+    if legend := ax.get_legend():
+        legend.remove()
 
 
 def _thinned(shown: npt.NDArray[np.bool_]) -> npt.NDArray[np.intp]:
     """Indices of some of the samples shown, the last one among them."""
     (indices,) = np.nonzero(shown)
     return indices[:: max(1, indices.size // _POINTS)]
-
-
-def _mark_widest(ax: plot.Axes, loop: LoopMetrics) -> None:
-    k = int(np.argmin(np.abs(loop.u - loop.max_width_at)))
-    lower, upper = (loop.u[k], loop.loading[k]), (loop.u[k], loop.unloading[k])
-    ax.annotate("", xy=lower, xytext=upper, arrowprops={"arrowstyle": "<->", "color": _MARK, "linewidth": 1.2})
-    text = f"widest: {loop.max_width:.3f} µm at {loop.max_width_at:g} V"
-    ax.annotate(text, xy=lower, xytext=(6, -20), textcoords="offset points", color=_MARK)
-
-
-def _name_branches(ax: plot.Axes, loop: LoopMetrics) -> None:
-    k = (2 * loop.u.size) // 3
-    for name, branch, offset, side in (
-        ("loading", loop.loading, (8, -14), "left"),
-        ("unloading", loop.unloading, (-8, 8), "right"),
-    ):
-        ax.annotate(name, xy=(loop.u[k], branch[k]), xytext=offset, textcoords="offset points", ha=side)

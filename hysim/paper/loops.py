@@ -10,13 +10,14 @@ middle, 34 V, of Table 2's 18 and 50 V.
 The paper prints no gains: they come from `hysim.paper.search`, one search for each plant and each pair of limits.
 """
 
-from collections.abc import Callable, Mapping
+import math
+from collections.abc import Callable
 from dataclasses import replace
 from typing import Any, Generic, NamedTuple, TypeVar
 
 import numpy as np
 
-from hysim._frozen import FloatArray, frozen
+from hysim._frozen import frozen
 from hysim.control import (
     PID,
     HysteresisAssessment,
@@ -49,9 +50,12 @@ SQUARE_PERIODS = {4.0: "Table 2", 40.65: "10 s of .246 s a sample", 10.0: "the u
 DYNAMICS_7 = TransferFunction(num=EQUATION_7.den[-1:], den=EQUATION_7.den)
 """Equation (7), its static gain made one."""
 
+GAINS = ("kp", "ki", "kd", "derivative_filter", "setpoint_weight", "derivative_weight")
+REDUCTIONS = ("overshoot_reduction_percent", "residual_rms_reduction_percent", "settling_time_reduction_percent")
+"""The three figures of `hysim.metrics.vibration_reduction`, never one without the others."""
 
-@frozen
-class Case(Generic[Assessment]):
+
+class Case(NamedTuple, Generic[Assessment]):
     """One reference on one plant.
 
     Parameters
@@ -98,21 +102,27 @@ class Loops:
     law_width: float
 
 
-class OnEquations(NamedTuple):
-    """The loops around the printed equations, in the order of `Loops`."""
+def on_equations() -> Loops:
+    """Search the controllers of (1), (4) and (6), and close their loops; there is no law."""
+    steps, squares = [], []
+    for name, plant in (("eq4", EQUATION_4), ("eq6", EQUATION_6)):
+        about, supply = (
+            step_task(plant, step=-1.0, limits=limits, duration=0.5 * DURATION, sample_time=UNIT_STEP)
+            for limits in (ABOUT_34_V, SUPPLY)
+        )
+        within, beyond = search(about), _longer_search(supply, seed=2) if name == "eq4" else search(supply)
+        cases = ((-1.0, SUPPLY, beyond), (-1.0, ABOUT_34_V, within), (1.0, ABOUT_34_V, within), (-1.0, None, within))
+        steps += [_step(name, plant, found, size, limits, DURATION, UNIT_STEP) for size, limits, found in cases]
+        squares += [_square(name, plant, within, period) for period in SQUARE_PERIODS]
+    task = step_task(EQUATION_1, step=1.0, limits=SUPPLY, duration=40.0, sample_time=SAMPLE_TIME)
+    steps.append(_step("eq1", EQUATION_1, _longer_search(task, seed=6), 1.0, SUPPLY, 60.0, SAMPLE_TIME))
+    alone = Actuator(vibration=EQUATION_1)
+    found = _longer_search(_triangle_task(alone, 0.0, cycles=3), seed=3, generations=60)
+    triangles = tuple(_triangle("eq1", alone, found, 0.0, limits) for limits in (SUPPLY, None))
+    return Loops(hysteresis=triangles, steps=tuple(steps), squares=tuple(squares), law_width=math.nan)
 
-    hysteresis: tuple[HysteresisCase, ...]
-    steps: tuple[StepCase, ...]
-    squares: tuple[SquareCase, ...]
 
-
-def on_equations() -> OnEquations:
-    """Search the controllers of (1), (4) and (6), and close their loops."""
-    steps, squares = zip(*(_vibration(name, plant) for name, plant in _VIBRATING.items()), strict=True)
-    return OnEquations(_on_equation_1(), (*sum(steps, ()), _step_on_equation_1()), sum(squares, ()))
-
-
-def loops(law: Any, equations: Callable[[], OnEquations] = on_equations) -> Loops:
+def loops(law: Any, equations: Callable[[], Loops] = on_equations) -> Loops:
     """Search the controllers, and close every loop.
 
     Parameters
@@ -122,26 +132,21 @@ def loops(law: Any, equations: Callable[[], OnEquations] = on_equations) -> Loop
     equations : callable
         Gives the loops around the equations, perhaps from where they have been computed meanwhile.
     """
-    on_law = _on_the_law(law)
+    plant = law_plant(law)
+    found = search(_triangle_task(plant, 0.1, cycles=2))
+    on_law = tuple(_triangle("bouc-wen+eq7", plant, found, low, SUPPLY) for low in (0.1, 0.0))
     others = equations()
-    return Loops(
-        hysteresis=(*on_law, *others.hysteresis),
-        steps=others.steps,
-        squares=others.squares,
-        law_width=_width_of_law(law, on_law[0].assessment),
-    )
+    width = _width_of_law(law, on_law[0].assessment)
+    return replace(others, hysteresis=(*on_law, *others.hysteresis), law_width=width)
 
 
 def control_measures(loops: Loops) -> dict[str, list[Row]]:
     """The entries about control in `summary.json`: a row for each loop, under "hysteresis" and "vibration"."""
     return {
-        "hysteresis": [
-            _head(case, case.assessment.closed) | _hysteresis_row(case.assessment, case.plant, loops.law_width)
-            for case in loops.hysteresis
-        ],
+        "hysteresis": [_head(case) | _hysteresis_row(case, loops.law_width) for case in loops.hysteresis],
         "vibration": [
-            *(_head(case, case.assessment.closed) | _step_row(case.assessment) for case in loops.steps),
-            *(_head(case, case.assessment.closed) | _square_row(case.assessment, case) for case in loops.squares),
+            *(_head(case) | _step_row(case.assessment) for case in loops.steps),
+            *(_head(case) | _square_row(case) for case in loops.squares),
         ],
     }
 
@@ -159,49 +164,22 @@ def law_plant(law: Any) -> Actuator:
     return Actuator(hysteresis=law, vibration=DYNAMICS_7)
 
 
-def limited_percent(closed: Any) -> float:
-    """Share of the samples at which the command is at a limit [%]."""
-    return 100.0 * float(closed.conditions["limited_samples"]) / float(closed.t.size)
-
-
-def tracking_rms(assessment: StepAssessment) -> float:
-    """Rms of reference minus displacement over a step's record [um]."""
-    return float(np.sqrt(np.mean(_error(assessment.closed) ** 2)))
-
-
-_VIBRATING: Mapping[str, TransferFunction] = {"eq4": EQUATION_4, "eq6": EQUATION_6}
-
-
-def _on_the_law(law: Any) -> tuple[HysteresisCase, ...]:
-    """Within the supply only: beyond the measured voltages a polynomial law means nothing."""
-    plant = law_plant(law)
-    task = triangle_task(plant, low=0.1, high=HIGH, period=PERIOD, limits=SUPPLY, sample_time=SAMPLE_TIME, cycles=2)
-    found = search(task)
-    return tuple(_triangle("bouc-wen+eq7", plant, found, low, SUPPLY) for low in (0.1, 0.0))
-
-
-def _on_equation_1() -> tuple[HysteresisCase, ...]:
-    plant = Actuator(vibration=EQUATION_1)
-    task = triangle_task(plant, low=0.0, high=HIGH, period=PERIOD, limits=SUPPLY, sample_time=SAMPLE_TIME, cycles=3)
-    found = _longer_search(task, seed=3, generations=60)
-    return tuple(_triangle("eq1", plant, found, 0.0, limits) for limits in (SUPPLY, None))
-
-
 def _longer_search(task: Task, seed: int, generations: int = 40) -> Found:
     """Search from one of several seeds, whose results differ by some percent on (1), by hundredths for steps of (4)."""
     return search(task, generations=generations, polish=600, seed=seed)
 
 
+def _triangle_task(plant: Actuator, low: float, cycles: int) -> Task:
+    """Within the supply only: beyond the measured voltages a polynomial law means nothing."""
+    return triangle_task(
+        plant, low=low, high=HIGH, period=PERIOD, limits=SUPPLY, sample_time=SAMPLE_TIME, cycles=cycles
+    )
+
+
 def _triangle(name: str, plant: Actuator, found: Found, low: float, limits: Limits) -> HysteresisCase:
     pid = replace(found.controller, limits=limits)
-    return Case(
-        plant=name,
-        reference=f"triangle {low:g} to {HIGH:g} um, {PERIOD:g} s, 10 cycles",
-        period=PERIOD,
-        found=found,
-        limits=limits,
-        assessment=assess_hysteresis(plant, pid, low=low, high=HIGH, period=PERIOD, sample_time=SAMPLE_TIME),
-    )
+    assessment = assess_hysteresis(plant, pid, low=low, high=HIGH, period=PERIOD, sample_time=SAMPLE_TIME)
+    return Case(name, f"triangle {low:g} to {HIGH:g} um, {PERIOD:g} s, 10 cycles", PERIOD, found, limits, assessment)
 
 
 def _width_of_law(law: Any, assessment: HysteresisAssessment) -> float:
@@ -210,60 +188,26 @@ def _width_of_law(law: Any, assessment: HysteresisAssessment) -> float:
     return loop_metrics(assessment.open_u[-samples:], law.response(assessment.open_u)[-samples:]).max_width
 
 
-def _vibration(name: str, plant: TransferFunction) -> tuple[tuple[StepCase, ...], tuple[SquareCase, ...]]:
-    """A search for each pair of limits; the larger voltages also show what the limits cost."""
-    tasks = (
-        step_task(plant, step=-1.0, limits=limits, duration=0.5 * DURATION, sample_time=UNIT_STEP)
-        for limits in (ABOUT_34_V, SUPPLY)
-    )
-    about, supply = search(next(tasks)), (_longer_search(next(tasks), seed=2) if name == "eq4" else search(next(tasks)))
-    cases = ((-1.0, SUPPLY, supply), (-1.0, ABOUT_34_V, about), (1.0, ABOUT_34_V, about), (-1.0, None, about))
-    return (
-        tuple(_step(name, plant, found, size, limits, DURATION, UNIT_STEP) for size, limits, found in cases),
-        tuple(_square(name, plant, about, period) for period in SQUARE_PERIODS),
-    )
-
-
-def _step_on_equation_1() -> StepCase:
-    task = step_task(EQUATION_1, step=1.0, limits=SUPPLY, duration=40.0, sample_time=SAMPLE_TIME)
-    return _step("eq1", EQUATION_1, _longer_search(task, seed=6), 1.0, SUPPLY, 60.0, SAMPLE_TIME)
-
-
 def _step(
     name: str, plant: TransferFunction, found: Found, size: float, limits: Limits, duration: float, sample_time: float
 ) -> StepCase:
     pid = replace(found.controller, limits=limits)
-    return Case(
-        plant=name,
-        reference=f"step {size:+g} um",
-        period=None,
-        found=found,
-        limits=limits,
-        assessment=assess_step(plant, pid, step=size, duration=duration, sample_time=sample_time),
-    )
+    assessment = assess_step(plant, pid, step=size, duration=duration, sample_time=sample_time)
+    return Case(name, f"step {size:+g} um", None, found, limits, assessment)
 
 
 def _square(name: str, plant: TransferFunction, found: Found, period: float) -> SquareCase:
-    return Case(
-        plant=name,
-        reference=f"square wave -0.5 to 0.5 um, period {period:g} samples",
-        period=period,
-        found=found,
-        limits=ABOUT_34_V,
-        assessment=assess_square_wave(
-            plant,
-            found.controller,
-            low=-0.5,
-            high=0.5,
-            period=period,
-            sample_time=UNIT_STEP,
-            periods=round(DURATION / period),
-        ),
+    periods = round(DURATION / period)
+    assessment = assess_square_wave(
+        plant, found.controller, low=-0.5, high=0.5, period=period, sample_time=UNIT_STEP, periods=periods
     )
+    reference = f"square wave -0.5 to 0.5 um, period {period:g} samples"
+    return Case(name, reference, period, found, ABOUT_34_V, assessment)
 
 
-def _head(case: Case[Any], closed: Any) -> Row:
+def _head(case: Case[Any]) -> Row:
     """Conditions under which the loop ran, in plain values."""
+    closed = case.assessment.closed
     conditions = closed.conditions
     pid = conditions["controller"]
     return {
@@ -272,20 +216,13 @@ def _head(case: Case[Any], closed: Any) -> Row:
         "period": case.period,
         "controller": words(pid),
         "limits": list(case.limits) if case.limits else "unlimited",
-        "saturated_percent": limited_percent(closed),
+        "saturated_percent": 100.0 * float(conditions["limited_samples"]) / float(closed.t.size),
         "volts_per_pixel": volts_per_pixel(pid, conditions["sample_time"]),
         "max_sensitivity": case.found.max_sensitivity,
         "max_sensitivity_with_delay": case.found.with_delay,
         "searched": case.found.searched,
         "conditions": {
-            "gains": {
-                "kp": pid.kp,
-                "ki": pid.ki,
-                "kd": pid.kd,
-                "derivative_filter": pid.derivative_filter,
-                "setpoint_weight": pid.setpoint_weight,
-                "derivative_weight": pid.derivative_weight,
-            },
+            "gains": {name: vars(pid)[name] for name in GAINS},
             "max_sensitivity": case.found.max_sensitivity,
             "time_unit": "s" if case.plant in ("eq1", "bouc-wen+eq7") else "sample of Table 2",
             **{key: conditions[key] for key in ("sample_time", "delay", "sensor_quantum", "noise", "seed")},
@@ -295,8 +232,8 @@ def _head(case: Case[Any], closed: Any) -> Row:
     }
 
 
-def _hysteresis_row(assessment: HysteresisAssessment, plant: str, law_width: float) -> Row:
-    has_law = plant != "eq1"
+def _hysteresis_row(case: HysteresisCase, law_width: float) -> Row:
+    assessment, has_law = case.assessment, case.plant != "eq1"
     return {
         "hysteresis_reduction_percent": assessment.hysteresis_reduction_percent,
         "lag_reduction_percent": assessment.lag_reduction_percent,
@@ -314,19 +251,19 @@ def _hysteresis_row(assessment: HysteresisAssessment, plant: str, law_width: flo
 
 def _step_row(assessment: StepAssessment) -> Row:
     closed = assessment.closed
-    tail = slice(-(closed.y.size // 10), None)
+    error, tail = closed.reference - closed.y, slice(-(closed.y.size // 10), None)
     step = closed.reference[-1] - closed.y[0]
     return {
         **_figures(assessment.reduction),
-        "steady_error_percent": 100.0 * float(np.abs(_error(closed)[tail]).max() / abs(step)),
-        "tracking_rms_um": tracking_rms(assessment),
+        "steady_error_percent": 100.0 * float(np.abs(error[tail]).max() / abs(step)),
+        "tracking_rms_um": float(np.sqrt(np.mean(error**2))),
     }
 
 
-def _square_row(assessment: SquareWaveAssessment, case: SquareCase) -> Row:
-    closed = assessment.closed
+def _square_row(case: SquareCase) -> Row:
+    assessment, closed = case.assessment, case.assessment.closed
     half = round(0.5 * (case.period or 0.0) / UNIT_STEP)
-    ends = _error(closed)[[-half - 1, -1]]
+    ends = (closed.reference - closed.y)[[-half - 1, -1]]
     return {
         **_figures(assessment.reduction),
         "steady_error_percent": 100.0 * float(np.abs(ends).max() / np.ptp(closed.reference)),
@@ -337,18 +274,11 @@ def _square_row(assessment: SquareWaveAssessment, case: SquareCase) -> Row:
     }
 
 
-def _error(closed: Any) -> FloatArray:
-    return np.asarray(closed.reference - closed.y)
-
-
 def _figures(reduction: VibrationReduction | None) -> Row:
     if reduction is None:
-        names = ("overshoot_reduction_percent", "residual_rms_reduction_percent", "settling_time_reduction_percent")
-        return dict.fromkeys((*names, "t98_open", "t98_closed"))
+        return dict.fromkeys((*REDUCTIONS, "t98_open", "t98_closed"))
     return {
-        "overshoot_reduction_percent": reduction.overshoot_reduction_percent,
-        "residual_rms_reduction_percent": reduction.residual_rms_reduction_percent,
-        "settling_time_reduction_percent": reduction.settling_time_reduction_percent,
+        **{name: vars(reduction)[name] for name in REDUCTIONS},
         "t98_open": reduction.open.t98,
         "t98_closed": reduction.closed.t98,
         "overshoot_open_percent": reduction.open.overshoot,

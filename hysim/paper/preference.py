@@ -1,23 +1,70 @@
-"""Which model the points of Table 1 prefer, from stored evidences.
+"""Which model the points of Table 1 prefer, from stored evidences and stored left-out errors.
 
 `hysim reproduce` samples no posterior: `experiments/49_evidence.py` does, and stores ln Z of each model in
 `hysim/data/table1_evidence.csv`, with the boxes of the priors halved, as they are, and doubled. Noise is the rounding
 to pixels and a normal part, and every memory is free at the first point.
+
+Nor does it repeat fifty searches: `experiments/33_nested_table1.py` does, and stores the left-out errors in
+`hysim/data/table1_nested.csv`. The 50 points between the first and the last are taken out of the record in turn, and
+everything about a model is chosen again without the point: the terms of a discovered law, the starts and the optimum
+of an identified one.
 """
 
 import csv
 from collections.abc import Mapping
 from functools import cache
 from importlib.resources import files
-from typing import Any
+from typing import Any, NamedTuple
 
-from hysim._printing import listed
-from hysim.paper.nested import NestedError, nested_errors
 from hysim.posterior import FACTORS, Evidence, EvidenceRow
 
-FILE = "table1_evidence.csv"
-BOXES = dict(zip(FACTORS, ("halved", "as they are", "doubled"), strict=True))
-"""Sizes of the boxes in words."""
+
+class NestedError(NamedTuple):
+    """The left-out error of one model.
+
+    Parameters
+    ----------
+    model : str
+    start : str
+        How the memory begins: ``"free"``, ``"rest"``, ``"auto"`` where the search chooses, or nothing.
+    n_parameters : int
+        On all points.
+    fit_percent : float
+        On all points, in free run [%].
+    left_out_rmse : float
+        Root mean square error at the points left out [um].
+    behind : float
+        Distance of the mean squared error from that of the best model whose terms are not kept, in standard errors of
+        the paired difference.
+    same_structure : int or None
+        Folds in which a discovered law has the terms that it has on all points.
+    folds : int
+        Number of points that were left out.
+    terms_kept : bool
+        Whether the terms are those that were found on all points.
+    """
+
+    model: str
+    start: str
+    n_parameters: int
+    fit_percent: float
+    left_out_rmse: float
+    behind: float
+    same_structure: int | None
+    folds: int
+    terms_kept: bool
+
+
+@cache
+def nested_errors() -> tuple[NestedError, ...]:
+    """The stored errors, the least first."""
+    return tuple(map(_nested_error, _stored("table1_nested.csv")))
+
+
+def of_discovered() -> NestedError:
+    """The error of the law that `discover` finds with its defaults."""
+    return next(each for each in nested_errors() if (each.model, each.start) == ("discovered", "auto"))
+
 
 _APART = 2.0  # standard errors of a difference that counts
 
@@ -46,8 +93,8 @@ def left_out(name: str) -> NestedError | None:
 def preference() -> str:
     """Which model the points prefer, and how surely; one sentence."""
     found = stored_evidence()
-    boxes = listed([BOXES[factor] for factor in found.factors])
-    return f"Of {len(found.rows)} models, {found.sentence} (the boxes of their priors {boxes})."
+    boxes = "the boxes of their priors halved, as they are and doubled"
+    return f"Of {len(found.rows)} models, {found.sentence} ({boxes})."
 
 
 def beside_nested() -> str:
@@ -105,8 +152,19 @@ def _measures(found: Evidence, name: str) -> dict[str, Any]:
 
 @cache
 def _lines() -> tuple[dict[str, str], ...]:
-    text = (files("hysim") / "data" / FILE).read_text(encoding="utf-8")
+    return _stored("table1_evidence.csv")
+
+
+def _stored(name: str) -> tuple[dict[str, str], ...]:
+    text = (files("hysim") / "data" / name).read_text(encoding="utf-8")
     return tuple(csv.DictReader(line for line in text.splitlines() if not line.startswith("#")))
+
+
+def _nested_error(row: Mapping[str, str]) -> NestedError:
+    fit, rmse, behind = (float(row[name]) for name in ("fit_percent", "left_out_rmse_um", "behind_in_stderr"))
+    same, n_parameters = row["same_structure"], int(row["n_parameters"])
+    folds = (int(same) if same else None, int(row["folds"]), row["terms_kept"] == "True")
+    return NestedError(row["model"], row["start"], n_parameters, fit, rmse, behind, *folds)
 
 
 def _row(line: Mapping[str, str]) -> EvidenceRow:

@@ -13,19 +13,20 @@ Table 2 cannot tell them, and whatever they say away from that line is extrapola
 import math
 from collections.abc import Mapping
 from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
+import numpy.typing as npt
 from scipy.optimize import minimize_scalar
 
-from hysim._frozen import FloatArray, frozen
+from hysim._frozen import FloatArray, frozen, read_only
 from hysim.control import to_control
 from hysim.datasets import SQUARE_WAVE_FREQUENCY, table1, table2
 from hysim.identification import Identification, identify
 from hysim.metrics import fit_percent
 from hysim.paper import printed
-from hysim.paper.best_dwell import DWELLS
 from hysim.paper.equations import EQUATION_1, EQUATION_4, in_time_unit
-from hysim.paper.resolution import quantum
+from hysim.paper.study import BEST_DWELLS
 from hysim.plants.transfer_function import TransferFunction
 from hysim.records import Record
 
@@ -47,8 +48,7 @@ _ALIASED_POLES = (-0.78894 + 14.37101j, -0.011337 + 6.276672j)
 _ROUNDING = 0.0005  # half a unit of the last digit of Table 2 [um]
 
 
-@frozen
-class PrintedFit:
+class PrintedFit(NamedTuple):
     """Equation (1) as printed, on Table 1.
 
     Parameters
@@ -69,8 +69,7 @@ class PrintedFit:
     fit_percent: float
 
 
-@frozen
-class Refit:
+class Refit(NamedTuple):
     """A structure identified anew.
 
     Parameters
@@ -112,8 +111,8 @@ class TimeUnit:
         The unit.
     sample_time : float
         From one sample to the next [that unit].
-    gain, phase_degrees : float
-        Of the continuous plant at the square wave's frequency [um/V, degrees].
+    gain : float
+        Of the continuous plant at the square wave's frequency [um/V].
     sampled_gain, sampled_phase_degrees : float
         Of the plant from sample to sample under the hold [um/V, degrees]: what Table 2 compares with.
     fit_at_rest : float
@@ -127,7 +126,6 @@ class TimeUnit:
     name: str
     sample_time: float
     gain: float
-    phase_degrees: float
     sampled_gain: float
     sampled_phase_degrees: float
     fit_at_rest: float
@@ -213,17 +211,15 @@ def reidentify(identified: Identification) -> Reidentification:
     identified : Identification
         Of (1)'s structure on Table 1: held voltage, start of the hold, at rest.
     """
-    first = _refit(identified, "zoh", "start", "rest")
-    others = [("zoh", "end", "rest"), ("zoh", "start", "free"), ("foh", "start", "rest")]
-    refits = [_identified(4, 1, table1(), *choice) for choice in others]
-    on_table2 = [("zoh", "start", "rest"), ("zoh", "end", "rest")]
+    first = _refit(4, table1(), "zoh", "start", "rest", identified)
+    others = (("zoh", "end", "rest"), ("zoh", "start", "free"), ("foh", "start", "rest"))
     record = without_means(table2())
     scanned = printed_fits(_SCAN)
     best_sample_time, best_fit = _best_unit(scanned[:, 2])
     return Reidentification(
         printed=printed_choices(),
-        hysteresis=(first, *refits),
-        vibration=tuple(_identified(2, 1, record, *choice) for choice in on_table2),
+        hysteresis=(first, *(_refit(4, table1(), *choice) for choice in others)),
+        vibration=tuple(_refit(2, record, "zoh", sample, "rest") for sample in ("start", "end")),
         time_units=time_units(),
         best_sample_time=best_sample_time,
         best_fit_percent=best_fit,
@@ -274,14 +270,13 @@ def printed_choices() -> tuple[PrintedFit, ...]:
 
     The level is none of the choices: Table 1 begins and ends at 0 V and 0 um.
     """
-    printed_fits = []
+    choices = []
     for sample in ("start", "end"):
-        fits = _fits(EQUATION_1, table1(), DWELLS, sample)
-        for column, initial in enumerate(("rest", "free")):
-            k = int(fits[:, column].argmax())
-            best = float(fits[k, column])
-            printed_fits.append(PrintedFit(sample=sample, initial=initial, dwell=float(DWELLS[k]), fit_percent=best))
-    return tuple(printed_fits)
+        fits = _fits(EQUATION_1, table1(), BEST_DWELLS, sample)
+        for initial, column in zip(("rest", "free"), fits.T, strict=False):
+            k = int(column.argmax())
+            choices.append(PrintedFit(sample, initial, float(BEST_DWELLS[k]), float(column[k])))
+    return tuple(choices)
 
 
 def aliased_fit() -> float:
@@ -344,7 +339,6 @@ def _time_unit(name: str, sample_time: float) -> TimeUnit:
         name=name,
         sample_time=sample_time,
         gain=abs(through),
-        phase_degrees=float(np.angle(through, deg=True)),
         sampled_gain=abs(sampled),
         sampled_phase_degrees=float(np.angle(sampled, deg=True)),
         fit_at_rest=float(at_rest),
@@ -353,23 +347,14 @@ def _time_unit(name: str, sample_time: float) -> TimeUnit:
     )
 
 
-def _identified(poles: int, zeros: int, record: Record, hold: str, sample: str, initial: str) -> Refit:
-    structure = TransferFunction.structure(poles=poles, zeros=zeros, hold=hold, sample=sample, initial=initial)
-    return _refit(identify(structure, record), hold, sample, initial)
-
-
-def _refit(fit: Identification, hold: str, sample: str, initial: str) -> Refit:
-    return Refit(
-        hold=hold,
-        sample=sample,
-        initial=initial,
-        n_parameters=fit.n_parameters,
-        fit_percent=fit.fit_percent,
-        fpe=fit.fpe,
-        dc_gain=fit.model.dc_gain,
-        model=fit.model,
-        message=fit.message,
-    )
+def _refit(
+    poles: int, record: Record, hold: str, sample: str, initial: str, fit: Identification | None = None
+) -> Refit:
+    """Some poles and a zero on a record, identified unless that has been done."""
+    structure = TransferFunction.structure(poles=poles, zeros=1, hold=hold, sample=sample, initial=initial)
+    fit = identify(structure, record) if fit is None else fit
+    model = fit.model
+    return Refit(hold, sample, initial, fit.n_parameters, fit.fit_percent, fit.fpe, model.dc_gain, model, fit.message)
 
 
 def _period(u: FloatArray) -> int:
@@ -387,3 +372,37 @@ def _line(values: FloatArray) -> complex:
     """Amplitude at a quarter of the sampling rate, over the last whole periods."""
     periodic = values[values.size % 4 :]
     return complex(np.mean(periodic * (-1j) ** np.arange(periodic.size)))
+
+
+def quantum(values: npt.ArrayLike, tolerance: float) -> float:
+    """The largest step of which every value is a whole multiple, to `tolerance` [unit of the values].
+
+    Each number of steps in the largest value is tried in turn, with the step that suits all values best.
+
+    Parameters
+    ----------
+    values : array, shape (n,)
+        At least one not zero.
+    tolerance : float
+        Largest distance from a whole multiple: half a unit of the last digit, if the values were rounded once.
+
+    Raises
+    ------
+    ValueError
+        If all values are zero, or the tolerance is not positive.
+
+    Examples
+    --------
+    >>> round(quantum([0.33, 0.67, 1.33], tolerance=0.01), 3)
+    0.333
+    """
+    sizes = np.abs(read_only(values, "values", ndim=1))
+    largest = float(sizes.max())
+    if not (largest > 0.0 and tolerance > 0.0):
+        raise ValueError("a quantum needs a value that is not zero, and a positive tolerance")
+    for steps in range(1, int(largest / tolerance) + 1):
+        counts = np.round(sizes * (steps / largest))
+        step = float(counts @ sizes / (counts @ counts))
+        if np.abs(sizes - step * counts).max() <= tolerance:
+            return step
+    return tolerance

@@ -19,23 +19,17 @@ from hysim._frozen import frozen
 from hysim._parallel import awaited, second_process
 from hysim._printing import csv_text
 from hysim._progress import reports
-from hysim.comparison import Comparison
 from hysim.datasets import table2
-from hysim.discovery import Discovery
 from hysim.export import Shown, page_text
 from hysim.paper import figures
-from hysim.paper.camera import camera_measures
-from hysim.paper.dwell import dwell_measures
+from hysim.paper.camera import camera_rows
 from hysim.paper.equations import EQUATION_1, EQUATION_4, EQUATION_6, EQUATION_7, step_response
 from hysim.paper.findings import Findings, find
 from hysim.paper.loops import control_measures
-from hysim.paper.periods import period_rows
 from hysim.paper.preference import preference_measures, preference_rows, stored_evidence
 from hysim.paper.report import report_page
-from hysim.paper.study import Progress, model_measures
+from hysim.paper.study import Progress, Study, model_measures
 from hysim.plot import Figure, to_svg
-
-_CLAIM = ("id", "where", "statement", "printed", "recomputed", "unit", "verdict", "method", "conditions", "note")
 
 
 @frozen
@@ -104,16 +98,14 @@ def reproduce(
 def contents(computed: Findings) -> dict[str, str]:
     """Every file's text by its name relative to the folder."""
     with second_process() as beside:
-        of_models = beside.submit(_model_drawings, computed.study.comparison, computed.study.discovery)
-        drawn = _paper_drawings(computed)
-        elsewhere = awaited(of_models)
-        drawn |= elsewhere
+        of_models = beside.submit(_model_drawings, computed.study)
+        drawn = _paper_drawings(computed) | awaited(of_models)
     summary = _summary(computed)
     return {
         **{f"figures/{name}.svg": svg for name, svg in drawn.items()},
         **_tables(computed, summary),
         "summary.json": json.dumps(_rounded(summary), indent=2, allow_nan=False) + "\n",
-        "report.html": report_page(computed, drawn),
+        "report.html": report_page(computed, summary, drawn),
     }
 
 
@@ -125,7 +117,8 @@ def browser_page(computed: Findings) -> dict[str, str]:
     return {"table1.html": page_text({title: shown}, study.comparison.record)}
 
 
-def _model_drawings(comparison: Comparison, discovery: Discovery) -> dict[str, str]:
+def _model_drawings(study: Study) -> dict[str, str]:
+    comparison = study.comparison
     return _as_svg(
         {
             "figure3": figures.input_and_output(comparison.record),
@@ -134,7 +127,7 @@ def _model_drawings(comparison: Comparison, discovery: Discovery) -> dict[str, s
             "loops": figures.model_loops(comparison),
             "widths": figures.model_widths(comparison),
             "residuals": figures.model_residuals(comparison),
-            "discovery": figures.discovery_path(discovery),
+            "discovery": figures.discovery_path(study.discovery),
         }
     )
 
@@ -178,9 +171,9 @@ def _summary(computed: Findings) -> dict[str, Any]:
             "area_um_V": loop.area,
         },
         "models": model_measures(computed.study),
-        "claims": [{key: vars(claim)[key] for key in _CLAIM} for claim in computed.claims],
-        "control": {**control_measures(computed.loops), "camera": camera_measures(computed.cameras)},
-        "dwell": [dwell_measures(width) for width in computed.dwell],
+        "claims": [dict(vars(claim)) for claim in computed.claims],
+        "control": {**control_measures(computed.loops), "camera": camera_rows(computed.cameras)},
+        "dwell": computed.dwell,
         "evidence": preference_measures(),
     }
 
@@ -207,11 +200,14 @@ def _tables(computed: Findings, summary: dict[str, Any]) -> dict[str, str]:
         "claims": _by_columns(summary["claims"]),
         "control": _by_columns([{key: value for key, value in row.items() if key != "conditions"} for row in control]),
         "camera": _by_columns(summary["control"]["camera"]),
-        "periods": _by_columns(period_rows(computed.periods)),
+        "periods": _by_columns(computed.periods),
         "dwell": _by_columns(summary["dwell"]),
         "evidence": _by_columns(preference_rows()),
     }
-    return {f"tables/{name}.csv": _csv(table) for name, table in named.items()}
+    return {
+        f"tables/{name}.csv": csv_text([_cell(_rounded(value)) for value in row] for row in table)
+        for name, table in named.items()
+    }
 
 
 def _by_columns(rows: Sequence[dict[str, Any]]) -> list[list[Any]]:
@@ -220,16 +216,10 @@ def _by_columns(rows: Sequence[dict[str, Any]]) -> list[list[Any]]:
     return [keys, *([row.get(key) for key in keys] for row in rows)]
 
 
-def _csv(table: Sequence[Sequence[Any]]) -> str:
-    return csv_text([_cell(value) for value in row] for row in table)
-
-
 def _cell(value: Any) -> str:
-    if value is None or (isinstance(value, float) and math.isnan(value)):
-        return ""
     if isinstance(value, list):
         return " to ".join(_cell(item) for item in value)
-    return value if isinstance(value, str) else str(_rounded(value))
+    return "" if value is None else str(value)
 
 
 def _rounded(value: Any) -> Any:

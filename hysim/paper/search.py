@@ -14,8 +14,9 @@ delay, in which a computer would work.
 
 import math
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from functools import cached_property
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -29,6 +30,7 @@ from hysim.metrics import step_metrics
 from hysim.plants.actuator import Actuator
 
 Limits = tuple[float, float] | None
+ComplexArray = npt.NDArray[np.complex128]
 
 MAX_SENSITIVITY = 2.0
 """Largest maximum sensitivity of a loop that counts, as is commonly asked."""
@@ -36,6 +38,7 @@ WITH_DELAY = 1.25
 """How much larger it may be with one sample more of delay."""
 BOX = ((-3.0, 3.0), (-2.0, 2.0), (-3.0, 2.0), (-4.0, 1.0), (0.0, 1.0), (0.0, 1.0))
 """Bounds of the search; times are in the plant's own unit."""
+_LOW, _HIGH = np.array(BOX).T
 
 _GENERATIONS = 24
 _POPULATION = 6  # for each of the six numbers
@@ -82,8 +85,7 @@ class Task:
     again: tuple[Actuator, ...] = ()
 
 
-@frozen
-class Found:
+class Found(NamedTuple):
     """The best controller of a search.
 
     Parameters
@@ -123,19 +125,11 @@ class Gains:
     kd: FloatArray
     derivative_filter: FloatArray
 
-    def response(self, z: npt.NDArray[np.complex128], sample_time: float) -> npt.NDArray[np.complex128]:
+    def response(self, z: ComplexArray, sample_time: float) -> ComplexArray:
         """As `PID.frequency_response`, shape (m, n)."""
         lag = self.derivative_filter + sample_time
         derivative = (self.kd / lag) * ((z - 1.0) / (z - self.derivative_filter / lag))
         return np.asarray(self.kp + self.ki * (sample_time / (z - 1.0)) + derivative)
-
-
-class _Grid:
-    """A plant's response at many frequencies."""
-
-    def __init__(self, loop: LinearLoop, frequencies: FloatArray) -> None:
-        self.z = np.exp(1j * frequencies * loop.sample_time)
-        self.plant = loop.plant_at(frequencies)
 
 
 class Robustness:
@@ -149,14 +143,14 @@ class Robustness:
         self.loops = [
             LinearLoop(each, sample_time) for each in (actuator, later(actuator, sample_time))[: 1 + with_delay]
         ]
-        self.grids = [_Grid(loop, loop.frequencies) for loop in self.loops]
+        self.grids = [_grid(loop, loop.frequencies) for loop in self.loops]
 
     @cached_property
-    def fine_grids(self) -> "list[_Grid]":
+    def fine_grids(self) -> list[tuple[ComplexArray, ComplexArray]]:
         """Grids so fine that nothing lies between their frequencies, unless a pole is very lightly damped."""
         highest = math.pi / self.h
         between = np.geomspace(_SLOWEST * highest, highest, _FINE)
-        return [_Grid(loop, np.union1d(loop.frequencies, between)) for loop in self.loops]
+        return [_grid(loop, np.union1d(loop.frequencies, between)) for loop in self.loops]
 
     def of(self, controller: PID) -> tuple[float, float]:
         """Both, within 0.1 %; infinite if a loop is unstable."""
@@ -176,8 +170,8 @@ class Robustness:
         """
         worst = np.zeros(gains.kp.size)
         grids = self.fine_grids if fine else self.grids
-        for grid, most in zip(grids, (bound, WITH_DELAY * bound), strict=False):
-            response = grid.plant * gains.response(grid.z, self.h)
+        for (z, plant), most in zip(grids, (bound, WITH_DELAY * bound), strict=False):
+            response = plant * gains.response(z, self.h)
             for slope in self.slopes:
                 worst = np.maximum(worst, 1.0 / (most * np.abs(1.0 + slope * response).min(axis=1)))
         return worst
@@ -187,6 +181,11 @@ class Robustness:
         feedbacks = [controller.linear(self.h) for controller in controllers]
         each = [loop.are_stable(feedbacks, slope) for loop in self.loops for slope in self.slopes]
         return np.asarray(np.all(each, axis=0))
+
+
+def _grid(loop: LinearLoop, frequencies: FloatArray) -> tuple[ComplexArray, ComplexArray]:
+    """Points of the unit circle at some frequencies, and the plant's response there."""
+    return np.exp(1j * frequencies * loop.sample_time), loop.plant_at(frequencies)
 
 
 def search(
@@ -219,7 +218,10 @@ def search(
         Of the random numbers.
     """
     tried = _Tried(task, bound, exact)
-    start = tried.best([tried.point(pid) for pid in starts]) if starts else None
+    start = None
+    if starts:
+        points = np.stack([tried.point(pid) for pid in starts], axis=1)
+        start = points[:, int(np.argmin(tried.costs(points)))]
     if generations:
         start = differential_evolution(
             tried.costs,
@@ -252,49 +254,29 @@ class _Tried:
         self.exact, self.is_polished = exact, False
 
     def controller(self, x: FloatArray) -> PID:
-        size, Ti, Td, ratio = 10.0 ** x[:4]
-        return PID.standard(
-            float(size / self.gain),
-            Ti=float(Ti),
-            Td=float(Td),
-            derivative_filter=float(ratio * Td),
-            limits=self.task.limits,
-            setpoint_weight=float(x[4]),
-            derivative_weight=float(x[5]),
-        )
+        size, Ti, Td, ratio = map(float, 10.0 ** x[:4])
+        pid = PID.standard(size / self.gain, Ti=Ti, Td=Td, derivative_filter=ratio * Td, limits=self.task.limits)
+        return replace(pid, setpoint_weight=float(x[4]), derivative_weight=float(x[5]))
 
     def point(self, pid: PID) -> FloatArray:
         """The point of a controller, or the nearest to it in the box."""
         kp = pid.kp or math.copysign(1e-9, self.gain)
         times = (kp / pid.ki if pid.ki else math.inf, pid.kd / kp, pid.derivative_filter / max(pid.kd / kp, 1e-9))
         x = [*np.log10(np.maximum([kp * self.gain, *times], 1e-9)), pid.setpoint_weight, pid.derivative_weight]
-        low, high = np.array(BOX).T
-        return np.asarray(np.clip(x, low, high))
+        return np.asarray(np.clip(x, _LOW, _HIGH))
 
     def descended(self, start: FloatArray, polish: int) -> Found:
         """The best controller that the simplex finds from a point; it begins anew once, on a smaller scale."""
-        low, high = np.array(BOX).T
         best, least = start, self.cost(start)
         for scale in _SIMPLEXES if polish else ():
-            step = scale * (high - low) * np.where(best > 0.5 * (low + high), -1.0, 1.0)
-            simplex = np.clip(best + np.vstack([np.zeros(len(BOX)), np.diag(step)]), low, high)
+            step = scale * (_HIGH - _LOW) * np.where(best > 0.5 * (_LOW + _HIGH), -1.0, 1.0)
+            simplex = np.clip(best + np.vstack([np.zeros(len(BOX)), np.diag(step)]), _LOW, _HIGH)
             options = {"maxfev": polish // 2, "xatol": 1e-5, "fatol": 1e-9, "initial_simplex": simplex}
             end = minimize(self.cost, best, method="Nelder-Mead", bounds=BOX, options=options)
             if end.fun < least:
                 best, least = end.x, end.fun
         controller = self.controller(best)
-        sensitivity, with_delay = self.robustness.of(controller)
-        return Found(
-            controller=controller,
-            max_sensitivity=sensitivity,
-            with_delay=with_delay,
-            bound=self.bound,
-            controllers=self.controllers,
-            simulations=self.simulations,
-        )
-
-    def best(self, points: Sequence[FloatArray]) -> FloatArray:
-        return points[int(np.argmin(self.costs(np.stack(points, axis=1))))]
+        return Found(controller, *self.robustness.of(controller), self.bound, self.controllers, self.simulations)
 
     def cost(self, x: FloatArray) -> float:
         return float(self.costs(x[:, np.newaxis])[0])
@@ -393,14 +375,8 @@ def triangle_task(
         error = tracking * float(np.sqrt(np.mean((reference[-samples - 1 :] - last)[begin:] ** 2))) if tracking else 0.0
         return float(apart.max() + apart[0] + error) / max(float(np.ptp(last)), 1e-12)
 
-    return Task(
-        plant=actuator,
-        sample_time=sample_time,
-        reference=reference,
-        limits=limits,
-        cost=cost,
-        slopes=slopes_along(actuator, reference[-samples - 1 :]),
-    )
+    along = slopes_along(actuator, reference[-samples - 1 :])
+    return Task(plant=actuator, sample_time=sample_time, reference=reference, limits=limits, cost=cost, slopes=along)
 
 
 def slopes_along(actuator: Actuator, cycle: FloatArray) -> tuple[float, ...]:

@@ -17,6 +17,7 @@ over which the response is evaluated. With eta = y / y(oo):
 """
 
 import math
+from itertools import accumulate
 from typing import Any
 
 import numpy as np
@@ -93,7 +94,7 @@ def step_reading(system: Any, *, per_time_constant: int = _PER_TIME_CONSTANT) ->
         if after == 0:
             return 0.0
         begin, end = float(time[after - 1]), float(time[after])
-        return _root(lambda t: response.eta(t) - level, begin, end, float(time[-1]))
+        return _root(lambda t: response.at(t)[0] - level, begin, end, float(time[-1]))
 
     outside = int(np.flatnonzero(np.abs(eta - 1.0) > _SETTLED)[-1])
     rise_begins, rise_ends = (crossing(int(np.argmax(eta >= level)), level) for level in (0.1, 0.9))
@@ -124,29 +125,23 @@ class _Response:
         self.final = D - float(to_final @ self.B)
         if self.final == 0.0:
             raise ValueError("the step response needs a system with a gain at zero frequency, got 0")
-        self.rest, self.slope = to_final / self.final, C / self.final
+        self.rows = np.array([to_final, C]) / self.final
 
-    def eta(self, t: float) -> float:
-        """The response over its final value."""
-        return 1.0 + float(self.rest @ expm(self.A * t) @ self.B)
-
-    def slope_at(self, t: float) -> float:
-        """Its derivative."""
-        return float(self.slope @ expm(self.A * t) @ self.B)
+    def at(self, t: float) -> tuple[float, float]:
+        """The response over its final value, and its derivative."""
+        rest, slope = self.rows @ expm(self.A * t) @ self.B
+        return 1.0 + float(rest), float(slope)
 
     def knots(self, per_time_constant: int) -> tuple[FloatArray, FloatArray]:
         """Times and values of the samples and of every extreme between them, until the slowest mode has faded."""
         duration = math.log(1.0 / _FADED) / self.slowest
         time = np.linspace(0.0, duration, math.ceil(duration * self.fastest * per_time_constant) + 2)
         step = expm(self.A * time[1])
-        modes = np.empty((time.size, self.B.size))
-        modes[0] = self.B
-        for k in range(1, time.size):
-            modes[k] = step @ modes[k - 1]
-        slope = modes @ self.slope
+        modes = np.array(list(accumulate(time[1:], lambda mode, _: step @ mode, initial=self.B)))
+        eta, slope = self.rows @ modes.T
         turning = np.flatnonzero(slope[1:-1] * slope[2:] < 0.0) + 1
-        extremes = [_root(self.slope_at, float(time[k]), float(time[k + 1]), duration) for k in turning]
-        values = np.concatenate([1.0 + modes @ self.rest, [self.eta(t) for t in extremes]])
+        extremes = [_root(lambda t: self.at(t)[1], time[k], time[k + 1], duration) for k in turning]
+        values = np.concatenate([1.0 + eta, [self.at(t)[0] for t in extremes]])
         times = np.concatenate([time, extremes])
         order = np.argsort(times, kind="stable")
         return times[order], values[order]

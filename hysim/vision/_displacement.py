@@ -1,24 +1,41 @@
-"""The verb `displacement`: frames in, displacements out."""
+"""The verb `displacement`: frames in, displacements out.
+
+The region is found frame after frame. A running reference is renewed from the last good frame when the picture has
+changed or moved away; the error of that frame's own place then adds to those of the frames after it.
+
+The shifts in pixels become a displacement along one direction. Directions are angles in the picture: 0 to the right, 90
+down it. A straight edge shows its motion in one direction only, across itself; what moves along another one, d, is seen
+there through the cosine between the two.
+"""
 
 import itertools
 import math
 import operator
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, Literal
 
 import numpy as np
+import numpy.typing as npt
 
+from hysim._frozen import FloatArray
 from hysim._progress import Reports, reports
-from hysim.vision._direction import along, angle_of
 from hysim.vision._frames import Picture, grey_pictures, read_frames
+from hysim.vision._locate import LOST, Location, locate
 from hysim.vision._result import Displacement
 from hysim.vision._template import Reference, Region
-from hysim.vision._tracking import against, running
 
 METHODS = ("subpixel", "whole-pixel")
 REFERENCES = ("first", "running")
 _SMALLEST = 16  # side of a region [pixel]
+_FOUND = 0.5  # correlation: below it, half of the content is another
+_CHANGED = 0.9  # of the best correlation with a running reference
+_LEFT_OVER = 0.75  # of the region's length that is still in the frame
+_AXES = {"x": 0.0, "y": 90.0}
+_BESIDE_VERTICAL = 10.0  # within it, a direction that is found is positive down the picture [degree]
+_LEAST_COSINE = 0.1
+_SHARP = 0.8  # curvature of the correlation's peak, of the median one
 
 
 @reports
@@ -96,17 +113,17 @@ def displacement(
         raise ValueError(f"method must be one of {', '.join(METHODS)}, got {method!r}")
     if isinstance(scale, (str, bool)) or not 0.0 < float(scale) < math.inf:
         raise ValueError(f"scale must be the length of a pixel, a positive number, got {scale}")
-    angle = angle_of(direction, whole=method == "whole-pixel")
+    angle = _angle_of(direction, whole=method == "whole-pixel")
     source, total = _source(frames)
     first, pictures = _pictures(source, reference)
     start = Reference(first, _region(region, first.shape))
-    follow = running if isinstance(reference, str) and reference == "running" else against
+    follow = _running if isinstance(reference, str) and reference == "running" else _against
     places = []
     for place in follow(start, pictures):
         places.append(place)
         if progress:
             progress(len(places), total)
-    return along(places, start.visible, angle, float(scale), unit, whole=method == "whole-pixel")
+    return _along(places, start.visible, angle, float(scale), unit, whole=method == "whole-pixel")
 
 
 def _source(frames: Any) -> tuple[Iterable[Any], int]:
@@ -155,3 +172,151 @@ def _region(sides: tuple[int, int, int, int] | None, shape: tuple[int, int]) -> 
 
 def _name(k: int) -> str:
     return f"frame {k}"
+
+
+def _against(reference: Reference, pictures: Iterable[Picture]) -> Iterator[Location]:
+    """The place of the reference's region in each picture."""
+    guess = np.zeros(2)
+    for picture in pictures:
+        location = _find(reference, picture, guess)
+        if location.is_located:
+            guess = location.shift
+        yield location
+
+
+def _running(reference: Reference, pictures: Iterable[Picture]) -> Iterator[Location]:
+    """The same, with references that are renewed; the first picture is the first reference."""
+    region, guess, best = reference.region, np.zeros(2), 0.0
+    start = replace(LOST, shift=np.zeros(2), covariance=np.zeros((2, 2)))
+    last: tuple[Picture, Location] | None = None
+    for k, picture in enumerate(pictures):
+        location = _find(reference, picture, guess)
+        if last is not None and (location.quality < _CHANGED * best or location.overlap < _LEFT_OVER):
+            renewed = Reference(last[0], _shifted(region, last[1], last[0]))
+            again = _find(renewed, picture, np.zeros(2))
+            if again.is_located:
+                reference, start, location, best, last = renewed, last[1], again, 0.0, None
+        if location.is_located:
+            guess = location.shift
+            location = replace(
+                location, shift=start.shift + location.shift, covariance=start.covariance + location.covariance
+            )
+            if k > 0:  # the first picture is like itself, noise and all
+                best, last = max(best, location.quality), (picture, location)
+        yield location
+
+
+def _find(reference: Reference, picture: Picture, guess: FloatArray) -> Location:
+    for start in (guess, np.zeros(2)):
+        location = locate(reference, picture, start)
+        if location.quality >= _FOUND:
+            return location
+    return replace(LOST, quality=location.quality)
+
+
+def _shifted(region: Region, place: Location, picture: Picture) -> Region:
+    """The region where its content now is, as far as the picture goes."""
+    top, left = np.rint(np.add((region.top, region.left), place.shift)).astype(int)
+    return replace(
+        region,
+        top=int(np.clip(top, 0, picture.shape[0] - region.height)),
+        left=int(np.clip(left, 0, picture.shape[1] - region.width)),
+    )
+
+
+def _along(
+    located: Sequence[Location],
+    visible: FloatArray,
+    angle: float | None,
+    scale: float,
+    unit: str,
+    *,
+    whole: bool,
+) -> Displacement:
+    """The displacements of located frames; `visible` projects on the directions in which there is structure."""
+    shift = np.array([place.shift[::-1] for place in located])
+    covariance = np.array([place.covariance[::-1, ::-1] for place in located])
+    visible = visible[::-1, ::-1]
+    if angle is None:
+        angle = _best_direction(shift, covariance, visible)
+        angle = 90.0 * round(angle / 90.0) if whole else angle
+    unit_vector = _unit(angle)
+    across = _unit(angle + 90.0)
+    towards = _towards(unit_vector, visible)
+    displacement, variance = shift @ towards, np.einsum("i,nij,j->n", towards, covariance, towards)
+    beside = shift @ across if np.trace(visible) > 1.5 else np.full(len(shift), np.nan)
+    if whole:
+        shift, displacement, beside = np.rint(shift) + 0.0, np.rint(displacement) + 0.0, np.rint(beside) + 0.0
+        variance = variance + 1.0 / 12.0
+    return Displacement(
+        y=scale * displacement,
+        uncertainty=scale * np.sqrt(variance),
+        shift=shift,
+        across=scale * beside,
+        quality=np.array([place.quality for place in located]),
+        status=_statuses(located, towards / np.linalg.norm(towards)),
+        scale=scale,
+        direction=angle,
+        resolution=scale if whole else None,
+        units={"y": unit},
+    )
+
+
+def _angle_of(direction: float | str | None, *, whole: bool) -> float | None:
+    """The angle of a direction; None if it must be estimated."""
+    if direction is None:
+        return None
+    if isinstance(direction, str) and direction in _AXES:
+        return _AXES[direction]
+    if isinstance(direction, (str, bool)) or not math.isfinite(direction):
+        raise ValueError(f'direction must be "x", "y", an angle in degrees or None, got {direction!r}')
+    if whole and direction % 90.0:
+        raise ValueError(f"whole pixels are counted along rows or columns: direction must be x or y, got {direction}")
+    return float(direction)
+
+
+def _best_direction(shift: FloatArray, covariance: FloatArray, visible: FloatArray) -> float:
+    """Direction in which the shifts spread more than their noise does; to the right where there is none."""
+    if np.trace(visible) < 1.5:
+        vector = np.linalg.eigh(visible)[1][:, 1]
+    else:
+        is_located = np.isfinite(shift[:, 0])
+        if not is_located.any():
+            return 0.0
+        off, noise = shift[is_located] - shift[is_located].mean(axis=0), covariance[is_located].mean(axis=0)
+        values, vectors = np.linalg.eigh(off.T @ off / is_located.sum() - noise)
+        if values[1] <= np.trace(noise):
+            return 0.0
+        vector = vectors[:, 1]
+    angle = math.degrees(math.atan2(vector[1], vector[0]))
+    return (angle + 90.0 - _BESIDE_VERTICAL) % 180.0 - 90.0 + _BESIDE_VERTICAL
+
+
+def _unit(angle: float) -> npt.NDArray[np.float64]:
+    """Unit vector of an angle, without rounding where it is along an axis."""
+    turned = angle % 360.0
+    axes = {0.0: (1.0, 0.0), 90.0: (0.0, 1.0), 180.0: (-1.0, 0.0), 270.0: (0.0, -1.0)}
+    return np.array(axes.get(turned, (math.cos(math.radians(angle)), math.sin(math.radians(angle)))))
+
+
+def _towards(direction: FloatArray, visible: FloatArray) -> FloatArray:
+    """The vector whose product with a shift is the displacement along the direction."""
+    if np.trace(visible) > 1.5:
+        return direction
+    shown = visible @ direction
+    cosine = float(np.linalg.norm(shown))
+    if cosine < _LEAST_COSINE:
+        normal = np.linalg.eigh(visible)[1][:, 1]
+        raise ValueError(
+            f"the picture is a straight edge, which shows no motion along {direction[0]:.2g}, {direction[1]:.2g} "
+            f"(right, down), only along {normal[0]:.2g}, {normal[1]:.2g}"
+        )
+    return shown / cosine**2
+
+
+def _statuses(located: Sequence[Location], direction: FloatArray) -> tuple[str, ...]:
+    """Blurred is a frame whose correlation has a flatter peak along the motion than the median one's."""
+    sharpness = np.array([direction @ place.sharpness[::-1, ::-1] @ direction for place in located])
+    is_located = np.isfinite(sharpness)
+    least = _SHARP * np.median(sharpness[is_located]) if is_located.any() else 0.0
+    return tuple("ok" if value >= least else "blurred" if value < least else "lost" for value in sharpness)

@@ -11,8 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from hysim._frozen import FloatArray
-from hysim.vision._template import Picture, Reference, Spectrum, Template, without_plane
-from hysim.vision._windows import cut
+from hysim.vision._template import Picture, Reference, Spectrum, Template, cut, without_plane
 
 _ROUNDS = 8
 _STEPS = 3  # in one position of the windows

@@ -12,8 +12,15 @@ Q_ij = <h_i, r dW/dx_j>. White noise of variance s^2 gives e the covariance (s /
 M_ij = <W h_i, W h_j>.
 
 The products with the templates are sums over spectra, where a shift by any fraction of a pixel is a phase.
+
+Windows move with the picture. A patch of the reference r, weighted by a window, is W(x) r(x). In a frame whose content
+has moved by d it is W(x - d) r(x - d): the same patch, moved by d, whatever enters or leaves at the borders. A window
+that stays where it is would pull every shift towards zero. Along each axis the window is flat with sine-squared flanks,
+and is known between the pixels. Where the content has moved out of the picture, the reference is cut back by whole
+steps on the side that is missing.
 """
 
+import math
 from dataclasses import dataclass
 from functools import lru_cache
 
@@ -22,7 +29,6 @@ import numpy.typing as npt
 from scipy import fft, ndimage
 
 from hysim._frozen import FloatArray
-from hysim.vision._windows import window
 
 Picture = npt.NDArray[np.float32]
 Spectrum = npt.NDArray[np.complex64]
@@ -34,6 +40,9 @@ _NOISE_SLOPE = 1.0 / (8.0 * np.pi * _SMOOTHING**4)  # energy of the smoothed slo
 _NOISE_OR_FINE = 0.5  # of the structure across: what is stronger is no noise, but as fine as noise
 _FAINT = 1e-3  # of the structure across, the least: what digits and pixels make of a straight edge is less
 _TEMPLATES = 8  # kept at a time
+_MARGIN = 1.0  # kept free at both ends, so that shifts up to a pixel need no cut [pixel]
+_FLANK = 0.25  # of the window's length
+_STEPS = 64  # cuts of one axis
 
 
 @dataclass(frozen=True)
@@ -184,3 +193,21 @@ def _noise_variance(patch: Picture) -> float:
     """Variance of white noise, by the median of the mixed differences of neighbours, which a smooth picture lacks."""
     mixed = np.diff(np.diff(patch, axis=0), axis=1)
     return float(np.median(np.abs(mixed)) / 0.6745) ** 2 / 4.0
+
+
+def cut(shift: float, length: int) -> int:
+    """By how much the reference is cut back for content that moves by `shift` inside `length` pixels [pixel].
+
+    Positive cuts are at the end of the axis: content that moves towards the end leaves there.
+    """
+    step = math.ceil(length / _STEPS)
+    return int(math.copysign(step * math.ceil(max(abs(shift) - _MARGIN, 0.0) / step), shift))
+
+
+def window(length: int, cut: int, shift: float) -> FloatArray:
+    """Weights of the pixels of one axis for content that has moved by `shift`, shape (length,)."""
+    low = _MARGIN + max(-cut, 0) + shift
+    high = length - 1 - _MARGIN - max(cut, 0) + shift
+    x = np.arange(length)
+    inside = np.minimum(x - low, high - x) / (_FLANK * (high - low))
+    return np.asarray(np.sin(0.5 * np.pi * inside.clip(0.0, 1.0)) ** 2)

@@ -1,21 +1,29 @@
-"""The values of claims about tables and equations, each from the evidence and the row's arguments."""
+"""The values of the claims, each from the evidence and the row's arguments.
 
-from collections.abc import Callable, Mapping
+The paper prints no gains. So a claim about a closed loop asks whether a controller exists, and is judged by the best of
+the loops of `hysim.paper.loops`: those within voltage limits, whose maximum sensitivity is at most 2.
+"""
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from inspect import isfunction
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from hysim._frozen import FloatArray
-from hysim.metrics import fit_percent, fpe, loop_metrics
-from hysim.paper import printed
-from hysim.paper.amplifier import UA741_SUPPLY_SPAN, full_power_bandwidth, resistor_ratio, voltage_gain
-from hysim.paper.claims._evidence import Evidence
-from hysim.paper.claims._judge import Value
-from hysim.paper.claims.rounding import Number, Spread, exactly, half_unit, spread, stands_for
-from hysim.paper.equations import EQUATION_1, EQUATION_4
-from hysim.paper.reidentification import aliased_fit
-from hysim.paper.resolution import quantum
-from hysim.paper.state_space import EQUATIONS_7_8, EQUATIONS_13_14, StateSpace
+from hysim._frozen import FloatArray, frozen
+from hysim.control import to_control
+from hysim.metrics import LoopMetrics, fit_percent, fpe, loop_metrics
+from hysim.paper import equations, printed
+from hysim.paper.equations import EQUATION_1, EQUATION_4, UA741_SUPPLY_SPAN, pid_standard
+from hysim.paper.loops import REDUCTIONS
+from hysim.paper.reidentification import Reidentification, aliased_fit, quantum
+from hysim.paper.rounding import Number, Spread, exactly, half_unit, spread, stands_for
+from hysim.paper.search import MAX_SENSITIVITY
+from hysim.paper.step_reading import StepReading, step_reading
+from hysim.paper.study import Study
 from hysim.plants.transfer_function import TransferFunction
+from hysim.records import Record
 
 QUANTUM_TOLERANCE = 0.005
 """Largest distance of Table 1's displacements from multiples of a pixel [um]: more than their last digit's rounding."""
@@ -26,6 +34,68 @@ SLOW_DWELL = 50.0
 
 _MEASURED_DIGITS = 3  # Table 1 is in 0.001 um; trailing zeros are not printed
 _PER_US = 1e6
+
+LOOP_GAIN = 0.5
+"""Gain at zero frequency of the loops that show the effect of each term: (1) is stable with any one of them."""
+INTEGRAL_TIME = 2.0
+DERIVATIVE_TIME = 0.2
+DERIVATIVE_FILTER = 0.01
+TRACKS_WITHIN = 0.02
+"""A reference is tracked where the steady error is at most this part of it."""
+Loop = Mapping[str, Any]
+"""One closed loop: its plant, controller, conditions and measures by name, as in `summary.json`."""
+
+
+@frozen
+class Evidence:
+    """Everything that a claim may be computed from.
+
+    Parameters
+    ----------
+    table1, table2 : Record
+        The paper's tables.
+    study : Study
+        The models of Table 1.
+    reidentification : Reidentification
+        (1) and (4) identified anew, and what Table 2 determines of a plant.
+    approximations : mapping
+        Estimates of (1) and (4) by the equation's number.
+    control : mapping
+        "hysteresis" and "vibration" to closed loops, as `hysim.paper.loops.control_measures` writes them.
+    """
+
+    table1: Record
+    table2: Record
+    study: Study
+    reidentification: Reidentification
+    approximations: Mapping[str, equations.Approximation]
+    control: Mapping[str, Sequence[Loop]]
+
+    @property
+    def loop(self) -> LoopMetrics:
+        """Measures of Table 1's loop."""
+        return loop_metrics(self.table1.u, self.table1.y)
+
+
+class Value(NamedTuple):
+    """Result of a claim's function.
+
+    Parameters
+    ----------
+    value : Spread, float or str
+        What comes out.
+    holds : bool, optional
+        Whether the criterion is met; None where the printed number decides.
+    facts : mapping
+        Names to what stands for them in the claim's texts.
+    printed : float or str, optional
+        In place of a number of `hysim.paper.printed`.
+    """
+
+    value: Spread | float | str
+    holds: bool | None = None
+    facts: Mapping[str, Any] = {}
+    printed: float | str | None = None
 
 
 # -- the introduction and Table 1
@@ -161,7 +231,7 @@ def settled_width(of: Evidence) -> Value:
     """Width of the loop of (1) when every voltage waits, against a pixel."""
     model = TransferFunction(num=EQUATION_1.num, den=EQUATION_1.den, sample="end")
     width = loop_metrics(of.table1.u, model.response(of.table1.u, SLOW_DWELL)).max_width
-    return Value(round(width, 9), width > of.pixel, {"dwell": SLOW_DWELL})
+    return Value(round(width, 9), width > (of.table1.resolution or 0.0), {"dwell": SLOW_DWELL})
 
 
 def similar(of: Evidence, name: str) -> Value:
@@ -176,12 +246,12 @@ def similar(of: Evidence, name: str) -> Value:
 
 def ratio_needed(_: Evidence) -> Value:
     """Rf/R2 by equation (2)."""
-    return Value(exactly(resistor_ratio(float(printed.OUTPUT_V), float(printed.INPUT_V))))
+    return Value(exactly(equations.resistor_ratio(float(printed.OUTPUT_V), float(printed.INPUT_V))))
 
 
 def output_of_ratio(_: Evidence) -> Value:
     """Output by equation (2) with the printed ratio."""
-    return Value(exactly(float(printed.INPUT_V) * voltage_gain(float(printed.RATIO))))
+    return Value(exactly(float(printed.INPUT_V) * equations.voltage_gain(float(printed.RATIO))))
 
 
 def gain_of_voltages(_: Evidence) -> Value:
@@ -197,25 +267,22 @@ def resistors(_: Evidence) -> Value:
 
 def supply(_: Evidence) -> Value:
     """Largest supply of the amplifier, against the output."""
-    needed = float(printed.OUTPUT_V)
-    return Value(UA741_SUPPLY_SPAN, needed <= UA741_SUPPLY_SPAN)
+    return Value(UA741_SUPPLY_SPAN, float(printed.OUTPUT_V) <= UA741_SUPPLY_SPAN)
 
 
 def power_bandwidth(_: Evidence, side: str) -> Value:
     """Full-power bandwidth by equation (3), in kHz."""
     amplitude = float(vars(printed)[side])
-    return Value(
-        spread(lambda x: full_power_bandwidth(x[0] * _PER_US, amplitude) / 1e3, [printed.SLEW_RATE_V_PER_US]),
-        facts={"amplitude": amplitude},
+    bandwidth = spread(
+        lambda x: equations.full_power_bandwidth(x[0] * _PER_US, amplitude) / 1e3, [printed.SLEW_RATE_V_PER_US]
     )
+    return Value(bandwidth, facts={"amplitude": amplitude})
 
 
 def program_frequency(_: Evidence) -> Value:
     """Frequency of the program's on and off times."""
-    return Value(
-        spread(lambda ms: 1000.0 / (ms[0] + ms[1]), [printed.ON_MS, printed.OFF_MS]),
-        facts={"period": 1000.0 / float(printed.FREQUENCY_HZ)},
-    )
+    frequency = spread(lambda ms: 1000.0 / (ms[0] + ms[1]), [printed.ON_MS, printed.OFF_MS])
+    return Value(frequency, facts={"period": 1000.0 / float(printed.FREQUENCY_HZ)})
 
 
 def square_wave(of: Evidence) -> Value:
@@ -245,7 +312,7 @@ def resolution_of_table2(of: Evidence) -> Value:
 
 def repeats_table2(of: Evidence, name: str) -> Value:
     """Fit of (4) to Table 2, read in a unit of time, with the initial state and the level free."""
-    unit = of.time_unit(name)
+    unit = next(unit for unit in of.reidentification.time_units if unit.name == name)
     return Value(unit.fit_with_level, unit.fit_with_level >= SIMILAR_PERCENT, {"unit": unit, "least": SIMILAR_PERCENT})
 
 
@@ -253,12 +320,8 @@ def static_swing(of: Evidence) -> Value:
     """Displacement of (4) for a lasting swing of the voltage, against Table 2's."""
     swing, gain = float(printed.HIGH_V) - float(printed.LOW_V), of.reidentification.information.gain
     facts = {"gain": EQUATION_4.dc_gain, "measured": gain, "swing": swing}
-    return Value(
-        EQUATION_4.dc_gain * swing,
-        EQUATION_4.dc_gain * gain > 0.0,
-        facts,
-        round(of.reidentification.information.swing, 3),
-    )
+    measured = round(of.reidentification.information.swing, 3)
+    return Value(EQUATION_4.dc_gain * swing, EQUATION_4.dc_gain * gain > 0.0, facts, measured)
 
 
 def numbers_determined(of: Evidence) -> Value:
@@ -308,13 +371,10 @@ def structural_rank(_: Evidence, model: str, kind: str) -> Value:
 
 
 def _structural(model: str, kind: str) -> Spread:
-    A, C, B = {
-        "(7), (8)": (printed.A_7, printed.C_8, EQUATIONS_7_8.B),
-        "(13), (14)": (printed.A_13, printed.C_14, EQUATIONS_13_14.B),
-    }[model]
+    A, C = (printed.A_7, printed.C_8) if model == "(7), (8)" else (printed.A_13, printed.C_14)
 
     def matrix(x: FloatArray) -> FloatArray:
-        form = StateSpace(A=[x[:2], [1.0, 0.0]], B=B, C=[[0.0, x[2]]])  # type: ignore[arg-type]
+        form = equations.state_space(np.array([x[:2], [1.0, 0.0]]), np.array([[0.0, x[2]]]))
         return form.controllability if kind == "controllability" else form.observability
 
     return spread(matrix, [*A[0], C[0][1]])
@@ -339,14 +399,124 @@ def _texts(displacements: FloatArray) -> list[Number]:
     return [f"{y:.{_MEASURED_DIGITS}f}" for y in displacements]
 
 
-FUNCTIONS: Mapping[str, Callable[..., Value]] = {
-    function.__name__: function
-    for function in (
-        listed, points, voltage_range, same_voltages, smallest_step, full_length, rest_error, resolution, loop_width,
-        bend, poles, printed_fit, identified_fit, prediction_error, prediction_error_of_fit, beats_single_valued,
-        settled_width, similar, ratio_needed, output_of_ratio, gain_of_voltages, resistors, supply, power_bandwidth,
-        program_frequency, square_wave, proportional, resolution_of_table2, repeats_table2, static_swing,
-        numbers_determined, static_gain_of_6, damping_of_6, entry_of_6, structural_matrix, structural_rank,
+# -- the terms of the controller
+
+
+def sum_of_terms(_: Evidence) -> Value:
+    """Largest relative distance of (17) from the sum of its three terms."""
+    gain, integral, derivative = 2.0, 3.0, 0.5
+    at = 1j * np.geomspace(0.01, 100.0, 25)
+    terms = gain + gain / (integral * at) + gain * derivative * at
+    apart = float(np.max(np.abs(pid_standard(gain, integral, derivative)(at) / terms - 1.0)))
+    return Value(round(apart, 12) + 0.0, apart < 1e-12)
+
+
+def proportional_rise(_: Evidence) -> Value:
+    """Rise time with proportional action, against that without."""
+    none, alone = _open_step(), _loop_step(math.inf, 0.0)
+    return Value(alone.rise_time, alone.rise_time < none.rise_time, {"open": none.rise_time, "gain": LOOP_GAIN})
+
+
+def proportional_error(_: Evidence) -> Value:
+    """Steady error with proportional action."""
+    error = 1.0 - _loop_step(math.inf, 0.0).final
+    return Value(100.0 * error, abs(error) > TRACKS_WITHIN, {"gain": LOOP_GAIN, "least": 100.0 * TRACKS_WITHIN})
+
+
+def integral_error(_: Evidence) -> Value:
+    """Steady error with integral action."""
+    loop = _loop_step(INTEGRAL_TIME, 0.0)
+    facts = {"gain": LOOP_GAIN, "integral": INTEGRAL_TIME, "rise": loop.rise_time}
+    return Value(100.0 * round(1.0 - loop.final, 12) + 0.0, abs(1.0 - loop.final) < 1e-9, facts)
+
+
+def derivative_overshoot(_: Evidence) -> Value:
+    """Overshoot with derivative action, against that without; the settling time has to fall too."""
+    without, loop = _loop_step(math.inf, 0.0), _loop_step(math.inf, DERIVATIVE_TIME)
+    better = loop.overshoot_percent < without.overshoot_percent and loop.settling_time < without.settling_time
+    facts = {"gain": LOOP_GAIN, "derivative": DERIVATIVE_TIME, "without": without, "loop": loop}
+    return Value(loop.overshoot_percent, better, facts)
+
+
+def _open_step() -> StepReading:
+    return step_reading(to_control(EQUATION_1))
+
+
+def _loop_step(integral_time: float, derivative_time: float) -> StepReading:
+    import control
+
+    gain, smoothing = LOOP_GAIN / EQUATION_1.dc_gain, DERIVATIVE_FILTER if derivative_time else 0.0
+    controller = pid_standard(gain, integral_time, derivative_time, derivative_filter=smoothing)
+    return step_reading(control.feedback(controller * to_control(EQUATION_1)))
+
+
+# -- the best loops
+
+
+def tracks(of: Evidence, plant: str, reference: str) -> Value | None:
+    """Steady error of the best loop on a plant for a reference, in percent of the step."""
+    rows = [row for row in _loops(of, "vibration", plant) if row["reference"].startswith(reference)]
+    if not rows:
+        return None
+    row = min(rows, key=lambda row: row["steady_error_percent"])
+    error, least = float(row["steady_error_percent"]), 100.0 * TRACKS_WITHIN
+    return Value(error, error <= least, {"least": least, "loop": _conditions(row)})
+
+
+def loop_reduction(of: Evidence, plant: str, key: str) -> Value | None:
+    """Reduction of the loop's relative width, of the best loop on a plant."""
+    return _reached(printed.HYSTERESIS_REDUCTION, _best(_loops(of, "hysteresis", plant), [key]), key)
+
+
+def vibration(of: Evidence, plant: str, measure: str) -> Value | None:
+    """A measure of the best loop on a plant, or the least of its three; one is never shown without the others."""
+    best = _best(_loops(of, "vibration", plant), REDUCTIONS)
+    return _reached(printed.VIBRATION_REDUCTION, best, f"{measure.replace(' ', '_')}_reduction_percent")
+
+
+def _reached(text: str, best: tuple[Mapping[str, float], Loop] | None, key: str) -> Value | None:
+    if best is None:
+        return None
+    figures, row = best
+    value = figures.get(key, min(figures.values()))
+    enough = value >= float(text) - half_unit(text)
+    said = _conditions(row) if enough else f"{row.get('searched', '')} Best: {_conditions(row)}".strip()
+    names = {name: name.removesuffix("_reduction_percent").replace("_", " ") for name in figures}
+    together = ", ".join(f"{names[name]} {figure:.1f} %" for name, figure in figures.items())
+    return Value(value, enough, {"loop": said, "together": together})
+
+
+def _best(loops: Sequence[Loop], keys: Sequence[str]) -> tuple[Mapping[str, float], Loop] | None:
+    """The loop whose least figure is the greatest, after its figures."""
+    each = [({key: math.nan if row.get(key) is None else float(row[key]) for key in keys}, row) for row in loops]
+    known = [pair for pair in each if not any(map(math.isnan, pair[0].values()))]
+    return max(known, key=lambda pair: min(pair[0].values()), default=None)
+
+
+def _loops(of: Evidence, kind: str, plant: str) -> list[Loop]:
+    """Loops on a plant that count: within voltage limits, and robust."""
+    return [
+        row
+        for row in of.control.get(kind, ())
+        if row["plant"] == plant
+        and row["limits"] != "unlimited"
+        and row["max_sensitivity"] <= 1.001 * MAX_SENSITIVITY  # to which the sensitivity is known
+    ]
+
+
+def _conditions(row: Loop) -> str:
+    """The controller of a loop, and the conditions under which it ran, in words."""
+    low, high = row["limits"]
+    under = row["conditions"]
+    return (
+        f"{row['controller']}; {row['reference']}; {low:g} to {high:g} V; sampled every {under['sample_time']:g} "
+        f"{under['time_unit']}; maximum sensitivity {row['max_sensitivity']:.2f}"
     )
-}  # fmt: skip
-"""Every function by the name that the table gives it."""
+
+
+FUNCTIONS: Mapping[str, Callable[..., Value | None]] = {
+    name: value
+    for name, value in vars().items()
+    if isfunction(value) and value.__module__ == __name__ and not name.startswith("_")
+}
+"""Every public function of this module by the name that the table gives it."""

@@ -62,8 +62,13 @@ def half_unit(text: str) -> float:
     >>> half_unit("0.07962"), half_unit("-2.430"), half_unit("9")
     (5e-06, 0.0005, 0.5)
     """
-    exponent = _decimal(text).as_tuple().exponent
-    return float(Decimal(5).scaleb(int(exponent) - 1))
+    try:
+        exponent = Decimal(text).as_tuple().exponent
+    except InvalidOperation:
+        exponent = "n"  # as that of nan
+    if isinstance(exponent, str):
+        raise ValueError(f"a printed number is a finite decimal, got {text!r}")
+    return float(Decimal(5).scaleb(exponent - 1))
 
 
 def stands_for(printed: Any) -> Spread:
@@ -96,12 +101,17 @@ def spread(function: Callable[[FloatArray], npt.ArrayLike], inputs: Sequence[Num
     (0.5, 0.463, 0.538)
     """
     centre, halves = _values(inputs), _halves(inputs)
-    value = np.asarray(function(centre), dtype=float)
-    rounded = np.flatnonzero(halves)
-    if rounded.size <= MAX_CORNERS:
-        low, high = _over_corners(function, centre, halves, rounded)
+    steps = np.diag(halves)[np.flatnonzero(halves)]
+
+    def at(offset: FloatArray | float) -> FloatArray:
+        return np.asarray(function(centre + offset), dtype=float)
+
+    value = at(0.0)
+    if len(steps) <= MAX_CORNERS:
+        corners = [at(np.array(signs) @ steps) for signs in product((-1.0, 1.0), repeat=len(steps))]
+        low, high = np.min(corners, axis=0), np.max(corners, axis=0)
     else:
-        radius = _one_at_a_time(function, centre, halves, rounded)
+        radius = sum((np.maximum(np.abs(at(-step) - value), np.abs(at(step) - value)) for step in steps), 0.0 * value)
         low, high = value - radius, value + radius
     return Spread(value=value, low=np.minimum(low, value), high=np.maximum(high, value))
 
@@ -109,32 +119,6 @@ def spread(function: Callable[[FloatArray], npt.ArrayLike], inputs: Sequence[Num
 def exactly(value: npt.ArrayLike) -> Spread:
     """A number, or an array, that no rounding touches."""
     return Spread(value=value, low=value, high=value)  # type: ignore[arg-type]
-
-
-def _over_corners(
-    function: Callable[[FloatArray], npt.ArrayLike], centre: FloatArray, halves: FloatArray, rounded: npt.NDArray[Any]
-) -> tuple[FloatArray, FloatArray]:
-    corners = []
-    for signs in product((-1.0, 1.0), repeat=rounded.size):
-        corner = centre.copy()
-        corner[rounded] += signs * halves[rounded]
-        corners.append(np.asarray(function(corner), dtype=float))
-    return np.min(corners, axis=0), np.max(corners, axis=0)
-
-
-def _one_at_a_time(
-    function: Callable[[FloatArray], npt.ArrayLike], centre: FloatArray, halves: FloatArray, rounded: npt.NDArray[Any]
-) -> FloatArray:
-    value = np.asarray(function(centre), dtype=float)
-    radius = np.zeros_like(value)
-    for k in rounded:
-        sides = []
-        for sign in (-1.0, 1.0):
-            moved = centre.copy()
-            moved[k] += sign * halves[k]
-            sides.append(np.abs(np.asarray(function(moved), dtype=float) - value))
-        radius += np.max(sides, axis=0)
-    return radius
 
 
 def _values(printed: Any) -> FloatArray:
@@ -149,13 +133,3 @@ def _nested(printed: Any, read: Callable[[Any], float]) -> Any:
     if isinstance(printed, (str, float, int)):
         return read(printed)
     return [_nested(item, read) for item in printed]
-
-
-def _decimal(text: str) -> Decimal:
-    try:
-        number = Decimal(text)
-    except InvalidOperation:
-        raise ValueError(f"a printed number is a decimal, got {text!r}") from None
-    if not number.is_finite():
-        raise ValueError(f"a printed number is finite, got {text!r}")
-    return number
