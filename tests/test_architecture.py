@@ -42,7 +42,7 @@ RANKS = (
     ("__main__",),
 )
 RANK = {name: rank for rank, names in enumerate(RANKS) for name in names}
-ONLY_IMPORTED_IN = {"pysindy": ("discovery/_pysindy.py",), "matplotlib": ("plot/",), "control": ("control/", "paper/")}
+ONLY_IMPORTED_IN = {"pysindy": ("discovery/_slopes.py",), "matplotlib": ("plot/",), "control": ("control/", "paper/")}
 MODULES = sorted(PACKAGE.rglob("*.py"))
 
 
