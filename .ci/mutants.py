@@ -74,14 +74,12 @@ MAPPED = {
     "metrics/_loop.py": "loop_metrics cycle_metrics",
     "metrics/_steps.py": "step_metrics",
     "metrics/rows.py": "loop_metrics",
-    "identification/_direct.py": "static_models",
+    "identification/_identify.py": "identification identification_result several_records bad_data static_models",
     "identification/_descent.py": "descent identification several_records",
-    "identification/_diagnostics.py": "identification_result warnings identification bad_data",
-    "identification/_identify.py": "identification identification_result several_records bad_data",
-    "identification/_noise.py": "warnings noise_models",
+    "identification/_diagnostics.py": "identification_parts identification_result warnings bad_data intervals",
+    "identification/_noise.py": "warnings noise_models posterior",
     "identification/_problem.py": "identification several_records noise_models",
     "identification/_profile.py": "intervals",
-    "identification/_resampling.py": "warnings intervals",
     "identification/_result.py": "identification_result intervals",
     "identification/_search.py": "identification several_records",
     "identification/_searched.py": "identification_parts warnings identification identification_result bad_data",
@@ -89,9 +87,7 @@ MAPPED = {
     "identification/_uncertainty.py": "identification_parts warnings intervals identification_result noise_models",
     "identification/marquardt.py": "descent discovery_refinement identification",
     "identification/swapped.py": "warnings",
-    "identification/folds.py": "identification_parts identification comparison",
-    "identification/sentences.py": "warnings",
-    "identification/json_forms.py": "identification_result",
+    "identification/forms.py": "identification_result warnings",
 }
 NOT_MUTATED = {"kernels/_compile.py"}  # how kernels are compiled, not what they compute
 

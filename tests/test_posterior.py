@@ -14,7 +14,7 @@ import pytest
 from scipy import stats
 
 import hysim as hs
-from hysim.identification.likelihood.densities import density
+from hysim.identification.likelihood import density
 from hysim.posterior import _log_evidence, _sampler, log_evidence
 from hysim.posterior._log_evidence import bridge_evidence
 from hysim.posterior._priors import REACH, given, scaled_box

@@ -13,7 +13,7 @@ from hysim._frozen import FloatArray, check_choice, frozen, items
 from hysim._names import among
 from hysim._printing import aligned, bic_in_words, csv_text, folded, listed, printed, summary_text
 from hysim.comparison._verdict import Contrast, contrasts
-from hysim.identification.sentences import CONSTANT, SWAPPED
+from hysim.identification.forms import CONSTANT, SWAPPED
 from hysim.interop import frame, heading
 from hysim.metrics import LoopMetrics
 from hysim.models.model import in_brief

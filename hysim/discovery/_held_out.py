@@ -24,7 +24,7 @@ from hysim._cycles import TOLERANCE, complete_cycles
 from hysim._frozen import FloatArray
 from hysim.discovery._competitors import FLOOR, Rival, curve, means, plays, relaxations, trend
 from hysim.errors import SimulationError
-from hysim.identification.folds import folds as blocks
+from hysim.identification import folds as blocks
 from hysim.records import Record
 
 LAW, RIVAL, RELAXATIONS, PLAYS, CURVE = "law", "rival", "relaxations", "plays", "curve"

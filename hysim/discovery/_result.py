@@ -20,7 +20,7 @@ from hysim._frozen import FloatArray, frozen
 from hysim._printing import printed, summary_text, wrapped
 from hysim.discovery._judgement import Judgement
 from hysim.discovery._refinement import AnyExponent, Candidate, Structure, Terms
-from hysim.identification.json_forms import Stored
+from hysim.identification.forms import Stored
 from hysim.interop import frame
 from hysim.laws.differential.boucwen import BoucWen
 from hysim.laws.differential.duhem import Duhem

@@ -23,8 +23,7 @@ from hysim._frozen import FloatArray
 from hysim._input_noise import input_noise, quiet_path, reach
 from hysim._repeats import repeated_cycle
 from hysim.errors import SimulationError
-from hysim.identification._budget import Budget
-from hysim.identification._problem import Problem, problem, problems
+from hysim.identification._problem import Budget, Problem, problem, problems
 from hysim.identification._search import brief_optima, brief_optimum, optima
 from hysim.laws.operators.reversal_filter import ReversalFilter
 from hysim.metrics.criteria import information

@@ -6,7 +6,7 @@ The family's coordinates x are searched in a box. The output is affine in the li
 
 so that the norm of r(x) = y - e(x) - C(x) b(x) is minimised over x alone (Golub and Pereyra 1973). Records share all
 parameters but the state at the first sample, which each has as ``z0[0]``, ``z0[1]``, ... Everything is evaluated for
-many x at once.
+many x at once. A `Budget` limits the number of parameter sets that a search may simulate.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -21,12 +21,38 @@ from hysim._channels import taken
 from hysim._frozen import FloatArray
 from hysim._names import meant
 from hysim._repeats import repeated_cycle
-from hysim.identification._budget import Budget
-from hysim.identification._regression import Settled, least_squares, triangle
+from hysim.identification.marquardt import Settled, least_squares, triangle
 from hysim.models.protocols import Forgetting, Identifiable, Staged, placed
 from hysim.models.search_space import STATES, STATES_IN_WORDS, Freedom, Parameters, SearchSpace
 from hysim.models.stages import BASE, Stage
 from hysim.records import Record
+
+_LEAST = 64  # sets that are always compared
+_SHARE = 0.5  # of what remains, for one stage of the search
+
+
+@dataclass
+class Budget:
+    """So many samples may be simulated; `spent` of them have been, and `cut` says whether a stage was shortened."""
+
+    samples: float
+    spent: float = 0.0
+    cut: bool = False
+
+    def take(self, n_sets: int, n_samples: int) -> None:
+        """Count sets that are simulated."""
+        self.spent += float(n_sets) * n_samples
+
+    def sets(self, wanted: int, n_samples: int) -> int:
+        """As many of the `wanted` sets as a stage may simulate."""
+        allowed = max(_LEAST, int(_SHARE * (self.samples - self.spent) / n_samples))
+        self.cut = self.cut or allowed < wanted
+        return min(wanted, allowed)
+
+    def steps(self, wanted: int, sets_a_step: int, n_samples: int) -> int:
+        """As many of the `wanted` steps of a descent as a stage may take."""
+        return min(wanted, max(0, int(_SHARE * (self.samples - self.spent) / (sets_a_step * n_samples))))
+
 
 # Samples that are evaluated at once: some megabytes of arrays. Of many more, a C library may return the memory to the
 # system after each evaluation, and a new page costs as much as the work in it.

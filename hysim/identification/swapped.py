@@ -18,7 +18,7 @@ from hysim._frozen import FloatArray
 from hysim.errors import SimulationError
 from hysim.identification._problem import problems
 from hysim.identification._search import brief_cost
-from hysim.identification.sentences import SWAPPED
+from hysim.identification.forms import SWAPPED
 from hysim.models.protocols import Identifiable
 from hysim.models.search_space import Freedom
 from hysim.records import Record

@@ -15,8 +15,7 @@ from hysim._progress import Reports, reports
 from hysim._versions import optional
 from hysim.errors import SimulationError
 from hysim.identification import Identification, Width
-from hysim.identification.likelihood.densities import density
-from hysim.identification.likelihood.refit import Problem, again, optima
+from hysim.identification.likelihood import Problem, again, density, optima
 from hysim.metrics.rows import LoopRows
 from hysim.models.protocols import needs_time
 from hysim.posterior._priors import Given, check_names, given

@@ -31,8 +31,7 @@ from scipy.special import log_ndtr, ndtr, ndtri, ndtri_exp
 
 from hysim._frozen import FloatArray
 from hysim.errors import SimulationError
-from hysim.identification.likelihood.densities import Density
-from hysim.identification.likelihood.refit import Problem
+from hysim.identification.likelihood import Noise, Problem
 from hysim.posterior._priors import SIGMA, Given, Linear, Searched, linear, of_sigma, searched
 
 _FAR = 9.0  # from which on an end cuts off nothing that is seen in 64 bits
@@ -93,7 +92,7 @@ class Target:
     """
 
     problem: Problem
-    noise: Density
+    noise: Noise
     x_prior: Searched
     b_prior: Linear
     sigma_ends: tuple[float, float]  # of ln sigma
@@ -290,7 +289,7 @@ class Target:
 
 
 def target(
-    problem: Problem, noise: Density, priors: Mapping[str, Given], quantum: float | None, factor: float = 1.0
+    problem: Problem, noise: Noise, priors: Mapping[str, Given], quantum: float | None, factor: float = 1.0
 ) -> Target:
     """The posterior of a problem; `factor` enlarges every box but that of sigma."""
     low, high, own = of_sigma(problem, priors, quantum if noise.name == "quantised" else None)
