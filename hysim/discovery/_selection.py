@@ -110,9 +110,11 @@ def _cheapest(
     return parents[order][first], columns[order][first]
 
 
-MET = 24
+MET = 24  # this one and those below without a reason are chosen by hand
 ROUNDS = 6
 SEARCHED = 2000
+# "Not worth more than a bare mention" by Kass and Raftery. It is smaller than the 10 of `hysim.identification`, since
+# here the difference only decides which of several nearly equal laws is the simplest.
 INDISTINCT = 2.0
 ALIKE = 1e-4
 SIGNIFICANT = 2.0

@@ -35,15 +35,15 @@ from hysim._frozen import FloatArray
 from hysim.posterior._target import Target
 
 FEWEST_EACH = 4
-"""Points for each coordinate and one more: fewer shape no part."""
+"""Points for each coordinate and one more: fewer shape no part. Chosen by hand."""
 
 PARTS = 32
-"""Parts of a mixture at first."""
+"""Parts of a mixture at first; chosen by hand."""
 
-_STEPS = 12  # of expectation and maximisation
-_NEIGHBOURS = 0.02  # share of the points that shape a part at first
-_WIDE = 0.1  # share of the part around all
-_FREEDOM = 5  # at least
+_STEPS = 12  # by hand: of expectation and maximisation
+_NEIGHBOURS = 0.02  # by hand: share of the points that shape a part at first
+_WIDE = 0.1  # by hand: share of the part around all
+_FREEDOM = 5  # at least: tails heavier than those of a normal distribution, with a variance
 _NORMAL_SPREAD = 1.05  # of e: a little wider than the standard normal distribution
 _RIDGE = 1e-12  # variance of a part in units of that of all points, at least
 _TINY = 1e-300
@@ -182,17 +182,17 @@ def _covariance(off: FloatArray, weight: FloatArray) -> FloatArray:
     return np.asarray(covariance + np.diag(_RIDGE * np.diag(covariance) + _TINY))
 
 
-_FIRST = 4096  # points of the proposal that grows
-_GROWTHS = 25
-_ADDED, _EACH = 8, 256  # parts of a round, and points that are drawn from each
-_NEAR = 160  # points that shape a part
-_EVENLY = 0.01  # share of the weights near a part that is spread evenly: no part is flat
-_TRIED = 800  # points that may be centres, those of the largest weights
-_COVERED = 0.3  # share of the points near a centre that are not centres any more
+_FIRST = 4096  # by hand: points of the proposal that grows
+_GROWTHS = 25  # by hand: rounds
+_ADDED, _EACH = 8, 256  # by hand: parts of a round, and points that are drawn from each
+_NEAR = 160  # by hand: points that shape a part
+_EVENLY = 0.01  # by hand: share of the weights near a part that is spread evenly: no part is flat
+_TRIED = 800  # by hand: points that may be centres, those of the largest weights
+_COVERED = 0.3  # by hand: share of the points near a centre that are not centres any more
 _LEAST_VARIANCE = 1e-10  # variance of a part in units of that of all points, at least
 _LEAST_PRODUCT = 1e-14
-_FITTED, _PARTS = 4096, 64  # points, drawn by their weights, that a mixture of so many parts is fitted to
-_BESIDE = 0.3  # share of all parts beside that mixture
+_FITTED, _PARTS = 4096, 64  # by hand: points, drawn by their weights, that a mixture of so many parts is fitted to
+_BESIDE = 0.3  # by hand: share of all parts beside that mixture
 
 
 def grown(base: Proposal, target: Target, rng: np.random.Generator) -> tuple[Proposal, Proposal]:
@@ -266,20 +266,20 @@ def _together(base: Proposal, added: list[Proposal], n: int) -> Proposal:
     )
 
 
-_PARTICLES, _PARTICLES_EACH = 1024, 256  # at most, and for each number in v
-_MOVES = 6  # of each particle between two looks at the mean of ln L
-_LEVEL = 0.1  # rise of power times that mean in so many moves, from which on it counts as level
-_MOST_LOOKS = 12  # at each power
-_HALF = 0.5
-_WHOLE = 0.15  # share of the moves by a whole difference
-_EARLY = 0.6  # power of the likelihood whose particles shape some parts of the mixture
-EARLY_SHARE = 0.2  # of the mixture
-_MOST_POWERS = 100
-_IMPROVING = 4  # draws that improve a proposal, for each particle
-_ROUNDS = 3
-_EVEN_ENOUGH = 0.45  # effective share of the draws
+_PARTICLES, _PARTICLES_EACH = 1024, 256  # by hand: at most, and for each number in v
+_MOVES = 6  # by hand: of each particle between two looks at the mean of ln L
+_LEVEL = 0.1  # by hand: rise of power times that mean in so many moves, from which on it counts as level
+_MOST_LOOKS = 12  # by hand: at each power
+_HALF = 0.5  # of the particles stay effective at each power, the usual share of sequential Monte Carlo
+_WHOLE = 0.15  # by hand: share of the moves by a whole difference, which go from one optimum to another
+_EARLY = 0.6  # by hand: power of the likelihood whose particles shape some parts of the mixture
+EARLY_SHARE = 0.2  # by hand: of the mixture
+_MOST_POWERS = 100  # by hand: an end where rounding would go on for ever
+_IMPROVING = 4  # by hand: draws that improve a proposal, for each particle
+_ROUNDS = 3  # by hand: of improvement
+_EVEN_ENOUGH = 0.45  # by hand: effective share of the draws, from which on a further round gains little
 POOR, GOOD = 0.1, 0.6
-"""Effective shares of the draws of a proposal: below them it grows, for few samples and for many."""
+"""Effective shares of the draws of a proposal: below them it grows, for few samples and for many. Chosen by hand."""
 
 
 def proposal_for(

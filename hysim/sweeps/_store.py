@@ -143,7 +143,9 @@ def _of(kind: type[T], value: Any) -> T:
 OnChange = Literal["error", "keep", "restart"]
 ON_CHANGE = ("error", "keep", "restart")
 
-_FOR_A_WRITER, _FOR_A_COMMIT, _FOR_READERS = 0.25, 10.0, 60.0  # seconds to wait for another's lock
+# Seconds to wait for another's lock, chosen by hand: a second writer is refused at once; a reader waits for a commit; a
+# writer waits for readers, since rows that are finished would be lost.
+_FOR_A_WRITER, _FOR_A_COMMIT, _FOR_READERS = 0.25, 10.0, 60.0
 _OWN_COLUMNS = ("task", "seed", "seconds", "error", "shard")
 _TROUBLE = {
     sqlite3.SQLITE_BUSY: (errno.EAGAIN, "the store is locked: another process is writing to it"),
