@@ -23,7 +23,7 @@ from hysim.identification._assumptions import Treated, decided, in_units_of_nois
 from hysim.identification._diagnostics import fit_measures, left_out, left_out_errors, rate_noise_warning, rms_of_known
 from hysim.identification._measured import as_measured, said_of_noise
 from hysim.identification._noise import Quantised, density
-from hysim.identification._problem import Problem
+from hysim.identification._problem import Problem, Setting
 from hysim.identification._result import Identification, Width
 from hysim.identification._search import PERFECT, chosen, stages_in_words, widened
 from hysim.identification._searched import Search
@@ -175,17 +175,16 @@ def identify(
             fit = _in_one_step(model_or_class, records, left_out(cross_validate, records), seed)
             doubts = [swapped_columns(records)]
         else:
-            family = placed(_family(model_or_class, depends), None)
+            family, ends, is_cut = placed(_family(model_or_class, depends), None), None, False
+            setting = Setting(records, options, initial, shares, max_evaluations, seed)
             if isinstance(family, DependentStructure):
-                family = begun(family.over(records), records, options, initial, max_evaluations)
-            treatment = treated(family, records, options, initial, input)
-            paths, ends, is_cut = treatment.records, None, False
+                family = begun(family.over(records), setting)
+            treatment = treated(family, setting, input)
+            along = replace(setting, records=treatment.records)
             if isinstance(family, PartByPart):
-                family, paths, ends, is_cut = begun_by_parts(
-                    family, paths, options, initial, shares, max_evaluations, seed
-                )
-                noise = noise or family.noise
-            choice = decided(family, paths, options, initial, shares, max_evaluations)
+                family, paths, ends, is_cut = begun_by_parts(family, along)
+                along, noise = replace(along, records=paths), noise or family.noise
+            choice = decided(family, along)
             if ends is not None:
                 choice = choice._replace(problems=[replace(each, ends=ends) for each in choice.problems])
             searched = [in_units_of_noise(each, seed) for each in choice.problems]
@@ -196,13 +195,13 @@ def identify(
             fit = replace(fit, message="; ".join(filter(None, (fit.message, choice.sentence))))
             if all(type(record) is Record for record in records):  # not in units of sensors, nor weighted by a verb
                 fit = as_measured(fit, records, shares, treatment)
-                fit = said_of_noise(fit, records, treatment, quiet_rmse(family, treatment, options, initial))
+                fit = said_of_noise(fit, records, treatment, quiet_rmse(family, setting, treatment))
             first, doubts = choice.problems[0], [swapped_columns(records)]
             if is_partial := is_cut or (first.budget is not None and (first.budget.cut or not fit.success)):
                 stopped = f"partial: the search stopped at max_evaluations={max_evaluations}"
                 fit = replace(fit, success=False, message=f"{stopped}, better parameters may exist; {fit.message}")
             if not any(doubts) and not is_partial and not needs_time(fit.model):
-                doubts = [swapped_for(first.family, records, options, initial, 1.0 - fit.fit_percent / 100.0)]
+                doubts = [swapped_for(first.family, setting, 1.0 - fit.fit_percent / 100.0)]
             on_their_records = [on_record(each, record) for each, record in zip(fit.models, records, strict=True)]
             off = excursion(on_their_records, records)
             doubts += [implausible(off), rate_noise_warning(on_their_records, records)]

@@ -22,8 +22,8 @@ squares through the parameters that these have are the second start.
 """
 
 import math
-from collections.abc import Container, Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -32,7 +32,7 @@ from hysim._channels import steady
 from hysim._frozen import FloatArray
 from hysim.errors import SimulationError
 from hysim.identification._assumptions import decided
-from hysim.identification._problem import Budget, Problem, problem
+from hysim.identification._problem import Problem, Setting
 from hysim.identification._search import apart, brief_optimum, chosen, descended, spread
 from hysim.identification._uncertainty import uncertainty
 from hysim.metrics.criteria import information
@@ -48,7 +48,7 @@ _THINNED = 500  # samples of the slow record, beside its reversals
 _SAME = 0.01  # distance of two points in units of the box, under which the better one stands for both
 _APART = 0.03  # likewise of the first points on the fastest record
 _BEST, _KEPT = 8, 2  # points that descend on the fastest record, and on all
-_STRONG = 10.0  # difference of two BIC
+_STRONG = 10.0  # difference of two BIC: that of `_assumptions`
 _ENOUGH = 0.01  # error of the law alone beside the resolution, in spans of the output: with a larger one it moves
 _SPREAD_LAWS = 1024  # laws beside parts that were searched without one
 _APART_LAWS = 0.05  # likewise
@@ -57,7 +57,6 @@ _MOST_ROUNDS = 8  # of what is held
 _IN_VAIN = 2  # trials in a row that are no better
 _SHARE = 0.5  # of the evaluations that the user allows
 
-Initial = str | Sequence[str] | None
 Coordinates = Mapping[str, float]
 
 
@@ -91,64 +90,11 @@ class Begun(NamedTuple):
     cut: bool  # whether the user's number of evaluations has ended a part of the search
 
 
-@dataclass(frozen=True)
-class _Setting:
-    """Choices of the user."""
-
-    records: Sequence[Record]
-    freedom: Freedom
-    initial: Initial
-    weights: Sequence[FloatArray] | None
-    budget: Budget | None
-    seed: int
-
-    def problem(self, structure: Any, freedom: Freedom | None = None, only: int | None = None) -> Problem:
-        """The problem of a structure on all records, or on one."""
-        places = range(len(self.records)) if only is None else [only]
-        weights = None if self.weights is None else [self.weights[k] for k in places]
-        if weights is not None and not any(each.any() for each in weights):
-            weights = None
-        initial = self.initial
-        if initial is not None and not isinstance(initial, str):
-            initial = [initial[k] for k in places]
-        records = [self.records[k] for k in places]
-        attempt = problem(structure, records, self.freedom if freedom is None else freedom, initial)
-        return attempt.weighted(weights).within(self.budget)
-
-    def about(self, names: Container[str]) -> Freedom:
-        """The part of the user's freedom that is about these parameters."""
-        freedom = self.freedom
-        return replace(
-            freedom,
-            fixed={name: value for name, value in freedom.fixed.items() if name in names},
-            free=tuple(name for name in freedom.free if name in names),
-            bounds={name: pair for name, pair in freedom.bounds.items() if name in names},
-        )
-
-    def beside(self, values: Mapping[str, float]) -> Freedom:
-        """The user's freedom with further parameters that are fixed."""
-        fixed = {name: value for name, value in values.items() if name not in self.freedom.fixed}
-        return replace(
-            self.freedom,
-            fixed={**self.freedom.fixed, **fixed},
-            free=tuple(name for name in self.freedom.free if name not in fixed),
-            bounds={name: pair for name, pair in self.freedom.bounds.items() if name not in fixed},
-        )
-
-
-def begun_by_parts(
-    structure: PartByPart,
-    records: Sequence[Record],
-    freedom: Freedom,
-    initial: Initial,
-    weights: Sequence[FloatArray] | None,
-    max_evaluations: int | None,
-    seed: int,
-) -> Begun:
+def begun_by_parts(structure: PartByPart, setting: Setting) -> Begun:
     """The structure where the search part by part ends, with what it holds; ValueError as of `identify`."""
-    plant, records = structure.over(records, freedom)
-    budget = None if max_evaluations is None else Budget(_SHARE * max_evaluations * sum(map(len, records)))
-    setting = _Setting(records, freedom, initial, weights, budget, seed)
+    plant, records = structure.over(setting.records, setting.freedom)
+    most = setting.max_evaluations
+    setting = replace(setting, records=records).allowing(None if most is None else _SHARE * most)
     trial = setting.problem(plant)  # refuses what does not fit before anything is searched
     trial.split(0.5 * (trial.space.lower + trial.space.upper)[np.newaxis])
     if (begins := plant.begins()) is not None:
@@ -160,10 +106,10 @@ def begun_by_parts(
     plant, ends = end.plant, end.ends
     if end.whole.n_x:
         plant, ends = _told_apart(plant, setting, end.whole, _descended(end.whole, ends, exact=True))
-    return Begun(plant, records, ends, budget is not None and budget.cut)
+    return Begun(plant, records, ends, setting.budget is not None and setting.budget.cut)
 
 
-def _searched(plant: Any, setting: _Setting) -> _End:
+def _searched(plant: Any, setting: Setting) -> _End:
     """The best end of a search from the law on, and where its record moves, of one from the modes on."""
     plant, law = _with_law(plant, setting)
     grown, known = _behind_inputs(plant, law.model, setting)
@@ -181,21 +127,19 @@ def _gone_on(end: _End) -> _End:
     return end._replace(ends=_descended(end.whole, points, exact=False)[:1]) if len(points) > 1 else end
 
 
-def _with_law(plant: Any, setting: _Setting) -> tuple[Any, _Law]:
+def _with_law(plant: Any, setting: Setting) -> tuple[Any, _Law]:
     """The plant whose law begins where the law alone is best, and that law."""
-    k = plant.slowest
-    record, law = plant.static(setting.records[k]), plant.law
-    freedom = setting.freedom
+    k, law, freedom = plant.slowest, plant.law, setting.freedom
+    record = plant.static(setting.records[k])
     share = Freedom(
         fixed=own(freedom.fixed, "hysteresis"),
         free=tuple(own(dict.fromkeys(freedom.free), "hysteresis")),
         bounds=own(freedom.bounds, "hysteresis"),
     )
-    initial = setting.initial if setting.initial is None or isinstance(setting.initial, str) else setting.initial[k]
-    if initial is None and isinstance(law, Undecided):
-        initial = "rest"
-    weights = None if setting.weights is None else [setting.weights[k]]
-    every = decided(law, [record], share, initial, weights).problems
+    alone = replace(setting.only([k]), records=[record], freedom=share, max_evaluations=None)
+    if alone.initial is None and isinstance(law, Undecided):
+        alone = replace(alone, initial="rest")
+    every = decided(law, alone).problems
     best, optima = chosen([each.thinned(_THINNED) or each for each in every], seed=setting.seed)
     if not optima:
         raise ValueError("every set of parameters of the law diverged on the slowest record: pass bounds=")
@@ -210,13 +154,13 @@ def _with_law(plant: Any, setting: _Setting) -> tuple[Any, _Law]:
     return plant.with_law(start), _Law(model, shape, is_enough)
 
 
-def _behind_inputs(plant: Any, law: Any, setting: _Setting) -> tuple[Any, list[Coordinates]]:
+def _behind_inputs(plant: Any, law: Any, setting: Setting) -> tuple[Any, list[Coordinates]]:
     """The plant and coordinates of its parts, behind a known law, or behind several inputs as they are."""
     plant, known = _grown(plant, law, setting)
     return _tried(plant, setting), known
 
 
-def _all_at_once(plant: Any, known: Sequence[Coordinates], setting: _Setting, spread_laws: bool = False) -> _End:
+def _all_at_once(plant: Any, known: Sequence[Coordinates], setting: Setting, spread_laws: bool = False) -> _End:
     """End of a search for all parts from these coordinates, and if asked from laws all over their box."""
     whole = setting.problem(plant.begun(known))
     if not whole.n_x:
@@ -236,12 +180,13 @@ def _beside_laws(whole: Problem, begun: FloatArray, seed: int) -> FloatArray:
     return apart(space, points, whole.costs(points), _APART_LAWS, _BEST)
 
 
-def _grown(plant: Any, law: Any, setting: _Setting) -> tuple[Any, list[Coordinates]]:
+def _grown(plant: Any, law: Any, setting: Setting) -> tuple[Any, list[Coordinates]]:
     """The plant with the modes that the fastest record shows, and the best coordinates of its parts there."""
     known: list[Coordinates] = []
     before = math.inf
     for each in plant.growing():
-        attempt = setting.problem(each.behind(law), setting.about(each.behind(law).names), only=plant.fastest)
+        known_law = each.behind(law)
+        attempt = setting.only([plant.fastest]).about(known_law.names).problem(known_law)
         ends = _found(attempt, each, known) if attempt.n_x else np.empty((1, 0))
         cost = float(attempt.costs(ends[:1])[0])
         criterion = information(max(cost, 1e-300) / attempt.n_samples, attempt.n_samples, len(attempt.space.names))
@@ -275,7 +220,7 @@ def _left_out(plant: Any, each: Any, freedom: Freedom) -> Any:
     return smaller
 
 
-def _tried(plant: Any, setting: _Setting) -> Any:
+def _tried(plant: Any, setting: Setting) -> Any:
     """The best of the plant's trials, in whose order the sum of squares has one minimum."""
     best, least, worse = plant, math.inf, 0
     for trial in plant.trials():
@@ -289,16 +234,16 @@ def _tried(plant: Any, setting: _Setting) -> Any:
 
 
 def _on_all(
-    plant: Any, setting: _Setting, shape: Mapping[str, float], known: Sequence[Coordinates]
+    plant: Any, setting: Setting, shape: Mapping[str, float], known: Sequence[Coordinates]
 ) -> list[Coordinates]:
     """The best coordinates of the parts on all records, beside the law's shape."""
-    attempt = setting.problem(plant.begun(known), setting.beside(shape))
+    attempt = setting.beside(shape).problem(plant.begun(known))
     if not attempt.n_x:
         return []
     return _parts_only(attempt, _descended(attempt, _best_starts(attempt), exact=False)[:_KEPT])
 
 
-def _told_apart(plant: Any, setting: _Setting, whole: Problem, ends: FloatArray) -> tuple[Any, FloatArray]:
+def _told_apart(plant: Any, setting: Setting, whole: Problem, ends: FloatArray) -> tuple[Any, FloatArray]:
     """The plant without what the records do not determine, and where its search ends."""
     for _ in range(_MOST_ROUNDS):
         theta = whole.completed(ends[:1])[0]
@@ -357,25 +302,19 @@ def _parts_only(attempt: Problem, ends: FloatArray) -> list[Coordinates]:
 _MOST_GROUPS = 12
 
 
-def begun(
-    structure: DependentStructure,
-    records: Sequence[Record],
-    freedom: Freedom,
-    initial: Initial,
-    max_evaluations: int | None = None,
-) -> DependentStructure:
+def begun(structure: DependentStructure, setting: Setting) -> DependentStructure:
     """The structure with starts where short searches of its law end; itself where nothing searched depends.
 
-    All of them together simulate half of `max_evaluations` parameter sets at most.
+    All of them together simulate half of the user's `max_evaluations` parameter sets at most.
     """
     if all(name in structure.columns for name in structure.at):
         return structure
+    records, most = setting.records, setting.max_evaluations
     groups = _groups(structure, records)
-    share = None if max_evaluations is None else max_evaluations / (2.0 * (1 + len(groups)))
+    share = None if most is None else most / (2.0 * (1 + len(groups)))
 
     def found(chosen: Sequence[int]) -> dict[str, float] | None:
-        own = initial if initial is None or isinstance(initial, str) else [initial[k] for k in chosen]
-        return _short_search(structure.law, [records[k] for k in chosen], freedom, own, share)
+        return _short_search(structure.law, replace(setting.only(chosen), weights=None).allowing(share))
 
     alike = found(range(len(records)))
     starts = [] if alike is None else [_alike(structure, alike)]
@@ -386,13 +325,10 @@ def begun(
     return replace(structure, starts=tuple(starts))
 
 
-def _short_search(
-    law: Any, records: Sequence[Record], freedom: Freedom, initial: Initial, share: float | None
-) -> dict[str, float] | None:
-    """The parameters of the law where a short search of so many parameter sets ends; None if it finds nothing."""
-    budget = None if share is None else Budget(share * sum(map(len, records)))
+def _short_search(law: Any, setting: Setting) -> dict[str, float] | None:
+    """The parameters of the law where a short search ends; None if it finds nothing."""
     try:
-        attempt = problem(law, records, freedom, initial).within(budget)
+        attempt = setting.problem(law)
         x, cost = brief_optimum(attempt)
     except (ValueError, ArithmeticError, SimulationError):  # such as too few samples for the law alone
         return None
