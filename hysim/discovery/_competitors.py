@@ -88,7 +88,7 @@ class Yardstick:
 
 
 def curve(records: Sequence[Record]) -> Yardstick:
-    return _yardstick([_spline(records)], _trends(records), u=_inputs(records))
+    return _yardstick(records, [_spline(records)], u=_inputs(records))
 
 
 def relaxations(records: Sequence[Record]) -> Yardstick:
@@ -99,7 +99,7 @@ def relaxations(records: Sequence[Record]) -> Yardstick:
     times = np.geomspace(shortest, longest, n)
     hats = np.array([np.interp(np.linspace(0.0, 1.0, n), _PLACES, row) for row in np.eye(_PLACES.size)])
     parts = [np.stack([_relaxed(record, float(tau)) for tau in times], axis=1) @ hats.T for record in records]
-    return _yardstick([_inputs(records)[:, np.newaxis], np.concatenate(parts)], _trends(records))
+    return _yardstick(records, [_inputs(records)[:, np.newaxis], np.concatenate(parts)])
 
 
 def plays(records: Sequence[Record]) -> Yardstick:
@@ -112,7 +112,7 @@ def plays(records: Sequence[Record]) -> Yardstick:
         positions.append(0.5 * (high + low))
         before.append(high - low)
     powers = [np.concatenate(positions) ** power for power in _POWERS]
-    return _yardstick([_spline(records), *powers], _trends(records), block_diag(*before), u)
+    return _yardstick(records, [_spline(records), *powers], block_diag(*before), u)
 
 
 def means(u: FloatArray, y: FloatArray, weights: FloatArray) -> FloatArray:
@@ -140,11 +140,12 @@ def trend(record: Record) -> FloatArray:
 
 
 def _yardstick(
+    records: Sequence[Record],
     parts: Sequence[FloatArray],
-    trends: FloatArray,
     before: FloatArray | None = None,
     u: FloatArray | None = None,
 ) -> Yardstick:
+    trends = np.asarray(block_diag(*(trend(record) for record in records)))
     groups = [(np.concatenate(parts, axis=1), 0.0), (trends, _SLOW)]
     groups += [] if before is None else [(before, _BEFORE)]
     columns = np.concatenate([each for each, _ in groups], axis=1)
@@ -191,10 +192,6 @@ def _relaxed(record: Record, tau: float) -> FloatArray:
 
 def _inputs(records: Sequence[Record]) -> FloatArray:
     return np.concatenate([record.u for record in records])
-
-
-def _trends(records: Sequence[Record]) -> FloatArray:
-    return np.asarray(block_diag(*(trend(record) for record in records)))
 
 
 ORDERS = ((1, 0), (1, 1), (2, 0), (2, 1))  # poles, zeros

@@ -168,13 +168,23 @@ def discover(
     )
     report = _in_steps(progress or (lambda done, total: None), _REPORTS, 1 + n_folds)
     share = _SEARCHES / (1 + len(of_output))
-    outcomes = _searched(records, (of_memory,), replace(options, report=lambda done: report(share * done)))
+
+    def outcomes_of(
+        libraries: Sequence[Library],
+        how: Options,
+        best: float = math.inf,
+        masks: tuple[Samples, ...] | None = None,
+    ) -> list[Outcome]:
+        every = (searched(records, library, how, best=best, masks=masks) for library in libraries)
+        return [outcome for outcome in every if outcome is not None]
+
+    outcomes = outcomes_of([of_memory], replace(options, report=lambda done: report(share * done)))
     report(share)
     any_exponent = library is None and symmetry is None and not signs
 
     def chosen(first: list[Outcome], masks: tuple[Samples, ...] | None) -> tuple[Outcome, Candidate[Any]]:
         of_others = options if masks else replace(options, report=lambda done: report(share * (1.0 + done)))
-        both = [*first, *_searched(records, of_output, of_others, first[0].searched.bic, masks)]
+        both = [*first, *outcomes_of(of_output, of_others, first[0].searched.bic, masks)]
         outcome = min(both, key=lambda each: each.candidate.bic)
         outcome = replace(outcome, is_cut=any(each.is_cut for each in both))
         if not any_exponent or outcome.is_short:
@@ -182,7 +192,7 @@ def discover(
         return outcome, or_any_exponent(FreeRun(records, masks), first[0], outcome)
 
     def again(masks: tuple[Samples, ...]) -> Candidate[Any]:
-        return chosen(_searched(records, (of_memory,), options, masks=masks), masks)[1]
+        return chosen(outcomes_of([of_memory], options, masks=masks), masks)[1]
 
     outcome, candidate = chosen(outcomes, None)
     report(_SEARCHES)
@@ -257,25 +267,6 @@ def _libraries(
     if chosen.letter == "y" and route == "output":
         raise ValueError("a library in u and y has its feedthrough in the terms: take the memory route for it")
     return (chosen,)
-
-
-def _searched(
-    records: tuple[Record, ...],
-    libraries: Sequence[Library],
-    options: Options,
-    best: float = math.inf,
-    masks: Sequence[Samples] | None = None,
-) -> list[Outcome]:
-    n = sum(map(len, records))
-    outcomes: list[Outcome] = []
-    for library in libraries:
-        if n <= len(library.terms):
-            raise ValueError(
-                f"{len(library.terms)} terms and y0 cannot be estimated from {n} samples: lower the degree"
-            )
-        outcome = searched(records, library, options, best=best, masks=masks)
-        outcomes += [] if outcome is None else [outcome]
-    return outcomes
 
 
 def _discovery(

@@ -147,6 +147,8 @@ def searched(
     Only outputs in the `masks`, (n_samples,) for each record, are used. The search is short if no law on the
     optimizer's path, which has the largest ones, comes near an rmse that is enough.
     """
+    if (n := sum(map(len, records))) <= len(library.terms):
+        raise ValueError(f"{len(library.terms)} terms and y0 cannot be estimated from {n} samples: lower the degree")
     free_run = FreeRun(tuple(records), None if masks is None else tuple(masks), options.signs, Work(MOST_WORK))
     thin = thinned(free_run)
     optimizer, form = options.optimizer, options.derivative

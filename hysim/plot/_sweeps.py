@@ -200,7 +200,10 @@ def residual_map(
     if bins is not None and bins < 1:
         raise ValueError(f"bins must be at least 1, got {bins}")
     quantum, unit = (record.resolution, quanta) if record.resolution else (1.0, record.units.get("y", ""))
-    edges, tables = _mean_residuals(record, _residual(record, model) / quantum, bins, tolerance)
+    y = model.y if isinstance(model, Simulation) else free_run(model, record).y
+    if y.shape != record.y.shape:
+        raise ValueError(f"the model's output must be as long as the record, {len(record)} samples, got {y.size}")
+    edges, tables = _mean_residuals(record, (record.y - y) / quantum, bins, tolerance)
     reach = max(float(np.nanmax(np.abs(table))) for table in tables if table.size) or 1.0
     scale: dict[str, Any] = {"cmap": DIVERGING, "norm": Normalize(-reach, reach)}
     with several(axes, 2, height=3.4, columns=2, sharey=True) as panels:
@@ -280,14 +283,6 @@ def forc(
         unit = f"{labels['y']}/{labels['u']}²" if {"u", "y"} <= labels.keys() else ""
         axes.figure.colorbar(cells, ax=axes, label=in_unit("Density of relays", unit))
     return axes
-
-
-def _residual(record: Record, model: Any) -> FloatArray:
-    """Measured minus model, of a simulation or of a model to simulate."""
-    y = model.y if isinstance(model, Simulation) else free_run(model, record).y
-    if y.shape != record.y.shape:
-        raise ValueError(f"the model's output must be as long as the record, {len(record)} samples, got {y.size}")
-    return np.asarray(record.y - y)
 
 
 def _mean_residuals(
