@@ -11,8 +11,8 @@ import hysim as hs
 from hysim import plot
 from hysim.cli import main
 from hysim.discovery import discover
+from hysim.discovery._oscillator import Search, _Fitted, _tried
 from hysim.discovery._oscillator_response import Oscillator, Response
-from hysim.discovery._oscillator_search import Search, _Fitted, _tried
 from hysim.laws.differential.terms import RELAXATION, Term, bouc_wen_terms, power_term
 from hysim.plants.equation_of_motion import linear_plant
 

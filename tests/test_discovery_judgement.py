@@ -10,9 +10,9 @@ from hypothesis import strategies as st
 from scipy.optimize import least_squares
 
 import hysim as hs
+from hysim.discovery._competitors import steady_width
 from hysim.discovery._held_out import at_one_rate, rate_spread
 from hysim.discovery._judgement import BETTER, RATES, _loops, competitors, doubts, judge
-from hysim.discovery._rival import steady_width
 
 TAU = 0.05  # s
 LAW = hs.BoucWen(beta=1.5, gamma=0.4, feedthrough=1.0, gain=-0.5)

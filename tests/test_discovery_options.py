@@ -8,7 +8,7 @@ import pytest
 from discovered import CYCLES, DAHL, LAW, TRUTH, duhem, multisine, record_of, zigzag
 
 import hysim as hs
-from hysim.discovery import _discover, _structures
+from hysim.discovery import _discover, _refinement
 from hysim.discovery._refinement import FreeRun
 from hysim.discovery._search import Library, Options, searched
 from hysim.discovery._selection import MOST_WORK
@@ -278,7 +278,7 @@ def test_a_search_among_stiff_laws_ends_at_its_limit_of_work(monkeypatch):
         counted.append(terms)
         return runs, terms
 
-    monkeypatch.setattr(_structures, "free_runs", runs_and_count)
+    monkeypatch.setattr(_refinement, "free_runs", runs_and_count)
     u = np.cumsum(np.random.default_rng(0).standard_normal(80))
     record = hs.Record(u=u, y=hs.Play(threshold=0.005 * np.ptp(u)).response(u))
     found = hs.discover(record)

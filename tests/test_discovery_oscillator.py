@@ -10,10 +10,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import hysim as hs
-from hysim.discovery import _oscillator_search
+from hysim.discovery import _oscillator
 from hysim.discovery._hidden_memory import HiddenMemory, cases
 from hysim.discovery._oscillator import recorded
-from hysim.discovery._oscillator_models import diverges
+from hysim.discovery._oscillator_response import diverges
 from hysim.identification import identify
 from hysim.laws.differential.terms import RELAXATION, Term, bouc_wen_terms, memory_terms
 
@@ -123,7 +123,7 @@ def test_the_law_itself_is_among_the_structures_that_are_compared(noisy):
 
 @needs_compiled
 def test_a_law_that_diverges_is_no_structure(monkeypatch):
-    monkeypatch.setattr(_oscillator_search, "diverges", lambda found, y: True)
+    monkeypatch.setattr(_oscillator, "diverges", lambda found, y: True)
     found = hs.discover_oscillator([record(noise=0.01, n_samples=300)])
     assert found.verdict == "no structure found"
     assert found.coefficients == {}

@@ -10,12 +10,11 @@ from hypothesis import strategies as st
 from scipy.optimize import least_squares
 
 import hysim as hs
-from hysim.discovery import _laws
+from hysim.discovery import _result
 from hysim.discovery._discover import left_out_rmse
-from hysim.discovery._refinement import _SCHEDULE, FreeRun, bic_of
+from hysim.discovery._refinement import _SCHEDULE, AnyExponent, FreeRun, Terms, bic_of
 from hysim.discovery._search import Library, Options, searched
 from hysim.discovery._selection import INDISTINCT, Search, pruned
-from hysim.discovery._structures import AnyExponent, Terms
 from hysim.identification.marquardt import SumOfSquares, descend, differences
 from hysim.laws.differential.terms import Term, bouc_wen_terms
 
@@ -130,7 +129,7 @@ def test_the_scale_of_a_memory_is_a_convention(n, A, offset):
     candidate = SimpleNamespace(
         structure=structure, unknowns=np.append(numbers, 0.4), covariance=np.eye(numbers.size + 1)
     )
-    found = _laws.law_from(candidate, [record], "z")
+    found = _result.law_from(candidate, [record], "z")
     expected = structure.run(record.u, numbers[np.newaxis], np.array([0.4]), 1e6)[0][0]
     model = found.models[0]
     assert isinstance(model, hs.BoucWen)
@@ -148,7 +147,7 @@ def test_a_law_of_any_exponent_is_the_model_that_it_becomes(n, shifts):
     candidate = SimpleNamespace(
         structure=structure, unknowns=np.append(numbers, 0.4), covariance=np.eye(numbers.size + 1)
     )
-    found = _laws.law_from(candidate, [record], "z")
+    found = _result.law_from(candidate, [record], "z")
     expected = structure.run(record.u, numbers[np.newaxis], np.array([0.4]), 1e6)[0][0]
     assert found.models[0].response(record.u) == pytest.approx(expected, abs=1e-9 * np.ptp(expected))  # its kernel's
     assert found.models[0].n == n
@@ -162,7 +161,7 @@ def test_standard_errors_are_carried_to_the_gain():
     candidate = SimpleNamespace(
         structure=structure, unknowns=np.array([-2.0, -0.3, -0.6, 5.0, 0.0]), covariance=covariance
     )
-    spread = _laws.law_from(candidate, [record_of(lambda u: u)], "z").stderr
+    spread = _result.law_from(candidate, [record_of(lambda u: u)], "z").stderr
     # differences of step 1e-6; for n = 1 only the term u' |z| takes the sign of the gain, none its size
     assert spread == pytest.approx({"u'": 0.0, "u' |z|": 0.2, "|u'| z": 0.3, "feedthrough": 0.5, "gain": 0.1}, rel=1e-6)
 
@@ -194,7 +193,7 @@ def test_a_memory_at_rest_is_one_number_less_and_begins_at_zero():
     assert spread[-1] == 0.0
     assert (spread[:-1] > 0.0).all()
     assert abs(of_rest.unknowns[4] - 7.0) < 5.0 * spread[4]
-    assert _laws.law_from(of_rest, [record], "z").models[0].z0 == pytest.approx(0.0, abs=1e-12)
+    assert _result.law_from(of_rest, [record], "z").models[0].z0 == pytest.approx(0.0, abs=1e-12)
 
 
 def test_the_left_out_error_is_that_of_laws_that_have_not_seen_the_sample():

@@ -12,11 +12,10 @@ import pytest
 from discovered import COLEMAN_HODGDON, CYCLES, DAHL, QUADRATIC, duhem, record_of, zigzag
 
 import hysim as hs
-from hysim.discovery import _pysindy
-from hysim.discovery._selection import is_complete, preferred, thinning
+from hysim.discovery import _slopes
+from hysim.discovery._refinement import Terms
+from hysim.discovery._selection import best_subsets, is_complete, preferred, thinning
 from hysim.discovery._slopes import branches, feature, signs_of, slopes, smoothed, weak_rows
-from hysim.discovery._structures import Terms
-from hysim.discovery._subsets import best_subsets
 from hysim.laws.differential.terms import Term, duhem_terms, memory_terms, named_terms, symmetric
 
 
@@ -88,18 +87,18 @@ def test_libraries_have_their_sizes_and_one_order():
 
 def test_every_threshold_on_the_path_changes_the_structure():
     problem = slopes([record_of(duhem(COLEMAN_HODGDON), CYCLES)], "smoothed").regression(duhem_terms(2))
-    path = _pysindy.sparse_path(problem.features, problem.slope)
+    path = _slopes.sparse_path(problem.features, problem.slope)
     structures = [problem.included(coefficients) for _, coefficients in path]
     assert len(set(structures)) == len(structures)
     for threshold, coefficients in path:
         assert (np.abs(coefficients[coefficients != 0.0]) >= threshold).all()
-    assert not _pysindy.sparse_fit(problem.features, problem.slope, 1e6).any()
+    assert not _slopes.sparse_fit(problem.features, problem.slope, 1e6).any()
 
 
 @pytest.mark.parametrize("optimizer", ["SR3", "SSR", "FROLS"])
 def test_other_optimizers_have_paths_too(optimizer):
     problem = slopes([record_of(duhem(DAHL), CYCLES)], "smoothed").regression(duhem_terms(1))
-    path = _pysindy.sparse_path(problem.features, problem.slope, optimizer)
+    path = _slopes.sparse_path(problem.features, problem.slope, optimizer)
     structures = [problem.included(coefficients) for _, coefficients in path]
     assert len(set(structures)) == len(structures)
     assert tuple(Term.parse(name) for name in DAHL) in structures
@@ -108,7 +107,7 @@ def test_other_optimizers_have_paths_too(optimizer):
 def test_fewer_rows_of_the_same_least_squares():
     random = np.random.default_rng(0)
     features, slope = random.standard_normal((200, 4)), random.standard_normal(200)
-    fewer, left = _pysindy.compressed(features, slope)
+    fewer, left = _slopes.compressed(features, slope)
     assert fewer.shape == (5, 4)
     exact = np.linalg.lstsq(features, slope)[0]
     assert np.linalg.lstsq(fewer, left)[0] == pytest.approx(exact, abs=1e-12)  # rounding
@@ -119,7 +118,7 @@ def test_an_ensemble_is_drawn_from_its_seed_alone():
     random = np.random.default_rng(0)
     features = random.standard_normal((100, 3))
     slope = features @ [1.0, 0.1, 0.0] + 0.5 * random.standard_normal(100)
-    first, again, other = (_pysindy.inclusion(features, slope, 0.1, n_models=20, seed=seed) for seed in (5, 5, 6))
+    first, again, other = (_slopes.inclusion(features, slope, 0.1, n_models=20, seed=seed) for seed in (5, 5, 6))
     assert np.array_equal(first, again)
     assert not np.array_equal(first, other)
     assert first[0] == 1.0

@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 
 import hysim as hs
-from hysim.discovery._refinement import FreeRun
-from hysim.discovery._structures import Terms
+from hysim.discovery._refinement import FreeRun, Terms
 from hysim.laws.differential.terms import Term
 
 

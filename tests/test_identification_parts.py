@@ -5,10 +5,10 @@ import pytest
 
 import hysim as hs
 from hysim.identification import Candidate
+from hysim.identification._diagnostics import left_out
 from hysim.identification._problem import Problem, problem
 from hysim.identification._searched import _phrases
 from hysim.identification._uncertainty import _named, uncertainty
-from hysim.identification.folds import left_out
 from hysim.models.search_space import Freedom
 
 TRIANGLE = hs.signals.triangle(-1.0, 1.0, cycles=3, samples_per_cycle=20)

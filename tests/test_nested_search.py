@@ -8,7 +8,7 @@ import pytest
 
 import hysim as hs
 from hysim.identification._assumptions import decided
-from hysim.identification._problem import problem, problems
+from hysim.identification._problem import Setting, problem, problems
 from hysim.identification._search import descended, optima, polish
 from hysim.models.law import Law
 from hysim.models.model import every_family
@@ -139,7 +139,7 @@ def test_stages_follow_what_the_user_says(freedom, law, stages):
 
 def test_what_holds_parameters_of_a_family_passes_its_stages_on():
     (held,) = hs.BoucWenBaberNoori.candidates().values()
-    chain = decided(held, [RECORDS["pinching"]], Freedom(), None).problems
+    chain = decided(held, Setting([RECORDS["pinching"]], Freedom())).problems
     assert [each.stage.word for each in chain] == ["", "wear", "pinching", "lambda_"]
     for each in (*chain, chain[0].simpler):
         assert "n" not in each.space.names

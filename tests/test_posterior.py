@@ -14,13 +14,12 @@ import pytest
 from scipy import stats
 
 import hysim as hs
-from hysim.identification.likelihood.densities import density
-from hysim.posterior import _nested, _sampler, log_evidence
-from hysim.posterior._bridge import bridge_evidence
-from hysim.posterior._chains import effective_samples, split_rhat
+from hysim.identification.likelihood import density
+from hysim.posterior import _log_evidence, _sampler, log_evidence
+from hysim.posterior._log_evidence import bridge_evidence
 from hysim.posterior._priors import REACH, given, scaled_box
 from hysim.posterior._sample import posed, walkers_of
-from hysim.posterior._sampler import sampled
+from hysim.posterior._sampler import effective_samples, sampled, split_rhat
 
 SIGMA = 0.05
 KNOWN = {"sigma": (SIGMA * (1.0 - 1e-9), SIGMA * (1.0 + 1e-9))}
@@ -368,7 +367,7 @@ def test_bridge_sampling_has_the_closed_form(cubic):
 
 @pytest.mark.extra("dynesty")
 def test_nested_sampling_has_the_closed_form(monkeypatch):
-    monkeypatch.setattr(_nested, "_WALK", 6)  # enough for a normal posterior of three numbers
+    monkeypatch.setattr(_log_evidence, "_WALK", 6)  # enough for a normal posterior of three numbers
     rec = cubic_record(n=12)
     fit = hs.identify(hs.Line, rec)
     found = log_evidence(fit, rec, priors=KNOWN, factor=2.0, live_points=20)

@@ -10,7 +10,7 @@ from scipy import stats
 import hysim as hs
 from hysim.posterior._priors import given
 from hysim.posterior._sample import posed
-from hysim.posterior._truncated import between, solved_within
+from hysim.posterior._target import between, solved_within
 
 PIXEL = 0.0763
 PRIORS = {

@@ -4,12 +4,10 @@ import numpy as np
 import pytest
 from scipy import special, stats
 
-from hysim.posterior import _growth, _proposal
-from hysim.posterior._bridge import _error
-from hysim.posterior._growth import grown
-from hysim.posterior._mixture import mixture
-from hysim.posterior._optima import around_optima
-from hysim.posterior._proposal import particles, proposal_for
+from hysim.posterior import _proposal
+from hysim.posterior._log_evidence import _error
+from hysim.posterior._proposal import grown, mixture, particles, proposal_for
+from hysim.posterior._sampler import around_optima
 
 NOWHERE = np.empty((0, 9))
 
@@ -137,7 +135,7 @@ def weights_of(target, proposal):
 
 def test_a_proposal_grows_along_a_bent_line(monkeypatch):
     """It starts from one broad normal part, whose draws nearly all miss the line."""
-    monkeypatch.setattr(_growth, "_ROUNDS", 10)  # enough for this line
+    monkeypatch.setattr(_proposal, "_GROWTHS", 10)  # enough for this line
     target, rng = bent(0.2), np.random.default_rng(1)
     start = mixture(3.0 * rng.standard_normal((2000, 4)), np.ones(2000), 0, rng, parts=1)
     _, before = weights_of(target, start)

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import hysim as hs
-from hysim.identification.likelihood.refit import again
+from hysim.identification.likelihood import again
 from hysim.models.search_space import SearchSpace
 
 U = hs.signals.decaying_sine(1.0, cycles=4, samples_per_cycle=40)

@@ -13,7 +13,7 @@ from scipy import stats
 
 import hysim as hs
 from hysim.sweeps import _sweep
-from hysim.sweeps._seeds import seeds
+from hysim.sweeps._chunks import seeds
 
 
 def bits(result):

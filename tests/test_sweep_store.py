@@ -17,7 +17,7 @@ import sweep_tasks
 from test_sweep import bits
 
 import hysim as hs
-from hysim.sweeps import _identity, _store
+from hysim.sweeps import _store, _sweep
 
 GRID = {"a": [1.0, 2.0, 3.0, 4.0], "b": [1, 2]}
 
@@ -139,7 +139,7 @@ def test_another_study_is_refused(path, task, space, seed, words):
 
 def test_another_version_is_refused_or_kept(path, monkeypatch):
     first = hs.sweep(sweep_tasks.product, GRID, store=path)
-    monkeypatch.setattr(_identity, "__version__", "9.9")
+    monkeypatch.setattr(_sweep, "__version__", "9.9")
     with pytest.raises(ValueError, match=rf"the hysim was {re.escape(hs.__version__)} and is 9\.9.*keep"):
         hs.sweep(sweep_tasks.product, GRID, store=path)
     for _ in range(2):  # the second time it is the same study

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from hysim.discovery._term_regression import TermRegression
+from hysim.discovery._hidden_memory import TermRegression
 from hysim.laws.differential.terms import power_term
 
 TERMS = tuple(power_term(False, power, even=False) for power in range(4))

@@ -10,7 +10,7 @@ from hysim.identification._descent import Descent
 from hysim.identification._diagnostics import loop_widths, width_stderr
 from hysim.identification._noise import Gaussian
 from hysim.identification._problem import problem
-from hysim.identification._regression import least_squares
+from hysim.identification.marquardt import least_squares
 from hysim.models.search_space import ALL_FREE, Freedom
 
 THRESHOLDS = tuple((0.1 * np.arange(10)).tolist())

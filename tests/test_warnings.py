@@ -12,7 +12,7 @@ from hysim.cli import main
 from hysim.identification._admissible import danger, excursion, implausible
 from hysim.identification._diagnostics import whiteness
 from hysim.identification._noise import Quantised
-from hysim.identification.sentences import sentences
+from hysim.identification.forms import sentences
 
 SWAPPED = "the input and the output may be swapped"
 LOOP = hs.signals.triangle(-1.0, 1.0, cycles=2, samples_per_cycle=60)

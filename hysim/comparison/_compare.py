@@ -2,12 +2,13 @@
 
 Every model is identified on the same samples, cross-validated by the same splits and judged on the same test. It is
 simulated in free run and judged by the measures of `hysim.metrics`: the fit of its output, and the width of its loop.
+On several records a subject is one model for all of them, or one for each.
 """
 
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, NamedTuple, Protocol, runtime_checkable
 
 import numpy as np
 
@@ -18,7 +19,6 @@ from hysim._frozen import FloatArray
 from hysim._parallel import map_on_threads
 from hysim._progress import Reports, announced_by, reports
 from hysim._results import Result, model_of
-from hysim.comparison._records import CrossValidated, OneByOne, together
 from hysim.comparison._result import Comparison, ComparisonRow
 from hysim.errors import Interrupted, SimulationError
 from hysim.identification import Identification, identify
@@ -364,3 +364,34 @@ def _rate_deviation(model: Any, record: Record, y: FloatArray) -> float:
 
 def _excess_percent(value: float, measured: float) -> float:
     return 100.0 * (value / measured - 1.0) if measured > 0.0 else math.nan
+
+
+@runtime_checkable
+class CrossValidated(Protocol):
+    """A result with an error of prediction."""
+
+    cv_rmse: float
+
+
+class OneByOne(NamedTuple):
+    """Results on records one by one, as one result."""
+
+    models: tuple[Any, ...]
+    n_parameters: int
+    cv_rmse: float
+
+    @property
+    def model(self) -> Any:
+        """The model on the last record."""
+        return self.models[-1]
+
+
+def together(subjects: Sequence[Any]) -> Any:
+    """Results one by one as one result with the parameters of all; the last model if none was fitted."""
+    models = tuple(map(model_of, subjects))
+    fits = [each for each in subjects if isinstance(each, Identification)]
+    if not fits:
+        return models[-1]
+    sizes, errors = [each.residual.size for each in fits], [each.cv_rmse for each in fits]
+    squares = sum(n * error**2 for n, error in zip(sizes, errors, strict=True))
+    return OneByOne(models, sum(each.n_parameters for each in fits), math.sqrt(squares / float(np.sum(sizes))))

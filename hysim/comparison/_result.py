@@ -1,23 +1,29 @@
-"""The result of `compare`."""
+"""The result of `compare`, which is written as text, CSV, Markdown, LaTeX and columns from one list of columns."""
 
+import html
 import math
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import field
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from hysim._frozen import FloatArray, check_choice, frozen
+from hysim._frozen import FloatArray, check_choice, frozen, items
 from hysim._names import among
-from hysim._printing import bic_in_words, listed, printed, summary_text
-from hysim.comparison import _tables
+from hysim._printing import aligned, bic_in_words, csv_text, folded, listed, printed, summary_text
 from hysim.comparison._verdict import Contrast, contrasts
-from hysim.identification.sentences import CONSTANT, SWAPPED
+from hysim.identification.forms import CONSTANT, SWAPPED
+from hysim.interop import frame, heading
 from hysim.metrics import LoopMetrics
 from hysim.models.model import in_brief
 from hysim.records import Record
 
+_WIDE = 110  # letters in a line of text
+_PRINTED = 5  # rows in words
 _NAMED = 6  # models that a sentence names
+
+Value = str | int | float | bool
 
 
 @printed
@@ -137,14 +143,6 @@ class Comparison:
     failed: Mapping[str, str] = field(default_factory=dict)
     test: Record | None = None
 
-    __str__ = _tables.to_words
-    to_html = _tables.to_html
-    to_text = _tables.to_text
-    to_markdown = _tables.to_markdown
-    to_latex = _tables.to_latex
-    to_csv = _tables.to_csv
-    to_frame = _tables.to_frame
-
     def __getitem__(self, name: str) -> ComparisonRow:
         for row in self.rows:
             if row.name == name:
@@ -225,6 +223,87 @@ class Comparison:
         unsafe = [f"{row.name}: {row.unsafe}" for row in self.rows if row.unsafe]
         return (*constant, *dict.fromkeys([*unsafe, *of_best, *swapped]))
 
+    def to_text(self) -> str:
+        """The table for a terminal, and the verdict below it."""
+        lines = aligned(_short(self))
+        notes = [f"not compared: {name}: {reason}" for name, reason in self.failed.items()] + [self.verdict]
+        wrapped = [line for note in notes if note for line in folded(note, _WIDE, indent="  ")]
+        warnings = [line for each in self.warnings for line in folded(each, _WIDE, "  ", "    ")]
+        return "\n".join(
+            [lines[0], "-" * len(lines[0]), *lines[1:], *wrapped, *(["Warnings"] if warnings else []), *warnings]
+        )
+
+    def __str__(self) -> str:
+        """The rows that predict best, and the verdict."""
+        best = [row.name for row in self.ranked()]
+        unknown = [row.name for row in self.rows if math.isnan(row.cv_rmse)]
+        by_name = {row["name"]: row for row in rows(self)}
+        names = ("name", "n_parameters", "fit_percent", "rmse", "cv_rmse", "rmse_ratio", "max_width")
+        selected = [column for column in columns(self) if column.name in names]
+        ordered = [by_name[name] for name in best + unknown]
+        table = [["", *(column.heading for column in selected[1:])]]
+        table += [[_printed(row[column.name], column.digits) for column in selected] for row in ordered[:_PRINTED]]
+        more, many = len(ordered) - _PRINTED, len(ordered)
+        head = f"Comparison of {many} model{'' if many == 1 else 's'} on {self.record.name or 'a record'}, "
+        notes = [f"  ... and {more} more"] if more > 0 else []
+        sentences = [
+            f"Not compared: {', '.join(self.failed)}." if self.failed else "",
+            self.verdict,
+            f"Warnings: {'; '.join(self.warnings)}" if self.warnings else "",
+        ]
+        notes += folded(" ".join(filter(None, sentences)), first="  ", indent="  ")
+        return summary_text([f"{head}{len(self.record)} samples", *(f"  {line}" for line in aligned(table)), *notes])
+
+    def to_html(self) -> str:
+        """The short table for a notebook, and the verdict."""
+        header, *body = ([html.escape(cell) for cell in cells] for cells in _short(self))
+        head = "".join(f"<th>{cell}</th>" for cell in header)
+        lines = "".join("<tr>" + "".join(f"<td>{cell}</td>" for cell in cells) + "</tr>" for cells in body)
+        listed = "".join(f"<li>{html.escape(each)}</li>" for each in self.warnings)
+        warnings = f"<p>Warnings</p><ul>{listed}</ul>" if listed else ""
+        verdict = f"<p>{html.escape(self.verdict)}</p>"
+        return f"<table><thead><tr>{head}</tr></thead><tbody>{lines}</tbody></table>{verdict}{warnings}"
+
+    def to_markdown(self) -> str:
+        """The table in Markdown."""
+        header, *body = _short(self)
+        body += [[name, reason, *[""] * (len(header) - 2)] for name, reason in self.failed.items()]
+        lines = [header, ["---", *("---:" for _ in header[1:])], *body]
+        return "\n".join("| " + " | ".join(cell.replace("|", "\\|") for cell in cells) + " |" for cells in lines)
+
+    def to_latex(self) -> str:
+        """The table as a plain LaTeX tabular, which needs no package."""
+        (header, *body), failed = _short(self), self.failed.items()
+        spans = rf"\multicolumn{{{len(header) - 1}}}{{l}}"
+        lines = [" & ".join(map(_escaped, cells)) for cells in body]
+        lines += [rf"{_escaped(name)} & {spans}{{{_escaped(reason)}}}" for name, reason in failed]
+        head = [
+            rf"\begin{{tabular}}{{l{'r' * (len(header) - 1)}}}",
+            r"\hline",
+            " & ".join(map(_escaped, header)) + r" \\",
+        ]
+        return "\n".join([*head, r"\hline", *(rf"{line} \\" for line in lines), r"\hline", r"\end{tabular}"])
+
+    def to_csv(self) -> str:
+        """Every measure as comma-separated values with all digits, nan as an empty cell."""
+        table = self._columns()
+        return csv_text([table, *(map(_exact, row) for row in zip(*table.values(), strict=True))])
+
+    def _columns(self) -> dict[str, list[Value | None]]:
+        """Heading to values; a model that could not be compared has its name and message only."""
+        failed = [{"name": name, "success": False, "message": reason} for name, reason in self.failed.items()]
+        every = [*rows(self), *failed]
+        return {column.heading: [row.get(column.name) for row in every] for column in columns(self)}
+
+    def to_frame(self) -> Any:
+        """Every measure as a `pandas.DataFrame`, one row a model; ImportError without pandas.
+
+        ``attrs`` holds the units of the columns by their headings, the record's name and the verdict.
+        """
+        units = {each.heading: unit for each in columns(self) if (unit := heading(each.heading)[1])}
+        notes = {"record": self.record.name, "verdict": self.verdict}
+        return frame(self._columns(), units=units, notes=notes)
+
     def _undecided_in_words(self) -> str:
         method = "(signed ranks of left-out errors, 5 % after Holm's correction)"
         smaller = tuple(each.name for each in self.contrasts if each.contradicts)
@@ -259,3 +338,91 @@ class Comparison:
 def _first(names: Sequence[str]) -> str:
     """The names in a sentence; of many the first ones, and the number of the others."""
     return listed(names if len(names) <= _NAMED else [*names[: _NAMED - 1], f"{len(names) - _NAMED + 1} others"])
+
+
+class Column(NamedTuple):
+    """A column: its heading, the value in a row by name, the decimals in print, and whether short tables have it."""
+
+    heading: str
+    name: str
+    digits: int = 0
+    short: bool = True
+
+
+def columns(comparison: Comparison) -> list[Column]:
+    """The columns that this comparison can fill."""
+    units = comparison.record.units
+    u, y = (f" [{units[name]}]" if name in units else "" for name in ("u", "y"))
+    area = f" [{units['y']} {units['u']}]" if {"u", "y"} <= units.keys() else ""
+    contrasts = [
+        Column("cv rmse / best", "rmse_ratio", 2),
+        Column("typical error / best", "typical_ratio", 2, short=False),
+        Column("p", "probability", 3),
+        Column("diverged", "diverged", short=False),
+    ]
+    test = [Column(f"test rmse{y}", "test_rmse", 4), Column("test fit [%]", "test_fit_percent", 2)]
+    return [
+        Column("model", "name"),
+        Column("parameters", "n_parameters"),
+        Column("fit [%]", "fit_percent", 2),
+        Column(f"rmse{y}", "rmse", 4),
+        Column(f"cv rmse{y}", "cv_rmse", 4),
+        *(contrasts if comparison.contrasts else []),
+        *(test if comparison.test else []),
+        *([Column("max residual [quanta]", "residual_quanta", 2)] if comparison.record.resolution else []),
+        Column(f"max width{y}", "max_width", 3),
+        Column(f"at{u}", "max_width_at", 1, short=False),
+        Column(f"area{area}", "area", 2, short=False),
+        Column(f"width rmse{y}", "width_rmse", 4, short=False),
+        Column("width error [%]", "width_error_percent", 1),
+        Column("area error [%]", "area_error_percent", 1),
+        Column("BIC", "bic", 1),
+        Column("AIC", "aic", 1, short=False),
+        Column("FPE", "fpe", 6, short=False),
+        Column("rate independent", "is_rate_independent"),
+        Column("rate deviation", "rate_deviation", 9, short=False),
+        Column("converged", "success", short=False),
+        Column("message", "message", short=False),
+        Column("warnings", "warnings", short=False),
+    ]
+
+
+def rows(comparison: Comparison) -> list[dict[str, Any]]:
+    """The values of each model by name; the best model compares with itself as 1."""
+    contrasts = {each.name: items(each) for each in comparison.contrasts}
+    quantum, values = comparison.record.resolution, []
+    for row in comparison.rows:
+        same = math.nan if math.isnan(row.cv_rmse) else 1.0
+        best = {"rmse_ratio": same, "typical_ratio": same, "probability": math.nan, "diverged": False}
+        criteria = {name: math.nan if vars(row)[name] == -math.inf else vars(row)[name] for name in ("bic", "aic")}
+        derived = {"residual_quanta": row.max_residual / quantum if quantum else math.nan}
+        text = {"warnings": "; ".join(filter(None, (row.unsafe, *row.warnings)))}
+        values.append(contrasts.get(row.name, best) | items(row) | criteria | derived | text)
+    return values
+
+
+def _short(comparison: Comparison) -> list[list[str]]:
+    """Headings and printed cells of the short columns, one row a model."""
+    selected = [column for column in columns(comparison) if column.short]
+    body = [[_printed(row[column.name], column.digits) for column in selected] for row in rows(comparison)]
+    for cells, row in zip(body, comparison.rows, strict=True):
+        cells[0] += " (UNSAFE)" if row.unsafe else "" if row.success else " (partial)"
+    return [[column.heading for column in selected], *body]
+
+
+def _printed(value: Value, digits: int) -> str:
+    if isinstance(value, bool):
+        return "yes" if value else "no"
+    if isinstance(value, float):
+        return f"{value:.{digits}f}" if math.isfinite(value) else "-" if math.isnan(value) else str(value)
+    return str(value)
+
+
+def _exact(value: Value | None) -> str:
+    if value is None or value != value:
+        return ""
+    return repr(float(value)) if isinstance(value, float) else _printed(value, 0)
+
+
+def _escaped(text: str) -> str:
+    return re.sub(r"([%&_#$])", r"\\\1", text)

@@ -11,8 +11,7 @@ from hysim._names import among
 from hysim.design._candidates import usual
 from hysim.design._limits import InputLimits
 from hysim.design._subjects import sizes_of, squared
-from hysim.identification.likelihood.densities import density
-from hysim.identification.likelihood.expected import Expected
+from hysim.identification.likelihood import Expected, density
 from hysim.models.law import Law
 from hysim.models.parts import own
 from hysim.models.search_space import Freedom

@@ -2,9 +2,9 @@
 
     z' = sum c_k phi_k(u', |u'|, u, z),    y = offset + feedthrough u + gain z
 
-Regression of the slope along the loading length (`_slopes`), PySINDy's optimizers from dense to sparse (`_pysindy`),
-refinement by simulation error (`_refinement`), choice of one structure (`_selection`, `_subsets`, `_search`), and the
-verdict on the records (`_judgement`).
+Regression of the slope along the loading length, and PySINDy's optimizers from dense to sparse (`_slopes`), refinement
+by simulation error (`_refinement`), choice of one structure (`_selection`, `_search`), and the verdict on the records
+(`_judgement`).
 """
 
 import math
@@ -19,15 +19,13 @@ from hysim import metrics
 from hysim._blas import one_blas_thread
 from hysim._frozen import FloatArray, check_choice
 from hysim._progress import Progress, Reports, reports
-from hysim.discovery import _laws, _pysindy
 from hysim.discovery._judgement import HYSTERESIS, LAG, NO_STRUCTURE, Competitors, Judgement, competitors, doubts, judge
-from hysim.discovery._refinement import DIVERGED, Candidate, FreeRun, Samples, Work
-from hysim.discovery._result import Discovery
+from hysim.discovery._refinement import DIVERGED, AnyExponent, Candidate, FreeRun, Samples, Work
+from hysim.discovery._result import Discovery, coefficients, law_from
 from hysim.discovery._search import Library, Options, Outcome, or_any_exponent, searched
 from hysim.discovery._selection import MOST_WORK
-from hysim.discovery._slopes import FORMS, signs_of
-from hysim.discovery._structures import AnyExponent
-from hysim.identification.folds import folds
+from hysim.discovery._slopes import FORMS, check, signs_of
+from hysim.identification import folds
 from hysim.identification.swapped import swapped_columns
 from hysim.laws.differential.terms import duhem_terms, memory_terms, named_terms, symmetric
 from hysim.records import Record, several
@@ -147,7 +145,7 @@ def discover(
     records = _checked(record_or_records)
     n_samples = sum(map(len, records))
     n_folds = 0 if cross_validate is None else len(folds(cross_validate, n_samples, name="cross_validate"))
-    _pysindy.check(optimizer)
+    check(optimizer)
     if route == "oscillator":
         raise ValueError("an oscillator has its own verb: hs.discover_oscillator(record)")
     for name, value, allowed in (
@@ -170,13 +168,23 @@ def discover(
     )
     report = _in_steps(progress or (lambda done, total: None), _REPORTS, 1 + n_folds)
     share = _SEARCHES / (1 + len(of_output))
-    outcomes = _searched(records, (of_memory,), replace(options, report=lambda done: report(share * done)))
+
+    def outcomes_of(
+        libraries: Sequence[Library],
+        how: Options,
+        best: float = math.inf,
+        masks: tuple[Samples, ...] | None = None,
+    ) -> list[Outcome]:
+        every = (searched(records, library, how, best=best, masks=masks) for library in libraries)
+        return [outcome for outcome in every if outcome is not None]
+
+    outcomes = outcomes_of([of_memory], replace(options, report=lambda done: report(share * done)))
     report(share)
     any_exponent = library is None and symmetry is None and not signs
 
     def chosen(first: list[Outcome], masks: tuple[Samples, ...] | None) -> tuple[Outcome, Candidate[Any]]:
         of_others = options if masks else replace(options, report=lambda done: report(share * (1.0 + done)))
-        both = [*first, *_searched(records, of_output, of_others, first[0].searched.bic, masks)]
+        both = [*first, *outcomes_of(of_output, of_others, first[0].searched.bic, masks)]
         outcome = min(both, key=lambda each: each.candidate.bic)
         outcome = replace(outcome, is_cut=any(each.is_cut for each in both))
         if not any_exponent or outcome.is_short:
@@ -184,7 +192,7 @@ def discover(
         return outcome, or_any_exponent(FreeRun(records, masks), first[0], outcome)
 
     def again(masks: tuple[Samples, ...]) -> Candidate[Any]:
-        return chosen(_searched(records, (of_memory,), options, masks=masks), masks)[1]
+        return chosen(outcomes_of([of_memory], options, masks=masks), masks)[1]
 
     outcome, candidate = chosen(outcomes, None)
     report(_SEARCHES)
@@ -261,25 +269,6 @@ def _libraries(
     return (chosen,)
 
 
-def _searched(
-    records: tuple[Record, ...],
-    libraries: Sequence[Library],
-    options: Options,
-    best: float = math.inf,
-    masks: Sequence[Samples] | None = None,
-) -> list[Outcome]:
-    n = sum(map(len, records))
-    outcomes: list[Outcome] = []
-    for library in libraries:
-        if n <= len(library.terms):
-            raise ValueError(
-                f"{len(library.terms)} terms and y0 cannot be estimated from {n} samples: lower the degree"
-            )
-        outcome = searched(records, library, options, best=best, masks=masks)
-        outcomes += [] if outcome is None else [outcome]
-    return outcomes
-
-
 def _discovery(
     records: tuple[Record, ...],
     outcome: Outcome,
@@ -288,7 +277,7 @@ def _discovery(
     seed: int,
 ) -> Discovery:
     letter, structure = outcome.library.letter, candidate.structure
-    law = _laws.law_from(candidate, records, "z" if isinstance(structure, AnyExponent) else letter)
+    law = law_from(candidate, records, "z" if isinstance(structure, AnyExponent) else letter)
     judgement = _judged(records, candidate, letter, law.models, others)
     path = [(threshold, outcome.search.refine(each)) for threshold, each in outcome.path]
     path_scores = [_scores(each, outcome.search.free_run.records) for _, each in path]
@@ -332,7 +321,7 @@ def _regressed(outcome: Outcome) -> dict[str, float]:
         return {}
     shift = [start.feedthrough] * structure.feedthrough + [start.offset] * structure.offset
     numbers = np.array([*start.regression.ridge(structure.terms, 0.0), *shift])
-    return _laws.coefficients(structure, numbers, outcome.library.letter)
+    return coefficients(structure, numbers, outcome.library.letter)
 
 
 def _judged(
@@ -345,7 +334,7 @@ def _judged(
         refined = FreeRun(tuple(some), masks, work=Work(_OF_REFIT)).refine(structure, candidate.unknowns[np.newaxis])
         if refined is None:
             raise ValueError("the law diverges")
-        return _laws.law_from(refined, some, letter).models
+        return law_from(refined, some, letter).models
 
     return judge(records, models, refit, others)
 

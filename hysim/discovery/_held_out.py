@@ -22,10 +22,9 @@ from scipy import special
 
 from hysim._cycles import TOLERANCE, complete_cycles
 from hysim._frozen import FloatArray
-from hysim.discovery import _yardsticks as yardsticks
-from hysim.discovery._rival import FLOOR, Rival
+from hysim.discovery._competitors import FLOOR, Rival, curve, means, plays, relaxations, trend
 from hysim.errors import SimulationError
-from hysim.identification.folds import folds as blocks
+from hysim.identification import folds as blocks
 from hysim.records import Record
 
 LAW, RIVAL, RELAXATIONS, PLAYS, CURVE = "law", "rival", "relaxations", "plays", "curve"
@@ -114,9 +113,9 @@ def competitors_held_out(records: Sequence[Record], linear: Rival | None) -> Tri
     by, left_out = _folds(records)
     models = _models(records, y, linear)
     scores = {name: _scores(model, records, left_out) for name, model in models.items()}
-    means = scores.pop(_MEANS)
-    if means.error < scores[CURVE].error:
-        scores[CURVE] = means
+    other = scores.pop(_MEANS)
+    if other.error < scores[CURVE].error:
+        scores[CURVE] = other
     together = about_trends(y - models[PLAYS](np.ones(y.size)), records)
     ordered = dict.fromkeys((LAW, RIVAL, RELAXATIONS, PLAYS, CURVE), Scores()) | scores
     return Trial(ordered, rms(together), by, _noise(records), float(np.ptp(y)))
@@ -152,13 +151,13 @@ def _scores(model: Model, records: Sequence[Record], left_out: Sequence[Samples]
 
 def _models(records: Sequence[Record], y: FloatArray, linear: Rival | None) -> dict[str, Model]:
     u = np.concatenate([record.u for record in records])
-    models: dict[str, Model] = {_MEANS: partial(yardsticks.means, u, y)}
-    needed = {CURVE: yardsticks.curve, PLAYS: yardsticks.plays}
+    models: dict[str, Model] = {_MEANS: partial(means, u, y)}
+    needed = {CURVE: curve, PLAYS: plays}
     if linear is not None:
         models[RIVAL] = lambda weights: np.concatenate(
             linear.refitted(records, _of_each(weights, records)).outputs(records)
         )
-        needed[RELAXATIONS] = yardsticks.relaxations
+        needed[RELAXATIONS] = relaxations
     for name, made in needed.items():
         models[name] = partial(made(records).outputs, y)
     return models
@@ -169,7 +168,7 @@ def about_trends(residual: FloatArray, records: Sequence[Record]) -> list[FloatA
     residuals = []
     for own, record in zip(_of_each(residual, records), records, strict=True):
         counts = ~np.isnan(own)
-        slow = yardsticks.trend(record)[counts]
+        slow = trend(record)[counts]
         if np.count_nonzero(counts) <= slow.shape[1]:
             own, counts = np.full(own.size, math.nan), np.zeros(own.size, dtype=bool)
         elif np.isfinite(own[counts]).all():

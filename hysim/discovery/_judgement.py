@@ -28,8 +28,8 @@ from hysim import metrics, signals
 from hysim._cycles import TOLERANCE, complete_cycles
 from hysim._frozen import FloatArray, frozen
 from hysim.discovery import _held_out as held_out
+from hysim.discovery._competitors import FLOOR, Rival, rival, steady_width
 from hysim.discovery._held_out import CURVE, LAW, PLAYS, RELAXATIONS, RIVAL, SEVERAL, Law, Refit, Trial
-from hysim.discovery._rival import FLOOR, Rival, rival, steady_width
 from hysim.errors import SimulationError
 from hysim.plants.transfer_function import TransferFunction
 from hysim.records import Record

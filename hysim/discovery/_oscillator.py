@@ -1,19 +1,389 @@
-"""The verb `discover_oscillator`: its arguments; `hysim.discovery._oscillator_search` has the search."""
+"""The verb `discover_oscillator`: candidates for the law of the memory of an oscillator, and the choice of one.
 
+1. A mass on a linear spring is identified. If none of the library's terms lowers its BIC, there is no structure.
+2. Along the measured motion Bouc-Wen laws with n = 1, 2 and 3 and a linear relaxation are regressed
+   (`_hidden_memory`); the search begins with the nearest one.
+3. It is refined by simulation error (`hysim.identify`).
+4. About the refined law the whole library is regressed: PySINDy's STLSQ and plain elimination from dense to sparse, one
+   structure by BIC, inclusion by bagging (`_oscillator_response`). Terms that are not chosen leave the law, which is
+   refined again. If terms come in, the Bouc-Wen law is refined with n free and with n at the nearest whole number, and
+   where terms come in about these too, the law of these terms. All this is done for each structure of the records.
+5. Of all refined laws that do not diverge, the linear spring among them, the one of the lowest BIC is taken; every
+   number that has a standard error counts as a parameter.
+"""
+
+import contextlib
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 
+from hysim import metrics
 from hysim._frozen import FloatArray, check_positive
-from hysim._progress import Reports, reports
-from hysim.discovery._oscillator_response import Response
-from hysim.discovery._oscillator_search import Search
+from hysim._progress import Progress, Reports, reports
+from hysim.discovery._hidden_memory import PLANT, HiddenMemory, Regressed, TermRegression
+from hysim.discovery._judgement import NO_STRUCTURE
+from hysim.discovery._oscillator_response import (
+    RATE_DEPENDENT,
+    SPRING,
+    Oscillator,
+    Response,
+    State,
+    diverges,
+    model,
+    steady_loop,
+    verdict,
+)
 from hysim.discovery._result import OscillatorDiscovery
-from hysim.laws.differential.terms import RELAXATION, Term, memory_terms, symmetric
+from hysim.identification import identify
+from hysim.laws.differential.terms import (
+    RELAXATION,
+    Term,
+    bouc_wen_exponent,
+    bouc_wen_terms,
+    law_text,
+    memory_terms,
+    symmetric,
+)
+from hysim.metrics.criteria import information
+from hysim.plants.equation_of_motion import Linear, linear_plant
 from hysim.plants.oscillator import BoucWenOscillator
 from hysim.plants.oscillator_structure import OscillatorStructure
+from hysim.plants.transfer_function import TransferFunction
 from hysim.records import Record, several
+
+N_DRAWS = 20
+
+_SURE = 0.9  # inclusion below which a warning names a term of the law
+_LARGEST_CONDITION = 1e4
+_EXPONENTS = (0.5, 10.0)  # the published bounds of n
+_AT_BOUND = 1e-3  # relative distance from a bound below which a parameter is at it
+_STEPS = 5
+_ROUNDS = 5  # of choosing terms about a law of any terms
+_LAW = ("A", "beta", "gamma")
+_NO_MODEL = (
+    "There is no model of this law: the memory of an oscillator is simulated where it is a Bouc-Wen law or a linear "
+    "relaxation."
+)
+_DIVERGES = "A law of lower BIC diverges on cycles over the measured range, and is left out."
+
+
+class _Fitted(NamedTuple):
+    """A refined oscillator, the standard errors by name, its residual (n_samples,), and warnings."""
+
+    oscillator: Oscillator
+    stderr: dict[str, float]
+    residual: FloatArray
+    warnings: tuple[str, ...] = ()
+
+    @property
+    def terms(self) -> tuple[Term, ...]:
+        return tuple(self.oscillator.coefficients)
+
+    def bic(self, floor: float) -> float:
+        return information(float(np.mean(self.residual**2)), self.residual.size, len(self.stderr), floor=floor)
+
+
+class _Tried(NamedTuple):
+    """The library tried about a refined oscillator: its structures from dense to sparse, and the one chosen."""
+
+    fitted: _Fitted
+    regression: TermRegression
+    structures: list[tuple[Term, ...]]
+    chosen: tuple[Term, ...]
+
+    @property
+    def beyond(self) -> set[Term]:
+        return set(self.chosen) - set(self.fitted.terms)
+
+
+class Search(NamedTuple):
+    """The response of oscillators on records of one structure, and the library of terms."""
+
+    response: Response
+    library: tuple[Term, ...]
+    seed: int
+    progress: Progress
+
+    def result(self, others: Sequence[OscillatorStructure] = ()) -> OscillatorDiscovery:
+        """Steps 1 to 5; `others` are other structures that the records may have."""
+        motions = [self.response.structure.motion(record) for record in self.response.records]
+        linear = linear_plant(motions[0])
+        if linear is None:
+            raise ValueError(
+                "no plant with a positive mass is near: check the sign of u and y, and the time; or the motion is too "
+                "far from that of a linear spring"
+            )
+        memory = HiddenMemory(motions, linear, self.response.known)
+        elastic = self._without_memory(linear)
+        self.progress(1, _STEPS)
+        first = _tried(elastic, memory.regression(self.library))
+        self.progress(2, _STEPS)
+        if not first.chosen:
+            return self._described(first, elastic, {})
+        nearest = memory.nearest()
+        self.progress(3, _STEPS)
+        if nearest is None:
+            return self._described(first, elastic, {}, ("Every law tried diverges along the measured displacement.",))
+        refined, failures = [], []
+        for search in (self, *(self._made(structure) for structure in others)):
+            try:
+                refined.append((search, search._refined(nearest)))
+            except ValueError as error:
+                failures.append(f"A law with memory was tried and could not be refined: {error}.")
+        self.progress(4, _STEPS)
+        if not refined:
+            return self._described(first, elastic, {}, tuple(failures[:1]))
+        best, fitted = min(refined, key=lambda each: float(each[1].residual @ each[1].residual))
+        first = best._about(fitted)
+        candidates = [(best, each) for each in best._candidates(first)]
+        if first.beyond:  # a law that is not the one decided how the records were made
+            candidates += [pair for search, _ in refined if search is not best for pair in search._again(candidates)]
+        return _chosen(candidates, elastic, nearest)
+
+    def _made(self, structure: OscillatorStructure) -> "Search":
+        return self._replace(response=replace(self.response, structure=structure))
+
+    def _again(self, candidates: "Sequence[tuple[Search, _Tried]]") -> "list[tuple[Search, _Tried]]":
+        """Candidates by this structure of the records; none if it suits the best Bouc-Wen law less."""
+        laws = [each for _, each in candidates if bouc_wen_exponent(each.fitted.terms) is not None]
+        if not laws:
+            return []
+        law = min(laws, key=self._bic).fitted
+        with contextlib.suppress(ValueError):  # the candidates by the other belief stay
+            begun = self._bouc_wen(law.terms if _is_polynomial(law.terms) else ())
+            if begun.bic(self.response.floor) < law.bic(self.response.floor):
+                return [(self, each) for each in self._candidates(self._about(begun))]
+        return []
+
+    def _bic(self, tried: _Tried) -> float:
+        return tried.fitted.bic(self.response.floor)
+
+    def _without_memory(self, linear: Linear) -> _Fitted:
+        """The linear spring. Where the stiffness is known, z = A y is the rest of the spring."""
+        plant: dict[str, float] = {**linear._asdict(), **self.response.known}
+        springs = {SPRING: linear.stiffness - plant["stiffness"]} if "stiffness" in self.response.known else {}
+        refined = self._simulated(Oscillator(plant, springs))
+        plant, law = refined.oscillator
+        plant = plant | {"stiffness": plant["stiffness"] + law.get(SPRING, 0.0)}
+        stderr = {"stiffness" if name == SPRING.name else name: value for name, value in refined.stderr.items()}
+        return refined._replace(oscillator=Oscillator(plant, {}), stderr=stderr)
+
+    def _refined(self, nearest: Regressed) -> _Fitted:
+        if RELAXATION in nearest.coefficients:
+            return self._simulated(Oscillator(nearest.plant, nearest.coefficients))
+        return self._bouc_wen(tuple(nearest.coefficients))
+
+    def _candidates(self, first: _Tried) -> list[_Tried]:
+        """Step 4: the first law; where it lacks terms, also n free, n at the nearest whole number, and these terms."""
+        candidates, is_free = self._pruned(first), not _is_polynomial(first.fitted.terms)
+        if not candidates[-1].beyond and not is_free:
+            return candidates
+        with contextlib.suppress(ValueError):  # the first law stays
+            free = first if is_free else self._about(self._bouc_wen(()))
+            candidates += [] if is_free else [free]
+            n = float(max(round(bouc_wen_exponent(free.fitted.terms) or 1.0), 1))
+            if n != bouc_wen_exponent(first.fitted.terms):
+                candidates += self._pruned(self._about(self._bouc_wen(bouc_wen_terms(n))))
+        if not min(candidates, key=self._bic).beyond:
+            return candidates
+        lacking = [each for each in candidates if each.beyond and _is_polynomial(each.chosen)]
+        more = self._extended(min(lacking, key=self._bic)) if lacking else None
+        return candidates if more is None else [*candidates, more]
+
+    def _pruned(self, tried: _Tried) -> list[_Tried]:
+        """A Bouc-Wen law, and the same without those of its terms that are not chosen."""
+        law = tried.fitted.terms
+        smaller = tuple(term for term in law if term == SPRING or term in tried.chosen)
+        n = bouc_wen_exponent(smaller)
+        if bouc_wen_exponent(law) is None or len(smaller) == len(law) or n is None or n != int(n):
+            return [tried]
+        with contextlib.suppress(ValueError):  # the law with all terms stays
+            return [tried, self._about(self._bouc_wen(smaller))]
+        return [tried]
+
+    def _extended(self, tried: _Tried) -> _Tried | None:
+        """The law of the terms that are chosen, which are chosen again until they stay the same."""
+        for _ in range(_ROUNDS):
+            plant, coefficients = tried.fitted.oscillator
+            law = {term: coefficients.get(term, 0.0) for term in tried.regression.terms if term in tried.chosen}
+            try:
+                again = self._about(self._simulated(Oscillator(plant, law)))
+            except ValueError:
+                return None
+            if set(again.chosen) == set(law) or not again.chosen:
+                return again
+            tried = again
+        return tried
+
+    def _bouc_wen(self, terms: Sequence[Term]) -> _Fitted:
+        """Identified with these terms of a Bouc-Wen law; without any, with all of them and n free."""
+        fixed: dict[str, float] = {} if not terms else {"n": bouc_wen_exponent(terms) or 1.0}
+        for rectified, name in ((True, "beta"), (False, "gamma")):
+            if terms and all(term.rectified != rectified for term in terms if term != SPRING):
+                fixed[name] = 0.0
+        fit = identify(
+            self.response.structure,
+            self.response.records,
+            fixed={**fixed, **self.response.known},
+            bounds={} if terms else {"n": _EXPONENTS},
+        )
+        numbers = fit.estimates
+        law = {
+            term: (sign * numbers[name], name)
+            for term, name, sign in zip(bouc_wen_terms(numbers["n"]), _LAW, (1.0, -1.0, -1.0), strict=True)
+            if name not in fixed
+        }
+        stderr = {name: value for name, value in fit.stderr.items() if name not in _LAW}
+        stderr |= {term.named("z"): fit.stderr[name] for term, (_, name) in law.items()}
+        plant = {name: numbers[name] for name in PLANT}
+        warnings: list[str] = [] if fit.success else [f"The refinement did not converge: {fit.message}."]
+        if not terms:
+            reached = [bound for bound in _EXPONENTS if abs(numbers["n"] - bound) < _AT_BOUND * bound]
+            warnings += [f"The exponent n reached its search bound {bound:g}." for bound in reached]
+        coefficients = {term: value for term, (value, _) in law.items()}
+        return _Fitted(Oscillator(plant, coefficients), stderr, fit.residual, tuple(warnings))
+
+    def _simulated(self, oscillator: Oscillator) -> _Fitted:
+        """A law of any terms, refined by the simulation behind the regression; a ValueError if it diverges."""
+        refined = self.response.descended(oscillator)
+        terms = tuple(refined.coefficients)
+        residual = self.response.measured - self.response.outputs([refined])[0]
+        J = self.response.slopes(refined, terms)
+        size = np.linalg.norm(J, axis=0)
+        if not (np.isfinite(residual).all() and (size > 0.0).all()):
+            raise ValueError(
+                "the oscillator nearest to the records diverges, or does not become steady: check the units, the time, "
+                "and the sign of u and y"
+            )
+        variance = float(residual @ residual) / max(residual.size - size.size, 1)
+        errors = np.sqrt(variance * np.diag(np.linalg.pinv((J / size).T @ (J / size)))) / size
+        names = (*self.response.free, *(term.named("z") for term in terms))
+        return _Fitted(refined, dict(zip(names, errors.tolist(), strict=True)), residual)
+
+    def _about(self, fitted: _Fitted) -> _Tried:
+        """The library about a law; where n is free, without the terms that differ from the law's own by their power."""
+        law = fitted.oscillator.coefficients
+        same = {(t.rectified, t.is_even_in_memory) for t in law if not (t.is_polynomial or t.relaxing)}
+        library = [t for t in self.library if not t.degree or (t.rectified, t.is_even_in_memory) not in same]
+        regression = self.response.regression(fitted.oscillator, fitted.residual, library)
+        return _tried(fitted, regression if _is_polynomial(fitted.terms) else replace(regression, n_others=1))
+
+    def _diverges(self, fitted: _Fitted) -> bool:
+        plant, law = fitted.oscillator
+        return diverges(model(plant, law, self.response.structure, State(0.0, 0.0, 0.0)), self.response.widest)
+
+    def _described(
+        self,
+        tried: _Tried,
+        elastic: _Fitted,
+        regressed: Mapping[Term, float],
+        warnings: tuple[str, ...] = (),
+    ) -> OscillatorDiscovery:
+        fitted, regression, structures = tried.fitted, tried.regression, tried.structures
+        plant, law = fitted.oscillator
+        measured, response = self.response.measured, self.response
+        coefficients = _by_name(law)
+        inclusion = _by_name(regression.inclusion(np.random.default_rng(self.seed), N_DRAWS))
+        states = response.initial_states(fitted.oscillator)
+        models = [model(plant, law, response.structure, state) for state in states]
+        nothing = (_NO_MODEL,) if models[0] is None else ()
+        warnings = (*nothing, *warnings, *fitted.warnings, *_warnings(tried, inclusion))
+        free_exponent = {"n": bouc_wen_exponent(law) or np.nan} if "n" in fitted.stderr else {}
+        held_out = np.array([regression.held_out_rmse(terms) for terms in structures])
+        width, area = steady_loop(models[0] if law else None, response.widest)
+        self.progress(_STEPS, _STEPS)
+        return OscillatorDiscovery(
+            model=models[0],
+            models=tuple(each for each in models if each is not None),
+            coefficients=coefficients,
+            stderr=fitted.stderr,
+            equation=f"{law_text(coefficients, 'z')}, {_motion(plant)}",
+            verdict=verdict(fitted.terms),
+            scores={
+                "fit_percent": metrics.fit_percent(measured, measured - fitted.residual),
+                "rmse": float(np.sqrt(np.mean(fitted.residual**2))),
+                "bic": fitted.bic(response.floor),
+                "held_out_rmse": response.held_out_rmse(fitted.oscillator, fitted.residual),
+                "linear_rmse": float(np.sqrt(np.mean(elastic.residual**2))),
+                "linear_held_out_rmse": response.held_out_rmse(elastic.oscillator, elastic.residual),
+                "linear_bic": elastic.bic(response.floor),
+                "n_terms": len(coefficients),
+                "n_structures": len(structures),
+                "condition": regression.condition,
+            },
+            n_parameters=len(fitted.stderr),
+            parameters=plant | free_exponent,
+            initial="rest" if response.structure.period is None else "periodic",
+            initial_states=tuple(dict(zip(("y0", "y'0", "z0"), state, strict=True)) for state in states),
+            rival=TransferFunction(num=(1.0,), den=tuple(elastic.oscillator.plant[name] for name in PLANT), hold="foh"),
+            regressed=_by_name(regressed),
+            inclusion=inclusion,
+            left_out=tuple(term.named("z") for term in regression.dependent),
+            path_n_terms=np.array([len(terms) for terms in structures], dtype=float),
+            path_bic=np.array([regression.bic(terms) for terms in structures]),
+            path_fit_percent=100.0 * (1.0 - held_out / float(np.std(measured))),
+            path_terms=tuple(", ".join(term.named("z") for term in terms) for terms in structures),
+            relative_width=width,
+            dissipation=area,
+            message=_message(verdict(fitted.terms), warnings),
+            warnings=warnings,
+        )
+
+
+def _chosen(candidates: Sequence[tuple[Search, _Tried]], elastic: _Fitted, nearest: Regressed) -> OscillatorDiscovery:
+    """Step 5: the law of the lowest BIC of those that do not diverge, or none."""
+    ranked = sorted(candidates, key=lambda each: each[0]._bic(each[1]))
+    search, lowest = ranked[0]
+    linear = elastic.bic(search.response.floor)
+    for rank, (believed, each) in enumerate(ranked):
+        if believed._bic(each) < linear and not believed._diverges(each.fitted):
+            return believed._described(each, elastic, nearest.coefficients, (_DIVERGES,) if rank else ())
+    lost = (_DIVERGES,) if search._bic(lowest) < linear else ()
+    return search._described(lowest._replace(fitted=elastic), elastic, nearest.coefficients, lost)
+
+
+def _tried(fitted: _Fitted, regression: TermRegression) -> _Tried:
+    law = tuple(term for term in regression.terms if term in fitted.terms)
+    paths = {*regression.thresholded(), *regression.eliminated(), *([law] if law else [])}
+    structures = sorted(paths, key=lambda terms: (-len(terms), regression.bic(terms), terms))
+    return _Tried(fitted, regression, structures, regression.best(structures))
+
+
+def _by_name(values: Mapping[Term, float]) -> dict[str, float]:
+    return {term.named("z"): value for term, value in values.items()}
+
+
+def _is_polynomial(terms: Sequence[Term]) -> bool:
+    return all(term.is_polynomial or term.relaxing for term in terms)
+
+
+def _motion(plant: Mapping[str, float]) -> str:
+    text = f"{plant['mass']:.6g} y'' + {plant['damping']:.6g} y' + {plant['stiffness']:.6g} y + z = u"
+    return text.replace("+ -", "- ")
+
+
+def _message(kind: str, warnings: Sequence[str]) -> str:
+    if kind == NO_STRUCTURE:
+        return "no term of the library lowers the BIC of a linear spring"
+    if kind == RATE_DEPENDENT:
+        return "the memory depends on the rate"
+    return "" if warnings else "every term is needed, and no other"
+
+
+def _warnings(tried: _Tried, inclusion: Mapping[str, float]) -> tuple[str, ...]:
+    parts = []
+    if verdict(tried.fitted.terms) != NO_STRUCTURE and tried.beyond:
+        parts.append(f"More terms would lower the BIC: {', '.join(term.named('z') for term in sorted(tried.beyond))}.")
+    names = [term.named("z") for term in tried.fitted.terms]
+    doubtful = [name for name in names if inclusion.get(name, 0.0) < _SURE]
+    if doubtful:
+        parts.append(f"Some terms are not in every fit to resampled data: {', '.join(doubtful)}.")
+    if tried.fitted.terms and tried.regression.condition > _LARGEST_CONDITION:
+        parts.append(f"The terms are nearly collinear on these records (condition {tried.regression.condition:.0e}).")
+    return tuple(parts)
+
 
 _REPEATS = 1e-3  # of the input's rms: largest difference of two periods that count as alike
 _TRANSIENT = 1.5  # rms of what changes from period to period, early in the period over late

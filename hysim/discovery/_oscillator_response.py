@@ -3,30 +3,121 @@
     y = y0 + sum of (coefficient - its value) times dy/d(coefficient) + the same for m, c and k
 
 About a law that simulates the record well the residual is white and the slopes are free of noise. Unlike one of z' on
-noisy signals, this regression has no bias, and its standard errors and BIC are right (`_term_regression`).
+noisy signals, this regression has no bias, and its standard errors and BIC are right (`_hidden_memory`).
+
+hysim has models of these discovered oscillators:
+
+    z' = A y' - beta |y'| |z|^(n-1) z - gamma y' |z|^n    BoucWenOscillator
+    z' = A y' - r z                                       TransferFunction, since all of it is linear:
+
+    Y / U = (s + r) / ((m s^2 + c s + k) (s + r) + A s)
 """
 
 import itertools
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
+from hysim import metrics
 from hysim._frozen import FloatArray
 from hysim._parallel import in_chunks
-from hysim.discovery._hidden_memory import OSCILLATOR_SCHEDULE, PLANT, memory_arrays
-from hysim.discovery._oscillator_models import State
-from hysim.discovery._term_regression import BLOCKS, FLOOR, TermRegression, term_regression
+from hysim.discovery._hidden_memory import (
+    BLOCKS,
+    FLOOR,
+    OSCILLATOR_SCHEDULE,
+    PLANT,
+    TermRegression,
+    memory_arrays,
+    term_regression,
+)
+from hysim.discovery._judgement import HYSTERESIS, LAG, NO_STRUCTURE, signed_area
 from hysim.errors import SimulationError
 from hysim.identification.marquardt import SumOfSquares, descend
 from hysim.kernels import memory_terms as kernels
-from hysim.laws.differential.terms import Term
-from hysim.plants.oscillator import ATTEMPTS, attracting_state
+from hysim.laws.differential.boucwen import BoucWen
+from hysim.laws.differential.terms import RELAXATION, Term, bouc_wen_exponent, bouc_wen_terms
+from hysim.plants.oscillator import ATTEMPTS, BoucWenOscillator, attracting_state
 from hysim.plants.oscillator_structure import OscillatorStructure
+from hysim.plants.transfer_function import TransferFunction
 from hysim.records import Record
+
+RATE_DEPENDENT = "rate-dependent hysteresis"
+
+Model = BoucWenOscillator | TransferFunction
+
+SPRING = bouc_wen_terms(1.0)[0]
+_CYCLES = 10
+_SAMPLES = 65  # of a branch
+
+
+class State(NamedTuple):
+    y: float
+    velocity: float
+    z: float
+
+
+def verdict(terms: Iterable[Term]) -> str:
+    present = set(terms)
+    if RELAXATION in present:
+        return LAG if present <= {SPRING, RELAXATION} else RATE_DEPENDENT
+    return HYSTERESIS if present - {SPRING} else NO_STRUCTURE
+
+
+def model(
+    plant: Mapping[str, float], law: Mapping[Term, float], structure: OscillatorStructure, state: State
+) -> Model | None:
+    """Model of an oscillator that begins in a state; None where hysim has none."""
+    kind, n = verdict(law), bouc_wen_exponent(law)
+    if kind == LAG:
+        return _lag(plant, law[RELAXATION], law.get(SPRING, 0.0), structure.hold, state)
+    if n is None and kind != NO_STRUCTURE:
+        return None
+    A, dissipative, conservative = (law.get(term, 0.0) for term in bouc_wen_terms(n or 1.0))
+    shape = {"A": A, "beta": -dissipative, "gamma": -conservative, "n": n or 1.0}
+    oscillator: BoucWenOscillator = structure.assemble({**plant, **shape})
+    if not any(state):
+        return oscillator
+    return replace(oscillator, initial_state=state[:2], law=replace(oscillator.law, z0=state.z))
+
+
+def diverges(oscillator: Model | None, y: FloatArray) -> bool:
+    """Whether a model's memory diverges on cycles over the range of the displacements `y`, or a lag is unstable."""
+    if isinstance(oscillator, TransferFunction):
+        return bool((oscillator.poles.real > 0.0).any())
+    try:
+        steady_loop(oscillator, y)
+    except SimulationError:
+        return True
+    return False
+
+
+def steady_loop(oscillator: Model | None, y: FloatArray) -> tuple[float, float]:
+    """Relative width and signed area of the memory's loop over the range of `y`; nan if it is no Bouc-Wen law."""
+    law = oscillator.law if isinstance(oscillator, BoucWenOscillator) else None
+    if not isinstance(law, BoucWen):
+        return np.nan, np.nan
+    path = np.linspace(0.0, 1.0, _SAMPLES)
+    one = np.concatenate([path, path[-2::-1]])
+    u = y.min() + np.ptp(y) * np.concatenate([one, *[one[1:]] * (_CYCLES - 1)])
+    loop = metrics.loop_metrics(u, law.gain * law.memory(u))
+    return loop.relative_width, signed_area(loop)
+
+
+def _lag(plant: Mapping[str, float], relaxation: float, A: float, hold: str, state: State) -> TransferFunction:
+    m, c, k = plant["mass"], plant["damping"], plant["stiffness"]
+    without_memory = np.polymul([m, c, k], [1.0, -relaxation])
+    force = -c * state.velocity - k * state.y - state.z  # of the free response, which no input pushes
+    return TransferFunction(
+        num=(1.0, -relaxation),
+        den=tuple(np.polyadd(without_memory, [A, 0.0]).tolist()),
+        hold="zoh" if hold == "zoh" else "foh",
+        initial_state=(state.y, state.velocity, force / m) if any(state) else (),
+    )
+
 
 _DIFFERENCES = (3e-4, 3e-5, 3e-6)  # of a parameter, for its slope: the first with which nothing diverges
 _STEADY = 1e-9  # relative change of the state from period to period

@@ -19,9 +19,8 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from hysim._frozen import FloatArray
-from hysim.discovery import _pysindy
 from hysim.discovery._held_out import about_trends, rms
-from hysim.discovery._refinement import POLISH, Candidate, FreeRun, Samples, Work, bic_of
+from hysim.discovery._refinement import POLISH, AnyExponent, Candidate, FreeRun, Samples, Terms, Work, bic_of, shifts
 from hysim.discovery._selection import (
     ALIKE,
     INDISTINCT,
@@ -35,8 +34,7 @@ from hysim.discovery._selection import (
     thinned,
     turning,
 )
-from hysim.discovery._slopes import FORMS, Feature, Slopes, ridge, slopes
-from hysim.discovery._structures import AnyExponent, Terms, shifts
+from hysim.discovery._slopes import FORMS, Feature, Slopes, inclusion, ridge, slopes, sparse_path
 from hysim.laws.differential.terms import Term, symmetric
 from hysim.records import Record
 
@@ -129,7 +127,7 @@ class Outcome:
         stride = max(1, -(-len(regression.slope) // _ENSEMBLE_ROWS))
         n_terms = len(self.candidate.structure.terms)
         threshold = max((t for t, structure in self.path if len(structure.terms) >= n_terms), default=0.0)
-        shares = _pysindy.inclusion(
+        shares = inclusion(
             regression.features[::stride], regression.slope[::stride], threshold, n_models=_ENSEMBLE, seed=seed
         )
         names = (term.named(self.library.letter) for term in regression.terms)
@@ -149,6 +147,8 @@ def searched(
     Only outputs in the `masks`, (n_samples,) for each record, are used. The search is short if no law on the
     optimizer's path, which has the largest ones, comes near an rmse that is enough.
     """
+    if (n := sum(map(len, records))) <= len(library.terms):
+        raise ValueError(f"{len(library.terms)} terms and y0 cannot be estimated from {n} samples: lower the degree")
     free_run = FreeRun(tuple(records), None if masks is None else tuple(masks), options.signs, Work(MOST_WORK))
     thin = thinned(free_run)
     optimizer, form = options.optimizer, options.derivative
@@ -188,7 +188,7 @@ def _least_rmse(search: Search) -> float:
 
 def _path(start: Start, library: Library, optimizer: str) -> list[tuple[float, Terms]]:
     regression = start.regression
-    path = _pysindy.sparse_path(regression.features, regression.slope, optimizer)
+    path = sparse_path(regression.features, regression.slope, optimizer)
     return [(threshold, library.structure(regression.included(coefficients))) for threshold, coefficients in path]
 
 

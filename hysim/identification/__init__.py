@@ -4,12 +4,12 @@ The model is simulated in free run, and the sum of squared output residuals is m
 the model's family declares (`SearchSpace`). Nothing here knows a family.
 """
 
+from hysim.identification._channel import ParameterCurve, estimate_channel, parameter_curve
+from hysim.identification._diagnostics import folds
 from hysim.identification._identify import identify
 from hysim.identification._profile import Profile
 from hysim.identification._result import Candidate, Identification, Width
 from hysim.identification._select import Selection, select
-from hysim.identification.channels.curve import ParameterCurve, parameter_curve
-from hysim.identification.channels.unknown import estimate_channel
 
 __all__ = [
     "Candidate",
@@ -19,6 +19,7 @@ __all__ = [
     "Selection",
     "Width",
     "estimate_channel",
+    "folds",
     "identify",
     "parameter_curve",
     "select",

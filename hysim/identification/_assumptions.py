@@ -23,18 +23,19 @@ from hysim._frozen import FloatArray
 from hysim._input_noise import input_noise, quiet_path, reach
 from hysim._repeats import repeated_cycle
 from hysim.errors import SimulationError
-from hysim.identification._budget import Budget
-from hysim.identification._problem import Problem, problem, problems
+from hysim.identification._problem import Initial, Problem, Setting, problem
 from hysim.identification._search import brief_optima, brief_optimum, optima
 from hysim.laws.operators.reversal_filter import ReversalFilter
 from hysim.metrics.criteria import information
 from hysim.models.dependent_structure import DependentStructure
 from hysim.models.protocols import LongerPast, PartByPart, Rescalable, Undecided, Variant
-from hysim.models.search_space import Freedom, SearchSpace
+from hysim.models.search_space import SearchSpace
 from hysim.records import Record
 from hysim.simulation import free_run
 
-_STRONG = 10.0  # difference of two BIC
+# Difference of two BIC: "very strong" evidence. Discovery takes 2 to find the simplest of nearly equal laws; here a
+# choice adds numbers to a model that is not exact, whose correlated residuals make smaller differences by chance.
+_STRONG = 10.0
 _IN_VAIN = 2  # longer pasts in a row that are no better: one number more may be of use only with another one
 _ROUNDING = 1e-10  # of the output's size: smaller residuals are those of a perfect fit
 _WEIGHINGS = 4
@@ -52,20 +53,19 @@ _STATES = {
 
 
 class Decision(NamedTuple):
-    """The problems to be searched, the value of `initial` that they have, and a sentence on what was chosen and why.
+    """The problems to be searched, and a sentence on what was chosen and why.
 
     There are several, the simplest first, where the family's search has stages.
     """
 
     problems: Sequence[Problem]
-    initial: str | Sequence[str] | None
-    sentence: str
+    sentence: str = ""
 
 
 class _State(NamedTuple):
     """A value of `initial`, and how many times the past of the family is made longer."""
 
-    initial: str | Sequence[str] | None
+    initial: Initial
     longer: int = 0
 
 
@@ -95,15 +95,14 @@ class Treated(NamedTuple):
     quiet: Sequence[Record] = ()
 
 
-def treated(
-    family: Any, records: Sequence[Record], freedom: Freedom, initial: str | Sequence[str] | None, how: str
-) -> Treated:
+def treated(family: Any, setting: Setting, how: str) -> Treated:
     """How a search takes measured inputs: `how` is "raw", "filtered" or, where the record decides, "auto".
 
     A law is fitted behind a filter of reversals, and alone, on the first halves of the records. The bare law is taken
     where it predicts the second halves as well, both along the input as measured and along its quiet path: on the
     first alone a law whose parameters make up for false reversals may be as good.
     """
+    records = setting.records
     is_plain = all(type(record) is Record for record in records)  # not of several sensors, nor weighted
     if how == "raw" or not is_plain or isinstance(family, DependentStructure):  # which no stage can stand in front of
         return Treated(records)
@@ -123,26 +122,20 @@ def treated(
     behind = Treated(filtered, front, noises, quiet)
     if how == "filtered" or isinstance(family, PartByPart):
         return behind
-    alone, in_front = (_left_out(family, each, quiet, freedom, initial) for each in (records, filtered))
+    alone, in_front = (_left_out(family, setting, each, quiet) for each in (records, filtered))
     if alone <= _AS_GOOD**2 * in_front:
         return Treated(records, None, noises, quiet)
     return behind
 
 
-def _left_out(
-    family: Any,
-    paths: Sequence[Record],
-    quiet: Sequence[Record],
-    freedom: Freedom,
-    initial: str | Sequence[str] | None,
-) -> float:
+def _left_out(family: Any, setting: Setting, paths: Sequence[Record], quiet: Sequence[Record]) -> float:
     """Sum of squares on the second halves of these paths and the quiet ones, by a fit to the first halves."""
     halves = [record[: len(record) // 2] for record in paths]
     if not all(half.reversals(_TURN).size for half in halves):
         halves = [*paths]
     total = 0.0
     try:
-        attempt = problem(family, halves, freedom, initial)
+        attempt = problem(family, halves, setting.freedom, setting.initial)
         theta = attempt.completed(brief_optimum(attempt)[0][np.newaxis])[0]
         for k, half in enumerate(halves):
             model = attempt.family.assemble(attempt.estimates(theta, k))
@@ -154,7 +147,7 @@ def _left_out(
     return total
 
 
-def quiet_rmse(family: Any, treatment: Treated, freedom: Freedom, initial: str | Sequence[str] | None) -> float:
+def quiet_rmse(family: Any, setting: Setting, treatment: Treated) -> float:
     """Error of a short fit along the quiet paths, with what their noise adds through the slope of the record.
 
     It is infinite where there is no noise, or such a fit.
@@ -162,7 +155,7 @@ def quiet_rmse(family: Any, treatment: Treated, freedom: Freedom, initial: str |
     if not treatment.noises or isinstance(family, PartByPart):
         return math.inf
     try:
-        attempt = problem(family, treatment.quiet, freedom, initial)
+        attempt = problem(family, treatment.quiet, setting.freedom, setting.initial)
         cost = brief_optimum(attempt)[1]
     except (ValueError, ArithmeticError, SimulationError):
         return math.inf
@@ -195,32 +188,18 @@ def in_units_of_noise(problem: Problem, seed: int) -> Problem:
     return problem
 
 
-def decided(
-    family: Any,
-    records: Sequence[Record],
-    freedom: Freedom,
-    initial: str | Sequence[str] | None,
-    weights: Sequence[FloatArray] | None = None,
-    max_evaluations: int | None = None,
-) -> Decision:
-    """The problems of a family on these records; `initial` and `freedom` are the user's, and are kept."""
-    choice = _decided(family, records, freedom, initial, weights, max_evaluations)
-    budget = _budget(max_evaluations, records)
+def decided(family: Any, setting: Setting) -> Decision:
+    """The problems of a family in this setting; `initial` and `freedom` are the user's, and are kept."""
+    choice = _decided(family, setting)
+    budget = setting.allowing(setting.max_evaluations).budget
     return choice._replace(problems=[each.within(budget) for each in choice.problems])
 
 
-def _decided(
-    family: Any,
-    records: Sequence[Record],
-    freedom: Freedom,
-    initial: str | Sequence[str] | None,
-    weights: Sequence[FloatArray] | None,
-    max_evaluations: int | None,
-) -> Decision:
+def _decided(family: Any, setting: Setting) -> Decision:
     given: Any = family
     if not isinstance(family, Undecided):
-        every = problems(given, records, freedom, initial)
-        return Decision([each.weighted(weights) for each in every], initial, "")
+        return Decision(setting.problems(given))
+    records, freedom, initial = setting.records, setting.freedom, setting.initial
     states, is_told = [_State(initial)], False
     if initial in (None, "free"):
         plain = problem(given, records, freedom, initial)
@@ -231,16 +210,17 @@ def _decided(
     may_be_longer = _State("free") in states and len(records) == 1 and not is_told
     longest = _longer_pasts(variants[-1].family) if may_be_longer else 0
     if len(states) == len(variants) == 1 and not longest:
-        chain = problems(variants[0].family, records, freedom, states[0].initial)
-        return Decision([each.weighted(weights) for each in chain], states[0].initial, "")
+        return Decision(replace(setting, initial=states[0].initial).problems(variants[0].family))
     trials: dict[tuple[int, int], _Trial] = {}
-    brief = None if max_evaluations is None else max_evaluations / (2 * (len(states) + longest + len(variants)))
+    n_trials, brief = len(states) + longest + len(variants), None
+    if setting.max_evaluations is not None:
+        brief = setting.max_evaluations / (2 * n_trials)
 
     def trial(state: int, variant: int) -> _Trial:
         if (state, variant) not in trials:
             choice = _longer(variants[variant], states[state].longer)
-            attempt = problem(choice.family, records, freedom, states[state].initial).weighted(weights)
-            attempt = attempt.within(_budget(brief, records))
+            own = replace(setting, initial=states[state].initial).allowing(brief)
+            attempt = own.problem(choice.family)
             trials[state, variant] = _tried(attempt, states[state], choice, [*trials.values()])
         return trials[state, variant]
 
@@ -263,7 +243,7 @@ def _decided(
         state = _best([state, *likely], lambda k: trial(k, chosen).bic)
     best = trial(state, chosen)
     others = [each for key, each in trials.items() if key != (state, chosen) and each.variant.offered]
-    return Decision([_with_starts(best, trials.values())], best.state.initial, _sentence(best, others, records))
+    return Decision([_with_starts(best, trials.values())], _sentence(best, others, records))
 
 
 def _longer_pasts(family: Any) -> int:
@@ -276,11 +256,6 @@ def _longer(variant: Variant, times: int) -> Variant:
     for _ in range(times):
         variant = variant._replace(family=variant.family.longer_past())
     return variant
-
-
-def _budget(max_evaluations: float | None, records: Sequence[Record]) -> Budget | None:
-    """A budget of so many sets on the whole records."""
-    return None if max_evaluations is None else Budget(max_evaluations * sum(map(len, records)))
 
 
 def _possible(family: Undecided, records: Sequence[Record]) -> list[str]:

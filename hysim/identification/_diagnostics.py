@@ -1,15 +1,21 @@
-"""Measures of a fit, whether its residuals are white, and how uncertain the loop width is."""
+"""Measures of a fit, whether its residuals are white, how uncertain the loop width is, and cross-validation.
+
+Searches on other data, with samples left out or records drawn anew, begin at the optima of the whole record.
+"""
 
 from collections.abc import Sequence
 from typing import Any, TypedDict
 
 import numpy as np
+import numpy.typing as npt
 
 from hysim import metrics
+from hysim._cycles import TOLERANCE
 from hysim._frozen import FloatArray
 from hysim._input_noise import noise_level
 from hysim.errors import SimulationError
 from hysim.identification._descent import Descent
+from hysim.identification._noise import Gaussian, Noise
 from hysim.identification._problem import Problem
 from hysim.identification._uncertainty import output_slopes
 from hysim.metrics.rows import LoopRows
@@ -111,3 +117,98 @@ def width_stderr(problem: Problem, theta: FloatArray, of_theta: FloatArray, slop
         return float("nan")
     slope = LoopRows(record.u).max_width_slopes(output, slopes.T)
     return float(np.sqrt(np.maximum(slope @ of_theta @ slope, 0.0)))
+
+
+_AT_FOLD = 4  # a fold of the cross-validation begins from this many of the best optima
+_SAMPLES_AT_ONCE = 1_000_000  # of all sets that descend together, to bound the memory
+_TOLERANCE = 1e-9
+
+
+def folds(count: str | int, n: int, *, name: str = "folds") -> list[npt.NDArray[np.intp]]:
+    """Samples of each fold of `n`: ``"loo"`` is one at a time, an int that many blocks; else a ValueError."""
+    number = n if count == "loo" else count
+    if not isinstance(number, int) or isinstance(number, bool) or not 2 <= number <= n:
+        raise ValueError(f'{name} must be "loo" or a number of blocks from 2 to {n}, got {count!r}')
+    return np.array_split(np.arange(n), number)
+
+
+def left_out(cross_validate: str | int | None, records: Sequence[Record]) -> list[npt.NDArray[np.intp]]:
+    """Samples of each fold of records that follow each other, by `cross_validate` of `identify`; else a ValueError."""
+    if cross_validate is None:
+        return []
+    cuts = [0, *np.cumsum([len(record) for record in records]).tolist()]
+    if cross_validate == "records":
+        if len(records) < 2:
+            raise ValueError('cross_validate="records" needs at least 2 records')
+        return np.split(np.arange(cuts[-1]), cuts[1:-1])
+    if cross_validate == "cycles":
+        return _cycles(records, cuts)
+    return folds(cross_validate, cuts[-1], name="cross_validate")
+
+
+def _cycles(records: Sequence[Record], cuts: Sequence[int]) -> list[npt.NDArray[np.intp]]:
+    cycles = []
+    for record, begin in zip(records, cuts, strict=False):
+        turns = record.reversals(TOLERANCE)[1::2]
+        cycles += [begin + samples for samples in np.split(np.arange(len(record)), turns)[1:]]
+    if not cycles:
+        raise ValueError('cross_validate="cycles" needs at least 2 cycles of the input')
+    return cycles
+
+
+def left_out_errors(
+    problem: Problem, noise: Noise, optima: FloatArray, every_fold: Sequence[npt.NDArray[np.intp]]
+) -> FloatArray:
+    """Error of each sample, shape (n,), in the fit that leaves it out; nan where none does, inf where it diverged."""
+    errors_of_all = np.full(problem.y.size, np.nan)
+    if not every_fold:
+        return errors_of_all
+    starts = optima[:_AT_FOLD]
+    at_once = max(1, _SAMPLES_AT_ONCE // (len(starts) * problem.y.size))
+    groups = [every_fold[k : k + at_once] for k in range(0, len(every_fold), at_once)]
+    errors = [_left_out_errors(problem, noise, starts, group) for group in groups]
+    errors_of_all[np.concatenate(every_fold)] = np.concatenate(errors)
+    return errors_of_all
+
+
+def rms_of_known(errors: FloatArray) -> float:
+    known = errors[~np.isnan(errors)]
+    if not np.isfinite(known).all():
+        return float("inf")
+    return float(np.sqrt(np.mean(known**2))) if known.size else float("nan")
+
+
+def _left_out_errors(
+    problem: Problem, noise: Noise, starts: FloatArray, every_fold: Sequence[npt.NDArray[np.intp]]
+) -> FloatArray:
+    weights = np.ones((len(every_fold), problem.y.size))
+    for fold, samples in enumerate(every_fold):
+        weights[fold, samples] = 0.0
+    descent = Descent(problem, noise, problem.y[np.newaxis], np.repeat(weights, len(starts), axis=0))
+    reached = descent.run(np.tile(starts, (len(every_fold), 1)), tolerance=_TOLERANCE)
+    best = np.arange(len(every_fold)) * len(starts) + reached.loss.reshape(len(every_fold), -1).argmin(axis=1)
+    errors = (problem.y - problem.model(reached.theta[best]))[weights == 0.0]
+    return np.where(np.isfinite(errors), errors, np.inf)  # nan is for samples that no fold has
+
+
+def bootstrap(
+    problem: Problem, noise: Noise, theta: FloatArray, residual: FloatArray, sigma: float, *, draws: int, seed: int
+) -> FloatArray:
+    """Theta (draws, n_theta) of records drawn anew: residuals enlarged by sqrt(N / (N - d)), or other noise."""
+    rng = np.random.default_rng(seed)
+    y_model = np.broadcast_to(problem.y - residual, (draws, residual.size))
+    freedom = residual.size - len(problem.space.names)
+    if isinstance(noise, Gaussian):
+        enlarged = (residual - residual.mean()) * np.sqrt(residual.size / freedom)
+        targets = y_model + rng.choice(enlarged, (draws, residual.size))
+    else:
+        targets = noise.draw(y_model, sigma * np.sqrt(residual.size / freedom), rng)
+    at_once = max(1, _SAMPLES_AT_ONCE // problem.y.size)
+    weights = np.ones((1, residual.size))
+    descents = [
+        Descent(problem, noise, targets[k : k + at_once], weights).run(
+            np.tile(theta, (len(targets[k : k + at_once]), 1))
+        )
+        for k in range(0, draws, at_once)
+    ]
+    return np.concatenate([reached.theta[np.isfinite(reached.loss)] for reached in descents])

@@ -1,4 +1,8 @@
-"""The verb `identify`: declare, search, describe."""
+"""The verb `identify`: declare, search, describe.
+
+A family that is fitted in one step (`hysim.models.protocols.Direct`) is not searched. Its number of parameters is that
+of its degrees of freedom, rounded; it has none by name, and no standard errors.
+"""
 
 import inspect
 from collections.abc import Mapping, Sequence
@@ -8,30 +12,29 @@ from typing import Any, Protocol, runtime_checkable
 import numpy as np
 import numpy.typing as npt
 
+from hysim import metrics
 from hysim._blas import one_blas_thread
 from hysim._frozen import FloatArray, check_choice, check_count, read_only
 from hysim._parallel import at_most
 from hysim._progress import Progress, Reports, reports
 from hysim._results import model_of
-from hysim.identification import _direct as direct
 from hysim.identification._admissible import choose, danger, excursion, implausible
 from hysim.identification._assumptions import Treated, decided, in_units_of_noise, quiet_rmse, treated
-from hysim.identification._diagnostics import rate_noise_warning
+from hysim.identification._diagnostics import fit_measures, left_out, left_out_errors, rate_noise_warning, rms_of_known
 from hysim.identification._measured import as_measured, said_of_noise
-from hysim.identification._noise import Gaussian, Noise, Quantised, Robust
-from hysim.identification._problem import Problem
-from hysim.identification._resampling import left_out_errors, rms_of_known
-from hysim.identification._result import Identification
+from hysim.identification._noise import Quantised, density
+from hysim.identification._problem import Problem, Setting
+from hysim.identification._result import Identification, Width
 from hysim.identification._search import PERFECT, chosen, stages_in_words, widened
 from hysim.identification._searched import Search
-from hysim.identification.channels.starts import begun
-from hysim.identification.folds import left_out
+from hysim.identification._starts import begun, begun_by_parts
+from hysim.identification.forms import CONSTANT
 from hysim.identification.swapped import swapped_columns, swapped_for
-from hysim.identification.whole.parts import begun_by_parts
+from hysim.metrics.rows import LoopRows
 from hysim.models.dependent import Dependent, on_record
 from hysim.models.dependent_structure import DependentStructure
 from hysim.models.model import family_named
-from hysim.models.protocols import Direct, Identifiable, PartByPart, Recorded, needs_time, placed
+from hysim.models.protocols import Direct, Identifiable, Recorded, needs_time, placed
 from hysim.models.search_space import Freedom
 from hysim.records import Record, several
 
@@ -167,21 +170,20 @@ def identify(
         check_count("max_evaluations", max_evaluations)
     with at_most(workers), one_blas_thread():
         if isinstance(model_or_class, Direct) and depends is None:
-            direct.refuse(model_or_class, options, noise or "gaussian", intervals, shares)
-            fit = direct.identified(model_or_class, records, left_out(cross_validate, records), seed)
+            _refuse(model_or_class, options, noise or "gaussian", intervals, shares)
+            fit = _in_one_step(model_or_class, records, left_out(cross_validate, records), seed)
             doubts = [swapped_columns(records)]
         else:
-            family = placed(_family(model_or_class, depends), None)
+            family, ends, is_cut = placed(_family(model_or_class, depends), None), None, False
+            setting = Setting(records, options, initial, shares, max_evaluations, seed)
             if isinstance(family, DependentStructure):
-                family = begun(family.over(records), records, options, initial, max_evaluations)
-            treatment = treated(family, records, options, initial, input)
-            paths, ends, is_cut = treatment.records, None, False
+                family = begun(family.over(records), setting)
+            treatment = treated(family, setting, input)
+            along = replace(setting, records=treatment.records)
             if isinstance(family, PartByPart):
-                family, paths, ends, is_cut = begun_by_parts(
-                    family, paths, options, initial, shares, max_evaluations, seed
-                )
-                noise = noise or family.noise
-            choice = decided(family, paths, options, initial, shares, max_evaluations)
+                family, paths, ends, is_cut = begun_by_parts(family, along)
+                along, noise = replace(along, records=paths), noise or family.noise
+            choice = decided(family, along)
             if ends is not None:
                 choice = choice._replace(problems=[replace(each, ends=ends) for each in choice.problems])
             searched = [in_units_of_noise(each, seed) for each in choice.problems]
@@ -192,13 +194,13 @@ def identify(
             fit = replace(fit, message="; ".join(filter(None, (fit.message, choice.sentence))))
             if all(type(record) is Record for record in records):  # not in units of sensors, nor weighted by a verb
                 fit = as_measured(fit, records, shares, treatment)
-                fit = said_of_noise(fit, records, treatment, quiet_rmse(family, treatment, options, initial))
+                fit = said_of_noise(fit, records, treatment, quiet_rmse(family, setting, treatment))
             first, doubts = choice.problems[0], [swapped_columns(records)]
             if is_partial := is_cut or (first.budget is not None and (first.budget.cut or not fit.success)):
                 stopped = f"partial: the search stopped at max_evaluations={max_evaluations}"
                 fit = replace(fit, success=False, message=f"{stopped}, better parameters may exist; {fit.message}")
             if not any(doubts) and not is_partial and not needs_time(fit.model):
-                doubts = [swapped_for(first.family, records, options, initial, 1.0 - fit.fit_percent / 100.0)]
+                doubts = [swapped_for(first.family, setting, 1.0 - fit.fit_percent / 100.0)]
             on_their_records = [on_record(each, record) for each, record in zip(fit.models, records, strict=True)]
             off = excursion(on_their_records, records)
             doubts += [implausible(off), rate_noise_warning(on_their_records, records)]
@@ -227,18 +229,20 @@ def _searched(
         raise ValueError("every parameter is fixed: leave at least one free")
     if n_samples < n_names:
         raise ValueError(f"{n_names} parameters cannot be estimated from {n_samples} samples; fix some of them")
-    density = _density(noise, problem)
+    quanta = {part.record.resolution for part in problem.parts}
+    floor = PERFECT * (float(np.abs(problem.y).max()) or 1.0)
+    noise_model = density(noise, quanta.pop() if len(quanta) == 1 else None, floor)
     problem, squares = widened(*chosen(problems, seed=seed, progress=progress))
     if not squares:
         raise ValueError("every parameter set tried diverged: check the units, or pass bounds=")
-    if isinstance(density, Quantised):
-        density = density.at_least(squares[0].cost, n_samples - len(problem.space.names))
-    best = Search(problem, density, seed, treatment)
+    if isinstance(noise_model, Quantised):
+        noise_model = noise_model.at_least(squares[0].cost, n_samples - len(problem.space.names))
+    best = Search(problem, noise_model, seed, treatment)
     search, likely, named, remark = choose(best, best.likely(squares), admissible)
     plain = squares[0].x if search is best else likely[0].theta[: problem.n_x]
     result, likely = search.described(likely, intervals, plain)
     message = "; ".join(filter(None, (result.message, remark, stages_in_words(problems, problem.stage))))
-    errors = left_out_errors(search.problem, density, np.array([optimum.theta for optimum in likely]), folds)
+    errors = left_out_errors(search.problem, noise_model, np.array([optimum.theta for optimum in likely]), folds)
     return replace(result, message=message, regions=named, cv_residual=errors, cv_rmse=rms_of_known(errors))
 
 
@@ -301,13 +305,61 @@ def _in_words(subject: Any) -> str:
     return repr(subject)
 
 
-def _density(noise: str, problem: Problem) -> Noise:
-    floor = PERFECT * (float(np.abs(problem.y).max()) or 1.0)
-    if noise == "gaussian":
-        return Gaussian(floor)
-    if noise == "robust":
-        return Robust(floor)
-    quanta = {part.record.resolution for part in problem.parts}
-    if len(quanta) != 1 or None in quanta:
-        raise ValueError("quantised noise needs the sensor's quantum, the same for all records: Record(resolution=...)")
-    return Quantised(float(quanta.pop() or 0.0))
+def _refuse(family: Direct, freedom: Freedom, noise: str, intervals: str, weights: Sequence[FloatArray] | None) -> None:
+    name = family.__name__ if isinstance(family, type) else type(family).__name__
+    if freedom.fixed or freedom.free or freedom.bounds:
+        raise ValueError(f"{name} has no parameters by name: leave out fixed=, free= and bounds=")
+    if weights is not None:
+        raise ValueError(f"{name} is fitted without weights: leave out weights=, and cut samples off the record")
+    if noise != "gaussian":
+        raise ValueError(f'{name} is fitted by least squares: noise must be "gaussian", got {noise!r}')
+    if intervals != "linear":
+        raise ValueError(f'{name} has no parameters by name: intervals must be "linear", got {intervals!r}')
+
+
+def _in_one_step(
+    family: Direct, records: Sequence[Record], folds: Sequence[npt.NDArray[np.intp]], seed: int
+) -> Identification:
+    u = np.concatenate([record.u for record in records])
+    y = np.concatenate([record.y for record in records])
+    fit = family.fitted(u, y)
+    residual, n_parameters = y - fit.model.response(u), max(1, round(fit.degrees_of_freedom))
+    measures = fit_measures(y, residual, n_parameters)
+    freedom = y.size - fit.degrees_of_freedom
+    sigma = float(np.sqrt(np.sum(residual**2) / freedom)) if freedom > 0.5 else float("nan")
+    errors = _left_out_errors(family, u, y, folds)
+    return Identification(
+        model=fit.model,
+        models=(fit.model,) * len(records),
+        n_parameters=n_parameters,
+        **measures,
+        sigma=measures["rmse"],
+        log_likelihood=-0.5 * metrics.aic(residual, 0) - 0.5 * y.size,
+        residual=residual,
+        resolution=records[0].resolution,
+        response_stderr=sigma * fit.spread,
+        loop_width=_no_width(records[0]),
+        success=True,
+        message="fitted in one step",
+        cv_residual=errors,
+        cv_rmse=rms_of_known(errors),
+        seed=seed,
+        warnings=() if np.ptp(y) else (CONSTANT,),
+    )
+
+
+def _left_out_errors(family: Direct, u: FloatArray, y: FloatArray, folds: Sequence[npt.NDArray[np.intp]]) -> FloatArray:
+    errors = np.full(y.size, np.nan)
+    for fold in folds:
+        training = np.ones(y.size, dtype=bool)
+        training[fold] = False
+        errors[fold] = y[fold] - family.fitted(u[training], y[training]).model.response(u[fold])
+    return errors
+
+
+def _no_width(record: Record) -> Width | None:
+    try:
+        LoopRows(record.u)
+    except ValueError:  # there is no complete cycle
+        return None
+    return Width(value=0.0, lower=0.0, upper=0.0)

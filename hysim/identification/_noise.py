@@ -6,19 +6,30 @@
 
 Constants are left out of the first and the last. `scale` is the most likely sigma (n_sets, 1) for residuals
 (n_sets, n_samples), so that only the model's parameters are searched. `terms` are, for each sample, -ln p and its slope
-and non-negative curvature in m: a descent is a sequence of weighted regressions. `draw` makes measured outputs.
+and non-negative curvature in m: a descent is a sequence of weighted regressions. `draw` makes measured outputs, and
+`spread` is the standard deviation of normal noise that says about as much on the output.
+
+`log_likelihood` (n_sets,) of residuals and scales (n_sets,) has the constants, and is summed over the samples:
+
+    gaussian    -r^2 / (2 sigma^2) - ln sigma - ln(2 pi) / 2
+    quantised   ln [Phi((r + q/2) / sigma) - Phi((r - q/2) / sigma)],   the probability of the rounded value
+    robust      Student's t with 4 degrees of freedom: -(5/2) ln(1 + r^2 / (4 sigma^2)) - ln sigma + ln(3/8)
 """
 
+import math
 from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
 
-from hysim._frozen import FloatArray
+from hysim._frozen import FloatArray, check_choice
 
 _FREEDOM = 4.0  # of Student's t: a compromise between efficiency on normal noise and indifference to outliers
 _FINEST = 0.1  # smallest sigma of rounded data, in quanta: with less noise intervals are on the safe side
-_LOG_ROOT_2PI = 0.5 * np.log(2.0 * np.pi)
+_LOG_ROOT_2PI = 0.5 * math.log(2.0 * math.pi)
+_LOG_T = math.lgamma(0.5 * (_FREEDOM + 1.0)) - math.lgamma(0.5 * _FREEDOM) - 0.5 * math.log(_FREEDOM * math.pi)
+_TINY = 1e-16  # least relative width of an interval, whose logarithm is then finite
+Scale = float | FloatArray
 
 
 class Terms(NamedTuple):
@@ -43,8 +54,15 @@ class Gaussian:
         normal = residual / sigma
         return Terms(0.5 * normal**2 + np.log(sigma), -normal / sigma, np.broadcast_to(sigma**-2.0, residual.shape))
 
-    def draw(self, y: FloatArray, sigma: float, rng: np.random.Generator) -> FloatArray:
-        return y + sigma * rng.standard_normal(y.shape)
+    def log_likelihood(self, residual: FloatArray, sigma: FloatArray) -> FloatArray:
+        squares = np.einsum("sk,sk->s", residual, residual)
+        return np.asarray(-0.5 * squares / sigma**2 - residual.shape[1] * (np.log(sigma) + _LOG_ROOT_2PI))
+
+    def spread(self, sigma: FloatArray) -> FloatArray:
+        return sigma
+
+    def draw(self, y: FloatArray, sigma: Scale, rng: np.random.Generator) -> FloatArray:
+        return np.asarray(y + _by_set(sigma) * rng.standard_normal(y.shape))
 
 
 @dataclass(frozen=True)
@@ -69,8 +87,16 @@ class Robust:
         loss = 0.5 * (_FREEDOM + 1.0) * np.log1p(square / _FREEDOM) + np.log(sigma)
         return Terms(loss, -trust * residual, trust)
 
-    def draw(self, y: FloatArray, sigma: float, rng: np.random.Generator) -> FloatArray:
-        return y + sigma * rng.standard_t(_FREEDOM, y.shape)
+    def log_likelihood(self, residual: FloatArray, sigma: FloatArray) -> FloatArray:
+        square = (residual / sigma[:, np.newaxis]) ** 2
+        terms = 0.5 * (_FREEDOM + 1.0) * np.log1p(square / _FREEDOM).sum(axis=1)
+        return np.asarray(residual.shape[1] * (_LOG_T - np.log(sigma)) - terms)
+
+    def spread(self, sigma: FloatArray) -> FloatArray:
+        return math.sqrt((_FREEDOM + 3.0) / (_FREEDOM + 1.0)) * sigma  # from the information on the location
+
+    def draw(self, y: FloatArray, sigma: Scale, rng: np.random.Generator) -> FloatArray:
+        return np.asarray(y + _by_set(sigma) * rng.standard_t(_FREEDOM, y.shape))
 
 
 @dataclass(frozen=True)
@@ -106,8 +132,20 @@ class Quantised:
         curvature = slope**2 + (far * far_share - near * near_share) / sigma**2
         return Terms(-log_p, np.sign(residual) * -slope, np.maximum(curvature, 0.0))
 
-    def draw(self, y: FloatArray, sigma: float, rng: np.random.Generator) -> FloatArray:
-        return self.quantum * np.round((y + sigma * rng.standard_normal(y.shape)) / self.quantum)
+    def log_likelihood(self, residual: FloatArray, sigma: FloatArray) -> FloatArray:
+        from scipy.special import log_ndtr
+
+        size, scale, half = np.abs(residual), sigma[:, np.newaxis], 0.5 * self.quantum
+        above_near, above_far = log_ndtr((half - size) / scale), log_ndtr((-half - size) / scale)
+        share = np.log1p(-np.exp(np.minimum(above_far - above_near, -_TINY)))
+        return np.asarray((above_near + share).sum(axis=1))
+
+    def spread(self, sigma: FloatArray) -> FloatArray:
+        return np.sqrt(sigma**2 + self.quantum**2 / 12.0)
+
+    def draw(self, y: FloatArray, sigma: Scale, rng: np.random.Generator) -> FloatArray:
+        drawn = y + _by_set(sigma) * rng.standard_normal(y.shape)
+        return np.asarray(self.quantum * np.round(drawn / self.quantum))
 
     def _scale_slope(self, residual: FloatArray, sigma: FloatArray) -> FloatArray:
         near, far, _, near_share, far_share = self._interval(residual, sigma)
@@ -128,6 +166,23 @@ class Quantised:
 
 
 Noise = Gaussian | Robust | Quantised
+
+
+def density(noise: str, quantum: float | None = None, floor: float = 0.0) -> Noise:
+    """The noise of this name; a ValueError if it is unknown, or quantised noise has no `quantum`."""
+    check_choice("noise", noise, ("gaussian", "quantised", "robust"))
+    if noise == "gaussian":
+        return Gaussian(floor)
+    if noise == "robust":
+        return Robust(floor)
+    if quantum is None:
+        raise ValueError("quantised noise needs the sensor's quantum, the same for all records: Record(resolution=...)")
+    return Quantised(float(quantum))
+
+
+def _by_set(sigma: Scale) -> FloatArray:
+    """The scale of each set, for all its samples."""
+    return np.asarray(sigma)[..., np.newaxis]
 
 
 def _rms(residual: FloatArray, weights: FloatArray) -> FloatArray:

@@ -6,10 +6,10 @@ The family's coordinates x are searched in a box. The output is affine in the li
 
 so that the norm of r(x) = y - e(x) - C(x) b(x) is minimised over x alone (Golub and Pereyra 1973). Records share all
 parameters but the state at the first sample, which each has as ``z0[0]``, ``z0[1]``, ... Everything is evaluated for
-many x at once.
+many x at once. A `Budget` limits the number of parameter sets that a search may simulate.
 """
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Container, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
@@ -21,12 +21,38 @@ from hysim._channels import taken
 from hysim._frozen import FloatArray
 from hysim._names import meant
 from hysim._repeats import repeated_cycle
-from hysim.identification._budget import Budget
-from hysim.identification._regression import Settled, least_squares, triangle
+from hysim.identification.marquardt import Settled, least_squares, triangle
 from hysim.models.protocols import Forgetting, Identifiable, Staged, placed
 from hysim.models.search_space import STATES, STATES_IN_WORDS, Freedom, Parameters, SearchSpace
 from hysim.models.stages import BASE, Stage
 from hysim.records import Record
+
+_LEAST = 64  # sets that are always compared
+_SHARE = 0.5  # of what remains, for one stage of the search
+
+
+@dataclass
+class Budget:
+    """So many samples may be simulated; `spent` of them have been, and `cut` says whether a stage was shortened."""
+
+    samples: float
+    spent: float = 0.0
+    cut: bool = False
+
+    def take(self, n_sets: int, n_samples: int) -> None:
+        """Count sets that are simulated."""
+        self.spent += float(n_sets) * n_samples
+
+    def sets(self, wanted: int, n_samples: int) -> int:
+        """As many of the `wanted` sets as a stage may simulate."""
+        allowed = max(_LEAST, int(_SHARE * (self.samples - self.spent) / n_samples))
+        self.cut = self.cut or allowed < wanted
+        return min(wanted, allowed)
+
+    def steps(self, wanted: int, sets_a_step: int, n_samples: int) -> int:
+        """As many of the `wanted` steps of a descent as a stage may take."""
+        return min(wanted, max(0, int(_SHARE * (self.samples - self.spent) / (sets_a_step * n_samples))))
+
 
 # Samples that are evaluated at once: some megabytes of arrays. Of many more, a C library may return the memory to the
 # system after each evaluation, and a new page costs as much as the work in it.
@@ -37,6 +63,9 @@ _MOST_OF_SPAN = 0.8
 _TURN = 0.01  # of the span: smaller reversals are noise, or change little
 _CLOSE = 1e-8  # accuracy of a close law, at worst
 _DIFFERENCE = 1e-6  # step of a central difference in units of the box: truncation and rounding both ~1e-10
+
+
+Initial = str | Sequence[str] | None
 
 
 @dataclass(frozen=True)
@@ -381,9 +410,7 @@ def _at(part: Part, chosen: npt.NDArray[np.intp]) -> Part:
     return replace(part, record=short, weights=None if part.weights is None else part.weights[chosen])
 
 
-def problem(
-    family: Identifiable, records: Sequence[Record], freedom: Freedom, initial: str | Sequence[str] | None
-) -> Problem:
+def problem(family: Identifiable, records: Sequence[Record], freedom: Freedom, initial: Initial) -> Problem:
     """Put the records of one family together; a ValueError says why `initial` or `freedom` does not fit.
 
     The memory of a law that stands somewhere is that at the first sample of each record.
@@ -397,9 +424,7 @@ def problem(
     return replace(alone, simpler=simpler, enlarged=simple.enlarged)
 
 
-def problems(
-    family: Identifiable, records: Sequence[Record], freedom: Freedom, initial: str | Sequence[str] | None
-) -> list[Problem]:
+def problems(family: Identifiable, records: Sequence[Record], freedom: Freedom, initial: Initial) -> list[Problem]:
     """The problems of a search in stages, the simplest first, among which a criterion may choose; else one problem."""
     stages = [each for each in family.stages if each.is_open(freedom)] if isinstance(family, Staged) else []
     if not isinstance(family, Staged) or not stages:
@@ -413,6 +438,58 @@ def problems(
     return chain[first:]
 
 
+@dataclass(frozen=True)
+class Setting:
+    """Records, and the choices of the user for a search on them; `budget` is that of the problems made here."""
+
+    records: Sequence[Record]
+    freedom: Freedom
+    initial: Initial = None
+    weights: Sequence[FloatArray] | None = None
+    max_evaluations: float | None = None
+    seed: int = 0
+    budget: Budget | None = None
+
+    def problem(self, family: Any) -> Problem:
+        attempt = problem(family, self.records, self.freedom, self.initial)
+        return attempt.weighted(self.weights).within(self.budget)
+
+    def problems(self, family: Any) -> list[Problem]:
+        every = problems(family, self.records, self.freedom, self.initial)
+        return [each.weighted(self.weights) for each in every]
+
+    def allowing(self, evaluations: float | None) -> "Setting":
+        """With a budget of so many parameter sets on the whole records."""
+        budget = None if evaluations is None else Budget(evaluations * sum(map(len, self.records)))
+        return replace(self, budget=budget)
+
+    def only(self, places: Sequence[int]) -> "Setting":
+        """On some of the records; weights that leave all samples of these out are dropped."""
+        initial, weights = self.initial, self.weights and [self.weights[k] for k in places]
+        if initial is not None and not isinstance(initial, str):
+            initial = [initial[k] for k in places] if len(places) > 1 else initial[places[0]]
+        if weights is not None and not any(each.any() for each in weights):
+            weights = None
+        return replace(self, records=[self.records[k] for k in places], initial=initial, weights=weights)
+
+    def about(self, names: Container[str]) -> "Setting":
+        """With the part of the user's freedom that is about these parameters."""
+        fixed, free, bounds = self.freedom.fixed, self.freedom.free, self.freedom.bounds
+        freedom = replace(
+            self.freedom,
+            fixed={name: value for name, value in fixed.items() if name in names},
+            free=tuple(name for name in free if name in names),
+            bounds={name: pair for name, pair in bounds.items() if name in names},
+        )
+        return replace(self, freedom=freedom)
+
+    def beside(self, values: Mapping[str, float]) -> "Setting":
+        """With further parameters that are fixed, unless the user has fixed them."""
+        known = {name: value for name, value in values.items() if name not in self.freedom.fixed}
+        others = self.about({*self.freedom.free, *self.freedom.bounds} - known.keys()).freedom
+        return replace(self, freedom=replace(others, fixed={**self.freedom.fixed, **known}))
+
+
 def _at_stage(stages: Sequence[Stage], k: int, freedom: Freedom, values: Mapping[str, float]) -> Freedom:
     for stage in stages[:k]:
         freedom = stage.opened(freedom, values)
@@ -421,9 +498,7 @@ def _at_stage(stages: Sequence[Stage], k: int, freedom: Freedom, values: Mapping
     return freedom
 
 
-def _alone(
-    family: Identifiable, records: Sequence[Record], freedom: Freedom, initial: str | Sequence[str] | None
-) -> Problem:
+def _alone(family: Identifiable, records: Sequence[Record], freedom: Freedom, initial: Initial) -> Problem:
     kinds = _kinds(initial, len(records))
     shared = None if kinds[0] is None else "free" if "free" in kinds else "rest"
     widest = max(records, key=lambda record: (float(np.ptp(record.u)), len(record)))  # it scales the box
@@ -444,7 +519,7 @@ def _before(record: Record, kind: str | None) -> Record | None:
     return record[: repeated_cycle(record.u)] if kind == "periodic" else None
 
 
-def _kinds(initial: str | Sequence[str] | None, n: int) -> list[str | None]:
+def _kinds(initial: Initial, n: int) -> list[str | None]:
     kinds: list[Any] = list(initial) if isinstance(initial, (list, tuple)) else [initial] * n
     if len(kinds) != n:
         raise ValueError(f"initial must be one word, or one for each of the {n} records, got {initial!r}")

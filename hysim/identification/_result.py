@@ -9,7 +9,7 @@ import numpy as np
 from hysim._frozen import FloatArray, frozen
 from hysim._printing import bic_in_words, folded, printed, summary_text, wrapped
 from hysim.identification._profile import Profile
-from hysim.identification.json_forms import Stored
+from hysim.identification.forms import Stored
 from hysim.interop import frame
 from hysim.models.cascade import Cascade
 

@@ -22,39 +22,40 @@ from hysim.metrics.criteria import information
 from hysim.models.search_space import SearchSpace
 from hysim.models.stages import Stage
 
-N_SCREENED = 4096
-N_DESCENDING = 64
-N_DESCENDING_BESIDE = 32  # on a record that is not short, where the optima of a simpler family are starts
-N_STEPS = 40
-N_POLISHED = 8
-N_POLISHING = 200
-N_POLISHING_ALONE = 1000  # of the best optimum, where it is not at rest
-N_NESTED = 3  # optima of a simpler family that are starts
-N_STAGED = 3  # points of a stage that are polished
-N_POLISHED_WHOLE = 3  # optima of a thinned record that descend on all samples
-N_BRIEF_SCREENED = 512
-N_BRIEF_DESCENDING = 12
-N_BRIEF_WHOLE = 4  # steps on all samples
-_LONG = 512  # samples beyond which fewer points are tried: each costs more, and longer records have fewer optima
-_SHORT = 250  # samples of a thinned record beside its reversals
-_FIRST = 1000  # samples of the beginning of a record that turns at most of its samples
-_APART = 0.05  # distance of two starts, in units of the box, under which the better one stands for both
-_SAME = 0.01  # likewise of two points after the descent
-_GAIN = 1e-5  # share of the sum of squares: a descent that gains less rests
-_TOLERANCE = 2e-8  # likewise of a polish
-_HOPELESS = 3.0  # times the least sum of squares on a thinned record
-_BRIEF = 25  # steps on a thinned record
-_PASS = 60  # steps of a pass, in which the slopes of a law are those of the rough one, amended
-_PASSES_OF_ALL = 2
-_PASSES = 3  # of the best alone
-_LAST = 25  # steps with exact slopes
-_PASSED = 1e-6  # share of the sum of squares: a step that gains less ends a pass, a pass the polish
-_RIVAL = 20.0  # log-likelihood below the best optimum's, from which on an optimum is not within the noise
-_WIDENINGS = 4  # of a box, each by a quarter of its width: in all to 2.4 times it
-_ROUGH = 0.1  # share of the cost by which the rough law's may differ: beyond, it does not say what stays
+# Where "by hand" stands beside a number, it was chosen by hand, and no other reason is known.
+N_SCREENED = 4096  # by hand; a power of 2, for which a Sobol sequence is balanced
+N_DESCENDING = 64  # by hand
+N_DESCENDING_BESIDE = 32  # half, where the optima of a simpler family are starts and a record that is not short is dear
+N_STEPS = 40  # by hand: of a descent that only ranks, and is then polished
+N_POLISHED = 8  # by hand
+N_POLISHING = 200  # by hand: most polishes rest long before
+N_POLISHING_ALONE = 1000  # by hand: of the best optimum in a narrow bent valley, where it is not at rest
+N_NESTED = 3  # by hand: optima of a simpler family that are starts
+N_STAGED = 3  # by hand: points of a stage that are polished
+N_POLISHED_WHOLE = 3  # by hand: optima of a thinned record that descend on all samples, of which each is dear
+N_BRIEF_SCREENED = 512  # by hand: an eighth of a full search
+N_BRIEF_DESCENDING = 12  # by hand: about a fifth of a full search
+N_BRIEF_WHOLE = 4  # by hand: steps on all samples
+_LONG = 512  # by hand: samples beyond which fewer points are tried; each costs more, and there are fewer optima
+_SHORT = 250  # by hand: samples of a thinned record beside its reversals; less than half of `_LONG`, so that it pays
+_FIRST = 1000  # by hand: samples of the beginning of a record that turns at most of its samples
+_APART = 0.05  # by hand: distance of two starts in units of the box, under which the better one stands for both
+_SAME = 0.01  # by hand: likewise of two points after the descent, which are nearer to their optimum
+_GAIN = 1e-5  # by hand: share of the sum of squares; a descent that gains less rests, and ranks are known
+_TOLERANCE = 2e-8  # likewise of a polish: far less than a likelihood can tell on records of some 1e5 samples
+_HOPELESS = 3.0  # by hand: times the least sum of squares on a thinned record, beyond which an optimum is no rival
+_BRIEF = 25  # by hand: steps on a thinned record
+_PASS = 60  # by hand: steps of a pass, in which the slopes of a law are those of the rough one, amended
+_PASSES_OF_ALL = 2  # by hand
+_PASSES = 3  # by hand: of the best alone
+_LAST = 25  # by hand: steps with exact slopes, which end what the amended ones have left
+_PASSED = 1e-6  # by hand: share of the sum of squares; a step that gains less ends a pass, a pass the polish
+_RIVAL = 20.0  # log-likelihood below the best optimum's: far outside the region at 95 % of a dozen parameters, 10.5
+_WIDENINGS = 4  # by hand: of a box, each by a quarter of its width, in all to 2.4 times it
+_ROUGH = 0.1  # by hand: share of the cost by which the rough law's may differ; beyond, it does not say what stays
 BRIEFLY, NEARLY, FULLY = range(3)  # as far as optima of a law with a rough one are polished
-_FAR_FROM_CLOSE = 100.0  # times the accuracy of a close law: a residual of this size is fitted as well by it
-PERFECT = 1e-14  # smallest sigma, in units of the output's size
+_FAR_FROM_CLOSE = 100.0  # by hand: times the accuracy of a close law; a residual of this size is fitted as well by it
+PERFECT = 1e-14  # smallest sigma, in units of the output's size: about the rounding of a sum of some products
 
 
 class Optimum(NamedTuple):

@@ -10,15 +10,14 @@ from hysim import metrics
 from hysim._frozen import FloatArray
 from hysim.identification._assumptions import Treated
 from hysim.identification._descent import Descent
-from hysim.identification._diagnostics import fit_measures, loop_widths, width_stderr
+from hysim.identification._diagnostics import bootstrap, fit_measures, loop_widths, width_stderr
 from hysim.identification._noise import Gaussian, Noise, Quantised
 from hysim.identification._problem import Problem
 from hysim.identification._profile import Profile, profiles, threshold
-from hysim.identification._resampling import bootstrap
 from hysim.identification._result import Candidate, Identification, Width
 from hysim.identification._search import PERFECT, Optimum, polish
 from hysim.identification._uncertainty import Uncertainty, uncertainty
-from hysim.identification.sentences import sentences
+from hysim.identification.forms import sentences
 from hysim.records import Record
 
 LEVEL = 0.95

@@ -13,12 +13,7 @@ from hysim.identification.sharing import sharing
 from hysim.interop import frame
 from hysim.records import Record
 
-CRITERIA: dict[str, Callable[[Identification], float]] = {
-    "bic": lambda fit: fit.bic,
-    "aic": lambda fit: fit.aic,
-    "fpe": lambda fit: fit.fpe,
-    "cv_rmse": lambda fit: fit.cv_rmse,
-}
+CRITERIA = ("bic", "aic", "fpe", "cv_rmse")
 
 
 @printed
@@ -52,14 +47,13 @@ class Selection:
 
     def to_text(self) -> str:
         """The table for a terminal, the best first."""
-        criterion = CRITERIA[self.criterion]
         rows = [
             [
                 name if fit.success else f"{name} ({'UNSAFE' if fit.unsafe else 'partial'})",
                 str(fit.n_parameters),
                 "-" if math.isnan(fit.fit_percent) else f"{fit.fit_percent:.2f}",
                 f"{fit.rmse:.4g}",
-                f"{criterion(fit):.6g}",
+                f"{vars(fit)[self.criterion]:.6g}",
             ]
             for name, fit in self.fits.items()
         ]
@@ -152,7 +146,7 @@ def select(
             report(len(fits), len(named))
 
     def score(name: str) -> float:
-        value = CRITERIA[criterion](fits[name])
+        value = float(vars(fits[name])[criterion])
         return math.inf if math.isnan(value) else value
 
     ranked = sorted(fits, key=score)

@@ -22,19 +22,14 @@ from hysim.identification._problem import Problem
 T = TypeVar("T")
 
 
-class _Known:
-    def __init__(self) -> None:
-        self.lock = threading.Lock()
-        self.results: dict[Hashable, Future[Any]] = {}
-
-
-_known: ContextVar[_Known | None] = ContextVar("searches that are known", default=None)
+_known: ContextVar[dict[Hashable, Future[Any]] | None] = ContextVar("searches that are known", default=None)
+_lock = threading.Lock()
 
 
 @contextmanager
 def sharing() -> Iterator[None]:
     """Within the block `once` searches a problem once, in threads that `map_on_threads` begins there too."""
-    token = _known.set(_Known())
+    token = _known.set({})
     try:
         yield
     finally:
@@ -47,11 +42,13 @@ def once(problem: Problem, seed: int, search: Callable[[], T]) -> T:
     if known is None or problem.budget is not None or problem.ends is not None or problem.stage is not None:
         return search()
     key = (problem.family, _contents(problem), seed)
-    if not _can_be_a_key(key):
+    try:
+        hash(key)
+    except TypeError:  # a family of the user's, with a list among its fields
         return search()
-    with known.lock:
-        is_first = key not in known.results
-        result = known.results.setdefault(key, Future())
+    with _lock:
+        is_first = key not in known
+        result = known.setdefault(key, Future())
     if is_first:
         try:
             result.set_result(search())
@@ -60,14 +57,6 @@ def once(problem: Problem, seed: int, search: Callable[[], T]) -> T:
             raise
     shared: T = awaited(result)
     return shared
-
-
-def _can_be_a_key(key: Hashable) -> bool:
-    try:
-        hash(key)
-    except TypeError:  # a family of the user's, with a list among its fields
-        return False
-    return True
 
 
 def _contents(problem: Problem) -> Hashable:

@@ -16,11 +16,10 @@ import numpy as np
 from hysim import metrics
 from hysim._frozen import FloatArray
 from hysim.errors import SimulationError
-from hysim.identification._problem import problems
+from hysim.identification._problem import Setting, problems
 from hysim.identification._search import brief_cost
-from hysim.identification.sentences import SWAPPED
+from hysim.identification.forms import SWAPPED
 from hysim.models.protocols import Identifiable
-from hysim.models.search_space import Freedom
 from hysim.records import Record
 
 _FEWEST = 20  # samples in which a waveform can be recognised
@@ -60,19 +59,17 @@ def _is_generated(signal: FloatArray) -> bool:
     return bool(np.std(rest) <= _SMOOTH * np.std(bends) > 0.0)
 
 
-def swapped_for(
-    family: Identifiable, records: Sequence[Record], freedom: Freedom, initial: str | Sequence[str] | None, error: float
-) -> str:
+def swapped_for(family: Identifiable, setting: Setting, error: float) -> str:
     """A sentence where the family fits the first record better from y to u; else the empty text.
 
     `error` is the rms of the forward residual over the standard deviation of the output.
     """
-    record = records[0]
-    if len(records) > 1 or not error > _PERFECT or not _is_clockwise(record):
+    record = setting.records[0]
+    if len(setting.records) > 1 or not error > _PERFECT or not _is_clockwise(record):
         return ""
     reverse = replace(record, u=record.y, y=record.u, resolution=None, units={})[:: -(-len(record) // _MOST_SAMPLES)]
     try:
-        reversed_problem = problems(family, [reverse], freedom, initial)[0]
+        reversed_problem = problems(family, [reverse], setting.freedom, setting.initial)[0]
         if len(reversed_problem.space.names) >= len(reverse):
             return ""
         cost = brief_cost(reversed_problem)

@@ -13,17 +13,14 @@ Nothing here changes matplotlib's settings outside its own calls.
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from hysim.plot._channels import parameter
 from hysim.plot._comparisons import comparison, identification, loops, residuals, widths
 from hysim.plot._files import FORMATS, save_svg, to_bytes, to_svg
 from hysim.plot._loops import animate, cycles, minor_loops, width
-from hysim.plot._maps import forc, residual_map
-from hysim.plot._outcomes import describing_function, displacement, selection, trade_off
+from hysim.plot._outcomes import describing_function, displacement, parameter, selection, track, trade_off
 from hysim.plot._posterior import corner, evidence, prediction
 from hysim.plot._records import element_loops, history, loop, response, signals, traces
 from hysim.plot._style import DIVERGING, SEQUENTIAL, figure, house_style, panels
-from hysim.plot._sweeps import heat_map, parallel_coordinates, quantile_bands, sensitivities
-from hysim.plot._tracks import track
+from hysim.plot._sweeps import forc, heat_map, parallel_coordinates, quantile_bands, residual_map, sensitivities
 
 __all__ = [
     "DIVERGING",

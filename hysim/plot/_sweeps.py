@@ -1,11 +1,23 @@
-"""Pictures of studies: sensitivities, maps over a grid, bands of quantiles, and one line for each task."""
+"""Pictures of studies, and maps of residuals over inputs and cycles and of relays over their thresholds."""
+
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any, Literal
 
 import numpy as np
 from matplotlib import colormaps
 from matplotlib.axes import Axes
+from matplotlib.cm import ScalarMappable
+from matplotlib.colors import Normalize
+from matplotlib.patches import Polygon
+from matplotlib.ticker import MaxNLocator
 
+from hysim._cycles import TOLERANCE, turns
 from hysim._frozen import FloatArray
-from hysim.plot._style import MEASURED, POINTS, line, one
+from hysim._prefixes import in_unit, label
+from hysim.laws.operators.preisach import Preisach, PreisachRelays
+from hysim.plot._style import DIVERGING, GUIDE, MEASURED, POINTS, AxesArray, line, one, several
+from hysim.records import Record
+from hysim.simulation import Simulation, free_run
 from hysim.sweeps import SobolIndices, Sweep
 
 _BANDS = ((0.05, 0.95), (0.25, 0.75))
@@ -139,3 +151,169 @@ def _scaled(values: FloatArray) -> FloatArray:
 
 def _short(value: object) -> str:
     return f"{value:.3g}" if isinstance(value, float) else str(value)
+
+
+_MOST_BINS = 40
+_SEAMLESS: dict[str, Any] = {"edgecolors": "face", "linewidth": 0.7, "antialiased": True}
+_Place = Callable[[FloatArray, FloatArray], tuple[FloatArray, FloatArray]]
+_COORDINATES: dict[str, tuple[_Place, tuple[str, str]]] = {
+    "thresholds": (lambda a, b: (b, a), ("Lower threshold b", "Upper threshold a")),
+    "centre": (lambda a, b: (0.5 * (a - b), 0.5 * (a + b)), ("Half the distance (a - b)/2", "Middle (a + b)/2")),
+}
+_FEWEST_CURVES = 3  # below it the map has no shape
+
+
+def residual_map(
+    record: Record,
+    model: Any,
+    axes: Sequence[Axes] | AxesArray | None = None,
+    *,
+    bins: int | None = None,
+    tolerance: float = TOLERANCE,
+    quanta: str = "quanta",
+) -> AxesArray:
+    """Draw the residual, measured minus model, over the input and the cycles, loading beside unloading.
+
+    A change from left to right is an error of the loop's shape, a change of sign between the panels one of its width,
+    and a change from bottom to top is drift. A cell is the mean over the samples of one branch in one interval of the
+    input; grey is zero, lighter is more, darker is less, and white has no samples.
+
+    `model` is a model, a result of a fit, or a Simulation of the record's input. `bins` is the number of intervals, by
+    default half as many as a branch has samples, at most 40. Reversals up to the fraction `tolerance` of the input's
+    span do not end a branch. `quanta` is the name of the sensor's quanta, in which residuals are counted if the record
+    has a resolution. The result has shape (2,).
+
+    Raises
+    ------
+    ValueError
+        If the simulation and the record differ in length, the input is constant, or `bins` is below 1.
+
+    Examples
+    --------
+    >>> import hysim as hs
+    >>> u = hs.signals.triangle(0.0, 1.0, cycles=3, samples_per_cycle=40)
+    >>> law = hs.BoucWen(beta=2.0)
+    >>> axes = hs.plot.figure().subplots(1, 2)
+    >>> [ax.get_title(loc="left") for ax in hs.plot.residual_map(hs.Record(u=u, y=law.response(u)), law, axes)]
+    ['loading', 'unloading']
+    """
+    if bins is not None and bins < 1:
+        raise ValueError(f"bins must be at least 1, got {bins}")
+    quantum, unit = (record.resolution, quanta) if record.resolution else (1.0, record.units.get("y", ""))
+    y = model.y if isinstance(model, Simulation) else free_run(model, record).y
+    if y.shape != record.y.shape:
+        raise ValueError(f"the model's output must be as long as the record, {len(record)} samples, got {y.size}")
+    edges, tables = _mean_residuals(record, (record.y - y) / quantum, bins, tolerance)
+    reach = max(float(np.nanmax(np.abs(table))) for table in tables if table.size) or 1.0
+    scale: dict[str, Any] = {"cmap": DIVERGING, "norm": Normalize(-reach, reach)}
+    with several(axes, 2, height=3.4, columns=2, sharey=True) as panels:
+        for ax, table, name in zip(panels, tables, ("loading", "unloading"), strict=True):
+            ax.grid(visible=False)
+            ax.pcolormesh(edges, np.arange(len(table) + 1) + 0.5, table, **scale, **_SEAMLESS)
+            ax.set_title(name, loc="left")
+            ax.set_xlabel(label(record.units, "u"))
+            ax.yaxis.set_major_locator(MaxNLocator(integer=True, min_n_ticks=1))
+        panels[0].set_ylabel("Cycle")
+        panels[0].figure.colorbar(ScalarMappable(**scale), ax=list(panels), label=in_unit("Residual", unit))
+    return panels
+
+
+def forc(
+    source: PreisachRelays | Preisach | Record,
+    ax: Axes | None = None,
+    *,
+    coordinates: Literal["thresholds", "centre"] = "thresholds",
+    units: Mapping[str, str] | None = None,
+    tolerance: float = TOLERANCE,
+) -> Axes:
+    """Draw the density of relays over their thresholds: the diagram of first-order reversal curves.
+
+    The density is the weight of the relays in a cell over its area; from reversal curves, half the mixed second
+    difference of the output, as `hysim.Preisach.from_reversal_curves` computes it on the turning points, without
+    smoothing; a picture finer than the curves is that of ``hysim.Preisach.smoothed(record)``. Grey is zero, lighter is
+    more, darker is less. The cells along the diagonal, of relays that switch up and down at one input, are
+    triangles.
+
+    `source` is a Preisach, a PreisachRelays, or a Record of curves such as `hysim.signals.reversal_curves`, whose
+    reversals up to the fraction `tolerance` of its span are ignored. `coordinates` are ``"thresholds"``, the upper one
+    a over the lower one b; or ``"centre"``, the middle (a + b) / 2, known as bias or interaction field, over half the
+    distance (a - b) / 2, known as coercivity. `units` are labels of the units of ``"u"`` and ``"y"``.
+
+    Raises
+    ------
+    ValueError
+        If the law has no relays, the record does not consist of reversal curves, or `coordinates` is another word.
+
+    Examples
+    --------
+    >>> import numpy as np, hysim as hs
+    >>> law = hs.Preisach.from_density(np.linspace(-1.0, 1.0, 21), lambda a, b: np.exp(b - a))
+    >>> hs.plot.forc(law, hs.plot.figure().add_subplot()).get_xlabel()
+    'Lower threshold b'
+    """
+    if coordinates not in _COORDINATES:
+        raise ValueError(f'coordinates must be "thresholds" or "centre", got {coordinates!r}')
+    if isinstance(source, Record):
+        turning_points = [branch.u[0] for branch in source.branches(tolerance) if branch.u[-1] < branch.u[0]]
+        levels = np.unique([source.u.min(), *turning_points])
+        if levels.size <= _FEWEST_CURVES:
+            raise ValueError(
+                f"a density needs at least {_FEWEST_CURVES} reversal curves from different levels, the record has "
+                f"{levels.size - 1}: measure along hysim.signals.reversal_curves"
+            )
+        law: PreisachRelays | Preisach = Preisach.from_reversal_curves(source, levels=levels, tolerance=tolerance)
+        labels = source.units if units is None else units
+    else:
+        law, labels = source, units or {}
+    if not law.levels:
+        raise ValueError("the law has no relays: give it levels and weights, or a record of reversal curves")
+    levels = np.array(law.levels)
+    density = _density(levels, np.array(law.weights))
+    reach = float(np.nanmax(np.abs(density))) or 1.0
+    place, names = _COORDINATES[coordinates]
+    with one(ax, height=4.8) as axes:
+        axes.grid(visible=False)
+        b, a = np.meshgrid(levels, levels)
+        cells = axes.pcolormesh(*place(a, b), density, cmap=DIVERGING, norm=Normalize(-reach, reach), **_SEAMLESS)
+        corners = np.column_stack(place(levels[[0, -1, -1]], levels[[0, 0, -1]]))
+        half = axes.add_patch(Polygon(corners, fill=False, edgecolor=GUIDE, linewidth=0.8))
+        cells.set_clip_path(half)
+        axes.set(**{f"{axis}label": in_unit(name, labels.get("u", "")) for axis, name in zip("xy", names, strict=True)})
+        axes.set(xlim=(corners[:, 0].min(), corners[:, 0].max()), ylim=(corners[:, 1].min(), corners[:, 1].max()))
+        unit = f"{labels['y']}/{labels['u']}²" if {"u", "y"} <= labels.keys() else ""
+        axes.figure.colorbar(cells, ax=axes, label=in_unit("Density of relays", unit))
+    return axes
+
+
+def _mean_residuals(
+    record: Record, residual: FloatArray, bins: int | None, tolerance: float
+) -> tuple[FloatArray, list[FloatArray]]:
+    """Edges of the input's intervals, and means (n_branches, n_bins) in them: of rising, and of falling branches."""
+    branches = turns(record.u, tolerance).branches
+    if not branches:
+        raise ValueError("the input is constant: there is no branch to draw")
+    typical = int(np.median([branch.stop - branch.start for branch in branches]))
+    n_bins = bins or max(1, min(_MOST_BINS, typical // 2))
+    edges = np.linspace(record.u.min(), record.u.max(), n_bins + 1)
+    tables = []
+    for sign in (1.0, -1.0):
+        same_way = [part for part in branches if sign * (record.u[part.stop - 1] - record.u[part.start]) > 0.0]
+        rows = [_means(record.u[part], residual[part], edges) for part in same_way]
+        tables.append(np.array(rows).reshape(-1, n_bins))
+    return edges, tables
+
+
+def _means(u: FloatArray, values: FloatArray, edges: FloatArray) -> FloatArray:
+    """Mean of the values whose input is between two edges, nan if there are none."""
+    place = np.clip(np.searchsorted(edges, u, side="right") - 1, 0, edges.size - 2)
+    count, total = (np.bincount(place, weights, edges.size - 1) for weights in (None, values))
+    return np.asarray(np.divide(total, count, out=np.full(count.size, np.nan), where=count > 0))
+
+
+def _density(levels: FloatArray, weights: FloatArray) -> FloatArray:
+    """Weight over area (n_levels - 1, n_levels - 1), upper thresholds along axis 0; nan above the diagonal."""
+    n = levels.size - 1
+    density = np.full((n, n), np.nan)
+    length = np.diff(levels)
+    density[np.tril_indices(n)] = weights
+    return np.asarray(density / np.outer(length, length) * np.where(np.eye(n, dtype=bool), 2.0, 1.0))

@@ -4,9 +4,7 @@ Both stand on the problem that `identify` solves, with its box, its noise and it
 """
 
 from hysim.posterior._evidence import FACTORS, Evidence, EvidenceRow, compare_evidence, log_evidence
-from hysim.posterior._prediction import Prediction
-from hysim.posterior._result import Posterior
-from hysim.posterior._sample import sample_posterior
+from hysim.posterior._sample import Posterior, Prediction, sample_posterior
 
 __all__ = [
     "FACTORS",

@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Mapping, Sequence
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -11,8 +12,7 @@ from hysim._frozen import check_choice, check_count, frozen
 from hysim._printing import aligned, listed, printed, summary_text
 from hysim._progress import Reports, reports
 from hysim.identification import Identification, identify
-from hysim.posterior._bridge import bridge_evidence
-from hysim.posterior._nested import LogEvidence, nested_evidence
+from hysim.posterior._log_evidence import LogEvidence, bridge_evidence, nested_evidence
 from hysim.posterior._priors import given
 from hysim.posterior._sample import posed, walkers_of
 from hysim.posterior._sampler import sampled
@@ -247,24 +247,26 @@ def compare_evidence(
     if not models:
         raise ValueError("compare_evidence takes at least one model: {name: model}")
     fits = {name: _fitted(model, records, noise, initial) for name, model in models.items()}
-    options: dict[str, Any] = {
-        "noise": noise,
-        "initial": initial,
-        "method": method,
-        "live_points": live_points,
-        "seed": seed,
-    }
-    rows, done = [], 0
+    evidence = partial(log_evidence, noise=noise, initial=initial, method=method, live_points=live_points, seed=seed)
+    rows = list[EvidenceRow]()
     for name, fit in fits.items():
-        found = []
+        found = list[LogEvidence]()
         for factor in FACTORS:
-            own = (priors or {}).get(name)
-            found.append(log_evidence(fit, records, priors=own, factor=factor, **options))
-            done += 1
+            found.append(evidence(fit, records, priors=(priors or {}).get(name), factor=factor))
             if progress:
-                progress(done, len(FACTORS) * len(fits))
-        rows.append(row_of(name, fit, found))
-    return Evidence(rows=ordered(rows), noise=noise, method=method, seed=seed)
+                progress(len(FACTORS) * len(rows) + len(found), len(FACTORS) * len(fits))
+        rows.append(
+            EvidenceRow(
+                name=name,
+                n_parameters=fit.n_parameters,
+                fit_percent=fit.fit_percent,
+                log_evidence=tuple(each.value for each in found),
+                error=tuple(each.error for each in found),
+                n_evaluations=sum(each.evaluations for each in found),
+            )
+        )
+    rows.sort(key=lambda row: -row.log_evidence[FACTORS.index(1.0)])
+    return Evidence(rows=tuple(rows), noise=noise, method=method, seed=seed)
 
 
 def log_evidence(
@@ -293,24 +295,6 @@ def log_evidence(
         walkers = walkers_of(posterior.n_dim, None, _DRAWS)
         chains = sampled(posterior, walkers=walkers, samples=_DRAWS, seed=seed, most_steps=_STEPS)
         return bridge_evidence(posterior, chains, seed)
-
-
-def row_of(name: str, fit: Identification, evidences: Sequence[LogEvidence]) -> EvidenceRow:
-    """The row of a model."""
-    return EvidenceRow(
-        name=name,
-        n_parameters=fit.n_parameters,
-        fit_percent=fit.fit_percent,
-        log_evidence=tuple(each.value for each in evidences),
-        error=tuple(each.error for each in evidences),
-        n_evaluations=sum(each.evaluations for each in evidences),
-    )
-
-
-def ordered(rows: Sequence[EvidenceRow]) -> tuple[EvidenceRow, ...]:
-    """The rows, the largest evidence with the boxes of the search first."""
-    place = FACTORS.index(1.0)
-    return tuple(sorted(rows, key=lambda row: -row.log_evidence[place]))
 
 
 def _fitted(model: Any, records: Sequence[Record], noise: str, initial: str | Sequence[str] | None) -> Identification:

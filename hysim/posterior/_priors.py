@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 
 from hysim._frozen import FloatArray
-from hysim.identification.likelihood.refit import Problem
+from hysim.identification.likelihood import Problem
 
 REACH = 3.0
 """Largest w of a linear parameter without a given prior: three spans of the measured output."""

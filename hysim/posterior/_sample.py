@@ -1,26 +1,329 @@
-"""The verb `sample_posterior`."""
+"""The verb `sample_posterior`, its result, and bands of what a model with uncertain parameters does."""
 
+import warnings
 from collections.abc import Mapping, Sequence
+from dataclasses import field
 from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 
 from hysim._blas import one_blas_thread
-from hysim._frozen import FloatArray, check_count
+from hysim._frozen import FloatArray, check_count, frozen, read_only
+from hysim._printing import aligned, csv_text, printed, quantity, summary_text, wrapped
 from hysim._progress import Reports, reports
-from hysim.identification import Identification
-from hysim.identification.likelihood.densities import density
-from hysim.identification.likelihood.refit import Problem, again, optima
-from hysim.posterior._chains import effective_samples, split_rhat
+from hysim._versions import optional
+from hysim.errors import SimulationError
+from hysim.identification import Identification, Width
+from hysim.identification.likelihood import Problem, again, density, optima
+from hysim.metrics.rows import LoopRows
+from hysim.models.protocols import needs_time
 from hysim.posterior._priors import Given, check_names, given
-from hysim.posterior._result import LARGEST_RHAT, Posterior
-from hysim.posterior._sampler import Chains, sampled
+from hysim.posterior._sampler import Chains, effective_samples, sampled, split_rhat
 from hysim.posterior._target import Target, target
-from hysim.records import Record, several
+from hysim.records import Record, even_step, several
+
+LARGEST_RHAT = 1.05
+"""R-hat above which the chains do not agree: `Posterior.warnings` says so."""
 
 _WALKERS, _WALKERS_PER_DIMENSION = 128, 4  # at most, and at least
 _SAMPLES_PER_WALKER = 25  # effective ones: of shorter paths R-hat is large by chance
 _MOST_STEPS = 100_000
+
+
+@printed
+@frozen
+class Prediction:
+    """Outputs of draws of the parameters for one input.
+
+    Parameters
+    ----------
+    u : array, shape (n_samples,) [unit of u]
+        Input.
+    outputs : array, shape (n, n_samples) [unit of y]
+        One output for each draw; a draw whose output diverges is left out.
+    measured : array, shape (n, n_samples) [unit of y]
+        The same with noise, as the sensor would measure it.
+    level : float
+        Probability of the bands.
+    loop_width : Width or None
+        Median and band of the largest width of the loop [unit of y]; None without a complete cycle.
+    widths : array, shape (n,) or (0,)
+        Largest width of each draw [unit of y].
+    """
+
+    u: FloatArray
+    outputs: FloatArray
+    measured: FloatArray
+    level: float
+    loop_width: Width | None
+    widths: FloatArray
+
+    @property
+    def y(self) -> FloatArray:
+        """Median output at each sample, shape (n_samples,)."""
+        return np.asarray(np.median(self.outputs, axis=0))
+
+    @property
+    def band(self) -> tuple[FloatArray, FloatArray]:
+        """Lower and upper side of the band of the output, shape (n_samples,) each."""
+        return _band(self.outputs, self.level)
+
+    @property
+    def measured_band(self) -> tuple[FloatArray, FloatArray]:
+        """Lower and upper side of the band of the next measurement, shape (n_samples,) each."""
+        return _band(self.measured, self.level)
+
+    def __str__(self) -> str:
+        low, high = self.band
+        width = self.loop_width
+        return summary_text(
+            [f"Prediction of {len(self.outputs)} draws at {self.u.size} samples, bands at {100.0 * self.level:g} %"],
+            {
+                "output": f"band {quantity(float((high - low).mean()))} wide on average",
+                "loop width": f"{width.value:.4g}, from {width.lower:.4g} to {width.upper:.4g}" if width else "",
+            },
+        )
+
+
+@printed
+@frozen
+class Posterior:
+    """Draws of all free parameters of a model from their distribution given the records.
+
+    Parameters
+    ----------
+    model : model
+        The identified model, whose parameters were sampled.
+    samples : mapping
+        Name to draws, shape (n_draws * n_walkers,), draw by draw: every free parameter, the linear ones included, and
+        ``"sigma"``, the scale of the noise [unit of y].
+    log_density : array, shape (n_draws * n_walkers,)
+        Logarithm of likelihood times prior, in the coordinates of the sampler, up to a constant.
+    n_walkers : int
+        Number of walkers of the ensemble.
+    effective_samples : mapping
+        Name to the number of independent draws whose mean would be as sure.
+    rhat : mapping
+        Name to R-hat, the spread of all halves of the walkers' paths over the spread within them: near 1 where the
+        paths agree.
+    noise : {"gaussian", "quantised", "robust"}
+    resolution : float or None
+        Quantum of the sensor [unit of y].
+    priors : mapping
+        Name of each coordinate to its prior in words.
+    states : mapping
+        Name to draws of a state at the first sample that follows from the parameters, where the record is periodic.
+    acceptance : float
+        Share of the proposed moves that were accepted.
+    n_evaluations : int
+        Number of parameter sets that were simulated.
+    seed : int
+        Seed of the draws.
+    warnings : tuple of str
+        Sentences on chains that do not agree or are too short.
+    """
+
+    model: Any
+    samples: Mapping[str, FloatArray]
+    log_density: FloatArray
+    n_walkers: int
+    effective_samples: Mapping[str, float]
+    rhat: Mapping[str, float]
+    noise: str
+    resolution: float | None
+    priors: Mapping[str, str] = field(default_factory=dict)
+    states: Mapping[str, FloatArray] = field(default_factory=dict)
+    acceptance: float
+    n_evaluations: int
+    seed: int
+    warnings: tuple[str, ...] = ()
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """The sampled parameters, and sigma."""
+        return tuple(self.samples)
+
+    @property
+    def table(self) -> FloatArray:
+        """All draws, shape (n_draws * n_walkers, n_names)."""
+        return np.column_stack([self.samples[name] for name in self.names])
+
+    @property
+    def mean(self) -> dict[str, float]:
+        """Mean of each parameter."""
+        return {name: float(draws.mean()) for name, draws in self.samples.items()}
+
+    @property
+    def median(self) -> dict[str, float]:
+        """Median of each parameter."""
+        return {name: float(np.median(draws)) for name, draws in self.samples.items()}
+
+    @property
+    def covariance(self) -> FloatArray:
+        """Covariance of the parameters, shape (n_names, n_names), in the order of `names`."""
+        return np.atleast_2d(np.cov(self.table, rowvar=False))
+
+    def chains(self, name: str) -> FloatArray:
+        """Draws of one parameter, shape (n_draws, n_walkers)."""
+        return self.samples[name].reshape(-1, self.n_walkers)
+
+    def interval(self, level: float = 0.95) -> dict[str, tuple[float, float]]:
+        """Name to the central interval that holds a parameter with the probability `level`; both tails are equal.
+
+        A ValueError is raised unless `level` is between 0 and 1.
+        """
+        tails = _tails(level)
+        ends = {name: np.quantile(draws, tails).tolist() for name, draws in self.samples.items()}
+        return {name: (low, high) for name, (low, high) in ends.items()}
+
+    def predict(
+        self,
+        u: npt.ArrayLike,
+        *,
+        t: npt.ArrayLike | None = None,
+        n: int = 400,
+        level: float = 0.95,
+        seed: int = 0,
+    ) -> Prediction:
+        """Bands of the output, and of the loop width, for an input.
+
+        Parameters
+        ----------
+        u : array, shape (n_samples,) [unit of u]
+            The model starts from the state that each draw has at the first sample of the first record.
+        t : array, shape (n_samples,), optional [s]
+            Times, for models that depend on them.
+        n : int
+            Number of draws, at most as many as there are.
+        level : float
+            Probability of the bands.
+        seed : int
+            Seed of the choice of the draws, and of the noise.
+
+        Returns
+        -------
+        Prediction
+        """
+        inputs, tails = read_only(u, "u", ndim=1), _tails(level)
+        check_count("n", n)
+        rng = np.random.default_rng(seed)
+        total = len(self.samples["sigma"])
+        chosen = rng.choice(total, min(n, total), replace=False)
+        outputs, kept = _outputs(self, inputs, t, chosen)
+        noise = density(self.noise, self.resolution)
+        widths = _widths(inputs, outputs)
+        return Prediction(
+            u=inputs,
+            outputs=outputs,
+            measured=noise.draw(outputs, self.samples["sigma"][kept], rng),
+            level=tails[1] - tails[0],
+            loop_width=_interval(widths, tails),
+            widths=widths,
+        )
+
+    def to_csv(self) -> str:
+        """All draws with every digit, one in a line, below the names."""
+        return csv_text([self.names, *self.table.tolist()])
+
+    def to_arviz(self) -> Any:
+        """The draws as the installed arviz holds them: a DataTree, or InferenceData before arviz 1.0.
+
+        Chains are the walkers. The group ``posterior`` has the parameters, ``sample_stats`` has ``lp``. An ImportError
+        is raised without arviz.
+        """
+        posterior = {name: self.chains(name).T for name in self.names}
+        stats = {"lp": self.log_density.reshape(-1, self.n_walkers).T}
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", FutureWarning)  # arviz 0.23 announces its successor once a day
+            warnings.filterwarnings("ignore", "More chains")  # than draws: an ensemble may have many walkers
+            arviz = optional("arviz", "a container of arviz", "bayes")
+            if int(arviz.__version__.partition(".")[0]) < 1:
+                return arviz.from_dict(posterior=posterior, sample_stats=stats)
+            return arviz.from_dict({"posterior": posterior, "sample_stats": stats})
+
+    def summary(self) -> str:
+        """All parameters with median, interval, mean, standard deviation, effective samples and R-hat."""
+        ends, median = self.interval(), self.median
+        table = [["parameter", "median", "interval at 95 %", "mean", "deviation", "effective", "R-hat"]]
+        for name, draws in self.samples.items():
+            low, high = ends[name]
+            values = f"{median[name]:.5g}", f"{low:.5g} to {high:.5g}", f"{draws.mean():.5g}"
+            trust = f"{draws.std(ddof=1):.2g}", f"{self.effective_samples[name]:.0f}", f"{self.rhat[name]:.3f}"
+            table.append([name, *values, *trust])
+        lines = [self._head(), *aligned(table), *(f"  prior of {name}: {words}" for name, words in self.priors.items())]
+        return "\n".join([*lines, *(["Warnings"] if self.warnings else []), *(f"  {each}" for each in self.warnings)])
+
+    def __str__(self) -> str:
+        ends = self.interval()
+        values = [f"{name} {self.mean[name]:.4g} [{ends[name][0]:.4g}, {ends[name][1]:.4g}]" for name in self.names]
+        return summary_text(
+            [self._head(), wrapped(values, most=5)],
+            {
+                "chains": f"{self.n_walkers} walkers, R-hat at most {max(self.rhat.values()):.3f}, "
+                f"{100.0 * self.acceptance:.0f} % of the moves accepted",
+                "warnings": "; ".join(self.warnings),
+            },
+        )
+
+    def _head(self) -> str:
+        fewest = min(self.effective_samples.values())
+        return (
+            f"Posterior of {type(self.model).__name__}: {self.log_density.size} draws, {fewest:.0f} effective ones at "
+            f"least, {self.noise} noise"
+        )
+
+
+def _outputs(draws: Posterior, u: FloatArray, t: npt.ArrayLike | None, chosen: Any) -> tuple[FloatArray, Any]:
+    """Outputs of the chosen draws that stay finite, and which these are."""
+    timed = needs_time(draws.model)
+    if timed and t is None:
+        raise ValueError(f"a {type(draws.model).__name__} depends on time: pass t=")
+    further = (even_step(read_only(t, "t", ndim=1)),) if timed and t is not None else ()
+    columns = {_own(name, draws.model): values for name, values in draws.samples.items() if name != "sigma"}
+    columns |= dict(draws.states)
+    rows, kept = [], []
+    for k in chosen.tolist():
+        law = draws.model.with_scalars({name: float(values[k]) for name, values in columns.items() if name})
+        try:
+            rows.append(law.response(u, *further))
+        except SimulationError:
+            continue
+        kept.append(k)
+    return np.array(rows).reshape(-1, u.size), kept
+
+
+def _own(name: str, model: Any) -> str:
+    """The model's name of a parameter; of a state of one record that of the first one, and none for the others."""
+    if name in model.scalars:
+        return name
+    base, _, record = name.rpartition("[")
+    return base if record == "0]" else ""
+
+
+def _widths(u: FloatArray, outputs: FloatArray) -> FloatArray:
+    try:
+        return LoopRows(u).max_width(outputs) if len(outputs) else np.empty(0)
+    except ValueError:  # no complete cycle
+        return np.empty(0)
+
+
+def _interval(widths: FloatArray, tails: tuple[float, float]) -> Width | None:
+    if not widths.size:
+        return None
+    low, middle, high = np.quantile(widths, [tails[0], 0.5, tails[1]]).tolist()
+    return Width(value=middle, lower=low, upper=high)
+
+
+def _band(rows: FloatArray, level: float) -> tuple[FloatArray, FloatArray]:
+    low, high = np.quantile(rows, [0.5 * (1.0 - level), 0.5 * (1.0 + level)], axis=0)
+    return low, high
+
+
+def _tails(level: float) -> tuple[float, float]:
+    if not 0.0 < level < 1.0:
+        raise ValueError(f"level must be between 0 and 1, got {level}")
+    return 0.5 * (1.0 - level), 0.5 * (1.0 + level)
 
 
 @reports
@@ -151,7 +454,7 @@ def described(fit: Identification, posterior: Target, chains: Chains, samples: i
     rhat = {name: split_rhat(path) for name, path in paths.items()}
     return Posterior(
         model=fit.model,
-        samples={name: _read_only(table[:, k]) for k, name in enumerate(posterior.names)},
+        samples={name: read_only(table[:, k], finite=False) for k, name in enumerate(posterior.names)},
         log_density=chains.log_density.ravel(),
         n_walkers=n_walkers,
         effective_samples=effective,
@@ -167,18 +470,16 @@ def described(fit: Identification, posterior: Target, chains: Chains, samples: i
     )
 
 
-def _read_only(values: FloatArray) -> FloatArray:
-    column = np.ascontiguousarray(values)
-    column.setflags(write=False)
-    return column
-
-
 def _states(problem: Problem, q: FloatArray) -> dict[str, FloatArray]:
     """States of the first record that follow from the parameters, as those of a periodic record."""
     if not (problem.parts[0].before and problem.own.state):
         return {}
     known = problem.parameters(q[:, : problem.n_x])
-    return {name: _read_only(np.broadcast_to(known[name], len(q))) for name in problem.own.state if name in known}
+    return {
+        name: read_only(np.broadcast_to(known[name], len(q)), finite=False)
+        for name in problem.own.state
+        if name in known
+    }
 
 
 def _warnings(effective: Mapping[str, float], rhat: Mapping[str, float], samples: int) -> tuple[str, ...]:

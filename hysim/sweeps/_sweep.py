@@ -3,30 +3,176 @@
 Tasks are sent in chunks. The first chunk is one task; chunks grow at most fourfold, until one takes `_CHUNK`, so that
 sending, about a millisecond, costs little; at the end they shrink so that all workers end together. Finished chunks are
 written before they are reported. No result depends on the division into chunks.
+
+**Workers** are threads, processes, the user's executor, or a dask cluster. Of an executor only `submit` is used, as
+`concurrent.futures.Executor` defines it.
+
+**The identity** of a study is the source of the task, the parameters of the tasks, the seed, and the version of hysim.
 """
 
+import dataclasses
+import hashlib
 import inspect
-from collections.abc import Callable
-from concurrent.futures import FIRST_COMPLETED, CancelledError, Future, wait
-from contextlib import nullcontext
+import pickle
+from collections.abc import Callable, Iterator, Mapping
+from concurrent.futures import FIRST_COMPLETED, CancelledError, Future, ProcessPoolExecutor, ThreadPoolExecutor, wait
+from contextlib import contextmanager, nullcontext
+from functools import partial
 from pathlib import Path
-from types import FunctionType
-from typing import Any
+from types import CodeType, FunctionType, MethodType, ModuleType
+from typing import Any, NamedTuple, Protocol, runtime_checkable
 
 import numpy as np
 
-from hysim._frozen import check_choice
-from hysim._parallel import GLANCE
+from hysim._frozen import check_choice, check_count, last_names
+from hysim._parallel import GLANCE, cores, processes, threads
 from hysim._progress import Line, Progress, Reports, reports
+from hysim._release import __version__
 from hysim._versions import is_installed
-from hysim.sweeps._chunks import Chunk, Outcome, part_of
-from hysim.sweeps._executors import Workers, workers_of
-from hysim.sweeps._identity import identity
+from hysim.sweeps._chunks import Chunk, Outcome, Table, Task, computed, part_of, seeds
 from hysim.sweeps._result import Sweep, result_of
-from hysim.sweeps._seeds import seeds
 from hysim.sweeps._space import Space, space_of
 from hysim.sweeps._store import ON_CHANGE, OnChange, Store, opened
-from hysim.sweeps._table import Table
+
+_task_of_process: list[Task] = []  # the task of the study that this process was started for
+
+
+@runtime_checkable
+class _Submits(Protocol):
+    def submit(self, function: Task, /, *arguments: Any) -> Future[Any]: ...
+
+
+@runtime_checkable
+class _DaskClient(Protocol):
+    def get_executor(self) -> _Submits: ...
+
+    def nthreads(self) -> dict[str, int]: ...
+
+
+class Workers(NamedTuple):
+    """A function that sends a chunk out, and the number of chunks that are computed at a time."""
+
+    submit: Callable[[Chunk], Future[Outcome]]
+    number: Callable[[], int]
+
+
+@contextmanager
+def workers_of(executor: Any, number: int | None, task: Task) -> Iterator[Workers]:
+    """The workers that the argument `executor` of `sweep` stands for; own threads and processes end with the block."""
+    if number is not None:
+        check_count("workers", number)
+    if executor in (None, "threads"):
+        with threads(number or cores()) as pool:
+            yield Workers(lambda chunk: pool.submit(computed, task, chunk), lambda: number or cores())
+    elif executor == "processes":
+        with processes(number or cores(), _begin, task) as pool:
+            yield Workers(lambda chunk: pool.submit(_computed_here, chunk), lambda: number or cores())
+    elif isinstance(executor, str):
+        raise ValueError(f'executor must be "threads", "processes", an Executor or a dask client, got {executor!r}')
+    elif isinstance(executor, _DaskClient):
+        of_client = executor.get_executor()
+        yield Workers(
+            lambda chunk: of_client.submit(computed, task, chunk),
+            lambda: number or max(1, sum(executor.nthreads().values())),
+        )
+    elif isinstance(executor, _Submits):
+        is_pool = isinstance(executor, (ThreadPoolExecutor, ProcessPoolExecutor))
+        size: int = vars(executor)["_max_workers"] if is_pool else cores()
+        yield Workers(lambda chunk: executor.submit(computed, task, chunk), lambda: number or size)
+    else:
+        raise TypeError(f"executor must have the method submit of concurrent.futures.Executor, got {executor!r}")
+
+
+def _begin(task: Task) -> None:
+    _task_of_process[:] = [task]
+
+
+def _computed_here(chunk: Chunk) -> Outcome:
+    return computed(_task_of_process[0], chunk)
+
+
+_PLAIN = (str, bytes, int, float, complex, type(None), type(...), np.generic)
+
+
+def identity(task: Callable[..., Any], space: Space, seed: int) -> dict[str, str]:
+    """The facts that must not change between two calls that share a store, as short texts."""
+    names = ", ".join(space.columns)
+    return {
+        "task": _digest(inspect.unwrap(task)),
+        "space": f"{space.n_tasks} tasks of {names} ({_digest(dict(space.columns))})",
+        "seed": str(seed),
+        "hysim": __version__,
+    }
+
+
+def _digest(value: Any) -> str:
+    digest = hashlib.sha256()
+    for part in _parts(value, ()):
+        digest.update(len(part).to_bytes(8, "little") + part)
+    return digest.hexdigest()[:16]
+
+
+def _parts(value: Any, above: tuple[Any, ...]) -> Iterator[bytes]:
+    """The content of a value in bytes that are the same in every process; `above` are the functions that hold it."""
+    if isinstance(value, (FunctionType, CodeType)) and any(value is one for one in above):
+        yield b"itself"
+    elif isinstance(value, FunctionType):
+        yield from _function_parts(value, (*above, value))
+    elif isinstance(value, np.ndarray) and value.dtype != object:
+        yield from (str(value.dtype).encode(), str(value.shape).encode(), np.ascontiguousarray(value).tobytes())
+    elif isinstance(value, _PLAIN):
+        yield repr(value).encode()
+    elif isinstance(value, (type, ModuleType)):
+        yield f"{value.__module__ if isinstance(value, type) else ''}.{value.__name__}".encode()
+    elif (members := _members(value)) is not None:
+        yield str(len(members)).encode()
+        for member in members:
+            yield from _parts(member, above)
+    else:
+        yield from (repr(type(value)).encode(), _pickled(value))
+
+
+def _members(value: Any) -> list[Any] | None:
+    """The parts of a value in a fixed order; None if it is of a type without known parts."""
+    if isinstance(value, (list, tuple)):
+        return [*value]
+    if isinstance(value, Mapping):
+        return [each for name in sorted(value, key=repr) for each in (name, value[name])]
+    if isinstance(value, (set, frozenset)):
+        return sorted(value, key=repr)
+    if isinstance(value, np.ndarray):
+        return [value.shape, *value.ravel().tolist()]
+    if isinstance(value, partial):
+        return [value.func, value.args, value.keywords]
+    if isinstance(value, MethodType):
+        return [value.__func__, value.__self__]
+    if isinstance(value, CodeType):
+        return [value.co_code, value.co_names, value.co_varnames, value.co_consts]
+    if dataclasses.is_dataclass(value):
+        # a user's dataclass may have slots, so that `vars` would fail
+        values = {field.name: getattr(value, field.name) for field in dataclasses.fields(value)}
+        last = last_names(type(value))
+        return [type(value), *(each for name, each in values.items() if each is not None or name not in last)]
+    return None
+
+
+def _function_parts(function: FunctionType, above: tuple[Any, ...]) -> Iterator[bytes]:
+    """The source, or the compiled code where no file holds it, and the values bound to the function."""
+    try:
+        yield inspect.getsource(function).encode()
+    except (OSError, TypeError):
+        yield from _parts(function.__code__, above)
+    bound = inspect.getclosurevars(function).nonlocals
+    batch = vars(function).get("batch")
+    yield from _parts([function.__defaults__, function.__kwdefaults__, bound, batch], above)
+
+
+def _pickled(value: Any) -> bytes:
+    try:
+        return pickle.dumps(value)
+    except Exception as error:
+        raise TypeError(f"with a store a task is a function, or something that can be pickled: {error}") from error
+
 
 _CHUNK, _SHORTEST = 0.075, 0.002  # seconds
 _WITH_ARRAYS = 0.5  # seconds; a shard for each

@@ -1,4 +1,6 @@
-"""A plant of several parts is searched part by part, and where that ends all parts are searched at once.
+"""Where searches begin that are too wide for a search at once: plants of several parts, parameters of a channel.
+
+**A plant of several parts** is searched part by part, and where that ends all parts are searched at once.
 
 1. The law alone, on the record of the slowest input: a global search.
 2. On the fastest record, behind that law but for its gain and offset, one mode after the other: the best of many
@@ -13,32 +15,39 @@ each end it goes on beyond whole samples of delay, and the end of the lower BIC 
 
 Of several inputs no record shows a law alone: modes are searched behind the inputs themselves, with gains that are
 solved for, and then all at once. Where the user knows an actuator like it, the search begins with its modes.
+
+**Parameters that depend on channels** begin where short searches of the law itself end. The law without a dependence,
+on all records, and the law on the records of each value of the channels, one after the other; polynomials of least
+squares through the parameters that these have are the second start.
 """
 
 import math
-from collections.abc import Container, Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import Any, NamedTuple
 
 import numpy as np
 
+from hysim._channels import steady
 from hysim._frozen import FloatArray
+from hysim.errors import SimulationError
 from hysim.identification._assumptions import decided
-from hysim.identification._budget import Budget
-from hysim.identification._problem import Problem, problem
-from hysim.identification._search import apart, chosen, descended, spread
+from hysim.identification._problem import Problem, Setting
+from hysim.identification._search import apart, brief_optimum, chosen, descended, spread
 from hysim.identification._uncertainty import uncertainty
 from hysim.metrics.criteria import information
+from hysim.models.dependent_structure import DependentStructure
 from hysim.models.parts import own
 from hysim.models.protocols import Identifiable, PartByPart, Undecided
 from hysim.models.search_space import Freedom
+from hysim.models.varying import weights
 from hysim.records import Record
 
 _THINNED = 500  # samples of the slow record, beside its reversals
 _SAME = 0.01  # distance of two points in units of the box, under which the better one stands for both
 _APART = 0.03  # likewise of the first points on the fastest record
 _BEST, _KEPT = 8, 2  # points that descend on the fastest record, and on all
-_STRONG = 10.0  # difference of two BIC
+_STRONG = 10.0  # difference of two BIC: that of `_assumptions`
 _ENOUGH = 0.01  # error of the law alone beside the resolution, in spans of the output: with a larger one it moves
 _SPREAD_LAWS = 1024  # laws beside parts that were searched without one
 _APART_LAWS = 0.05  # likewise
@@ -47,7 +56,6 @@ _MOST_ROUNDS = 8  # of what is held
 _IN_VAIN = 2  # trials in a row that are no better
 _SHARE = 0.5  # of the evaluations that the user allows
 
-Initial = str | Sequence[str] | None
 Coordinates = Mapping[str, float]
 
 
@@ -81,64 +89,11 @@ class Begun(NamedTuple):
     cut: bool  # whether the user's number of evaluations has ended a part of the search
 
 
-@dataclass(frozen=True)
-class _Setting:
-    """Choices of the user."""
-
-    records: Sequence[Record]
-    freedom: Freedom
-    initial: Initial
-    weights: Sequence[FloatArray] | None
-    budget: Budget | None
-    seed: int
-
-    def problem(self, structure: Any, freedom: Freedom | None = None, only: int | None = None) -> Problem:
-        """The problem of a structure on all records, or on one."""
-        places = range(len(self.records)) if only is None else [only]
-        weights = None if self.weights is None else [self.weights[k] for k in places]
-        if weights is not None and not any(each.any() for each in weights):
-            weights = None
-        initial = self.initial
-        if initial is not None and not isinstance(initial, str):
-            initial = [initial[k] for k in places]
-        records = [self.records[k] for k in places]
-        attempt = problem(structure, records, self.freedom if freedom is None else freedom, initial)
-        return attempt.weighted(weights).within(self.budget)
-
-    def about(self, names: Container[str]) -> Freedom:
-        """The part of the user's freedom that is about these parameters."""
-        freedom = self.freedom
-        return replace(
-            freedom,
-            fixed={name: value for name, value in freedom.fixed.items() if name in names},
-            free=tuple(name for name in freedom.free if name in names),
-            bounds={name: pair for name, pair in freedom.bounds.items() if name in names},
-        )
-
-    def beside(self, values: Mapping[str, float]) -> Freedom:
-        """The user's freedom with further parameters that are fixed."""
-        fixed = {name: value for name, value in values.items() if name not in self.freedom.fixed}
-        return replace(
-            self.freedom,
-            fixed={**self.freedom.fixed, **fixed},
-            free=tuple(name for name in self.freedom.free if name not in fixed),
-            bounds={name: pair for name, pair in self.freedom.bounds.items() if name not in fixed},
-        )
-
-
-def begun_by_parts(
-    structure: PartByPart,
-    records: Sequence[Record],
-    freedom: Freedom,
-    initial: Initial,
-    weights: Sequence[FloatArray] | None,
-    max_evaluations: int | None,
-    seed: int,
-) -> Begun:
+def begun_by_parts(structure: PartByPart, setting: Setting) -> Begun:
     """The structure where the search part by part ends, with what it holds; ValueError as of `identify`."""
-    plant, records = structure.over(records, freedom)
-    budget = None if max_evaluations is None else Budget(_SHARE * max_evaluations * sum(map(len, records)))
-    setting = _Setting(records, freedom, initial, weights, budget, seed)
+    plant, records = structure.over(setting.records, setting.freedom)
+    most = setting.max_evaluations
+    setting = replace(setting, records=records).allowing(None if most is None else _SHARE * most)
     trial = setting.problem(plant)  # refuses what does not fit before anything is searched
     trial.split(0.5 * (trial.space.lower + trial.space.upper)[np.newaxis])
     if (begins := plant.begins()) is not None:
@@ -150,10 +105,10 @@ def begun_by_parts(
     plant, ends = end.plant, end.ends
     if end.whole.n_x:
         plant, ends = _told_apart(plant, setting, end.whole, _descended(end.whole, ends, exact=True))
-    return Begun(plant, records, ends, budget is not None and budget.cut)
+    return Begun(plant, records, ends, setting.budget is not None and setting.budget.cut)
 
 
-def _searched(plant: Any, setting: _Setting) -> _End:
+def _searched(plant: Any, setting: Setting) -> _End:
     """The best end of a search from the law on, and where its record moves, of one from the modes on."""
     plant, law = _with_law(plant, setting)
     grown, known = _behind_inputs(plant, law.model, setting)
@@ -171,21 +126,19 @@ def _gone_on(end: _End) -> _End:
     return end._replace(ends=_descended(end.whole, points, exact=False)[:1]) if len(points) > 1 else end
 
 
-def _with_law(plant: Any, setting: _Setting) -> tuple[Any, _Law]:
+def _with_law(plant: Any, setting: Setting) -> tuple[Any, _Law]:
     """The plant whose law begins where the law alone is best, and that law."""
-    k = plant.slowest
-    record, law = plant.static(setting.records[k]), plant.law
-    freedom = setting.freedom
+    k, law, freedom = plant.slowest, plant.law, setting.freedom
+    record = plant.static(setting.records[k])
     share = Freedom(
         fixed=own(freedom.fixed, "hysteresis"),
         free=tuple(own(dict.fromkeys(freedom.free), "hysteresis")),
         bounds=own(freedom.bounds, "hysteresis"),
     )
-    initial = setting.initial if setting.initial is None or isinstance(setting.initial, str) else setting.initial[k]
-    if initial is None and isinstance(law, Undecided):
-        initial = "rest"
-    weights = None if setting.weights is None else [setting.weights[k]]
-    every = decided(law, [record], share, initial, weights).problems
+    alone = replace(setting.only([k]), records=[record], freedom=share, max_evaluations=None)
+    if alone.initial is None and isinstance(law, Undecided):
+        alone = replace(alone, initial="rest")
+    every = decided(law, alone).problems
     best, optima = chosen([each.thinned(_THINNED) or each for each in every], seed=setting.seed)
     if not optima:
         raise ValueError("every set of parameters of the law diverged on the slowest record: pass bounds=")
@@ -200,13 +153,13 @@ def _with_law(plant: Any, setting: _Setting) -> tuple[Any, _Law]:
     return plant.with_law(start), _Law(model, shape, is_enough)
 
 
-def _behind_inputs(plant: Any, law: Any, setting: _Setting) -> tuple[Any, list[Coordinates]]:
+def _behind_inputs(plant: Any, law: Any, setting: Setting) -> tuple[Any, list[Coordinates]]:
     """The plant and coordinates of its parts, behind a known law, or behind several inputs as they are."""
     plant, known = _grown(plant, law, setting)
     return _tried(plant, setting), known
 
 
-def _all_at_once(plant: Any, known: Sequence[Coordinates], setting: _Setting, spread_laws: bool = False) -> _End:
+def _all_at_once(plant: Any, known: Sequence[Coordinates], setting: Setting, spread_laws: bool = False) -> _End:
     """End of a search for all parts from these coordinates, and if asked from laws all over their box."""
     whole = setting.problem(plant.begun(known))
     if not whole.n_x:
@@ -226,12 +179,13 @@ def _beside_laws(whole: Problem, begun: FloatArray, seed: int) -> FloatArray:
     return apart(space, points, whole.costs(points), _APART_LAWS, _BEST)
 
 
-def _grown(plant: Any, law: Any, setting: _Setting) -> tuple[Any, list[Coordinates]]:
+def _grown(plant: Any, law: Any, setting: Setting) -> tuple[Any, list[Coordinates]]:
     """The plant with the modes that the fastest record shows, and the best coordinates of its parts there."""
     known: list[Coordinates] = []
     before = math.inf
     for each in plant.growing():
-        attempt = setting.problem(each.behind(law), setting.about(each.behind(law).names), only=plant.fastest)
+        known_law = each.behind(law)
+        attempt = setting.only([plant.fastest]).about(known_law.names).problem(known_law)
         ends = _found(attempt, each, known) if attempt.n_x else np.empty((1, 0))
         cost = float(attempt.costs(ends[:1])[0])
         criterion = information(max(cost, 1e-300) / attempt.n_samples, attempt.n_samples, len(attempt.space.names))
@@ -265,7 +219,7 @@ def _left_out(plant: Any, each: Any, freedom: Freedom) -> Any:
     return smaller
 
 
-def _tried(plant: Any, setting: _Setting) -> Any:
+def _tried(plant: Any, setting: Setting) -> Any:
     """The best of the plant's trials, in whose order the sum of squares has one minimum."""
     best, least, worse = plant, math.inf, 0
     for trial in plant.trials():
@@ -279,16 +233,16 @@ def _tried(plant: Any, setting: _Setting) -> Any:
 
 
 def _on_all(
-    plant: Any, setting: _Setting, shape: Mapping[str, float], known: Sequence[Coordinates]
+    plant: Any, setting: Setting, shape: Mapping[str, float], known: Sequence[Coordinates]
 ) -> list[Coordinates]:
     """The best coordinates of the parts on all records, beside the law's shape."""
-    attempt = setting.problem(plant.begun(known), setting.beside(shape))
+    attempt = setting.beside(shape).problem(plant.begun(known))
     if not attempt.n_x:
         return []
     return _parts_only(attempt, _descended(attempt, _best_starts(attempt), exact=False)[:_KEPT])
 
 
-def _told_apart(plant: Any, setting: _Setting, whole: Problem, ends: FloatArray) -> tuple[Any, FloatArray]:
+def _told_apart(plant: Any, setting: Setting, whole: Problem, ends: FloatArray) -> tuple[Any, FloatArray]:
     """The plant without what the records do not determine, and where its search ends."""
     for _ in range(_MOST_ROUNDS):
         theta = whole.completed(ends[:1])[0]
@@ -342,3 +296,75 @@ def _parts_only(attempt: Problem, ends: FloatArray) -> list[Coordinates]:
         return known
     solved = [plant.solved(attempt.estimates(theta)) for theta in attempt.completed(ends)]
     return [{**own, **gains} for own, gains in zip(known, solved, strict=True)]
+
+
+_MOST_GROUPS = 12
+
+
+def begun(structure: DependentStructure, setting: Setting) -> DependentStructure:
+    """The structure with starts where short searches of its law end; itself where nothing searched depends.
+
+    All of them together simulate half of the user's `max_evaluations` parameter sets at most.
+    """
+    if all(name in structure.columns for name in structure.at):
+        return structure
+    records, most = setting.records, setting.max_evaluations
+    groups = _groups(structure, records)
+    share = None if most is None else most / (2.0 * (1 + len(groups)))
+
+    def found(chosen: Sequence[int]) -> dict[str, float] | None:
+        return _short_search(structure.law, replace(setting.only(chosen), weights=None).allowing(share))
+
+    alike = found(range(len(records)))
+    starts = [] if alike is None else [_alike(structure, alike)]
+    if 1 < len(groups) <= _MOST_GROUPS:
+        known = [each for numbers in groups.values() if (each := found(numbers)) is not None]
+        first = [records[numbers[0]] for numbers in groups.values()]
+        starts[:0] = [_through(structure, first, known)] if len(known) == len(groups) else []
+    return replace(structure, starts=tuple(starts))
+
+
+def _short_search(law: Any, setting: Setting) -> dict[str, float] | None:
+    """The parameters of the law where a short search ends; None if it finds nothing."""
+    try:
+        attempt = setting.problem(law)
+        x, cost = brief_optimum(attempt)
+    except (ValueError, ArithmeticError, SimulationError):  # such as too few samples for the law alone
+        return None
+    return attempt.estimates(attempt.completed(x[np.newaxis])[0]) if np.isfinite(cost) else None
+
+
+def _groups(structure: DependentStructure, records: Sequence[Record]) -> dict[tuple[float, ...], list[int]]:
+    """Numbers of the records by the values of their channels; none if a channel varies along a record."""
+    channels = sorted({channel for channel, _ in structure.depends.values()})
+    groups: dict[tuple[float, ...], list[int]] = {}
+    for k, record in enumerate(records):
+        values = [steady(record.channels[channel]) for channel in channels]
+        if any(np.ndim(value) for value in values):
+            return {}
+        groups.setdefault(tuple(values), []).append(k)
+    return groups
+
+
+def _through(
+    structure: DependentStructure, records: Sequence[Record], known: Sequence[Mapping[str, float]]
+) -> dict[str, float]:
+    """Values of polynomials through the `known` parameters of the law on some records, and medians of the others."""
+    start = {name: float(np.median([each[name] for each in known])) for name in known[0]}
+    for name, at in structure.at.items():
+        if name in start:
+            channel = structure.depends[name][0]
+            rows = weights(at, [steady(record.channels[channel]) for record in records])
+            values = np.linalg.lstsq(rows, np.array([each[name] for each in known]), rcond=None)[0]
+            start |= dict(zip(structure.names[name], values.tolist(), strict=True))
+            del start[name]
+    return start
+
+
+def _alike(structure: DependentStructure, known: Mapping[str, float]) -> dict[str, float]:
+    """The parameters of the law as a start at which nothing depends on a channel."""
+    start = dict(known)
+    for name, names in structure.names.items():
+        if name in start:
+            start |= dict.fromkeys(names, start.pop(name))
+    return start

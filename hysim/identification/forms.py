@@ -1,4 +1,7 @@
-"""Results to plain JSON values and back: nan is null, an infinity its name, a model its family and parameters."""
+"""Results to plain JSON values and back, and warnings for users of a result.
+
+In JSON nan is null, an infinity its name, a model its family and parameters.
+"""
 
 import json
 import math
@@ -77,3 +80,32 @@ def from_plain(value: Any, kinds: Sequence[type]) -> Any:
 def _field(value: Any, hint: Any, kinds: Sequence[type]) -> Any:
     optional = typing.get_origin(hint) in (types.UnionType, typing.Union) and type(None) in typing.get_args(hint)
     return None if value is None and optional else from_plain(value, kinds)
+
+
+CONSTANT = "the output is constant: the fit in percent is not defined, and the output shows no effect of the input"
+SWAPPED = "the input and the output may be swapped"
+_CORRELATED = 1e-3  # probability of white residuals
+_RESTING = 1e-6  # of the output's standard deviation: smaller residuals are the end of a descent
+_ROUNDING = 1e-12  # of the output's size
+
+
+def sentences(
+    *,
+    spread: float,
+    size: float,
+    rmse: float,
+    whiteness: float,
+    stderr: Mapping[str, float],
+    reasons: tuple[str, ...],
+    success: bool,
+) -> tuple[str, ...]:
+    """Warnings; `spread` and `size` are the output's standard deviation and largest magnitude."""
+    warnings = [] if success else ["the search did not converge: better parameters may exist"]
+    if spread == 0.0:
+        warnings.append(CONSTANT)
+    if unknown := [name for name, value in stderr.items() if np.isnan(value)]:
+        why = f": {'; '.join(reasons)}" if reasons else ""
+        warnings.append(f"no standard error for {', '.join(unknown)}{why}")
+    if stderr and whiteness < _CORRELATED and rmse > max(_RESTING * spread, _ROUNDING * size):
+        warnings.append("residuals are correlated (p < 0.001): the intervals are too narrow")
+    return tuple(warnings)
