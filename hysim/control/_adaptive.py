@@ -11,7 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from hysim._frozen import FloatArray, read_only
-from hysim.control._sampled import Feedback, SampledController, check_limits, check_sample_time
+from hysim.control._controller import Feedback, SampledController, check_limits, check_sample_time
 from hysim.kernels import stepping
 from hysim.kernels.adaptation.inverse import adaptive
 from hysim.models.compiled_step import compiled_step

@@ -15,9 +15,9 @@ from typing import Any
 import numpy as np
 
 from hysim._frozen import FloatArray, check_positive
+from hysim.control._controller import Controller
 from hysim.control._loop import RestingPlant, as_actuator
 from hysim.control._open_loop import secant_gain
-from hysim.control._protocols import Controller
 from hysim.control._stability import closing_slopes, limit_cycle, linear_figures
 from hysim.errors import SimulationError
 from hysim.plants.actuator import Actuator

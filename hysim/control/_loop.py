@@ -12,7 +12,7 @@ from hysim._frozen import FloatArray, frozen, read_only
 from hysim._printing import extent, printed, quantity, summary_text
 from hysim._progress import Progress, Reports, reports
 from hysim._results import model_of
-from hysim.control._protocols import Controller, begun, held_samples, limits_of, preview
+from hysim.control._controller import Controller, begun, held_samples, limits_of, preview
 from hysim.errors import SimulationError, warn_beyond, warn_limited
 from hysim.models.model import in_brief
 from hysim.models.protocols import Remembering, Responding, standing

@@ -13,8 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 from hysim._frozen import FloatArray, check_not_negative, read_only
-from hysim.control._protocols import with_room
-from hysim.control._sampled import Feedback, SampledController, check_limits, check_sample_time
+from hysim.control._controller import Feedback, SampledController, check_limits, check_sample_time, with_room
 from hysim.kernels import controllers as kernels
 from hysim.models.model import family
 from hysim.models.protocols import CompiledController

@@ -17,22 +17,289 @@ The sensor's noise is in the simulation, always the same: it moves the memory of
 """
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import replace
-from typing import Any
+from itertools import product
+from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 from scipy.optimize import minimize
 
-from hysim._frozen import FloatArray, check_choice, read_only
+from hysim._frozen import FloatArray, check_choice, check_positive, frozen, read_only
+from hysim._printing import printed, summary_text
+from hysim.control._controller import SampledController, limits_of
 from hysim.control._loop import RestingPlant, as_actuator, sample_time_of
-from hysim.control._margins import LinearLoop
-from hysim.control._protocols import limits_of
-from hysim.control._specification import Specification
-from hysim.control._stability import limit_cycle
-from hysim.control._template import Limits, Tuned, as_template
-from hysim.control._tuning import Trial, Tuning, front
+from hysim.control._open_loop import secant_gain, slopes
+from hysim.control._pid import PID
+from hysim.control._stability import LinearLoop, limit_cycle, slowest_decay
+from hysim.control._tracking import TrackingController
+from hysim.models.model import in_brief
+from hysim.plants.actuator import Actuator
+
+Limits = tuple[float, ...] | None
+Gains = tuple[float, float, float]
+"""kp, ki and kd."""
+
+Tuned = PID | TrackingController
+
+_SHAPES = tuple(product((0.1, 1.0, 3.0, 10.0), (0.05, 0.3, 1.0)))  # Ti and Td in units of 1 / crossover
+_ZEROS = (0.03, 0.3)  # damping ratio of zeros that a PID puts on a resonance
+_SCALES = (1.0, 0.3, 0.1, 0.03)  # of a template's own gains
+_FILTER = 0.1
+_LARGEST_WEIGHT = 1.0
+_LARGEST_LOG = 100.0
+_STEP = 0.2  # of the first simplex along the logarithm of a gain
+
+
+class StandardForm:
+    """PIDs as points (log |Kp|, log Ti, log Td, setpoint weight); the gains have the sign of the plant's gain.
+
+    The derivative's filter is a tenth of Td, and of sqrt(Ti Td), one over the frequency of its zeros, if shorter.
+    """
+
+    def __init__(self, sign: float) -> None:
+        self.sign = sign
+
+    def controller(self, x: FloatArray) -> PID:
+        Kp, Ti, Td = _gains(x[:3])
+        weight = float(np.clip(x[3], 0.0, _LARGEST_WEIGHT))
+        shorter = _FILTER * min(Td, math.sqrt(Ti * Td))
+        return PID.standard(math.copysign(Kp, self.sign), Ti, Td, derivative_filter=shorter, setpoint_weight=weight)
+
+    def feedback(self, gains: Gains) -> PID:
+        """Part of the controller that is proportional to the gains."""
+        return self.controller(self.point(gains))
+
+    def point(self, gains: Gains) -> FloatArray:
+        kp, ki, kd = gains
+        return np.append(np.log([kp, kp / ki, kd / kp]), 1.0)
+
+    def shapes(self, crossover: float, resonances: FloatArray) -> Iterator[Gains]:
+        """Gains up to a factor, for a crossover frequency and a plant with these resonances [rad/s]."""
+        yield from _shapes(crossover, resonances)
+
+    def own(self) -> list[FloatArray]:
+        return []
+
+    def simplex(self, x: FloatArray) -> FloatArray | None:
+        """Corners from which a search around a point begins; None for the search's own."""
+        return None
+
+
+class FreeGains:
+    """Controllers as points: logarithms of the gains of a template's feedback and damping loop that are not zero."""
+
+    def __init__(self, template: Tuned, sign: float) -> None:
+        self.template, self.sign = template, sign
+        self.pid = template if isinstance(template, PID) else template.feedback or PID()
+        self.damping = None if isinstance(template, PID) else template.damping
+        damping_gain = 0.0 if self.damping is None else self.damping.gain
+        self.gains = np.array([self.pid.kp, self.pid.ki, self.pid.kd, damping_gain])
+        self.free = self.gains != 0.0
+        if not self.free.any():
+            raise ValueError("the controller has nothing to tune: the gains that are not zero are the free ones")
+
+    def controller(self, x: FloatArray) -> Tuned:
+        gains = np.zeros(4)
+        gains[self.free] = self.sign * _gains(x)
+        kp, ki, kd, damping = gains.tolist()
+        pid = replace(self.pid, kp=kp, ki=ki, kd=kd)
+        if isinstance(self.template, PID):
+            return pid
+        damped = self.damping if self.damping is None else replace(self.damping, gain=damping)
+        return replace(self.template, feedback=self.template.feedback and pid, damping=damped)
+
+    def feedback(self, gains: Gains) -> Tuned:
+        controller = self.controller(self.point(gains))
+        return controller if isinstance(controller, PID) else replace(controller, damping=None)
+
+    def point(self, gains: Gains) -> FloatArray:
+        return np.asarray(np.log(np.abs(np.array([*gains, self.gains[3]])[self.free])))
+
+    def shapes(self, crossover: float, resonances: FloatArray) -> Iterator[Gains]:
+        free = self.free[:3]
+        shapes = _shapes(crossover, resonances) if free.any() else ()
+        yield from dict.fromkeys(tuple(np.where(free, gains, 0.0).tolist()) for gains in shapes)
+
+    def own(self) -> list[FloatArray]:
+        own = np.log(np.abs(self.gains[self.free]))
+        return [own + math.log(scale) for scale in _SCALES]
+
+    def simplex(self, x: FloatArray) -> FloatArray | None:
+        return np.vstack([x, x + _STEP * np.eye(x.size)])
+
+
+def as_template(template: Tuned | None, sign: float) -> StandardForm | FreeGains:
+    if template is None:
+        return StandardForm(sign)
+    if not isinstance(template, PID | TrackingController):
+        raise TypeError(f"controller must be a PID or a TrackingController, got {type(template).__name__}")
+    return FreeGains(template, sign)
+
+
+def _gains(logarithms: FloatArray) -> FloatArray:
+    return np.exp(np.clip(logarithms, -_LARGEST_LOG, _LARGEST_LOG))
+
+
+def _shapes(crossover: float, resonances: FloatArray) -> Iterator[Gains]:
+    """PIDs up to a factor: by their times, and with zeros on the resonances."""
+    yield from ((1.0, crossover / Ti, Td / crossover) for Ti, Td in _SHAPES)
+    yield from ((2.0 * ratio / w, 1.0, 1.0 / w**2) for w in resonances for ratio in _ZEROS)
+
+
+@frozen
+class Trial:
+    """A controller that `tune` tried, and its figures.
+
+    Parameters
+    ----------
+    controller : PID or TrackingController
+        With the limits.
+    max_sensitivity, voltage_noise : float
+        Largest ``|1 / (1 + L)|`` of all plants, at either slope of the law, and largest rms of the voltage noise in the
+        linear loops [unit of u]; infinite if a loop is unstable.
+    objective : float
+        Objective of the simulated loop, in units of the reference's span; infinite if a loop is unstable.
+    """
+
+    controller: Any
+    max_sensitivity: float
+    voltage_noise: float
+    objective: float
+
+
+@printed
+@frozen
+class Tuning:
+    """Result of `tune`.
+
+    Parameters
+    ----------
+    controller, objective, max_sensitivity
+        As in the best `Trial`.
+    gain_margin, phase_margin : float
+        Factor and angle [degrees] by which the loop may change before it is unstable: the smallest of all plants.
+    voltage_noise : float
+        As in the best `Trial`. The noise also moves the memory of a law, which `close_loop` has in its conditions.
+    trade_off : tuple of Trial
+        Trials within the bound on the noise that no other beats in both objective and sensitivity, most robust first.
+    trials : tuple of Trial
+        Every controller that was simulated.
+    success : bool
+        Whether a controller within the bounds was found.
+    message : str
+        Extent of the search, distance to the bounds, and number of samples with limited voltage.
+    """
+
+    controller: Any
+    objective: float
+    max_sensitivity: float
+    gain_margin: float
+    phase_margin: float
+    voltage_noise: float
+    trade_off: tuple[Trial, ...]
+    trials: tuple[Trial, ...]
+    success: bool
+    message: str
+
+    def __str__(self) -> str:
+        bounds = "within" if self.success else "NOT within"
+        return summary_text(
+            [
+                f"Tuning: {type(self.controller).__name__} {bounds} its bounds, objective {self.objective:.4g} of the "
+                "reference's span"
+            ],
+            {
+                "controller": in_brief(self.controller),
+                "sensitivity": f"at most {self.max_sensitivity:.4g}",
+                "margins": f"gain {self.gain_margin:.4g}, phase {self.phase_margin:.4g} degrees",
+                "noise": f"{self.voltage_noise:.4g} rms of voltage" if self.voltage_noise else "",
+                "search": self.message,
+            },
+        )
+
+
+def front(trials: Iterable[Trial]) -> tuple[Trial, ...]:
+    best: list[Trial] = []
+    for trial in sorted(trials, key=lambda trial: (trial.max_sensitivity, trial.objective)):
+        if trial.objective < (best[-1].objective if best else math.inf):
+            best.append(trial)
+    return tuple(best)
+
+
+class Judgement(NamedTuple):
+    max_sensitivity: float
+    voltage_noise: float
+
+
+class Specification:
+    """Bounds on the maximum sensitivity and on the voltage noise; the linear rule uses the first plant."""
+
+    def __init__(
+        self,
+        plants: Sequence[Actuator],
+        cycle: FloatArray,
+        sample_time: float,
+        max_sensitivity: float,
+        max_voltage_noise: float | None,
+    ) -> None:
+        if not max_sensitivity > 1.0:
+            raise ValueError(f"max_sensitivity must be above one, got {max_sensitivity}")
+        check_positive(max_voltage_noise=max_voltage_noise)
+        self.max_sensitivity = max_sensitivity
+        self.max_voltage_noise = math.inf if max_voltage_noise is None else max_voltage_noise
+        self.plants = [_PlantLoops(plant, cycle, sample_time) for plant in plants]
+
+    def judge(self, controller: SampledController) -> Judgement:
+        sensitivity = 0.0
+        for loop, slope in self._loops():
+            sensitivity = max(sensitivity, loop.max_sensitivity(controller, slope))
+            if sensitivity == math.inf:
+                return Judgement(math.inf, math.inf)
+        return Judgement(sensitivity, max(plant.voltage_noise(controller) for plant in self.plants))
+
+    def excess(self, figures: Judgement | Trial) -> float:
+        """Sum of the parts by which the bounds are exceeded; 0 within."""
+        if figures.max_sensitivity == math.inf:
+            return math.inf
+        parts = figures.max_sensitivity / self.max_sensitivity, figures.voltage_noise / self.max_voltage_noise
+        return sum(max(0.0, part - 1.0) for part in parts)
+
+    def words(self, trial: Trial) -> str:
+        sensitivity = f"sensitivity {trial.max_sensitivity:.2f} of {self.max_sensitivity:g} allowed"
+        if self.max_voltage_noise == math.inf:
+            return sensitivity
+        return f"{sensitivity}, voltage noise {trial.voltage_noise:.2g} of {self.max_voltage_noise:g}"
+
+    def margins(self, controller: SampledController) -> tuple[float, float]:
+        gains, phases = np.array([loop.margins(controller, slope) for loop, slope in self._loops()]).T
+        return float(gains.min()), float(phases.min())
+
+    def _loops(self) -> Iterator[tuple[LinearLoop, float]]:
+        return ((plant.loop, slope) for plant in self.plants for slope in plant.slopes)
+
+
+class _PlantLoops:
+    """One plant along the reference's cycle: its gain, the extreme slopes of its law, and its linear part."""
+
+    def __init__(self, plant: Actuator, cycle: FloatArray, sample_time: float) -> None:
+        self.gain = secant_gain(plant, cycle)
+        self.secant = self.gain / plant.dc_gain
+        self.slopes = sorted(set(slopes(plant, cycle / self.gain)))
+        self.loop = LinearLoop(plant, sample_time)
+        self.noise = 0.0 if plant.sensor is None else plant.sensor.noise
+        self.volts = 1.0 if plant.amplifier is None else abs(plant.amplifier.gain)
+
+    def decay(self, controller: SampledController) -> float:
+        """Decay of the slowest oscillation of the stable loops, per sample."""
+        return slowest_decay(self.loop, controller, self.slopes)
+
+    def voltage_noise(self, controller: SampledController) -> float:
+        if not self.noise:
+            return 0.0
+        return self.volts * self.noise * max(self.loop.noise_gain(controller, slope) for slope in self.slopes)
+
 
 OBJECTIVES: dict[str, Callable[[FloatArray], float]] = {
     "itae": lambda e: float(np.mean(np.linspace(0.0, 1.0, e.size) * np.abs(e))),
