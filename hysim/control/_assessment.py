@@ -15,9 +15,9 @@ from hysim import signals
 from hysim._frozen import FloatArray, frozen, read_only
 from hysim._printing import extent, printed, quantity, summary_text
 from hysim.control._controller import Controller, preview
-from hysim.control._loop import ClosedLoop, RestingPlant, around_actuator, as_actuator
+from hysim.control._loop import ClosedLoop, RestingPlant, around_actuator, as_actuator, sampled
 from hysim.control._open_loop import secant_gain, without_memory
-from hysim.control._stability import closing_slopes, limit_cycle, linear_figures
+from hysim.control._stability import judge
 from hysim.control._tracking import is_fed_back
 from hysim.metrics import LoopMetrics, VibrationReduction, loop_metrics, reduction_percent, rmse, vibration_reduction
 from hysim.plants.actuator import Actuator
@@ -87,14 +87,7 @@ class LoopAssessment:
             ``"max_sensitivity_with_delay"`` and ``"volts_per_quantum"``.
         """
         step = self.closed.conditions["sensor_quantum"] if quantum is None else quantum
-        numbers = {
-            "period": self.period,
-            "tracking_rms": self.tracking_rms,
-            "limited_percent": self.limited_percent,
-            "max_sensitivity": self.max_sensitivity,
-            "max_sensitivity_with_delay": self.max_sensitivity_with_delay,
-            "volts_per_quantum": self.command_jump * step,
-        }
+        numbers = {name: vars(self)[name] for name in _IN_A_ROW} | {"volts_per_quantum": self.command_jump * step}
         return {"stable": self.stable} | {key: each if math.isfinite(each) else None for key, each in numbers.items()}
 
 
@@ -137,42 +130,38 @@ def assess_loop(
     >>> [each.stable for each in found], found[1].message
     ([True, False], 'the loop is unstable: a pole of the linear loop lies outside the unit circle')
     """
-    actuator, r = as_actuator(plant), read_only(reference, "reference", ndim=1)
-    closed = around_actuator(actuator, controller, read_only(t, "t", ndim=1), r, u0)
-    h = closed.conditions["sample_time"]
+    times, r, h = sampled(t, reference)
+    resting = RestingPlant(as_actuator(plant), h, u0)
     samples = r.size if math.isnan(period) else round(period / h)
     if not 0 < samples <= r.size:
         raise ValueError(f"period must be at least a sample and no longer than the reference, got {period} s")
-    cycle = r if math.isnan(period) else r[-samples:]
-    y0 = RestingPlant(actuator, h, u0).y0
-    cycle = np.append(y0, cycle) if np.ptp(cycle) == 0.0 else cycle
-    return judged(actuator, controller, closed, cycle, secant_gain(actuator, cycle), slice(-samples, None), period)
+    cycle = r[-samples:]
+    cycle = np.append(resting.y0, cycle) if np.ptp(cycle) == 0.0 else cycle
+    gain = secant_gain(resting.actuator, cycle)
+    return _judged(resting, controller, times, r, cycle, gain, slice(-samples, None), period)
 
 
-def judged(
-    plant: Actuator,
+def _judged(
+    resting: RestingPlant,
     controller: Controller,
-    closed: ClosedLoop,
+    times: FloatArray,
+    reference: FloatArray,
     cycle: FloatArray,
     gain: float,
     counted: slice,
     period: float = math.nan,
 ) -> LoopAssessment:
-    """Judgement of a loop that has run; `gain` is the secant gain along `cycle`, and `counted` what the error is of."""
-    conditions = closed.conditions
-    h, u0 = conditions["sample_time"], conditions["u0"]
-    linear = linear_figures(plant, controller, h, closing_slopes(plant, cycle, gain))
-    message = "the loop is unstable: a pole of the linear loop lies outside the unit circle"
-    if linear.is_stable:
-        asked = float(np.ptp(cycle)) / abs(gain)
-        moves = limit_cycle(plant, controller, closed.reference, h, u0, decay=linear.decay, asked=asked)
-        message = f"the loop {moves} where the reference stops" if moves else ""
+    """Judgement of a loop; `gain` is the secant gain along `cycle`, and `counted` are the samples of the error."""
+    closed = around_actuator(resting, controller, times, reference)
+    linear, moves = judge(resting, controller, closed.reference, cycle, gain)
+    unstable = linear.max_sensitivity == math.inf
+    why = ": a pole of the linear loop lies outside the unit circle" if unstable else " where the reference stops"
     return LoopAssessment(
-        stable=not message,
-        message=message,
+        stable=not moves,
+        message=moves and f"the loop {moves}{why}",
         period=period,
         tracking_rms=rmse(closed.reference[counted], closed.y[counted]),
-        limited_percent=100.0 * float(conditions["limited_samples"]) / float(closed.t.size),
+        limited_percent=100.0 * float(closed.conditions["limited_samples"]) / float(closed.t.size),
         max_sensitivity=linear.max_sensitivity,
         max_sensitivity_with_delay=linear.max_sensitivity_with_delay,
         command_jump=linear.command_jump,
@@ -358,6 +347,8 @@ def driven_by(run: ClosedLoop) -> str:
 
 
 _FEWEST = 10  # samples of which a step is measured
+_IN_A_ROW = ("period", "tracking_rms", "limited_percent", "max_sensitivity", "max_sensitivity_with_delay")
+_REDUCTIONS = ("overshoot_reduction_percent", "residual_rms_reduction_percent", "settling_time_reduction_percent")
 
 
 def assess_hysteresis(
@@ -407,11 +398,11 @@ def assess_hysteresis(
     reference = signals.triangle(low, high, cycles=cycles, samples_per_cycle=samples)
     opened = open_loop(actuator, reference, sample_time, samples)
     line = RestingPlant(without_memory(actuator, opened.cycle / opened.secant_gain), sample_time)
-    closed = around_actuator(actuator, controller, opened.t, reference)
+    resting = RestingPlant(actuator, sample_time)
     counted = slice(-samples - 1, None)
-    loop = judged(actuator, controller, closed, opened.cycle, opened.secant_gain, counted, period)
-    reduction = opened.reduction_percent(closed.y) if loop.stable else math.nan
-    after, has_law = opened.loop_of(closed.y), actuator.hysteresis is not None
+    loop = _judged(resting, controller, opened.t, reference, opened.cycle, opened.secant_gain, counted, period)
+    reduction = opened.reduction_percent(loop.closed.y) if loop.stable else math.nan
+    after, has_law = opened.loop_of(loop.closed.y), actuator.hysteresis is not None
     return HysteresisAssessment(
         hysteresis_reduction_percent=reduction if has_law else math.nan,
         lag_reduction_percent=math.nan if has_law else reduction,
@@ -424,7 +415,7 @@ def assess_hysteresis(
         secant_gain=opened.secant_gain,
         open_u=opened.u,
         open_y=opened.y,
-        closed=closed,
+        closed=loop.closed,
         loop=loop,
     )
 
@@ -529,18 +520,17 @@ def assess_step(
     t = sample_time * np.arange(before + after)
     resting = RestingPlant(actuator, sample_time, u0)
     reference = resting.y0 + np.where(np.arange(t.size) < before + ahead, 0.0, step)
-    closed = around_actuator(actuator, controller, read_only(t), reference, u0)
     cycle = np.array([resting.y0, resting.y0 + step])
     gain = secant_gain(actuator, cycle)
-    loop = judged(actuator, controller, closed, cycle, gain, slice(None))
+    loop = _judged(resting, controller, read_only(t), reference, cycle, gain, slice(None))
     waits = np.arange(after) < (ahead if known_ahead else 0)
     open_y = resting.driven(resting.u0 + np.where(waits, 0.0, step / gain))
     decay_rate = -_least_damped(actuator).real
-    reduction = vibration_reduction(t[:after], open_y, closed.y[before:], decay_rate=decay_rate)
+    reduction = vibration_reduction(t[:after], open_y, loop.closed.y[before:], decay_rate=decay_rate)
     return StepAssessment(
-        reduction=reduction if loop.stable else _unknown(reduction),
+        reduction=reduction if loop.stable else replace(reduction, **dict.fromkeys(_REDUCTIONS, math.nan)),
         open_y=open_y,
-        closed=closed,
+        closed=loop.closed,
         loop=loop,
     )
 
@@ -587,13 +577,13 @@ def assess_square_wave(
     t = sample_time * np.arange(reference.size)
     levels = np.array([low, high])
     gain = secant_gain(actuator, levels)
-    closed = around_actuator(actuator, controller, read_only(t), reference)
-    open_y = RestingPlant(actuator, sample_time).driven(reference / gain)
+    resting = RestingPlant(actuator, sample_time)
+    open_y = resting.driven(reference / gain)
     last, last_half = slice(-2 * half, None), slice(-half, None)
-    loop = judged(actuator, controller, closed, levels, gain, last, period)
+    loop = _judged(resting, controller, read_only(t), reference, levels, gain, last, period)
     mode, step = _least_damped(actuator), None
     if half >= _FEWEST and loop.stable:
-        halves = t[last_half], open_y[last_half], closed.y[last_half]
+        halves = t[last_half], open_y[last_half], loop.closed.y[last_half]
         reduction = vibration_reduction(*halves, decay_rate=-mode.real)
         if half * sample_time >= reduction.open.t98 + 5.0 * 2.0 * math.pi / mode.imag:
             step = reduction
@@ -601,21 +591,11 @@ def assess_square_wave(
         open_tracking_rms=rmse(reference[last], open_y[last]),
         tracking_rms=loop.tracking_rms,
         open_peak_excess_percent=_peak_excess(open_y[last], low, high),
-        peak_excess_percent=_peak_excess(closed.y[last], low, high),
+        peak_excess_percent=_peak_excess(loop.closed.y[last], low, high),
         reduction=step,
         open_y=open_y,
-        closed=closed,
+        closed=loop.closed,
         loop=loop,
-    )
-
-
-def _unknown(reduction: VibrationReduction) -> VibrationReduction:
-    """The measures of both responses, without the reductions."""
-    return replace(
-        reduction,
-        overshoot_reduction_percent=math.nan,
-        residual_rms_reduction_percent=math.nan,
-        settling_time_reduction_percent=math.nan,
     )
 
 

@@ -9,18 +9,16 @@ G is the loop's describing function. The bandwidth is the lowest frequency at wh
 """
 
 import math
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
-from hysim._frozen import FloatArray, check_positive
+from hysim._frozen import check_positive
 from hysim.control._controller import Controller
 from hysim.control._loop import RestingPlant, as_actuator
 from hysim.control._open_loop import secant_gain
-from hysim.control._stability import closing_slopes, limit_cycle, linear_figures
+from hysim.control._stability import judge
 from hysim.errors import SimulationError
-from hysim.plants.actuator import Actuator
 
 _PER_DECADE = 24  # frequencies tried
 _BISECTIONS = 10
@@ -79,12 +77,10 @@ def bandwidth(
     9.0
     """
     check_positive(amplitude=amplitude, lowest=lowest)
-    actuator = as_actuator(plant)
-    if actuator.sensor is not None:
-        actuator = replace(actuator, sensor=replace(actuator.sensor, noise=0.0))
-    resting = RestingPlant(actuator, sample_time, u0)
-    sine = amplitude * np.sin(np.linspace(0.0, 2.0 * math.pi, _FEWEST))
-    _refuse_unstable(actuator, controller, resting, resting.y0 + sine)
+    resting = RestingPlant(as_actuator(plant), sample_time, u0).quiet()
+    cycle = resting.y0 + amplitude * np.sin(np.linspace(0.0, 2.0 * math.pi, _FEWEST))
+    if moves := judge(resting, controller, cycle, cycle, secant_gain(resting.actuator, cycle))[1]:
+        raise SimulationError(f"the loop {moves}: it has no bandwidth")
 
     def follows(frequency: float) -> bool:
         gain = abs(_describing(resting, controller, frequency, amplitude, transient))
@@ -102,17 +98,6 @@ def bandwidth(
         middle = math.sqrt(within * beyond)
         within, beyond = (middle, beyond) if follows(middle) else (within, middle)
     return math.sqrt(within * beyond)
-
-
-def _refuse_unstable(actuator: Actuator, controller: Controller, resting: RestingPlant, cycle: FloatArray) -> None:
-    gain = secant_gain(actuator, cycle)
-    linear = linear_figures(actuator, controller, resting.sample_time, closing_slopes(actuator, cycle, gain))
-    if not linear.is_stable:
-        raise SimulationError("the loop is unstable: it has no bandwidth")
-    asked = float(np.ptp(cycle)) / abs(gain)
-    here = resting.sample_time, resting.u0
-    if moves := limit_cycle(actuator, controller, cycle, *here, decay=linear.decay, asked=asked):
-        raise SimulationError(f"the loop {moves}: it has no bandwidth")
 
 
 def _describing(

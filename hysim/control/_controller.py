@@ -1,16 +1,14 @@
 """Abilities of controllers, all but `compiled` optional; base class of the sampled ones, and their linear part."""
 
-import functools
-import math
 from abc import ABC, abstractmethod
-from typing import Any, NamedTuple, Protocol, runtime_checkable
+from typing import NamedTuple, Protocol, runtime_checkable
 
 import numpy as np
 import numpy.typing as npt
+from scipy.linalg import block_diag
 
 from hysim._frozen import FloatArray
 from hysim.kernels.controllers import guarded
-from hysim.kernels.tracking import bound
 from hysim.models.protocols import CompiledController
 
 
@@ -90,10 +88,6 @@ def preview(controller: object, sample_time: float) -> int:
     return controller.ahead(sample_time) if isinstance(controller, Previewing) else 0
 
 
-with_inverse = functools.lru_cache(maxsize=256)(bound)
-"""The controller of a kernel of `hysim.kernels.tracking` and the inverse of a law."""
-
-
 class Feedback(NamedTuple):
     """Linear system from the measurement m to the command, limits apart: x' = A x + B m, command = C x + D m."""
 
@@ -111,13 +105,8 @@ class Feedback(NamedTuple):
         )
 
     def beside(self, other: "Feedback") -> "Feedback":
-        n, m = self.B.size, other.B.size
-        return Feedback(
-            np.block([[self.A, np.zeros((n, m))], [np.zeros((m, n)), other.A]]),
-            np.concatenate([self.B, other.B]),
-            np.concatenate([self.C, other.C]),
-            self.D + other.D,
-        )
+        B, C = np.concatenate([self.B, other.B]), np.concatenate([self.C, other.C])
+        return Feedback(block_diag(self.A, other.A), B, C, self.D + other.D)
 
 
 class SampledController(ABC):
@@ -184,16 +173,18 @@ class SampledController(ABC):
         return guarded(after.step, after.parameters, after.state, reference, measurement), after
 
 
-def check_kind(name: str, part: Any, kind: type) -> None:
-    if part is not None and not isinstance(part, kind):
-        raise TypeError(f"{name} must be of {kind.__name__}, got {type(part).__name__}")
+class WithoutFeedback(SampledController):
+    """Controllers of which the measurement does not move the command itself."""
+
+    def frequency_response(self, frequency: npt.ArrayLike, sample_time: float) -> npt.NDArray[np.complex128]:
+        """Zeros: there is no feedback."""
+        return np.zeros(np.shape(frequency), dtype=complex)
+
+    def linear(self, sample_time: float) -> Feedback:
+        """No feedback, a system without states."""
+        return Feedback(np.zeros((0, 0)), np.zeros(0), np.zeros(0), 0.0)
 
 
 def check_limits(limits: tuple[float, ...] | None) -> None:
     if limits is not None and not (len(limits) == 2 and limits[0] <= limits[1]):
         raise ValueError(f"limits must be (lowest, highest), got {limits}")
-
-
-def check_sample_time(sample_time: float) -> None:
-    if not 0.0 < sample_time < math.inf:
-        raise ValueError(f"sample_time must be positive and finite, got {sample_time}")

@@ -38,7 +38,7 @@ from typing import Self
 import numpy as np
 import numpy.typing as npt
 
-from hysim._frozen import FloatArray, check_not_negative, check_positive
+from hysim._frozen import FloatArray, check_count, check_not_negative, check_positive
 from hysim.control._controller import Feedback
 from hysim.models.model import family
 from hysim.plants.modes import mode
@@ -100,10 +100,8 @@ class Notch(_Filter):
 
     def coefficients(self, sample_time: float) -> FloatArray:
         w = self.natural_frequency
-        numerator, denominator = (
-            (w**2, 2.0 * ratio * w, 1.0) for ratio in (self.damping_ratio, self.new_damping_ratio)
-        )
-        return _discrete(numerator, denominator, w, sample_time)
+        zeros, poles = 2.0 * self.damping_ratio * w, 2.0 * self.new_damping_ratio * w
+        return _discrete((w**2, zeros, 1.0), (w**2, poles, 1.0), w, sample_time)
 
 
 @family
@@ -210,8 +208,7 @@ class Shaper:
         check_positive(natural_frequencies=min(self.natural_frequencies, default=None))
         if not all(0.0 <= ratio < 1.0 for ratio in self.damping_ratios):
             raise ValueError(f"damping_ratios must be from 0 to below 1, got {self.damping_ratios}")
-        if not isinstance(self.repeats, int) or self.repeats < 1:
-            raise ValueError(f"repeats must be an integer of at least 1, got {self.repeats}")
+        check_count("repeats", self.repeats)
         check_not_negative(smoothing=self.smoothing)
 
     @classmethod
@@ -262,8 +259,7 @@ class Shaper:
         """
         if not 0.0 <= tolerance < 1.0:
             raise ValueError(f"tolerance must be from 0 to below 1, got {tolerance}")
-        if not isinstance(zeros, int) or zeros < 1:
-            raise ValueError(f"zeros must be an integer of at least 1, got {zeros}")
+        check_count("zeros", zeros)
         places = np.sin(np.pi * (np.arange(zeros) - 0.5 * (zeros - 1)) / zeros)
         return cls.zv(natural_frequency * (1.0 + tolerance * places), np.full(zeros, damping_ratio))
 
@@ -313,8 +309,7 @@ class ModeInverse:
         a1, a2 = -np.trace(A), np.linalg.det(A)
         b1 = C @ stage.B[0]
         b2 = C @ A @ stage.B[0] + a1 * b1
-        weights: FloatArray = np.convolve([1.0, a1, a2], [b2, b1]) / (b1 + b2) ** 2
-        return weights
+        return np.asarray(np.convolve([1.0, a1, a2], [b2, b1]) / (b1 + b2) ** 2)
 
 
 def _zero_vibration(frequency: float, ratio: float, sample_time: float) -> FloatArray:

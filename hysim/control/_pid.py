@@ -12,11 +12,11 @@ from typing import Self
 import numpy as np
 import numpy.typing as npt
 
-from hysim._frozen import FloatArray, check_not_negative, read_only
-from hysim.control._controller import Feedback, SampledController, check_limits, check_sample_time, with_room
+from hysim._frozen import FloatArray, check_not_negative, read_only, vectors
+from hysim.control._controller import Feedback, SampledController, check_limits, with_room
 from hysim.kernels import controllers as kernels
 from hysim.models.model import family
-from hysim.models.protocols import CompiledController
+from hysim.models.protocols import CompiledController, positive_time
 
 State = tuple[float, float, float, float]
 """Last command before the limits, integral part, derivative part, and last c r - y."""
@@ -152,14 +152,11 @@ class PID(SampledController):
         >>> u.tolist(), state[1]
         ([1.0, 1.5], 1.0)
         """
-        r, y = read_only(reference, "reference", ndim=1), read_only(measurement, "measurement", ndim=1)
-        if r.size != y.size:
-            raise ValueError(f"reference and measurement must have equal lengths, got {r.size} and {y.size}")
-        begin = self.start(y=float(y[0]) if y.size else 0.0) if state is None else state
-        numbers = read_only(begin, "state", ndim=1)
+        r, y = vectors(reference=reference, measurement=measurement)
+        rest = float(y[0]) if y.size else 0.0
+        numbers = read_only(self.start(y=rest) if state is None else state, "state", ndim=1)
         if numbers.size != 4:
             raise ValueError(f"state must hold 4 numbers, as `start` gives them, got {numbers.size}")
-        rest = float(y[0]) if y.size else 0.0
         state_after = with_room(numbers, float(numbers[0]), rest, rest)
         command, u = np.empty((2, r.size))
         step, parameters, _ = self.compiled(sample_time)
@@ -187,7 +184,7 @@ class PID(SampledController):
         )
 
     def compiled(self, sample_time: float, u0: float = 0.0, y0: float = 0.0) -> CompiledController:
-        check_sample_time(sample_time)
+        positive_time(sample_time)
         lowest, highest = self.limits or (-math.inf, math.inf)
         lag = self.derivative_filter + sample_time
         parameters = [

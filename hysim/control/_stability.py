@@ -37,13 +37,12 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from hysim._frozen import FloatArray, frozen
+from hysim._frozen import FloatArray
 from hysim.control._controller import Controller, Feedback, SampledController, limits_of
 from hysim.control._loop import RestingPlant, as_actuator
 from hysim.control._open_loop import slopes
 from hysim.control._to_control import to_control
 from hysim.plants.actuator import Actuator
-from hysim.plants.amplifier import Amplifier
 from hysim.plants.sensor import Sensor
 
 _FREQUENCIES = 300
@@ -118,7 +117,18 @@ class LinearLoop:
         frequencies = np.concatenate([self.frequencies, own])
         values = np.concatenate([_sensitivity(slope * self.response(controller)), self._at(own, controller, slope)])
         order = np.argsort(frequencies, kind="stable")
-        return self._highest(frequencies[order], values[order], controller, slope)
+        frequencies, values = frequencies[order], values[order]
+        before, after = np.append(0.0, values[:-1]), np.append(values[1:], 0.0)
+        highest = float(values.max())
+        peaks = np.flatnonzero((values > before) & (values >= after) & (values >= _HIGH * highest))
+        low, high = frequencies[np.maximum(peaks - 1, 0)], frequencies[np.minimum(peaks + 1, values.size - 1)]
+        for _ in range(_ROUNDS):
+            between = np.linspace(low, high, _BETWEEN)
+            finer = self._at(between.ravel(), controller, slope).reshape(between.shape)
+            highest = max(highest, float(finer.max()))
+            best, each = finer.argmax(axis=0), np.arange(low.size)
+            low, high = between[np.maximum(best - 1, 0), each], between[np.minimum(best + 1, _BETWEEN - 1), each]
+        return highest
 
     def is_stable(self, controller: SampledController, slope: float = 1.0) -> bool:
         """Whether all poles of the loop with a law of this slope lie inside the unit circle."""
@@ -144,7 +154,7 @@ class LinearLoop:
         """Rms of the command for white noise of rms one in the measurement; infinite if the loop is unstable."""
         if not self.is_stable(controller, slope):
             return math.inf
-        loop = self._loop(controller, slope)
+        loop = self._closed(controller.linear(self.sample_time), slope)
         power, states = loop.M, np.outer(loop.G, loop.G)
         while np.abs(power).max() > _FORGOTTEN:
             states, power = states + power @ states @ power.T, power @ power
@@ -152,7 +162,7 @@ class LinearLoop:
 
     def poles(self, controller: SampledController, slope: float = 1.0) -> npt.NDArray[np.complex128]:
         """Poles of the loop in z with a law of this slope."""
-        return np.asarray(np.linalg.eigvals(self._loop(controller, slope).M))
+        return np.asarray(np.linalg.eigvals(self._closed(controller.linear(self.sample_time), slope).M))
 
     def _default(self) -> FloatArray:
         highest = math.pi / self.sample_time
@@ -169,25 +179,6 @@ class LinearLoop:
     def _at(self, frequencies: FloatArray, controller: SampledController, slope: float) -> FloatArray:
         feedback = controller.frequency_response(frequencies, self.sample_time)
         return _sensitivity(slope * self.plant_at(frequencies) * feedback)
-
-    def _highest(
-        self, frequencies: FloatArray, values: FloatArray, controller: SampledController, slope: float
-    ) -> float:
-        """Largest value, refined between the neighbours of all peaks that are nearly as high."""
-        before, after = np.append(0.0, values[:-1]), np.append(values[1:], 0.0)
-        highest = float(values.max())
-        peaks = np.flatnonzero((values > before) & (values >= after) & (values >= _HIGH * highest))
-        low, high = frequencies[np.maximum(peaks - 1, 0)], frequencies[np.minimum(peaks + 1, values.size - 1)]
-        for _ in range(_ROUNDS):
-            between = np.linspace(low, high, _BETWEEN)
-            finer = self._at(between.ravel(), controller, slope).reshape(between.shape)
-            highest = max(highest, float(finer.max()))
-            best, each = finer.argmax(axis=0), np.arange(low.size)
-            low, high = between[np.maximum(best - 1, 0), each], between[np.minimum(best + 1, _BETWEEN - 1), each]
-        return highest
-
-    def _loop(self, controller: SampledController, slope: float) -> _Loop:
-        return self._closed(controller.linear(self.sample_time), slope)
 
     def _closed(self, feedback: Feedback, slope: float) -> _Loop:
         n = len(self.system.A)
@@ -227,22 +218,14 @@ _SWINGS = 3  # changes of side; a curved drift has two
 _CLOSES = 1e-6  # least slope of a law that closes a loop, in units of the cycle's
 
 
-@frozen
-class LinearFigures:
-    """Figures of the linear loop, the worst over both slopes of the law.
+class LinearFigures(NamedTuple):
+    """Figures of the linear loop, the worst over both slopes of the law; nan for a controller without a linear part.
 
-    Parameters
-    ----------
-    is_stable : bool
-    max_sensitivity, max_sensitivity_with_delay : float
-        The largest ``|1 / (1 + L)|``, also with one sample more of delay; infinite if unstable, nan if unknown.
-    decay : float
-        Of the slowest oscillation, per sample.
-    command_jump : float
-        Jump of the command when the measurement moves by one; nan if unknown [unit of u / unit of y].
+    The sensitivities are the largest ``|1 / (1 + L)|``, also with one sample more of delay, and infinite if the loop is
+    unstable; `decay` is that of the slowest oscillation per sample, and `command_jump` the jump of the command when the
+    measurement moves by one.
     """
 
-    is_stable: bool
     max_sensitivity: float
     max_sensitivity_with_delay: float
     decay: float
@@ -255,39 +238,38 @@ def later(plant: Actuator, time: float) -> Actuator:
     return replace(plant, sensor=replace(sensor, delay=sensor.delay + time))
 
 
-def closing_slopes(plant: Actuator, cycle: FloatArray, gain: float) -> tuple[float, ...]:
-    """Least and largest slope of the law along a cycle of the reference, of those that close a loop; 1 without a law.
+def judge(
+    resting: RestingPlant, controller: Controller, reference: FloatArray, cycle: FloatArray, gain: float
+) -> tuple[LinearFigures, str]:
+    """Figures of the linear loop, and in words how the loop fails to come to rest behind the reference, empty if not.
 
-    `gain` is the secant gain.
+    `gain` is the secant gain along `cycle`, a cycle of the reference.
     """
-    if plant.hysteresis is None:
-        return (1.0,)
-    secant = gain / plant.dc_gain
-    each = sorted({slope for slope in slopes(plant, cycle / gain) if slope / secant > _CLOSES})
-    return tuple(each) or (secant,)
+    linear = _linear_figures(resting.actuator, controller, resting.sample_time, cycle, gain)
+    if linear.max_sensitivity == math.inf:
+        return linear, "is unstable"
+    asked = float(np.ptp(cycle)) / abs(gain)
+    return linear, limit_cycle(resting, controller, reference, linear.decay, asked)
 
 
-def linear_figures(
-    plant: Actuator, controller: Controller, sample_time: float, slopes: Sequence[float]
+def _linear_figures(
+    plant: Actuator, controller: Controller, sample_time: float, cycle: FloatArray, gain: float
 ) -> LinearFigures:
-    """Figures of the linear loop; of a controller that is not known to have a linear part they are unknown."""
     if not isinstance(controller, SampledController):
-        return LinearFigures(
-            is_stable=True,
-            max_sensitivity=math.nan,
-            max_sensitivity_with_delay=math.nan,
-            decay=_FASTEST,
-            command_jump=math.nan,
-        )
+        return LinearFigures(math.nan, math.nan, _FASTEST, math.nan)
     loops = [LinearLoop(each, sample_time) for each in (plant, later(plant, sample_time))]
-    now, delayed = (max(loop.max_sensitivity(controller, slope) for slope in slopes) for loop in loops)
-    return LinearFigures(
-        is_stable=now < math.inf,
-        max_sensitivity=now,
-        max_sensitivity_with_delay=delayed,
-        decay=slowest_decay(loops[0], controller, slopes) if now < math.inf else 0.0,
-        command_jump=abs(controller.linear(sample_time).D),
-    )
+    along = _closing_slopes(plant, cycle, gain)
+    now, delayed = (max(loop.max_sensitivity(controller, slope) for slope in along) for loop in loops)
+    decay = slowest_decay(loops[0], controller, along) if now < math.inf else 0.0
+    return LinearFigures(now, delayed, decay, abs(controller.linear(sample_time).D))
+
+
+def _closing_slopes(plant: Actuator, cycle: FloatArray, gain: float) -> list[float]:
+    """Least and largest slope of the law along a cycle of the reference that close a loop; 1 without a law."""
+    if plant.hysteresis is None:
+        return [1.0]
+    secant = gain / plant.dc_gain
+    return sorted({slope for slope in slopes(plant, cycle / gain) if slope / secant > _CLOSES}) or [secant]
 
 
 def slowest_decay(loop: LinearLoop, controller: SampledController, slopes: Sequence[float]) -> float:
@@ -299,28 +281,21 @@ def slowest_decay(loop: LinearLoop, controller: SampledController, slopes: Seque
 
 
 def limit_cycle(
-    plant: Actuator,
-    controller: Controller,
-    reference: FloatArray,
-    sample_time: float,
-    u0: float | None = None,
-    *,
-    decay: float,
-    asked: float,
+    resting: RestingPlant, controller: Controller, reference: FloatArray, decay: float, asked: float
 ) -> str:
     """In words, how the loop moves on where it should be at rest; empty if it comes to rest.
 
     `decay` is that of the slowest oscillation of the stable linear loop, per sample, and `asked` the range of the
     voltage that the reference asks for.
     """
-    resting = RestingPlant(_without_noise(plant), sample_time, u0)
+    resting = resting.quiet()
     n = reference.size
     longest = _LONGEST * max(n, _SHORTEST)
     held = min(max(math.ceil(_REST / decay), _SHORTEST, n // 4), longest)
     while True:
         signals = resting.attempt(controller, np.append(reference, np.full(held, reference[-1])))
         if signals.lost >= 0:
-            return f"diverges at t = {signals.lost * sample_time:g}"
+            return f"diverges at t = {signals.lost * resting.sample_time:g}"
         tail, slower = held // 4, math.exp(-0.5 * decay * (held // 4))
         volts, far = _swing(signals.drive, tail, slower), _swing(signals.y, tail, slower)
         if _too_large(resting, controller, volts, far, asked):
@@ -331,25 +306,16 @@ def limit_cycle(
         held = min(4 * held, longest)  # it drifts, or swings more slowly than that
 
 
-def _without_noise(plant: Actuator) -> Actuator:
-    return plant if plant.sensor is None else replace(plant, sensor=replace(plant.sensor, noise=0.0))
-
-
 def _too_large(resting: RestingPlant, controller: Controller, volts: float, far: float, asked: float) -> bool:
     chain = resting.chain
     quantum = chain.sensor.quantum
     if not quantum:
         return volts > _SMALL * asked
-    low, high = np.clip(limits_of(controller) or (-math.inf, math.inf), *_commands(chain.amplifier))
+    low, high = limits_of(controller) or (-math.inf, math.inf)
+    if chain.amplifier.limits is not None:
+        commands = ((limit - chain.amplifier.offset) / chain.amplifier.gain for limit in chain.amplifier.limits)
+        low, high = np.clip((low, high), *sorted(commands))
     return far > _QUANTA * quantum or _FULL * float(high - low) < volts
-
-
-def _commands(amplifier: Amplifier) -> tuple[float, float]:
-    """Commands at the limits of an amplifier."""
-    if amplifier.limits is None:
-        return -math.inf, math.inf
-    first, second = ((limit - amplifier.offset) / amplifier.gain for limit in amplifier.limits)
-    return min(first, second), max(first, second)
 
 
 def _swing(signal: FloatArray, samples: int, slower: float) -> float:

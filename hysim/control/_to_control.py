@@ -24,7 +24,7 @@ from hysim.control._tracking import InverseFeedforward, TrackingController
 from hysim.errors import SimulationError
 from hysim.kernels import boucwen_inverse
 from hysim.laws.differential.boucwen_inverse import BoucWenInverse
-from hysim.models.protocols import CompiledController, Continuable, Remembering
+from hysim.models.protocols import CompiledController, Continuable, Remembering, positive_time
 from hysim.plants.actuator import Actuator
 from hysim.plants.chain import Chain, ChainState
 from hysim.plants.oscillator import BoucWenOscillator, OscillatorState
@@ -202,8 +202,8 @@ def to_control(plant: Any, sample_time: float | None = None) -> Any:
     >>> control.input_output_response(play, 0.1 * np.arange(5), [0.0, 1.0, 0.75, 0.0, 0.0]).outputs.tolist()
     [0.0, 0.0, 1.5, 1.5, 0.5]
     """
-    if sample_time is not None and not 0.0 < sample_time < math.inf:
-        raise ValueError(f"sample_time must be positive and finite, got {sample_time}")
+    if sample_time is not None:
+        positive_time(sample_time)
     plant = model_of(plant)
     if isinstance(plant, PID):
         return _pid(plant, sample_time)

@@ -10,6 +10,7 @@ Every part may be left out. With `preview` the reference is known as many sample
 take, so that the displacement follows it without delay.
 """
 
+import functools
 import math
 from dataclasses import fields
 from typing import Any, NamedTuple, Self
@@ -18,14 +19,7 @@ import numpy as np
 import numpy.typing as npt
 
 from hysim._frozen import FloatArray, read_only
-from hysim.control._controller import (
-    Feedback,
-    SampledController,
-    check_kind,
-    check_limits,
-    check_sample_time,
-    with_inverse,
-)
+from hysim.control._controller import Feedback, SampledController, WithoutFeedback, check_limits
 from hysim.control._filters import DampingLoop, ModeInverse, Notch, Shaper
 from hysim.control._pid import PID
 from hysim.kernels import tracking as kernels
@@ -34,10 +28,12 @@ from hysim.kernels.stepping import Step
 from hysim.laws.static import Line
 from hysim.models.inverse_steps import inverse_step
 from hysim.models.model import family
-from hysim.models.protocols import CompiledController, needs_time
+from hysim.models.protocols import CompiledController, needs_time, positive_time
 from hysim.plants.actuator import Actuator, as_actuator, is_law
 from hysim.plants.amplifier import Amplifier
 from hysim.plants.creep import Creep
+
+_with_inverse = functools.lru_cache(maxsize=256)(kernels.bound)
 
 
 class FeedforwardBlock(NamedTuple):
@@ -49,7 +45,7 @@ class FeedforwardBlock(NamedTuple):
 
 
 @family
-class InverseFeedforward(SampledController):
+class InverseFeedforward(WithoutFeedback):
     """Command that takes a model of an actuator to a wanted displacement, one sample later.
 
     It closes a loop by itself, or as a part of a `TrackingController`.
@@ -85,8 +81,8 @@ class InverseFeedforward(SampledController):
     amplifier: Amplifier | None = None
 
     def __post_init__(self) -> None:
-        check_kind("creep", self.creep, Creep)
-        check_kind("amplifier", self.amplifier, Amplifier)
+        _check_kind("creep", self.creep, Creep)
+        _check_kind("amplifier", self.amplifier, Amplifier)
         if self.amplifier is not None and (self.amplifier.dynamic or not self.amplifier.gain):
             raise ValueError(
                 "the amplifier must answer at once and have a gain: its slewing and its lag have no inverse"
@@ -119,17 +115,9 @@ class InverseFeedforward(SampledController):
         actuator = as_actuator(plant)
         return cls(law=actuator.hysteresis, creep=actuator.creep, amplifier=actuator.amplifier)
 
-    def frequency_response(self, frequency: npt.ArrayLike, sample_time: float) -> npt.NDArray[np.complex128]:
-        """Zeros: the measurement is not used."""
-        return np.zeros(np.shape(frequency), dtype=complex)
-
-    def linear(self, sample_time: float) -> Feedback:
-        """No feedback: the measurement is not used."""
-        return Feedback(np.zeros((0, 0)), np.zeros(0), np.zeros(0), 0.0)
-
     def compiled(self, sample_time: float, u0: float = 0.0, y0: float = 0.0) -> CompiledController:
         inverse, parameters, state = self.block(sample_time, u0)
-        step = with_inverse(kernels.invert, inverse)
+        step = _with_inverse(kernels.invert, inverse)
         return CompiledController(step, read_only(parameters, finite=False), np.append(u0, state))
 
     def block(
@@ -210,7 +198,7 @@ class TrackingController(SampledController):
     def __post_init__(self) -> None:
         kinds = (Shaper, ModeInverse, InverseFeedforward, PID, Notch, DampingLoop, Actuator)
         for field, kind in zip(fields(self), kinds, strict=False):
-            check_kind(field.name, vars(self)[field.name], kind)
+            _check_kind(field.name, vars(self)[field.name], kind)
         check_limits(self.limits)
         if self.feedback is not None and self.feedback.limits is not None:
             raise ValueError(
@@ -257,7 +245,7 @@ class TrackingController(SampledController):
         return None if self.feedforward is None else self.feedforward.plant
 
     def compiled(self, sample_time: float, u0: float = 0.0, y0: float = 0.0) -> CompiledController:
-        check_sample_time(sample_time)
+        positive_time(sample_time)
         lowest, highest = self.limits or (-math.inf, math.inf)
         taps = self._taps(sample_time)
         counts, plant, plant_state = self._model_blocks(sample_time, u0)
@@ -271,7 +259,7 @@ class TrackingController(SampledController):
         parameters = [np.array(head), taps.ravel(), plant, feedback.parameters, *filters, forward.parameters]
         state = [np.array([u0]), np.full(taps.shape[1], y0), plant_state, feedback.state, np.zeros(4), forward.state]
         return CompiledController(
-            with_inverse(kernels.track, forward.inverse),
+            _with_inverse(kernels.track, forward.inverse),
             read_only(np.concatenate(parameters), finite=False),
             np.concatenate(state),
         )
@@ -309,3 +297,8 @@ def is_fed_back(controller: object) -> bool:
     if isinstance(controller, TrackingController):
         return controller.feedback is not None or controller.damping is not None
     return not isinstance(controller, InverseFeedforward)
+
+
+def _check_kind(name: str, part: Any, kind: type) -> None:
+    if part is not None and not isinstance(part, kind):
+        raise TypeError(f"{name} must be of {kind.__name__}, got {type(part).__name__}")

@@ -18,18 +18,18 @@ The sensor's noise is in the simulation, always the same: it moves the memory of
 
 import math
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, field, replace
 from itertools import product
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 from scipy.optimize import minimize
 
-from hysim._frozen import FloatArray, check_choice, check_positive, frozen, read_only
+from hysim._frozen import FloatArray, check_choice, check_positive, frozen
 from hysim._printing import printed, summary_text
 from hysim.control._controller import SampledController, limits_of
-from hysim.control._loop import RestingPlant, as_actuator, sample_time_of
+from hysim.control._loop import RestingPlant, as_actuator, sampled
 from hysim.control._open_loop import secant_gain, slopes
 from hysim.control._pid import PID
 from hysim.control._stability import LinearLoop, limit_cycle, slowest_decay
@@ -66,10 +66,6 @@ class StandardForm:
         weight = float(np.clip(x[3], 0.0, _LARGEST_WEIGHT))
         shorter = _FILTER * min(Td, math.sqrt(Ti * Td))
         return PID.standard(math.copysign(Kp, self.sign), Ti, Td, derivative_filter=shorter, setpoint_weight=weight)
-
-    def feedback(self, gains: Gains) -> PID:
-        """Part of the controller that is proportional to the gains."""
-        return self.controller(self.point(gains))
 
     def point(self, gains: Gains) -> FloatArray:
         kp, ki, kd = gains
@@ -109,10 +105,6 @@ class FreeGains:
             return pid
         damped = self.damping if self.damping is None else replace(self.damping, gain=damping)
         return replace(self.template, feedback=self.template.feedback and pid, damping=damped)
-
-    def feedback(self, gains: Gains) -> Tuned:
-        controller = self.controller(self.point(gains))
-        return controller if isinstance(controller, PID) else replace(controller, damping=None)
 
     def point(self, gains: Gains) -> FloatArray:
         return np.asarray(np.log(np.abs(np.array([*gains, self.gains[3]])[self.free])))
@@ -228,58 +220,6 @@ def front(trials: Iterable[Trial]) -> tuple[Trial, ...]:
     return tuple(best)
 
 
-class Judgement(NamedTuple):
-    max_sensitivity: float
-    voltage_noise: float
-
-
-class Specification:
-    """Bounds on the maximum sensitivity and on the voltage noise; the linear rule uses the first plant."""
-
-    def __init__(
-        self,
-        plants: Sequence[Actuator],
-        cycle: FloatArray,
-        sample_time: float,
-        max_sensitivity: float,
-        max_voltage_noise: float | None,
-    ) -> None:
-        if not max_sensitivity > 1.0:
-            raise ValueError(f"max_sensitivity must be above one, got {max_sensitivity}")
-        check_positive(max_voltage_noise=max_voltage_noise)
-        self.max_sensitivity = max_sensitivity
-        self.max_voltage_noise = math.inf if max_voltage_noise is None else max_voltage_noise
-        self.plants = [_PlantLoops(plant, cycle, sample_time) for plant in plants]
-
-    def judge(self, controller: SampledController) -> Judgement:
-        sensitivity = 0.0
-        for loop, slope in self._loops():
-            sensitivity = max(sensitivity, loop.max_sensitivity(controller, slope))
-            if sensitivity == math.inf:
-                return Judgement(math.inf, math.inf)
-        return Judgement(sensitivity, max(plant.voltage_noise(controller) for plant in self.plants))
-
-    def excess(self, figures: Judgement | Trial) -> float:
-        """Sum of the parts by which the bounds are exceeded; 0 within."""
-        if figures.max_sensitivity == math.inf:
-            return math.inf
-        parts = figures.max_sensitivity / self.max_sensitivity, figures.voltage_noise / self.max_voltage_noise
-        return sum(max(0.0, part - 1.0) for part in parts)
-
-    def words(self, trial: Trial) -> str:
-        sensitivity = f"sensitivity {trial.max_sensitivity:.2f} of {self.max_sensitivity:g} allowed"
-        if self.max_voltage_noise == math.inf:
-            return sensitivity
-        return f"{sensitivity}, voltage noise {trial.voltage_noise:.2g} of {self.max_voltage_noise:g}"
-
-    def margins(self, controller: SampledController) -> tuple[float, float]:
-        gains, phases = np.array([loop.margins(controller, slope) for loop, slope in self._loops()]).T
-        return float(gains.min()), float(phases.min())
-
-    def _loops(self) -> Iterator[tuple[LinearLoop, float]]:
-        return ((plant.loop, slope) for plant in self.plants for slope in plant.slopes)
-
-
 class _PlantLoops:
     """One plant along the reference's cycle: its gain, the extreme slopes of its law, and its linear part."""
 
@@ -290,10 +230,6 @@ class _PlantLoops:
         self.loop = LinearLoop(plant, sample_time)
         self.noise = 0.0 if plant.sensor is None else plant.sensor.noise
         self.volts = 1.0 if plant.amplifier is None else abs(plant.amplifier.gain)
-
-    def decay(self, controller: SampledController) -> float:
-        """Decay of the slowest oscillation of the stable loops, per sample."""
-        return slowest_decay(self.loop, controller, self.slopes)
 
     def voltage_noise(self, controller: SampledController) -> float:
         if not self.noise:
@@ -378,138 +314,140 @@ def tune(
     (True, True, True)
     """
     check_choice("objective", objective, OBJECTIVES)
-    loop = _SimulatedLoop(plant, t, reference, OBJECTIVES[objective], _each(limits, controller), transient, u0)
-    plants = [loop.actuator, *map(as_actuator, variations)]
-    specification = Specification(plants, loop.cycle, loop.h, max_sensitivity, max_voltage_noise)
-    search = _Search(loop, specification, controller)
+    actuator, (_, r, h) = as_actuator(plant), sampled(t, reference)
+    resting = RestingPlant(actuator, h, u0)
+    if not 0.0 <= transient < h * (r.size - 1):
+        raise ValueError(f"transient must lie within the record, from 0 on, got {transient}")
+    cycle = np.append(resting.y0, r)
+    if np.ptp(cycle) == 0.0:
+        raise ValueError(f"the reference stays at the resting displacement {resting.y0:g}: nothing to follow")
+    if not max_sensitivity > 1.0:
+        raise ValueError(f"max_sensitivity must be above one, got {max_sensitivity}")
+    check_positive(max_voltage_noise=max_voltage_noise)
+    plants = [_PlantLoops(each, cycle, h) for each in (actuator, *map(as_actuator, variations))]
+    search = _Search(
+        resting=resting,
+        reference=r,
+        counted=slice(math.ceil(transient / h), None),
+        span=float(np.ptp(cycle)),
+        objective=OBJECTIVES[objective],
+        limits=_each(limits, controller),
+        plants=plants,
+        max_sensitivity=max_sensitivity,
+        max_voltage_noise=math.inf if max_voltage_noise is None else max_voltage_noise,
+        template=as_template(controller, math.copysign(1.0, plants[0].gain)),
+    )
     for start in sorted(search.starts(), key=search.cost)[:_STARTS]:
-        search.descend(start)
+        options = {**_SEARCHED, "initial_simplex": search.template.simplex(start)}
+        minimize(search.cost, start, method="Nelder-Mead", options=options)
     return search.result()
 
 
-class _SimulatedLoop:
-    """Error of the loop that a controller closes around the plant, as one number."""
+@dataclass(kw_only=True)
+class _Search:
+    """Loops that are simulated around a plant, and bounds on the linear loops around it and its variations."""
 
-    def __init__(
-        self,
-        plant: Any,
-        t: npt.ArrayLike,
-        reference: npt.ArrayLike,
-        objective: Callable[[FloatArray], float],
-        limits: tuple[Limits, ...],
-        transient: float,
-        u0: float | None,
-    ) -> None:
-        self.actuator = as_actuator(plant)
-        self.reference = read_only(reference, "reference", ndim=1)
-        self.h = sample_time_of(read_only(t, "t", ndim=1), self.reference)
-        self.plant = RestingPlant(self.actuator, self.h, u0)
-        if not 0.0 <= transient < self.h * (self.reference.size - 1):
-            raise ValueError(f"transient must lie within the record, from 0 on, got {transient}")
-        self.counted = slice(math.ceil(transient / self.h), None)
-        self.objective, self.limits = objective, limits
-        self.cycle = np.append(self.plant.y0, self.reference)
-        self.span = float(np.ptp(self.cycle))
-        if self.span == 0.0:
-            raise ValueError(f"the reference stays at the resting displacement {self.plant.y0:g}: nothing to follow")
+    resting: RestingPlant
+    reference: FloatArray
+    counted: slice
+    span: float
+    objective: Callable[[FloatArray], float]
+    limits: tuple[Limits, ...]
+    plants: list[_PlantLoops]
+    max_sensitivity: float
+    max_voltage_noise: float
+    template: StandardForm | FreeGains
+    trials: list[Trial] = field(default_factory=list)
+
+    def starts(self) -> list[FloatArray]:
+        """Stable points of the linear rule, without those far beyond the bounds where there are others."""
+        rule = [*self.template.own(), *self.rule()]
+        each = [self.excess(*self.judge(self.template.controller(x))) for x in rule]
+        least = min(each, default=math.inf)
+        if least == math.inf:
+            raise ValueError("no controller of the linear rule makes the loop stable; is the sample time short enough?")
+        return [x for excess, x in zip(each, rule, strict=True) if excess <= max(1.0, least)]
+
+    def rule(self) -> list[FloatArray]:
+        """Points whose feedback has |L| = 1 at a crossover frequency."""
+        plant, h = self.plants[0], self.resting.sample_time
+        highest = math.pi / h
+        lowest = max(_SLOWEST * highest, 2.0 * math.pi / (self.reference.size * h))
+        points = []
+        for crossover in np.geomspace(lowest, highest, _CROSSOVERS + 2)[1:-1]:
+            at_crossover = LinearLoop(self.resting.actuator, h, [crossover])
+            for gains in self.template.shapes(float(crossover), plant.loop.resonances.imag / h):
+                feedback = self.template.controller(self.template.point(gains))
+                if isinstance(feedback, TrackingController):
+                    feedback = replace(feedback, damping=None)  # it is not proportional to the gains
+                size = abs(plant.secant * at_crossover.response(feedback)[0])
+                points.append(self.template.point(tuple(gain / size for gain in gains)))
+        return points
+
+    def loops(self) -> Iterator[tuple[LinearLoop, float]]:
+        """Linear loops of every plant, at both extreme slopes of its law."""
+        return ((plant.loop, slope) for plant in self.plants for slope in plant.slopes)
+
+    def judge(self, controller: SampledController) -> tuple[float, float]:
+        """Maximum sensitivity and voltage noise of the worst linear loop."""
+        sensitivity = 0.0
+        for loop, slope in self.loops():
+            sensitivity = max(sensitivity, loop.max_sensitivity(controller, slope))
+            if sensitivity == math.inf:
+                return math.inf, math.inf
+        return sensitivity, max(plant.voltage_noise(controller) for plant in self.plants)
+
+    def excess(self, sensitivity: float, noise: float) -> float:
+        """Sum of the parts by which the bounds are exceeded; 0 within."""
+        if sensitivity == math.inf:
+            return math.inf
+        parts = sensitivity / self.max_sensitivity, noise / self.max_voltage_noise
+        return sum(max(0.0, part - 1.0) for part in parts)
 
     def value(self, controller: Tuned) -> float:
+        """Objective of the simulated loop under the worst of the limits; infinite if it diverges."""
         largest = -math.inf
         for limits in self.limits:
-            signals = self.plant.attempt(replace(controller, limits=limits), self.reference)
+            signals = self.resting.attempt(replace(controller, limits=limits), self.reference)
             if signals.lost >= 0:
                 return math.inf
             largest = max(largest, self.objective((self.reference - signals.y)[self.counted] / self.span))
         return largest
 
-    def rests(self, controller: Tuned, decay: float, gain: float) -> bool:
-        """Whether the loop comes to rest where the reference stops, under each of the limits."""
-        asked = self.span / abs(gain)
-        return not any(
-            limit_cycle(
-                self.actuator,
-                replace(controller, limits=limits),
-                self.reference,
-                self.h,
-                self.plant.u0,
-                decay=decay,
-                asked=asked,
-            )
-            for limits in self.limits
-        )
-
-    def limited(self, controller: Tuned) -> int:
-        signals = self.plant.attempt(controller, self.reference)
-        return int(np.count_nonzero(signals.drive != signals.command))
-
-
-class _Search:
-    def __init__(self, loop: _SimulatedLoop, specification: Specification, controller: Tuned | None) -> None:
-        self.loop, self.specification = loop, specification
-        self.template = as_template(controller, math.copysign(1.0, specification.plants[0].gain))
-        self.trials: list[Trial] = []
-
-    def starts(self) -> list[FloatArray]:
-        """Stable points of the linear rule, without those far beyond the bounds where there are others."""
-        rule = [*self.template.own(), *self.rule()]
-        stable = [(excess, x) for x in rule if (excess := self.excess(x)) < math.inf]
-        if not stable:
-            raise ValueError("no controller of the linear rule makes the loop stable; is the sample time short enough?")
-        enough = max(1.0, min(excess for excess, _ in stable))
-        return [x for excess, x in stable if excess <= enough]
-
-    def rule(self) -> list[FloatArray]:
-        """Points whose feedback has |L| = 1 at a crossover frequency."""
-        plant, samples = self.specification.plants[0], self.loop.reference.size
-        highest = math.pi / self.loop.h
-        lowest = max(_SLOWEST * highest, 2.0 * math.pi / (samples * self.loop.h))
-        points = []
-        for crossover in np.geomspace(lowest, highest, _CROSSOVERS + 2)[1:-1]:
-            at_crossover = LinearLoop(self.loop.actuator, self.loop.h, [crossover])
-            for gains in self.template.shapes(float(crossover), plant.loop.resonances.imag / self.loop.h):
-                size = abs(plant.secant * at_crossover.response(self.template.feedback(gains))[0])
-                points.append(self.template.point(tuple(gain / size for gain in gains)))
-        return points
-
-    def excess(self, x: FloatArray) -> float:
-        return self.specification.excess(self.specification.judge(self.template.controller(x)))
-
     def cost(self, x: FloatArray) -> float:
-        controller = replace(self.template.controller(x), limits=self.loop.limits[0])
-        judgement = self.specification.judge(controller)
-        value = self.loop.value(controller) if judgement.max_sensitivity < math.inf else math.inf
-        self.trials.append(Trial(controller=controller, objective=value, **judgement._asdict()))
-        return value * (1.0 + _BARRIER * self.specification.excess(judgement))
-
-    def descend(self, start: FloatArray) -> None:
-        options = {**_SEARCHED, "initial_simplex": self.template.simplex(start)}
-        minimize(self.cost, start, method="Nelder-Mead", options=options)
+        controller = replace(self.template.controller(x), limits=self.limits[0])
+        sensitivity, noise = self.judge(controller)
+        value = self.value(controller) if sensitivity < math.inf else math.inf
+        trial = Trial(controller=controller, max_sensitivity=sensitivity, voltage_noise=noise, objective=value)
+        self.trials.append(trial)
+        return value * (1.0 + _BARRIER * self.excess(sensitivity, noise))
 
     def result(self) -> Tuning:
         """Best controller within the bounds, or the nearest to them, with its margins."""
-        bounds = self.specification
         best, trade_off = self.chosen()
-        gain_margin, phase_margin = bounds.margins(best.controller)
-        limited, samples = self.loop.limited(best.controller), self.loop.reference.size
+        gains, phases = np.array([loop.margins(best.controller, slope) for loop, slope in self.loops()]).T
+        signals = self.resting.attempt(best.controller, self.reference)
+        limited = np.count_nonzero(signals.drive != signals.command)
+        noise = f", voltage noise {best.voltage_noise:.2g} of {self.max_voltage_noise:g}"
         return Tuning(
             controller=best.controller,
             objective=best.objective,
             max_sensitivity=best.max_sensitivity,
-            gain_margin=gain_margin,
-            phase_margin=phase_margin,
+            gain_margin=float(gains.min()),
+            phase_margin=float(phases.min()),
             voltage_noise=best.voltage_noise,
             trade_off=trade_off,
             trials=tuple(self.trials),
-            success=bounds.excess(best) == 0.0,
+            success=self.excess(best.max_sensitivity, best.voltage_noise) == 0.0,
             message=(
-                f"{len(self.trials)} loops simulated; {bounds.words(best)}; "
-                f"the voltage is limited at {limited} of {samples} samples"
+                f"{len(self.trials)} loops simulated; sensitivity {best.max_sensitivity:.2f} of "
+                f"{self.max_sensitivity:g} allowed{noise if self.max_voltage_noise < math.inf else ''}; "
+                f"the voltage is limited at {limited} of {self.reference.size} samples"
             ),
         )
 
     def chosen(self) -> tuple[Trial, tuple[Trial, ...]]:
         """The best trial and the trade-off, once none of them is in a limit cycle."""
-        bounds = self.specification
         resting: set[int] = set()
         while True:
             simulated = [(k, trial) for k, trial in enumerate(self.trials) if trial.objective < math.inf]
@@ -517,8 +455,8 @@ class _Search:
                 raise ValueError(
                     "every loop that was simulated is in a limit cycle: lower max_sensitivity, or widen the limits"
                 )
-            best = min(simulated, key=lambda each: _rank(bounds.excess(each[1]), each[1]))
-            trade_off = front(trial for _, trial in simulated if trial.voltage_noise <= bounds.max_voltage_noise)
+            best = min(simulated, key=lambda each: self.rank(each[1]))
+            trade_off = front(trial for _, trial in simulated if trial.voltage_noise <= self.max_voltage_noise)
             doubtful = [k for k, trial in simulated if k not in resting and (k == best[0] or trial in trade_off)]
             if not doubtful:
                 return best[1], trade_off
@@ -528,13 +466,15 @@ class _Search:
                 else:
                     self.trials[k] = replace(self.trials[k], objective=math.inf)
 
+    def rank(self, trial: Trial) -> tuple[float, float, float]:
+        return self.excess(trial.max_sensitivity, trial.voltage_noise), trial.objective, trial.max_sensitivity
+
     def rests(self, controller: Tuned) -> bool:
-        plant = self.specification.plants[0]
-        return self.loop.rests(controller, plant.decay(controller), plant.gain)
-
-
-def _rank(excess: float, trial: Trial) -> tuple[float, float, float]:
-    return excess, trial.objective, trial.max_sensitivity
+        """Whether the loop comes to rest where the reference stops, under each of the limits."""
+        plant = self.plants[0]
+        decay, asked = slowest_decay(plant.loop, controller, plant.slopes), self.span / abs(plant.gain)
+        each = (replace(controller, limits=limits) for limits in self.limits)
+        return not any(limit_cycle(self.resting, limited, self.reference, decay, asked) for limited in each)
 
 
 def _each(limits: Any, controller: Any) -> tuple[Limits, ...]:
