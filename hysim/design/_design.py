@@ -9,16 +9,8 @@ import numpy.typing as npt
 from hysim._frozen import FloatArray, frozen, read_only
 from hysim._printing import printed, summary_text
 from hysim._results import model_of
-from hysim.design._inputs import (
-    InputLimits,
-    random_segments,
-    random_strokes,
-    through,
-    triangles,
-    usual,
-    usual_of_many_speeds,
-    with_another_segment,
-)
+from hysim.design import _inputs as shapes
+from hysim.design._inputs import InputLimits
 from hysim.design._subjects import Criterion, LawAlone, Subject, merit, sizes_of, spreads, whole_actuator
 from hysim.models.law import Law
 from hysim.plants.whole.actuator_structure import ActuatorStructure
@@ -135,10 +127,7 @@ def determined(subject: Subject, inputs: Sequence[FloatArray]) -> tuple[Subject,
             f"it is taken as known, {subject.values[place]:.4g}"
         )
         kept = np.delete(kept, worst)
-    for name in names:
-        if name not in np.array(names)[kept]:
-            subject = subject.without(name)
-    return subject, tuple(remarks)
+    return subject.only([names[k] for k in kept]) if remarks else subject, tuple(remarks)
 
 
 def searched(
@@ -149,30 +138,16 @@ def searched(
     moves: int,
     rng: np.random.Generator,
 ) -> Found:
-    """The best strokes after moves of the best that were drawn."""
-
-    def tried(strokes: FloatArray) -> float:
-        return worth(through(strokes, limits))
-
-    ranked = sorted((Found(strokes, tried(strokes)) for strokes in drawn), key=lambda each: -each.worth)
-    improved = [_improved(each, limits, tried, move, moves, rng) for each in ranked[:_BEST]]
+    """The best strokes after random moves of the best that were drawn, those that are worth more being kept."""
+    every = [Found(strokes, worth(shapes.through(strokes, limits))) for strokes in drawn]
+    improved = sorted(every, key=lambda each: -each.worth)[:_BEST]
+    for place, best in enumerate(improved):
+        for k in range(moves):
+            strokes = move(best.strokes, limits, rng, k / moves)
+            trial = Found(strokes, worth(shapes.through(strokes, limits)))
+            best = trial if trial.worth > best.worth else best
+        improved[place] = best
     return max(improved, key=lambda each: each.worth, default=Found(np.empty((0, 3)), 0.0))
-
-
-def _improved(
-    best: Found,
-    limits: InputLimits,
-    tried: Callable[[FloatArray], float],
-    move: Move,
-    moves: int,
-    rng: np.random.Generator,
-) -> Found:
-    """The strokes after random moves, those that are worth more being kept."""
-    for k in range(moves):
-        strokes = move(best.strokes, limits, rng, k / moves)
-        trial = Found(strokes, tried(strokes))
-        best = trial if trial.worth > best.worth else best
-    return best
 
 
 def one_moved(strokes: FloatArray, limits: InputLimits, rng: np.random.Generator, progress: float) -> FloatArray:
@@ -185,16 +160,6 @@ def one_moved(strokes: FloatArray, limits: InputLimits, rng: np.random.Generator
         moved = trial[place, 0] + share * limits.amplitude
         trial[place, 0] = min(max(moved, -limits.amplitude), limits.amplitude)
     return trial
-
-
-def one_redrawn(strokes: FloatArray, limits: InputLimits, rng: np.random.Generator, progress: float) -> FloatArray:
-    """The strokes with a stretch of them drawn anew."""
-    return with_another_segment(strokes, limits, rng)
-
-
-def value_of(subject: Subject, criterion: Criterion) -> Callable[[FloatArray], float]:
-    """The worth of an input."""
-    return lambda u: merit(subject.information(u), criterion)
 
 
 _FASTER = 2.0  # times the frequency of the fastest mode: a multisine that is not told how far to go
@@ -276,21 +241,24 @@ def design_input(
     subject = _subject(plant, bounds, free, values, noise, criterion)
     rng, in_time = np.random.default_rng(seed), isinstance(plant, ActuatorStructure)
     if in_time:
-        inputs = usual_of_many_speeds(bounds, _highest(highest_frequency, values or {}, bounds), rng)
+        inputs = shapes.usual_of_many_speeds(bounds, _highest(highest_frequency, values or {}, bounds), rng)
     else:
-        inputs = usual(bounds)
-    drawn = [*triangles(bounds), *triangles(bounds, fading=True)] if in_time else []
-    drawn += [(random_segments if in_time else random_strokes)(bounds, rng) for _ in range(candidates)]
+        inputs = shapes.usual(bounds)
+    drawn = [*shapes.triangles(bounds), *shapes.triangles(bounds, fading=True)] if in_time else []
+    drawn += [(shapes.random_segments if in_time else shapes.random_strokes)(bounds, rng) for _ in range(candidates)]
     inputs |= _own(beside or {}, bounds)
     every = [u for variants in inputs.values() for u in variants]
-    subject, unseen = determined(subject, [*every, *(through(strokes, bounds) for strokes in drawn)])
-    worth = value_of(subject, criterion)
+    subject, unseen = determined(subject, [*every, *(shapes.through(strokes, bounds) for strokes in drawn)])
+
+    def worth(u: FloatArray) -> float:
+        return merit(subject.information(u), criterion)
+
     judged = {
         name: max(((worth(u), u) for u in variants), key=lambda each: each[0]) for name, variants in inputs.items()
     }
-    move = one_redrawn if in_time else one_moved
+    move = shapes.with_another_segment if in_time else one_moved
     strokes, best = searched(drawn, worth, bounds, move, moves, rng)
-    u, first = through(strokes, bounds), max(judged.values(), key=lambda each: each[0])
+    u, first = shapes.through(strokes, bounds), max(judged.values(), key=lambda each: each[0])
     if first[0] > best:
         (best, u), strokes = first, np.empty((0, 3))
     if not best > 0.0:
@@ -375,4 +343,4 @@ def _subject(
         raise ValueError("free must name at least one number")
     if unknown := [name for name in free if name not in plant.scalars]:
         raise ValueError(f"free has {unknown[0]!r}: a {type(plant).__name__} has {', '.join(plant.scalars)}")
-    return LawAlone(plant, tuple(free), 1.0 if noise is None else noise, {})
+    return LawAlone(plant, tuple(free), 1.0 if noise is None else noise)

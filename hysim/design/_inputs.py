@@ -175,8 +175,10 @@ def random_segment(limits: InputLimits, rng: np.random.Generator, last: float, l
     return _segment(limits, rng, last, lasting, hold, speed, least=limits.sample_time)
 
 
-def with_another_segment(strokes: FloatArray, limits: InputLimits, rng: np.random.Generator) -> FloatArray:
-    """The strokes with a random stretch drawn anew."""
+def with_another_segment(
+    strokes: FloatArray, limits: InputLimits, rng: np.random.Generator, progress: float = 0.0
+) -> FloatArray:
+    """The strokes with a random stretch drawn anew, of whatever length at any progress of the search."""
     ends = np.cumsum(_times(strokes, limits))
     lasting = limits.duration * _SHORTEST * (_LONGEST / _SHORTEST) ** float(rng.random())
     begin = float(rng.random()) * (limits.duration - lasting)

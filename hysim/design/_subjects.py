@@ -5,8 +5,8 @@ The problem of a whole actuator is that of `hysim.identify`, at known parameters
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
-from typing import Any, Literal, Protocol
+from dataclasses import dataclass, field, replace
+from typing import Any, Literal
 
 import numpy as np
 
@@ -57,39 +57,6 @@ def spreads(matrix: FloatArray) -> FloatArray:
 _DIFFERENCE = 1e-4  # of a number, or of one where that is smaller: both errors of a central difference are near 1e-8
 
 
-class Subject(Protocol):
-    """Numbers for which an input is designed."""
-
-    @property
-    def names(self) -> tuple[str, ...]:
-        """The free numbers."""
-
-    @property
-    def values(self) -> FloatArray:
-        """Their values, (n_names,)."""
-
-    @property
-    def noise(self) -> float:
-        """Standard deviation of the measured output [unit of y]."""
-
-    @property
-    def tolerances(self) -> Mapping[str, float]:
-        """Largest standard errors with which numbers count as determined, by name; others may not be left out."""
-
-    @property
-    def remarks(self) -> tuple[str, ...]:
-        """Remarks on numbers that are left out from the beginning."""
-
-    def information(self, u: FloatArray) -> FloatArray:
-        """Fisher information on the numbers in units of their sizes, (n_names, n_names); zeros if it diverges."""
-
-    def covariance(self, u: FloatArray) -> FloatArray:
-        """Expected covariance of the numbers (n_names, n_names), by refined derivatives."""
-
-    def without(self, name: str) -> "Subject":
-        """With a number that is known."""
-
-
 def sizes_of(values: FloatArray) -> FloatArray:
     """Units in which numbers are judged: their sizes, one for zeros."""
     return np.where(values == 0.0, 1.0, np.abs(values))
@@ -102,12 +69,12 @@ def squared(slopes: FloatArray) -> FloatArray:
 
 @dataclass(frozen=True)
 class LawAlone:
-    """A law at rest before the first sample."""
+    """A law at rest before the first sample: the free numbers, and the standard deviation of its output."""
 
     law: Law
     names: tuple[str, ...]
     noise: float
-    tolerances: Mapping[str, float]
+    tolerances: Mapping[str, float] = field(default_factory=dict)
     remarks: tuple[str, ...] = ()
 
     @property
@@ -115,7 +82,7 @@ class LawAlone:
         return np.array([self.law.scalars[name] for name in self.names])
 
     def information(self, u: FloatArray) -> FloatArray:
-        """By central differences."""
+        """Fisher information on the numbers in units of their sizes, by central differences; zeros if it diverges."""
         names, steps = self.names, _DIFFERENCE * sizes_of(self.values)
         sets: dict[str, Any] = {name: np.full(2 * len(names), self.law.scalars[name]) for name in names}
         for k, name in enumerate(names):
@@ -127,11 +94,12 @@ class LawAlone:
         return squared(slopes.T)
 
     def covariance(self, u: FloatArray) -> FloatArray:
-        """By exact derivatives."""
+        """Expected covariance of the numbers, by exact derivatives."""
         return np.asarray(np.linalg.inv(self.law.response_jacobian(u, self.names).information(self.noise)))
 
-    def without(self, name: str) -> "LawAlone":
-        return replace(self, names=tuple(each for each in self.names if each != name))
+    def only(self, names: Sequence[str]) -> "LawAlone":
+        """The subject whose other numbers are known."""
+        return replace(self, names=tuple(names))
 
 
 _LAW = "hysteresis"
@@ -174,9 +142,12 @@ class WholeActuator:
         scaled = slopes / lengths
         return np.asarray(np.linalg.inv(scaled.T @ scaled) / np.outer(lengths, lengths))
 
-    def without(self, name: str) -> "WholeActuator":
-        others = [each for each in self.names if each != name]
-        return replace(self, expected=_expected(self.structure, self.record, self.known, others))
+    def only(self, names: Sequence[str]) -> "WholeActuator":
+        """The subject whose other numbers are known."""
+        return replace(self, expected=_expected(self.structure, self.record, self.known, names))
+
+
+Subject = LawAlone | WholeActuator
 
 
 def whole_actuator(

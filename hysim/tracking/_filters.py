@@ -109,16 +109,11 @@ class Copies:
 
     def _packed(self, x: FloatArray) -> FloatArray:
         law = self._law
-        tables = self._tables(len(x))
-        for place, column in zip(self._places, self._coordinates.decode(x).T, strict=True):
-            field, k = place
+        tables = {name: np.repeat(table, len(x), axis=0) for name, table in self._one.items()}
+        for (field, k), column in zip(self._places, self._coordinates.decode(x).T, strict=True):
             tables[field][:, k] = column
         with np.errstate(all="ignore"):
             return read_only(law.pack(law.completed(tables)).parameters, finite=False)
-
-    def _tables(self, n_copies: int) -> dict[str, FloatArray]:
-        """Tables of every field, to be written to."""
-        return {name: np.repeat(table, n_copies, axis=0) for name, table in self._one.items()}
 
 
 _SURPRISE = 3.0  # mean square of the last normalised errors, from which on a number has jumped
