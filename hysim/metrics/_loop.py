@@ -63,6 +63,7 @@ COUNTERCLOCKWISE = (
 FORCE = "Energy is the integral of y du: what a force y on a displacement u dissipates."
 
 
+Orientation = Literal["counterclockwise", "clockwise", "none"]
 _SMALLEST_LOBE = 0.02  # of the area of all lobes: where the branches meet at the ends they cross by less
 _CLEAR = 4.0  # standard deviations by which the mean width of a lobe is above the noise of the width
 
@@ -78,7 +79,7 @@ class Lobe(NamedTuple):
     high: float
     area: float
     max_width: float
-    orientation: Literal["counterclockwise", "clockwise"]
+    orientation: Orientation
 
 
 @printed
@@ -127,7 +128,7 @@ class LoopMetrics:
     area: float
     stroke: float
     relative_width: float
-    orientation: Literal["counterclockwise", "clockwise", "none"]
+    orientation: Orientation
     closure_gap: float
     n_cycles: int
     energy: float
@@ -310,9 +311,8 @@ def width_rmse(a: LoopMetrics, b: LoopMetrics) -> float:
     other = b.width_at(a.u)
     common = ~np.isnan(other)
     if not common.any():
-        raise ValueError(
-            f"the loops share no input: one runs from {a.u[0]} to {a.u[-1]}, the other from {b.u[0]} to {b.u[-1]}"
-        )
+        ranges = f"one runs from {a.u[0]} to {a.u[-1]}, the other from {b.u[0]} to {b.u[-1]}"
+        raise ValueError(f"the loops share no input: {ranges}")
     return math.sqrt(np.mean((a.width[common] - other[common]) ** 2))
 
 
@@ -321,25 +321,22 @@ def _lobes(u: FloatArray, width: FloatArray) -> tuple[Lobe, ...]:
     turn = np.flatnonzero(width[:-1] * width[1:] < 0.0)
     zeros = u[turn] + np.diff(u)[turn] * width[turn] / (width[turn] - width[turn + 1])
     x, w = np.insert(u, turn + 1, zeros), np.insert(width, turn + 1, 0.0)
-    middle = 0.5 * (w[1:] + w[:-1])
-    areas = middle * np.diff(x)
+    areas = 0.5 * (w[1:] + w[:-1]) * np.diff(x)
     joints = np.concatenate([[0], np.flatnonzero(w[1:-1] == 0.0) + 1, [x.size - 1]]).astype(int)
     parts = [(int(a), int(b), float(areas[a:b].sum())) for a, b in pairwise(joints) if b > a]
     total, noise = sum(abs(area) for *_, area in parts), _noise(u, width)
     clear = [
-        part
-        for part in parts
-        if abs(part[2]) > _SMALLEST_LOBE * total
-        and abs(part[2]) > _CLEAR * noise * (x[part[1]] - x[part[0]]) / math.sqrt(part[1] - part[0])
+        (a, b, area)
+        for a, b, area in parts
+        if abs(area) > max(_SMALLEST_LOBE * total, _CLEAR * noise * (x[b] - x[a]) / math.sqrt(b - a))
     ]
     runs = [list(run) for _, run in groupby(clear, key=lambda part: part[2] > 0.0)]
     crossed = [(before[-1][1] + after[0][0]) // 2 for before, after in pairwise(runs)]
     lobes = []
     for run, (a, b) in zip(runs, pairwise([0, *crossed, x.size - 1] if runs else []), strict=True):
-        signed = float(areas[a:b].sum())
         highest = max(float(np.abs(w[first : last + 1]).max()) for first, last, _ in run)
-        sense: Literal["counterclockwise", "clockwise"] = "counterclockwise" if run[0][2] > 0.0 else "clockwise"
-        lobes.append(Lobe(float(x[a]), float(x[b]), abs(signed), highest, sense))
+        sense = _orientation(run[0][2])
+        lobes.append(Lobe(float(x[a]), float(x[b]), abs(float(areas[a:b].sum())), highest, sense))
     return tuple(lobes)
 
 
@@ -361,13 +358,11 @@ def common_inputs(inputs: list[FloatArray]) -> FloatArray:
     """Every input of any branch, over their common range."""
     union = np.unique(np.concatenate(inputs))
     low, high = max(x[0] for x in inputs), min(x[-1] for x in inputs)
-    common: FloatArray = union[(union >= low) & (union <= high)]
-    return common
+    return np.asarray(union[(union >= low) & (union <= high)])
 
 
 def _mean_curve(grid: FloatArray, curves: list[tuple[FloatArray, FloatArray]]) -> FloatArray:
-    mean: FloatArray = np.mean([np.interp(grid, x, y) for x, y in curves], axis=0)
-    return mean
+    return np.asarray(np.mean([np.interp(grid, x, y) for x, y in curves], axis=0))
 
 
 def signed_area(u: FloatArray, y: FloatArray) -> FloatArray:
@@ -376,10 +371,8 @@ def signed_area(u: FloatArray, y: FloatArray) -> FloatArray:
     return np.asarray(np.sum(x * np.roll(v, -1, axis=-1) - np.roll(x, -1) * v, axis=-1) / 2)
 
 
-def _orientation(area: float, rounding: float) -> Literal["counterclockwise", "clockwise", "none"]:
-    if abs(area) <= rounding:
-        return "none"
-    return "counterclockwise" if area > 0 else "clockwise"
+def _orientation(area: float, rounding: float = 0.0) -> Orientation:
+    return "none" if abs(area) <= rounding else "counterclockwise" if area > 0 else "clockwise"
 
 
 def samples_of_a_loop(u: npt.ArrayLike, y: npt.ArrayLike) -> tuple[FloatArray, FloatArray]:
@@ -431,7 +424,7 @@ class MagneticMetrics:
     n_cycles: int
 
     def __str__(self) -> str:
-        begins = not math.isnan(self.initial_permeability)
+        initial, largest = self.initial_permeability, self.maximum_permeability
         return summary_text(
             [f"MagneticMetrics: {self.energy:.4g} J/m^3 a cycle at {self.peak_induction:.4g} T"],
             {
@@ -439,9 +432,7 @@ class MagneticMetrics:
                 "remanence": f"{self.remanence:.4g} T",
                 "peak": f"{self.peak_field:.4g} A/m",
                 "permeability": f"amplitude {self.amplitude_permeability:.4g}, largest {self.largest_permeability:.4g}",
-                "initial curve": f"from {self.initial_permeability:.4g}, at most {self.maximum_permeability:.4g}"
-                if begins
-                else "",
+                "initial curve": "" if math.isnan(initial) else f"from {initial:.4g}, at most {largest:.4g}",
             },
         )
 

@@ -102,7 +102,7 @@ def aic(residual: npt.ArrayLike, n_parameters: int) -> float:
     4.0
     """
     v, n, d = _mean_square(residual, n_parameters)
-    return n * _log(v) + 2 * d if d < n else math.nan
+    return information(v, n, 0) + 2 * d if d < n else math.nan
 
 
 def bic(residual: npt.ArrayLike, n_parameters: int, *, floor: float = 0.0) -> float:
@@ -138,7 +138,3 @@ def _mean_square(residual: npt.ArrayLike, n_parameters: int) -> tuple[float, int
 
 def _rms(values: FloatArray) -> float:
     return math.sqrt(np.mean(values**2))
-
-
-def _log(value: float) -> float:
-    return math.log(value) if value > 0 else -math.inf
