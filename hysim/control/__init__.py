@@ -12,7 +12,7 @@ from hysim.control._assessment import assess_square_wave as assess_square_wave
 from hysim.control._assessment import assess_step as assess_step
 from hysim.control._assessment import driven_by as driven_by
 from hysim.control._assessment import open_loop as open_loop
-from hysim.control._bandwidth import bandwidth as bandwidth
+from hysim.control._controller import PID as PID
 from hysim.control._controller import Controller as Controller
 from hysim.control._controller import begun as begun
 from hysim.control._controller import held_samples as held_samples
@@ -27,8 +27,8 @@ from hysim.control._loop import as_actuator as as_actuator
 from hysim.control._loop import close_loop as close_loop
 from hysim.control._open_loop import secant_gain as secant_gain
 from hysim.control._open_loop import slopes as slopes
-from hysim.control._pid import PID as PID
 from hysim.control._stability import LinearLoop as LinearLoop
+from hysim.control._stability import bandwidth as bandwidth
 from hysim.control._stability import later as later
 from hysim.control._to_control import to_control as to_control
 from hysim.control._tracking import InverseFeedforward as InverseFeedforward

@@ -18,8 +18,8 @@ import numpy as np
 
 from hysim._frozen import FloatArray
 from hysim._results import model_of
+from hysim.control._controller import PID
 from hysim.control._loop import as_actuator, is_controller
-from hysim.control._pid import PID
 from hysim.control._tracking import InverseFeedforward, TrackingController
 from hysim.errors import SimulationError
 from hysim.kernels import boucwen_inverse

@@ -19,9 +19,8 @@ import numpy as np
 import numpy.typing as npt
 
 from hysim._frozen import FloatArray, read_only
-from hysim.control._controller import Feedback, SampledController, WithoutFeedback, check_limits
+from hysim.control._controller import PID, Feedback, SampledController, WithoutFeedback, check_limits
 from hysim.control._filters import DampingLoop, ModeInverse, Notch, Shaper
-from hysim.control._pid import PID
 from hysim.kernels import tracking as kernels
 from hysim.kernels.inverses import line
 from hysim.kernels.stepping import Step

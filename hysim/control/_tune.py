@@ -28,10 +28,9 @@ from scipy.optimize import minimize
 
 from hysim._frozen import FloatArray, check_choice, check_positive, frozen
 from hysim._printing import printed, summary_text
-from hysim.control._controller import SampledController, limits_of
+from hysim.control._controller import PID, SampledController, limits_of
 from hysim.control._loop import RestingPlant, as_actuator, sampled
 from hysim.control._open_loop import secant_gain, slopes
-from hysim.control._pid import PID
 from hysim.control._stability import LinearLoop, limit_cycle, slowest_decay
 from hysim.control._tracking import TrackingController
 from hysim.models.model import in_brief
@@ -430,12 +429,9 @@ class _Search:
         limited = np.count_nonzero(signals.drive != signals.command)
         noise = f", voltage noise {best.voltage_noise:.2g} of {self.max_voltage_noise:g}"
         return Tuning(
-            controller=best.controller,
-            objective=best.objective,
-            max_sensitivity=best.max_sensitivity,
+            **vars(best),
             gain_margin=float(gains.min()),
             phase_margin=float(phases.min()),
-            voltage_noise=best.voltage_noise,
             trade_off=trade_off,
             trials=tuple(self.trials),
             success=self.excess(best.max_sensitivity, best.voltage_noise) == 0.0,

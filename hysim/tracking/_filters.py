@@ -229,13 +229,12 @@ def particles(
     weights = np.full(count, 1.0 / count)
     means, deviations = np.empty((u.size, x.size)), np.empty((u.size, x.size))
     predicted, expected = np.empty(u.size), np.empty(u.size)
-    before, log_likelihood = float(u[0]), 0.0
+    log_likelihood = 0.0
     for k in range(u.size):
         points = points + walk.step * rng.standard_normal(points.shape)
         jumping = rng.random(count) < _JUMPING
         points[jumping] += walk.jump * rng.standard_normal((int(jumping.sum()), x.size))
-        outputs = copies.moved(points, memory, before, float(u[k]))
-        before = float(u[k])
+        outputs = copies.moved(points, memory, float(u[max(k - 1, 0)]), float(u[k]))
         usable = np.isfinite(outputs)
         if not usable.any():
             raise ValueError(f"every copy of the law diverges at sample {k}: give a smaller drift")

@@ -103,10 +103,11 @@ class ParameterTrack:
             f"{name} {size:.3g}{' (most likely)' if name in self.searched else ''}"
             for name, size in list(self.drift.items())[:6]
         )
-        notes = {"drift over the record": sizes}
-        notes |= {"consistency": f"{self.consistency:.3g} (near 1 if noise and drift are what was said)"}
-        if self.jumps:
-            notes["jumps"] = f"at samples {', '.join(map(str, self.jumps[:8]))}"
+        notes = {
+            "drift over the record": sizes,
+            "consistency": f"{self.consistency:.3g} (near 1 if noise and drift are what was said)",
+            "jumps": f"at samples {', '.join(map(str, self.jumps[:8]))}" if self.jumps else "",
+        }
         return summary_text([head], rows | notes)
 
 
@@ -210,10 +211,8 @@ def track_parameters(
     copies, x = Copies(law, coordinates), coordinates.encode(coordinates.values)
     if method == "sigma-point" and copies.memory.size > _MOST_MEMORIES:
         raise ValueError(f'this law remembers {copies.memory.size} numbers: use method="particle"')
-    drifts, jumps = (
-        _sizes(coordinates, given, share, what)
-        for given, share, what in ((drift, _DRIFT, "drift"), (jump, _JUMP, "jump"))
-    )
+    drifts = _sizes(coordinates, drift or {}, _DRIFT, "drift")
+    jumps = _sizes(coordinates, jump or {}, _JUMP, "jump")
     first = coordinates.spread(drifts)
 
     def filtered(sizes: FloatArray, by: str) -> Filtered:
@@ -259,9 +258,8 @@ def _result(
     )
 
 
-def _sizes(coordinates: Coordinates, given: Mapping[str, Any] | None, share: float, what: str) -> FloatArray:
+def _sizes(coordinates: Coordinates, given: Mapping[str, Any], share: float, what: str) -> FloatArray:
     """Sizes of changes (n_names,), those that are not given in parts of the values."""
-    given = {} if given is None else given
     if unknown := [name for name in given if name not in coordinates.names]:
         raise ValueError(f"{what} has {unknown[0]!r}, which is not free")
     usual = share * np.where(coordinates.values == 0.0, 1.0, np.abs(coordinates.values))
