@@ -1,12 +1,13 @@
 """The verb `design_input`."""
 
 from collections.abc import Callable, Mapping, Sequence
+from operator import itemgetter
 from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
-from hysim._frozen import FloatArray, frozen, read_only
+from hysim._frozen import FloatArray, check_positive, frozen, read_only
 from hysim._printing import printed, summary_text
 from hysim._results import model_of
 from hysim.design import _inputs as shapes
@@ -95,7 +96,7 @@ _BEST = 4  # candidates that are improved
 _MOVE = 0.3  # of the amplitude: the first moves of a turning point; the last ones are a tenth of it
 _PAUSES, _PAUSE = 0.3, 0.1  # share of the moves that change a pause, and their size beside _MOVE in parts of the record
 
-Move = Callable[[FloatArray, InputLimits, np.random.Generator, float], FloatArray]
+Move = Callable[[FloatArray, float], FloatArray]  # strokes and the progress of the search, from 0 to 1, to strokes
 
 
 class Found(NamedTuple):
@@ -130,21 +131,14 @@ def determined(subject: Subject, inputs: Sequence[FloatArray]) -> tuple[Subject,
     return subject.only([names[k] for k in kept]) if remarks else subject, tuple(remarks)
 
 
-def searched(
-    drawn: Sequence[FloatArray],
-    worth: Callable[[FloatArray], float],
-    limits: InputLimits,
-    move: Move,
-    moves: int,
-    rng: np.random.Generator,
-) -> Found:
+def searched(drawn: Sequence[FloatArray], worth: Callable[[FloatArray], float], move: Move, moves: int) -> Found:
     """The best strokes after random moves of the best that were drawn, those that are worth more being kept."""
-    every = [Found(strokes, worth(shapes.through(strokes, limits))) for strokes in drawn]
+    every = [Found(strokes, worth(strokes)) for strokes in drawn]
     improved = sorted(every, key=lambda each: -each.worth)[:_BEST]
     for place, best in enumerate(improved):
         for k in range(moves):
-            strokes = move(best.strokes, limits, rng, k / moves)
-            trial = Found(strokes, worth(shapes.through(strokes, limits)))
+            strokes = move(best.strokes, k / moves)
+            trial = Found(strokes, worth(strokes))
             best = trial if trial.worth > best.worth else best
         improved[place] = best
     return max(improved, key=lambda each: each.worth, default=Found(np.empty((0, 3)), 0.0))
@@ -253,12 +247,15 @@ def design_input(
     def worth(u: FloatArray) -> float:
         return merit(subject.information(u), criterion)
 
-    judged = {
-        name: max(((worth(u), u) for u in variants), key=lambda each: each[0]) for name, variants in inputs.items()
-    }
-    move = shapes.with_another_segment if in_time else one_moved
-    strokes, best = searched(drawn, worth, bounds, move, moves, rng)
-    u, first = shapes.through(strokes, bounds), max(judged.values(), key=lambda each: each[0])
+    judged = {name: max(((worth(u), u) for u in each), key=itemgetter(0)) for name, each in inputs.items()}
+    moved = shapes.with_another_segment if in_time else one_moved
+    strokes, best = searched(
+        drawn,
+        lambda strokes: worth(shapes.through(strokes, bounds)),
+        lambda strokes, progress: moved(strokes, bounds, rng, progress),
+        moves,
+    )
+    u, first = shapes.through(strokes, bounds), max(judged.values(), key=itemgetter(0))
     if first[0] > best:
         (best, u), strokes = first, np.empty((0, 3))
     if not best > 0.0:
@@ -333,8 +330,7 @@ def _subject(
         raise TypeError(f"free must be a sequence of names, got the string {free!r}")
     if criterion not in ("D", "A", "E"):
         raise ValueError(f'criterion must be "D", "A" or "E", got {criterion!r}')
-    if noise is not None and not noise > 0.0:
-        raise ValueError(f"noise must be positive, got {noise}")
+    check_positive(noise=noise)
     if isinstance(plant, ActuatorStructure):
         return whole_actuator(plant, limits, values or {}, free, noise)
     if values:

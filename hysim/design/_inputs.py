@@ -162,7 +162,7 @@ def random_segments(limits: InputLimits, rng: np.random.Generator) -> FloatArray
     count = int(rng.choice(_SEGMENTS))
     strokes = np.empty((0, 3))
     for end in np.append(np.sort(rng.random(count - 1)), 1.0):
-        lasting = end * limits.duration - lasts(strokes, limits)
+        lasting = end * limits.duration - float(_times(strokes, limits).sum())
         if lasting > 0.0:
             strokes = np.concatenate([strokes, random_segment(limits, rng, _last(strokes), lasting)])
     return strokes
@@ -186,11 +186,6 @@ def with_another_segment(
     before = strokes[:first]
     segment = random_segment(limits, rng, _last(before), lasting)
     return np.concatenate([before, segment, strokes[behind:]])
-
-
-def lasts(strokes: FloatArray, limits: InputLimits) -> float:
-    """Duration of strokes from the centre on [s]."""
-    return float(_times(strokes, limits).sum())
 
 
 def _times(strokes: FloatArray, limits: InputLimits) -> FloatArray:

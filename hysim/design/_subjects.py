@@ -86,8 +86,7 @@ class LawAlone:
         names, steps = self.names, _DIFFERENCE * sizes_of(self.values)
         sets: dict[str, Any] = {name: np.full(2 * len(names), self.law.scalars[name]) for name in names}
         for k, name in enumerate(names):
-            sets[name][2 * k] += steps[k]
-            sets[name][2 * k + 1] -= steps[k]
+            sets[name][2 * k : 2 * k + 2] += [steps[k], -steps[k]]
         outputs = self.law.outputs(sets, u)
         with np.errstate(invalid="ignore"):
             slopes = (outputs[0::2] - outputs[1::2]) / (2.0 * _DIFFERENCE * self.noise)
