@@ -348,7 +348,9 @@ def driven_by(run: ClosedLoop) -> str:
 
 _FEWEST = 10  # samples of which a step is measured
 _IN_A_ROW = ("period", "tracking_rms", "limited_percent", "max_sensitivity", "max_sensitivity_with_delay")
-_REDUCTIONS = ("overshoot_reduction_percent", "residual_rms_reduction_percent", "settling_time_reduction_percent")
+_UNKNOWN: dict[str, Any] = dict.fromkeys(
+    ("overshoot_reduction_percent", "residual_rms_reduction_percent", "settling_time_reduction_percent"), math.nan
+)
 
 
 def assess_hysteresis(
@@ -528,7 +530,7 @@ def assess_step(
     decay_rate = -_least_damped(actuator).real
     reduction = vibration_reduction(t[:after], open_y, loop.closed.y[before:], decay_rate=decay_rate)
     return StepAssessment(
-        reduction=reduction if loop.stable else replace(reduction, **dict.fromkeys(_REDUCTIONS, math.nan)),
+        reduction=reduction if loop.stable else replace(reduction, **_UNKNOWN),
         open_y=open_y,
         closed=loop.closed,
         loop=loop,

@@ -367,7 +367,7 @@ def _around_structure(
 
 
 def _conditions(
-    plant: Any, controller: Controller, sample_time: float, substeps: int, u: FloatArray, limited: Any, held: int
+    plant: Any, controller: Controller, sample_time: float, substeps: int | None, u: FloatArray, limited: Any, held: int
 ) -> dict[str, Any]:
     """The conditions of a loop, those of stages that the plant may lack at their value of rest."""
     return {

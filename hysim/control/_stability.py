@@ -323,8 +323,9 @@ def _too_large(resting: RestingPlant, controller: Controller, volts: float, far:
     low, high = limits_of(controller) or (-math.inf, math.inf)
     if chain.amplifier.limits is not None:
         commands = ((limit - chain.amplifier.offset) / chain.amplifier.gain for limit in chain.amplifier.limits)
-        low, high = np.clip((low, high), *sorted(commands))
-    return far > _QUANTA * quantum or _FULL * float(high - low) < volts
+        least, most = sorted(commands)
+        low, high = min(max(low, least), most), min(max(high, least), most)
+    return far > _QUANTA * quantum or _FULL * (high - low) < volts
 
 
 def _swing(signal: FloatArray, samples: int, slower: float) -> float:
