@@ -206,8 +206,14 @@ def corpus() -> dict[str, tuple[bytes, str]]:
         "huge.npz": (_claimed(10**12), r"array 'u' is too large: it says it has 1,000,000,000,000 numbers"),
         "long.npz": (_claimed(5, declared=168, actual=long), "the NPZ file is damaged"),
         "bzip.npz": (npz({"u": U, "y": Y}, zipfile.ZIP_BZIP2), "array 'u' is encrypted or packed in another way"),
-        "header.npz": (npz({"u": b"\x93NUMPY\2\0\0\0\0\x10", "y": Y}), "the NPZ file is damaged: .*reading array header"),
-        "code.npz": (npz({"u": lying(0, b"", "__import__('os').abort()"), "y": Y}), "the NPZ file is damaged: .*malformed"),
+        "header.npz": (
+            npz({"u": b"\x93NUMPY\2\0\0\0\0\x10", "y": Y}),
+            "the NPZ file is damaged: .*reading array header",
+        ),
+        "code.npz": (
+            npz({"u": lying(0, b"", "__import__('os').abort()"), "y": Y}),
+            "the NPZ file is damaged: .*malformed",
+        ),
         "twice.npz": (archive({"u.npy": npy(U), "y.npy": npy(Y)}, twice=True), "2 arrays are called 'u'"),
         "array.npy": (npy(np.zeros((9, 2))), "one array, array .9 x 2.: choose its columns by the numbers 0 to 1"),
         "objects.npy": (npy(np.array([None, 1]), allow_pickle=True), "no array 'u', the arrays are: 0: array .pickled"),

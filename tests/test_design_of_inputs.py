@@ -25,7 +25,7 @@ def test_the_input_keeps_its_limits_and_tells_more_than_the_usual_ones(design):
 
 
 def test_usual_inputs_keep_the_limits_too():
-    from hysim.design._candidates import usual
+    from hysim.design._inputs import usual
 
     for (u,) in usual(LIMITS).values():
         assert np.abs(u).max() <= 2.0

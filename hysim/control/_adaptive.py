@@ -8,10 +8,9 @@ import math
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
 from hysim._frozen import FloatArray, read_only
-from hysim.control._sampled import Feedback, SampledController, check_limits, check_sample_time
+from hysim.control._controller import WithoutFeedback, check_limits
 from hysim.kernels import stepping
 from hysim.kernels.adaptation.inverse import adaptive
 from hysim.models.compiled_step import compiled_step
@@ -19,7 +18,7 @@ from hysim.models.derivatives.packing import packed_rates
 from hysim.models.inverse_search import searched_inverse
 from hysim.models.law import Law
 from hysim.models.model import family
-from hysim.models.protocols import CompiledController
+from hysim.models.protocols import CompiledController, positive_time
 
 _DIFFERENCE = 1e-4  # of a number: how far its copy of the law is from the law
 _AFFINE = 1e-9  # of the parameters of a step: what of them may not be affine in the numbers
@@ -29,7 +28,7 @@ _bound = functools.lru_cache(maxsize=64)(adaptive)
 
 
 @family
-class AdaptiveInverse(SampledController):
+class AdaptiveInverse(WithoutFeedback):
     """Command by the inverse of a law whose numbers are estimated again at every sample.
 
     The measurement is compared with the output of the law at the last command, and the numbers that are free move
@@ -98,16 +97,8 @@ class AdaptiveInverse(SampledController):
         """Stand-in for a missing measurement: nan, since one of an earlier command would be taken for a drift."""
         return math.nan
 
-    def frequency_response(self, frequency: npt.ArrayLike, sample_time: float) -> npt.NDArray[np.complex128]:
-        """Zeros: the measurement moves the numbers of the law, not the command itself."""
-        return np.zeros(np.shape(frequency), dtype=complex)
-
-    def linear(self, sample_time: float) -> Feedback:
-        """No feedback: the measurement moves the numbers of the law, not the command itself."""
-        return Feedback(np.zeros((0, 0)), np.zeros(0), np.zeros(0), 0.0)
-
     def compiled(self, sample_time: float, u0: float = 0.0, y0: float = 0.0) -> CompiledController:
-        check_sample_time(sample_time)
+        positive_time(sample_time)
         law, count = self.law, len(self.free)
         parameters, rates = self._rates()
         sizes = self._sizes()

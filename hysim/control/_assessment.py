@@ -12,16 +12,345 @@ import numpy as np
 import numpy.typing as npt
 
 from hysim import signals
-from hysim._frozen import FloatArray, read_only
-from hysim.control._assessment_results import HysteresisAssessment, OpenLoop, SquareWaveAssessment, StepAssessment
-from hysim.control._loop import RestingPlant, around_actuator, as_actuator
-from hysim.control._loop_assessment import judged
+from hysim._frozen import FloatArray, frozen, read_only
+from hysim._printing import extent, printed, quantity, summary_text
+from hysim.control._controller import Controller, preview
+from hysim.control._loop import ClosedLoop, RestingPlant, around_actuator, as_actuator, sampled
 from hysim.control._open_loop import secant_gain, without_memory
-from hysim.control._protocols import Controller, preview
-from hysim.metrics import VibrationReduction, rmse, vibration_reduction
+from hysim.control._stability import judge
+from hysim.control._tracking import is_fed_back
+from hysim.metrics import LoopMetrics, VibrationReduction, loop_metrics, reduction_percent, rmse, vibration_reduction
 from hysim.plants.actuator import Actuator
 
+
+@printed
+@frozen
+class LoopAssessment:
+    """Stability, robustness and error of a closed loop.
+
+    Parameters
+    ----------
+    stable : bool
+        Whether the linear loop is stable at the least and at the largest slope of the law, and the loop itself comes
+        to rest where the reference stops.
+    message : str
+        Why it is not stable; empty if it is.
+    period : float
+        Period of the reference [s]; nan if it has none.
+    tracking_rms : float
+        Rms of reference minus true displacement, over the last period if there is one [unit of y].
+    limited_percent : float
+        Share of the samples at a limit of controller or amplifier [%].
+    max_sensitivity, max_sensitivity_with_delay : float
+        Largest ``|1 / (1 + L)|`` of the linear loop at either slope, and that with one sample more of delay; infinite
+        if it is unstable, nan for a controller whose linear part is unknown.
+    command_jump : float
+        Jump of the command when the measurement moves by one; nan if unknown [unit of u / unit of y].
+    closed
+        The closed loop.
+    """
+
+    stable: bool
+    message: str
+    period: float
+    tracking_rms: float
+    limited_percent: float
+    max_sensitivity: float
+    max_sensitivity_with_delay: float
+    command_jump: float
+    closed: ClosedLoop
+
+    def __str__(self) -> str:
+        return summary_text(
+            [f"LoopAssessment: {'stable' if self.stable else self.message}, tracking rms {self.tracking_rms:.4g}"],
+            {
+                "maximum sensitivity": f"{self.max_sensitivity:.4g}, with one sample more of delay "
+                f"{self.max_sensitivity_with_delay:.4g}",
+                "at a limit": f"{self.limited_percent:.3g} % of the samples",
+                "command": f"moves by {self.command_jump:.4g} when the measurement moves by one",
+                "period": "" if math.isnan(self.period) else quantity(self.period, "s"),
+            },
+        )
+
+    def row(self, quantum: float | None = None) -> dict[str, float | bool | None]:
+        """The columns beside a reduction in a table: numbers, None where one is infinite or unknown.
+
+        Parameters
+        ----------
+        quantum : float, optional
+            Step of the readings for ``"volts_per_quantum"`` [unit of y]; by default the sensor's own.
+
+        Returns
+        -------
+        dict
+            ``"stable"``, ``"period"``, ``"tracking_rms"``, ``"limited_percent"``, ``"max_sensitivity"``,
+            ``"max_sensitivity_with_delay"`` and ``"volts_per_quantum"``.
+        """
+        step = self.closed.conditions["sensor_quantum"] if quantum is None else quantum
+        numbers = {name: vars(self)[name] for name in _IN_A_ROW} | {"volts_per_quantum": self.command_jump * step}
+        return {"stable": self.stable} | {key: each if math.isfinite(each) else None for key, each in numbers.items()}
+
+
+def assess_loop(
+    plant: Any,
+    controller: Controller,
+    t: npt.ArrayLike,
+    reference: npt.ArrayLike,
+    *,
+    u0: float | None = None,
+    period: float = math.nan,
+) -> LoopAssessment:
+    """Close a loop, and judge its stability, robustness and error.
+
+    A loop whose linear poles lie outside the unit circle may still run along between the limits of its voltage, and a
+    loop that is stable in linear theory may swing there, or on the steps of its sensor. Both are not stable: the
+    figures of such a run say nothing of the controller.
+
+    Parameters
+    ----------
+    plant, controller, t, reference, u0
+        As in `hysim.close_loop`.
+    period : float
+        Period of the reference, of which the last one is measured [s]; nan for a reference that has none.
+
+    Returns
+    -------
+    LoopAssessment
+
+    Raises
+    ------
+    SimulationError, ValueError
+        If the loop diverges; if the plant has no gain, or the period is longer than the reference.
+
+    Examples
+    --------
+    >>> import numpy as np, hysim as hs
+    >>> lag, t = hs.TransferFunction(num=(1.0,), den=(1.0, 1.0)), 0.1 * np.arange(200)
+    >>> found = [hs.control.assess_loop(lag, hs.PID(kp=kp, limits=(0.0, 2.0)), t, np.ones(200)) for kp in (5.0, 50.0)]
+    >>> [each.stable for each in found], found[1].message
+    ([True, False], 'the loop is unstable: a pole of the linear loop lies outside the unit circle')
+    """
+    times, r, h = sampled(t, reference)
+    resting = RestingPlant(as_actuator(plant), h, u0)
+    samples = r.size if math.isnan(period) else round(period / h)
+    if not 0 < samples <= r.size:
+        raise ValueError(f"period must be at least a sample and no longer than the reference, got {period} s")
+    cycle = r[-samples:]
+    cycle = np.append(resting.y0, cycle) if np.ptp(cycle) == 0.0 else cycle
+    gain = secant_gain(resting.actuator, cycle)
+    return _judged(resting, controller, times, r, cycle, gain, slice(-samples, None), period)
+
+
+def _judged(
+    resting: RestingPlant,
+    controller: Controller,
+    times: FloatArray,
+    reference: FloatArray,
+    cycle: FloatArray,
+    gain: float,
+    counted: slice,
+    period: float = math.nan,
+) -> LoopAssessment:
+    """Judgement of a loop; `gain` is the secant gain along `cycle`, and `counted` are the samples of the error."""
+    closed = around_actuator(resting, controller, times, reference)
+    linear, moves = judge(resting, controller, closed.reference, cycle, gain)
+    unstable = linear.max_sensitivity == math.inf
+    why = ": a pole of the linear loop lies outside the unit circle" if unstable else " where the reference stops"
+    return LoopAssessment(
+        stable=not moves,
+        message=moves and f"the loop {moves}{why}",
+        period=period,
+        tracking_rms=rmse(closed.reference[counted], closed.y[counted]),
+        limited_percent=100.0 * float(closed.conditions["limited_samples"]) / float(closed.t.size),
+        max_sensitivity=linear.max_sensitivity,
+        max_sensitivity_with_delay=linear.max_sensitivity_with_delay,
+        command_jump=linear.command_jump,
+        closed=closed,
+    )
+
+
+@printed
+@frozen
+class OpenLoop:
+    """Response to a periodic reference without a controller; every signal has shape (n,).
+
+    Parameters
+    ----------
+    t, reference : array
+        Times [s] and reference [unit of y].
+    u, y : array
+        Voltage reference / secant gain [unit of u], and true displacement just before it [unit of y].
+    secant_gain, samples_per_cycle
+        Stroke over span of the last cycle [unit of y / unit of u], and length of a cycle.
+    """
+
+    t: FloatArray
+    reference: FloatArray
+    u: FloatArray
+    y: FloatArray
+    secant_gain: float
+    samples_per_cycle: int
+
+    def __str__(self) -> str:
+        return summary_text([f"OpenLoop: {self.t.size} samples, secant gain {self.secant_gain:.4g}", str(self.loop)])
+
+    @property
+    def cycle(self) -> FloatArray:
+        """Last cycle of the reference, both ends included."""
+        return self.last(self.reference)
+
+    @property
+    def loop(self) -> LoopMetrics:
+        return self.loop_of(self.y)
+
+    def last(self, signal: FloatArray) -> FloatArray:
+        return signal[-self.samples_per_cycle - 1 :]
+
+    def loop_of(self, y: FloatArray) -> LoopMetrics:
+        """Measures of a displacement against the reference in the last cycle."""
+        return loop_metrics(self.cycle, self.last(y))
+
+    def reduction_percent(self, y: FloatArray) -> float:
+        """100 (1 - W closed / W open) [%], W the largest width over the stroke."""
+        return reduction_percent(self.loop.relative_width, self.loop_of(y).relative_width)
+
+
+@printed
+@frozen
+class HysteresisAssessment:
+    """Figures of a triangle in open and in closed loop, over the last cycle.
+
+    Parameters
+    ----------
+    hysteresis_reduction_percent, lag_reduction_percent : float
+        100 (1 - W closed / W open) [%], W the largest width over the stroke of the true displacement against the
+        reference. The first is nan for a plant without a law, whose loop is lag; the second is nan with one. Both are
+        nan if the loop is not stable.
+    open_width, closed_width : float
+        Largest widths [unit of y].
+    open_lag_width, lag_width : float
+        The same with the law replaced by a line of its secant gain [unit of y].
+    tracking_rms, closure_gap : float
+        Rms error, and displacement at the end minus at the start [unit of y].
+    secant_gain : float
+        Secant gain of the open loop [unit of y / unit of u].
+    open_u, open_y, closed
+        Signals of the open loop, shape (n,), and the closed loop.
+    loop : LoopAssessment
+        Stability, robustness, and share of limited samples.
+    """
+
+    hysteresis_reduction_percent: float
+    lag_reduction_percent: float
+    open_width: float
+    closed_width: float
+    open_lag_width: float
+    lag_width: float
+    tracking_rms: float
+    closure_gap: float
+    secant_gain: float
+    open_u: FloatArray
+    open_y: FloatArray
+    closed: ClosedLoop
+    loop: LoopAssessment
+
+    @property
+    def is_lag(self) -> bool:
+        """Whether the plant has no law, so that its loop is lag."""
+        return self.closed.conditions["plant"].hysteresis is None
+
+    def __str__(self) -> str:
+        what = "lag" if self.is_lag else "hysteresis"
+        reduction = self.lag_reduction_percent if self.is_lag else self.hysteresis_reduction_percent
+        return summary_text(
+            [f"HysteresisAssessment: {what} reduction {reduction:.2f} %, tracking rms {self.tracking_rms:.4g}"],
+            {
+                "not stable": self.loop.message,
+                "open width": f"{self.open_width:.4g}, without the memory {self.open_lag_width:.4g}",
+                f"{driven_by(self.closed)} width": f"{self.closed_width:.4g}, without the memory {self.lag_width:.4g}",
+                "closure gap": f"{self.closure_gap:.4g}",
+                "secant gain": f"{self.secant_gain:.4g}",
+                "voltage": extent(self.closed.u),
+            },
+        )
+
+
+@printed
+@frozen
+class StepAssessment:
+    """Figures of a step in open and in closed loop.
+
+    Parameters
+    ----------
+    reduction : VibrationReduction
+        The three figures, nan if the loop is not stable, and the measures of both responses.
+    open_y, closed
+        Displacement in open loop, shape (n,), where the voltage steps to its final value; and the closed loop.
+    loop : LoopAssessment
+        Stability, robustness, and share of limited samples.
+    """
+
+    reduction: VibrationReduction
+    open_y: FloatArray
+    closed: ClosedLoop
+    loop: LoopAssessment
+
+    def __str__(self) -> str:
+        ends = f"from {self.closed.y[0]:.4g} to {self.closed.reference[-1]:.4g}"
+        lines = [f"StepAssessment {ends}, voltage {extent(self.closed.u)}", f"  {self.reduction}"]
+        return summary_text(lines, {"not stable": self.loop.message})
+
+
+@printed
+@frozen
+class SquareWaveAssessment:
+    """Figures of a square wave in its periodic steady state, in open and in closed loop.
+
+    Parameters
+    ----------
+    open_tracking_rms, tracking_rms : float
+        Rms errors over the last period [unit of y].
+    open_peak_excess_percent, peak_excess_percent : float
+        Largest displacement beyond the reference's range in the last period [% of the wave's height].
+    reduction : VibrationReduction, or None
+        The step's figures over the last half period, if it lasts the open loop's t98 and five of its periods, and the
+        loop is stable.
+    open_y, closed
+        Displacement in open loop, shape (n,), and the closed loop.
+    loop : LoopAssessment
+        Stability, robustness, and share of limited samples.
+    """
+
+    open_tracking_rms: float
+    tracking_rms: float
+    open_peak_excess_percent: float
+    peak_excess_percent: float
+    reduction: VibrationReduction | None
+    open_y: FloatArray
+    closed: ClosedLoop
+    loop: LoopAssessment
+
+    def __str__(self) -> str:
+        return summary_text(
+            [
+                f"SquareWaveAssessment: tracking rms {self.tracking_rms:.4g}, open loop {self.open_tracking_rms:.4g}",
+                f"  peak excess {self.peak_excess_percent:.2f} %, open loop {self.open_peak_excess_percent:.2f} %",
+                "" if self.reduction is None else f"  {self.reduction}",
+            ],
+            {"not stable": self.loop.message},
+        )
+
+
+def driven_by(run: ClosedLoop) -> str:
+    """The drive of the plant in a word: "closed" for a loop with feedback, "inverse" for a controller without it."""
+    return "closed" if is_fed_back(run.conditions["controller"]) else "inverse"
+
+
 _FEWEST = 10  # samples of which a step is measured
+_IN_A_ROW = ("period", "tracking_rms", "limited_percent", "max_sensitivity", "max_sensitivity_with_delay")
+_UNKNOWN: dict[str, Any] = dict.fromkeys(
+    ("overshoot_reduction_percent", "residual_rms_reduction_percent", "settling_time_reduction_percent"), math.nan
+)
 
 
 def assess_hysteresis(
@@ -71,11 +400,11 @@ def assess_hysteresis(
     reference = signals.triangle(low, high, cycles=cycles, samples_per_cycle=samples)
     opened = open_loop(actuator, reference, sample_time, samples)
     line = RestingPlant(without_memory(actuator, opened.cycle / opened.secant_gain), sample_time)
-    closed = around_actuator(actuator, controller, opened.t, reference)
+    resting = RestingPlant(actuator, sample_time)
     counted = slice(-samples - 1, None)
-    loop = judged(actuator, controller, closed, opened.cycle, opened.secant_gain, counted, period)
-    reduction = opened.reduction_percent(closed.y) if loop.stable else math.nan
-    after, has_law = opened.loop_of(closed.y), actuator.hysteresis is not None
+    loop = _judged(resting, controller, opened.t, reference, opened.cycle, opened.secant_gain, counted, period)
+    reduction = opened.reduction_percent(loop.closed.y) if loop.stable else math.nan
+    after, has_law = opened.loop_of(loop.closed.y), actuator.hysteresis is not None
     return HysteresisAssessment(
         hysteresis_reduction_percent=reduction if has_law else math.nan,
         lag_reduction_percent=math.nan if has_law else reduction,
@@ -88,7 +417,7 @@ def assess_hysteresis(
         secant_gain=opened.secant_gain,
         open_u=opened.u,
         open_y=opened.y,
-        closed=closed,
+        closed=loop.closed,
         loop=loop,
     )
 
@@ -193,18 +522,17 @@ def assess_step(
     t = sample_time * np.arange(before + after)
     resting = RestingPlant(actuator, sample_time, u0)
     reference = resting.y0 + np.where(np.arange(t.size) < before + ahead, 0.0, step)
-    closed = around_actuator(actuator, controller, read_only(t), reference, u0)
     cycle = np.array([resting.y0, resting.y0 + step])
     gain = secant_gain(actuator, cycle)
-    loop = judged(actuator, controller, closed, cycle, gain, slice(None))
+    loop = _judged(resting, controller, read_only(t), reference, cycle, gain, slice(None))
     waits = np.arange(after) < (ahead if known_ahead else 0)
     open_y = resting.driven(resting.u0 + np.where(waits, 0.0, step / gain))
     decay_rate = -_least_damped(actuator).real
-    reduction = vibration_reduction(t[:after], open_y, closed.y[before:], decay_rate=decay_rate)
+    reduction = vibration_reduction(t[:after], open_y, loop.closed.y[before:], decay_rate=decay_rate)
     return StepAssessment(
-        reduction=reduction if loop.stable else _unknown(reduction),
+        reduction=reduction if loop.stable else replace(reduction, **_UNKNOWN),
         open_y=open_y,
-        closed=closed,
+        closed=loop.closed,
         loop=loop,
     )
 
@@ -251,13 +579,13 @@ def assess_square_wave(
     t = sample_time * np.arange(reference.size)
     levels = np.array([low, high])
     gain = secant_gain(actuator, levels)
-    closed = around_actuator(actuator, controller, read_only(t), reference)
-    open_y = RestingPlant(actuator, sample_time).driven(reference / gain)
+    resting = RestingPlant(actuator, sample_time)
+    open_y = resting.driven(reference / gain)
     last, last_half = slice(-2 * half, None), slice(-half, None)
-    loop = judged(actuator, controller, closed, levels, gain, last, period)
+    loop = _judged(resting, controller, read_only(t), reference, levels, gain, last, period)
     mode, step = _least_damped(actuator), None
     if half >= _FEWEST and loop.stable:
-        halves = t[last_half], open_y[last_half], closed.y[last_half]
+        halves = t[last_half], open_y[last_half], loop.closed.y[last_half]
         reduction = vibration_reduction(*halves, decay_rate=-mode.real)
         if half * sample_time >= reduction.open.t98 + 5.0 * 2.0 * math.pi / mode.imag:
             step = reduction
@@ -265,21 +593,11 @@ def assess_square_wave(
         open_tracking_rms=rmse(reference[last], open_y[last]),
         tracking_rms=loop.tracking_rms,
         open_peak_excess_percent=_peak_excess(open_y[last], low, high),
-        peak_excess_percent=_peak_excess(closed.y[last], low, high),
+        peak_excess_percent=_peak_excess(loop.closed.y[last], low, high),
         reduction=step,
         open_y=open_y,
-        closed=closed,
+        closed=loop.closed,
         loop=loop,
-    )
-
-
-def _unknown(reduction: VibrationReduction) -> VibrationReduction:
-    """The measures of both responses, without the reductions."""
-    return replace(
-        reduction,
-        overshoot_reduction_percent=math.nan,
-        residual_rms_reduction_percent=math.nan,
-        settling_time_reduction_percent=math.nan,
     )
 
 

@@ -8,18 +8,18 @@ from typing import Any, TypeGuard
 import numpy as np
 import numpy.typing as npt
 
-from hysim._frozen import FloatArray, frozen, read_only
+from hysim._frozen import FloatArray, frozen, read_only, vectors
 from hysim._printing import extent, printed, quantity, summary_text
 from hysim._progress import Progress, Reports, reports
 from hysim._results import model_of
-from hysim.control._protocols import Controller, begun, held_samples, limits_of, preview
+from hysim.control._controller import Controller, begun, held_samples, limits_of, preview
 from hysim.errors import SimulationError, warn_beyond, warn_limited
 from hysim.models.model import in_brief
 from hysim.models.protocols import Remembering, Responding, standing
 from hysim.plants.actuator import Actuator
 from hysim.plants.actuator import as_actuator as as_actuator
 from hysim.plants.chain import Signals
-from hysim.plants.structures.moving import Controlled, ControlledStructure
+from hysim.plants.structures.moving import ControlledStructure
 from hysim.plants.structures.structure import Structure
 from hysim.records import even_step
 from hysim.simulation import columns_of, dataset_of_signals, frame_of_signals
@@ -203,40 +203,53 @@ def close_loop(
     True
     """
     _check_controller(controller)
-    r, times = read_only(reference, "reference", ndim=1), read_only(t, "t", ndim=1)
+    times, r, h = sampled(t, reference)
     plant = model_of(plant)
     if isinstance(plant, Structure):
         if u0 or substeps is not None:
             raise ValueError("a structure has its own initial_state and substeps: leave out u0 and substeps")
-        return _around_structure(plant, controller, times, r, ground_acceleration, units or {}, progress or None)
+        quake = None if ground_acceleration is None else vectors(ground_acceleration=ground_acceleration, t=times)[0]
+        ground = ControlledStructure(plant, h, quake)
+        return _around_structure(ground, controller, times, r, h, units or {}, progress or None)
     actuator = as_actuator(plant)
     if ground_acceleration is not None:
         raise ValueError(f"only a Structure stands on the ground, got {type(plant).__name__} and ground_acceleration")
-    run = around_actuator(actuator, controller, times, r, u0, substeps, units, progress or None)
+    resting = RestingPlant(actuator, h, u0, substeps)
+    run = around_actuator(resting, controller, times, r, units, progress or None)
     warn_beyond(actuator.u_range, run.u, type(actuator.hysteresis).__name__)
     warn_limited(run.conditions["limited_samples"], run.u.size)
     return run
 
 
 def around_actuator(
-    actuator: Actuator,
+    resting: "RestingPlant",
     controller: Controller,
     times: FloatArray,
     r: FloatArray,
-    u0: float | None = None,
-    substeps: int | None = None,
     units: Mapping[str, str] | None = None,
     progress: Progress | None = None,
 ) -> ClosedLoop:
     """The loop around an actuator, without the warnings of `close_loop`: measures of loops print what these say."""
     _check_controller(controller)
-    plant_at_rest = RestingPlant(actuator, sample_time_of(times, r), u0, substeps)
-    signals = plant_at_rest.run(controller, r, progress, float(times[0]))
-    u = plant_at_rest.voltages(signals)
-    conditions = {
-        **_conditions(actuator, controller, plant_at_rest, signals, u),
-        **_voltage_noise(actuator, controller, plant_at_rest, r, u),
+    signals = resting.run(controller, r, progress, float(times[0]))
+    u = resting.voltages(signals)
+    sensor, amplifier = resting.chain.sensor, resting.chain.amplifier
+    within = amplifier.voltage(signals.command) == amplifier.gain * signals.command + amplifier.offset
+    limited, h = (signals.drive != signals.command) | ~within, resting.sample_time
+    conditions = _conditions(resting.actuator, controller, h, resting.chain.substeps, u, limited, signals.held) | {
+        "delay": resting.chain.delay + sensor.delay,
+        "amplifier_limits": amplifier.limits,
+        "sensor_quantum": sensor.quantum,
+        "noise": sensor.noise,
+        "seed": sensor.seed if sensor.noise else None,
+        "u0": resting.u0,
     }
+    if sensor.noise:
+        quiet = resting.quiet()
+        silent = quiet.attempt(controller, r)
+        noise = u - quiet.voltages(silent) if silent.lost < 0 else np.array([math.nan])
+        conditions["voltage_noise_rms"] = float(np.sqrt(np.mean(noise**2)))
+        conditions["voltage_noise_peak"] = float(np.abs(noise).max())
     return ClosedLoop(
         t=times,
         reference=r,
@@ -244,7 +257,7 @@ def around_actuator(
         command=signals.command,
         drive=signals.drive,
         u=u,
-        z=plant_at_rest.memory(signals),
+        z=resting.memory(signals),
         y=signals.y,
         measurement=signals.measurement,
         conditions=conditions,
@@ -263,10 +276,17 @@ class RestingPlant:
     def __init__(
         self, actuator: Actuator, sample_time: float, u0: float | None = None, substeps: int | None = None
     ) -> None:
-        self.sample_time, self.u0 = sample_time, standing(actuator, u0)
+        self.actuator, self.sample_time, self.u0 = actuator, sample_time, standing(actuator, u0)
         self.chain = actuator.chain(sample_time, substeps)
         self.state = self.chain.rest(self.u0)
         self.y0 = self.chain.displacement(self.state)
+
+    def quiet(self) -> "RestingPlant":
+        """The plant without the noise of its sensor."""
+        if self.actuator.sensor is None:
+            return self
+        actuator = replace(self.actuator, sensor=replace(self.actuator.sensor, noise=0.0))
+        return RestingPlant(actuator, self.sample_time, self.u0, self.chain.substeps)
 
     def run(
         self, controller: Controller, reference: FloatArray, progress: Progress | None = None, begin: float = 0.0
@@ -316,24 +336,20 @@ def _ahead(controller: Controller, sample_time: float, reference: FloatArray) ->
 
 
 def _around_structure(
-    structure: Structure,
+    plant: ControlledStructure,
     controller: Controller,
     t: FloatArray,
     reference: FloatArray,
-    ground_acceleration: npt.ArrayLike | None,
+    sample_time: float,
     units: Mapping[str, str],
     progress: Progress | None,
 ) -> ClosedLoop:
     """The loop around a structure."""
-    sample_time = sample_time_of(t, reference)
-    ground = None if ground_acceleration is None else read_only(ground_acceleration, "ground_acceleration", ndim=1)
-    if ground is not None and ground.size != t.size:
-        raise ValueError(f"ground_acceleration and t must have equal lengths, got {ground.size} and {t.size}")
-    plant = ControlledStructure(structure, sample_time, ground)
     compiled = begun(controller, sample_time, 0.0, plant.y0)
     run = plant.run(compiled, _ahead(controller, sample_time, reference), progress)
     if run.lost >= 0:
         raise SimulationError(f"the loop diverges at t = {t[run.lost]:g}: it is unstable")
+    structure, limited, held = plant.structure, run.drive != run.command, held_samples(compiled)
     return ClosedLoop(
         t=t,
         reference=reference,
@@ -344,21 +360,21 @@ def _around_structure(
         z=None,
         y=run.y,
         measurement=run.y,
-        conditions=_conditions_of_structure(structure, controller, sample_time, run, held_samples(compiled)),
+        conditions=_conditions(structure, controller, sample_time, structure.substeps, run.drive, limited, held),
         units=units,
         signals={name: values for name, values in run.signals.items() if name != "y"},
     )
 
 
-def _conditions_of_structure(
-    structure: Structure, controller: Controller, sample_time: float, run: Controlled, held: int
+def _conditions(
+    plant: Any, controller: Controller, sample_time: float, substeps: int | None, u: FloatArray, limited: Any, held: int
 ) -> dict[str, Any]:
-    """The conditions of an actuator's loop, those that a structure has not at their value of rest."""
+    """The conditions of a loop, those of stages that the plant may lack at their value of rest."""
     return {
-        "plant": structure,
+        "plant": plant,
         "controller": controller,
         "sample_time": sample_time,
-        "substeps": structure.substeps,
+        "substeps": substeps,
         "delay": 0.0,
         "preview": preview(controller, sample_time) * sample_time,
         "limits": limits_of(controller),
@@ -367,58 +383,21 @@ def _conditions_of_structure(
         "noise": 0.0,
         "seed": None,
         "u0": 0.0,
-        "lowest_u": float(run.drive.min()),
-        "highest_u": float(run.drive.max()),
-        "limited_samples": int(np.count_nonzero(run.drive != run.command)),
+        "lowest_u": float(u.min()),
+        "highest_u": float(u.max()),
+        "limited_samples": int(np.count_nonzero(limited)),
         "held_samples": held,
         "voltage_noise_rms": 0.0,
         "voltage_noise_peak": 0.0,
     }
 
 
-def sample_time_of(t: FloatArray, reference: FloatArray) -> float:
-    if t.size != reference.size:
-        raise ValueError(f"reference and t must have equal lengths, got {reference.size} and {t.size}")
-    return even_step(t)
+def sampled(t: npt.ArrayLike, reference: npt.ArrayLike) -> tuple[FloatArray, FloatArray, float]:
+    """Times, reference and sample time; ValueError unless the times are even and as many."""
+    r, times = vectors(reference=reference, t=t)
+    return times, r, even_step(times)
 
 
 def is_controller(value: Any) -> TypeGuard[Controller]:
     """Whether a value closes a loop: it is compiled, and is no law."""
     return isinstance(value, Controller) and not isinstance(value, Responding)
-
-
-def _conditions(
-    actuator: Actuator, controller: Controller, plant: RestingPlant, signals: Signals, u: FloatArray
-) -> dict[str, Any]:
-    sensor, amplifier = plant.chain.sensor, plant.chain.amplifier
-    within = amplifier.voltage(signals.command) == amplifier.gain * signals.command + amplifier.offset
-    return {
-        "plant": actuator,
-        "controller": controller,
-        "sample_time": plant.sample_time,
-        "substeps": plant.chain.substeps,
-        "delay": plant.chain.delay + sensor.delay,
-        "preview": preview(controller, plant.sample_time) * plant.sample_time,
-        "limits": limits_of(controller),
-        "amplifier_limits": amplifier.limits,
-        "sensor_quantum": sensor.quantum,
-        "noise": sensor.noise,
-        "seed": sensor.seed if sensor.noise else None,
-        "u0": plant.u0,
-        "lowest_u": float(u.min()),
-        "highest_u": float(u.max()),
-        "limited_samples": int(np.count_nonzero((signals.drive != signals.command) | ~within)),
-        "held_samples": signals.held,
-    }
-
-
-def _voltage_noise(
-    actuator: Actuator, controller: Controller, plant: RestingPlant, reference: FloatArray, u: FloatArray
-) -> dict[str, float]:
-    if actuator.sensor is None or not actuator.sensor.noise:
-        return {"voltage_noise_rms": 0.0, "voltage_noise_peak": 0.0}
-    quiet = replace(actuator, sensor=replace(actuator.sensor, noise=0.0))
-    at_rest = RestingPlant(quiet, plant.sample_time, plant.u0, plant.chain.substeps)
-    signals = at_rest.attempt(controller, reference)
-    noise = u - at_rest.voltages(signals) if signals.lost < 0 else np.array([math.nan])
-    return {"voltage_noise_rms": float(np.sqrt(np.mean(noise**2))), "voltage_noise_peak": float(np.abs(noise).max())}

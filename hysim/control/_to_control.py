@@ -1,18 +1,160 @@
-"""The verb `to_control`: plants and controllers as systems of python-control."""
+"""The verb `to_control`: plants and controllers as systems of python-control.
+
+Those with a memory become nonlinear systems:
+
+    x[k+1] = f(x[k], u[k]),    y[k] = g(x[k])
+
+A discrete plant is one sample of hysim's own loop: x is the state carried from sample to sample, and y the measurement
+just before the new command u[k], so that no command reaches the output of its own sample. A controller's command
+answers to the inputs at once. Both are functions of their arguments alone, and states are counted from rest at u = 0.
+"""
 
 import math
+from collections.abc import Callable
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
+from hysim._frozen import FloatArray
 from hysim._results import model_of
-from hysim.control._io_systems import actuator_system, controller_system, oscillator_system
+from hysim.control._controller import PID
 from hysim.control._loop import as_actuator, is_controller
-from hysim.control._pid import PID
+from hysim.control._tracking import InverseFeedforward, TrackingController
+from hysim.errors import SimulationError
+from hysim.kernels import boucwen_inverse
+from hysim.laws.differential.boucwen_inverse import BoucWenInverse
+from hysim.models.protocols import CompiledController, Continuable, Remembering, positive_time
 from hysim.plants.actuator import Actuator
-from hysim.plants.oscillator import BoucWenOscillator
+from hysim.plants.chain import Chain, ChainState
+from hysim.plants.oscillator import BoucWenOscillator, OscillatorState
 from hysim.plants.sampled import sampled
+from hysim.plants.sensor import Sensor
 from hysim.plants.transfer_function import TransferFunction
+
+Rule = Callable[[float, FloatArray, FloatArray, Any], FloatArray]
+"""A function of python-control: time, state, input and parameters to the state's change or to the output."""
+
+
+def actuator_system(actuator: Actuator, sample_time: float) -> Any:
+    if isinstance(actuator.hysteresis, BoucWenInverse):
+        raise TypeError("the inverse of a law is part of a controller: give it as InverseFeedforward(law=...)")
+    sensor = replace(actuator.sensor or Sensor(), noise=0.0)
+    chain = replace(actuator, sensor=sensor).chain(sample_time)
+    rest = chain.rest(0.0)
+    at_rest, names = np.concatenate(_parts(rest)), _names(chain, rest)
+    carried = np.array([bool(name) for name in names])
+
+    def state(x: FloatArray) -> ChainState:
+        here = at_rest.copy()
+        here[carried] += x
+        return _with_parts(rest, here)
+
+    def update(t: float, x: FloatArray, u: FloatArray, params: Any) -> FloatArray:
+        signals, end = chain.driven(u, state(x))
+        if signals.lost >= 0:
+            raise SimulationError(f"the plant diverges after t = {t:g}, at the command {u[0]:g}")
+        return np.asarray((np.concatenate(_parts(end)) - at_rest)[carried])
+
+    def output(t: float, x: FloatArray, u: FloatArray, params: Any) -> FloatArray:
+        return sensor.measure([chain.seen(state(x))])
+
+    return _system(update, output, ["u"], "y", [name for name in names if name], sample_time)
+
+
+def oscillator_system(plant: BoucWenOscillator, sample_time: float | None) -> Any:
+    """Oscillator as its differential equations, or from sample to sample with its input held."""
+    start: FloatArray = np.array([*(plant.initial_state or (0.0, 0.0)), plant.law.z0])
+    step = sample_time or 0.0
+    law, elastic_force, sampled_plant = plant.law, plant.elastic_force, replace(plant, hold="zoh")
+    weight = 1.0 if plant.excitation == "force" else -plant.mass
+
+    def slope(t: float, x: FloatArray, u: FloatArray, params: Any) -> FloatArray:
+        y, velocity, z = (x + start).tolist()
+        force = weight * float(u[0]) - plant.damping * velocity - (float(elastic_force(y)) + law.gain * z)
+        against = law.gamma * velocity + law.beta * abs(velocity) * math.copysign(1.0, z)
+        return np.array([velocity, force / plant.mass, law.A * velocity - abs(z) ** law.n * against])
+
+    def update(t: float, x: FloatArray, u: FloatArray, params: Any) -> FloatArray:
+        _, end = sampled_plant.advance(u, OscillatorState(float(u[0]), *(x + start).tolist()), sample_time=step)
+        return np.array([end.y, end.velocity, end.z]) - start
+
+    def output(t: float, x: FloatArray, u: FloatArray, params: Any) -> FloatArray:
+        return (x + start)[:1]
+
+    rule = slope if sample_time is None else update
+    return _system(rule, output, ["u"], "y", ["y", "velocity", "z"], step)
+
+
+def controller_system(controller: Any, sample_time: float) -> Any:
+    compiled = CompiledController(*controller.compiled(sample_time, 0.0, 0.0))
+    at_rest = compiled.state
+    carried = np.isfinite(at_rest)  # other places are written before they are read
+    carried[at_rest.size - _scratch(controller, sample_time) :] = False
+
+    def stepped(x: FloatArray, inputs: FloatArray) -> tuple[float, FloatArray]:
+        state = at_rest.copy()
+        state[carried] += x
+        command = compiled.step(compiled.parameters, state, float(inputs[0]), float(inputs[1]))
+        return command, (state - at_rest)[carried]
+
+    def update(t: float, x: FloatArray, inputs: FloatArray, params: Any) -> FloatArray:
+        return stepped(x, inputs)[1]
+
+    def output(t: float, x: FloatArray, inputs: FloatArray, params: Any) -> FloatArray:
+        return np.array([stepped(x, inputs)[0]])
+
+    names = [f"x[{i}]" for i in range(np.count_nonzero(carried))]
+    return _system(update, output, ["reference", "measurement"], "u", names, sample_time)
+
+
+def _system(update: Rule, output: Rule, inputs: list[str], name: str, states: list[str], sample_time: float) -> Any:
+    import control
+
+    return control.nlsys(update, output, inputs=inputs, outputs=[name], states=states, dt=sample_time)
+
+
+def _parts(state: ChainState) -> list[FloatArray]:
+    return [state.voltages, state.law.state, state.x, state.past, state.readings]
+
+
+def _with_parts(state: ChainState, values: FloatArray) -> ChainState:
+    ends = np.cumsum([part.size for part in _parts(state)])
+    voltages, memory, x, past, readings = np.split(values, ends[:-1])
+    return state._replace(voltages=voltages, law=state.law._replace(state=memory), x=x, past=past, readings=readings)
+
+
+def _names(chain: Chain, state: ChainState) -> list[str]:
+    """Names of the elements of a chain's state, in the order of its parts; empty for scratch."""
+    creeping, order, late = chain.stage.decline.size, chain.stage.rest.size, chain.samples_late
+    memory = _memory_names(chain.hysteresis, state.law.state)
+    return [
+        *(["output", "voltage"] if chain.amplifier.dynamic else ["", ""]),
+        *memory, *[""] * (state.law.state.size - len(memory)),
+        *(f"creep[{i}]" for i in range(creeping)), *(f"vibration[{i}]" for i in range(order - creeping)), *[""] * order,
+        "", *(f"w[-{age}]" for age in range(chain.stage.lag + 2, 0, -1)),
+        "", *(f"y[-{age}]" for age in range(late, 0, -1)), "seen" if chain.seen_in >= 0 else "",
+    ]  # fmt: skip
+
+
+def _memory_names(law: Any, state: FloatArray) -> list[str]:
+    """Names of a law's state; a memory z begins the compiled state, and the rest is scratch."""
+    remembers = isinstance(law, Remembering) and isinstance(law, Continuable)
+    size = len(law.advance(state[:1])[1]) if remembers else state.size
+    others = ["z"] if size == 2 else [f"z[{i}]" for i in range(size - 1)]
+    return ["v", *others][:size]
+
+
+def _scratch(controller: Any, sample_time: float) -> int:
+    """How many elements at the end of a controller's state are room for the charts of a Bouc-Wen law."""
+    forward = controller.feedforward if isinstance(controller, TrackingController) else controller
+    if not isinstance(forward, InverseFeedforward):
+        return 0
+    block = forward.block(sample_time, 0.0)
+    if block.inverse is not boucwen_inverse.step:
+        return 0
+    creeping = 0 if forward.creep is None else len(forward.creep.weights)
+    return block.state.size - creeping - boucwen_inverse.N_OWN - 2  # behind the law's input and memory
 
 
 def to_control(plant: Any, sample_time: float | None = None) -> Any:
@@ -60,8 +202,8 @@ def to_control(plant: Any, sample_time: float | None = None) -> Any:
     >>> control.input_output_response(play, 0.1 * np.arange(5), [0.0, 1.0, 0.75, 0.0, 0.0]).outputs.tolist()
     [0.0, 0.0, 1.5, 1.5, 0.5]
     """
-    if sample_time is not None and not 0.0 < sample_time < math.inf:
-        raise ValueError(f"sample_time must be positive and finite, got {sample_time}")
+    if sample_time is not None:
+        positive_time(sample_time)
     plant = model_of(plant)
     if isinstance(plant, PID):
         return _pid(plant, sample_time)

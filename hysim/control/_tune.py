@@ -17,22 +17,224 @@ The sensor's noise is in the simulation, always the same: it moves the memory of
 """
 
 import math
-from collections.abc import Callable, Sequence
-from dataclasses import replace
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import dataclass, field, replace
+from itertools import product
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 from scipy.optimize import minimize
 
-from hysim._frozen import FloatArray, check_choice, read_only
-from hysim.control._loop import RestingPlant, as_actuator, sample_time_of
-from hysim.control._margins import LinearLoop
-from hysim.control._protocols import limits_of
-from hysim.control._specification import Specification
-from hysim.control._stability import limit_cycle
-from hysim.control._template import Limits, Tuned, as_template
-from hysim.control._tuning import Trial, Tuning, front
+from hysim._frozen import FloatArray, check_choice, check_positive, frozen
+from hysim._printing import printed, summary_text
+from hysim.control._controller import PID, SampledController, limits_of
+from hysim.control._loop import RestingPlant, as_actuator, sampled
+from hysim.control._open_loop import secant_gain, slopes
+from hysim.control._stability import LinearLoop, limit_cycle, slowest_decay
+from hysim.control._tracking import TrackingController
+from hysim.models.model import in_brief
+from hysim.plants.actuator import Actuator
+
+Limits = tuple[float, ...] | None
+Gains = tuple[float, float, float]
+"""kp, ki and kd."""
+
+Tuned = PID | TrackingController
+
+_SHAPES = tuple(product((0.1, 1.0, 3.0, 10.0), (0.05, 0.3, 1.0)))  # Ti and Td in units of 1 / crossover
+_ZEROS = (0.03, 0.3)  # damping ratio of zeros that a PID puts on a resonance
+_SCALES = (1.0, 0.3, 0.1, 0.03)  # of a template's own gains
+_FILTER = 0.1
+_LARGEST_WEIGHT = 1.0
+_LARGEST_LOG = 100.0
+_STEP = 0.2  # of the first simplex along the logarithm of a gain
+
+
+class StandardForm:
+    """PIDs as points (log |Kp|, log Ti, log Td, setpoint weight); the gains have the sign of the plant's gain.
+
+    The derivative's filter is a tenth of Td, and of sqrt(Ti Td), one over the frequency of its zeros, if shorter.
+    """
+
+    def __init__(self, sign: float) -> None:
+        self.sign = sign
+
+    def controller(self, x: FloatArray) -> PID:
+        Kp, Ti, Td = _gains(x[:3])
+        weight = float(np.clip(x[3], 0.0, _LARGEST_WEIGHT))
+        shorter = _FILTER * min(Td, math.sqrt(Ti * Td))
+        return PID.standard(math.copysign(Kp, self.sign), Ti, Td, derivative_filter=shorter, setpoint_weight=weight)
+
+    def point(self, gains: Gains) -> FloatArray:
+        kp, ki, kd = gains
+        return np.append(np.log([kp, kp / ki, kd / kp]), 1.0)
+
+    def shapes(self, crossover: float, resonances: FloatArray) -> Iterator[Gains]:
+        """Gains up to a factor, for a crossover frequency and a plant with these resonances [rad/s]."""
+        yield from _shapes(crossover, resonances)
+
+    def own(self) -> list[FloatArray]:
+        return []
+
+    def simplex(self, x: FloatArray) -> FloatArray | None:
+        """Corners from which a search around a point begins; None for the search's own."""
+        return None
+
+
+class FreeGains:
+    """Controllers as points: logarithms of the gains of a template's feedback and damping loop that are not zero."""
+
+    def __init__(self, template: Tuned, sign: float) -> None:
+        self.template, self.sign = template, sign
+        self.pid = template if isinstance(template, PID) else template.feedback or PID()
+        self.damping = None if isinstance(template, PID) else template.damping
+        damping_gain = 0.0 if self.damping is None else self.damping.gain
+        self.gains = np.array([self.pid.kp, self.pid.ki, self.pid.kd, damping_gain])
+        self.free = self.gains != 0.0
+        if not self.free.any():
+            raise ValueError("the controller has nothing to tune: the gains that are not zero are the free ones")
+
+    def controller(self, x: FloatArray) -> Tuned:
+        gains = np.zeros(4)
+        gains[self.free] = self.sign * _gains(x)
+        kp, ki, kd, damping = gains.tolist()
+        pid = replace(self.pid, kp=kp, ki=ki, kd=kd)
+        if isinstance(self.template, PID):
+            return pid
+        damped = self.damping if self.damping is None else replace(self.damping, gain=damping)
+        return replace(self.template, feedback=self.template.feedback and pid, damping=damped)
+
+    def point(self, gains: Gains) -> FloatArray:
+        return np.asarray(np.log(np.abs(np.array([*gains, self.gains[3]])[self.free])))
+
+    def shapes(self, crossover: float, resonances: FloatArray) -> Iterator[Gains]:
+        free = self.free[:3]
+        shapes = _shapes(crossover, resonances) if free.any() else ()
+        yield from dict.fromkeys(tuple(np.where(free, gains, 0.0).tolist()) for gains in shapes)
+
+    def own(self) -> list[FloatArray]:
+        own = np.log(np.abs(self.gains[self.free]))
+        return [own + math.log(scale) for scale in _SCALES]
+
+    def simplex(self, x: FloatArray) -> FloatArray | None:
+        return np.vstack([x, x + _STEP * np.eye(x.size)])
+
+
+def as_template(template: Tuned | None, sign: float) -> StandardForm | FreeGains:
+    if template is None:
+        return StandardForm(sign)
+    if not isinstance(template, PID | TrackingController):
+        raise TypeError(f"controller must be a PID or a TrackingController, got {type(template).__name__}")
+    return FreeGains(template, sign)
+
+
+def _gains(logarithms: FloatArray) -> FloatArray:
+    return np.exp(np.clip(logarithms, -_LARGEST_LOG, _LARGEST_LOG))
+
+
+def _shapes(crossover: float, resonances: FloatArray) -> Iterator[Gains]:
+    """PIDs up to a factor: by their times, and with zeros on the resonances."""
+    yield from ((1.0, crossover / Ti, Td / crossover) for Ti, Td in _SHAPES)
+    yield from ((2.0 * ratio / w, 1.0, 1.0 / w**2) for w in resonances for ratio in _ZEROS)
+
+
+@frozen
+class Trial:
+    """A controller that `tune` tried, and its figures.
+
+    Parameters
+    ----------
+    controller : PID or TrackingController
+        With the limits.
+    max_sensitivity, voltage_noise : float
+        Largest ``|1 / (1 + L)|`` of all plants, at either slope of the law, and largest rms of the voltage noise in the
+        linear loops [unit of u]; infinite if a loop is unstable.
+    objective : float
+        Objective of the simulated loop, in units of the reference's span; infinite if a loop is unstable.
+    """
+
+    controller: Any
+    max_sensitivity: float
+    voltage_noise: float
+    objective: float
+
+
+@printed
+@frozen
+class Tuning:
+    """Result of `tune`.
+
+    Parameters
+    ----------
+    controller, objective, max_sensitivity
+        As in the best `Trial`.
+    gain_margin, phase_margin : float
+        Factor and angle [degrees] by which the loop may change before it is unstable: the smallest of all plants.
+    voltage_noise : float
+        As in the best `Trial`. The noise also moves the memory of a law, which `close_loop` has in its conditions.
+    trade_off : tuple of Trial
+        Trials within the bound on the noise that no other beats in both objective and sensitivity, most robust first.
+    trials : tuple of Trial
+        Every controller that was simulated.
+    success : bool
+        Whether a controller within the bounds was found.
+    message : str
+        Extent of the search, distance to the bounds, and number of samples with limited voltage.
+    """
+
+    controller: Any
+    objective: float
+    max_sensitivity: float
+    gain_margin: float
+    phase_margin: float
+    voltage_noise: float
+    trade_off: tuple[Trial, ...]
+    trials: tuple[Trial, ...]
+    success: bool
+    message: str
+
+    def __str__(self) -> str:
+        bounds = "within" if self.success else "NOT within"
+        return summary_text(
+            [
+                f"Tuning: {type(self.controller).__name__} {bounds} its bounds, objective {self.objective:.4g} of the "
+                "reference's span"
+            ],
+            {
+                "controller": in_brief(self.controller),
+                "sensitivity": f"at most {self.max_sensitivity:.4g}",
+                "margins": f"gain {self.gain_margin:.4g}, phase {self.phase_margin:.4g} degrees",
+                "noise": f"{self.voltage_noise:.4g} rms of voltage" if self.voltage_noise else "",
+                "search": self.message,
+            },
+        )
+
+
+def front(trials: Iterable[Trial]) -> tuple[Trial, ...]:
+    best: list[Trial] = []
+    for trial in sorted(trials, key=lambda trial: (trial.max_sensitivity, trial.objective)):
+        if trial.objective < (best[-1].objective if best else math.inf):
+            best.append(trial)
+    return tuple(best)
+
+
+class _PlantLoops:
+    """One plant along the reference's cycle: its gain, the extreme slopes of its law, and its linear part."""
+
+    def __init__(self, plant: Actuator, cycle: FloatArray, sample_time: float) -> None:
+        self.gain = secant_gain(plant, cycle)
+        self.secant = self.gain / plant.dc_gain
+        self.slopes = sorted(set(slopes(plant, cycle / self.gain)))
+        self.loop = LinearLoop(plant, sample_time)
+        self.noise = 0.0 if plant.sensor is None else plant.sensor.noise
+        self.volts = 1.0 if plant.amplifier is None else abs(plant.amplifier.gain)
+
+    def voltage_noise(self, controller: SampledController) -> float:
+        if not self.noise:
+            return 0.0
+        return self.volts * self.noise * max(self.loop.noise_gain(controller, slope) for slope in self.slopes)
+
 
 OBJECTIVES: dict[str, Callable[[FloatArray], float]] = {
     "itae": lambda e: float(np.mean(np.linspace(0.0, 1.0, e.size) * np.abs(e))),
@@ -111,138 +313,137 @@ def tune(
     (True, True, True)
     """
     check_choice("objective", objective, OBJECTIVES)
-    loop = _SimulatedLoop(plant, t, reference, OBJECTIVES[objective], _each(limits, controller), transient, u0)
-    plants = [loop.actuator, *map(as_actuator, variations)]
-    specification = Specification(plants, loop.cycle, loop.h, max_sensitivity, max_voltage_noise)
-    search = _Search(loop, specification, controller)
+    actuator, (_, r, h) = as_actuator(plant), sampled(t, reference)
+    resting = RestingPlant(actuator, h, u0)
+    if not 0.0 <= transient < h * (r.size - 1):
+        raise ValueError(f"transient must lie within the record, from 0 on, got {transient}")
+    cycle = np.append(resting.y0, r)
+    if np.ptp(cycle) == 0.0:
+        raise ValueError(f"the reference stays at the resting displacement {resting.y0:g}: nothing to follow")
+    if not max_sensitivity > 1.0:
+        raise ValueError(f"max_sensitivity must be above one, got {max_sensitivity}")
+    check_positive(max_voltage_noise=max_voltage_noise)
+    plants = [_PlantLoops(each, cycle, h) for each in (actuator, *map(as_actuator, variations))]
+    search = _Search(
+        resting=resting,
+        reference=r,
+        counted=slice(math.ceil(transient / h), None),
+        span=float(np.ptp(cycle)),
+        objective=OBJECTIVES[objective],
+        limits=_each(limits, controller),
+        plants=plants,
+        max_sensitivity=max_sensitivity,
+        max_voltage_noise=math.inf if max_voltage_noise is None else max_voltage_noise,
+        template=as_template(controller, math.copysign(1.0, plants[0].gain)),
+    )
     for start in sorted(search.starts(), key=search.cost)[:_STARTS]:
-        search.descend(start)
+        options = {**_SEARCHED, "initial_simplex": search.template.simplex(start)}
+        minimize(search.cost, start, method="Nelder-Mead", options=options)
     return search.result()
 
 
-class _SimulatedLoop:
-    """Error of the loop that a controller closes around the plant, as one number."""
+@dataclass(kw_only=True)
+class _Search:
+    """Loops that are simulated around a plant, and bounds on the linear loops around it and its variations."""
 
-    def __init__(
-        self,
-        plant: Any,
-        t: npt.ArrayLike,
-        reference: npt.ArrayLike,
-        objective: Callable[[FloatArray], float],
-        limits: tuple[Limits, ...],
-        transient: float,
-        u0: float | None,
-    ) -> None:
-        self.actuator = as_actuator(plant)
-        self.reference = read_only(reference, "reference", ndim=1)
-        self.h = sample_time_of(read_only(t, "t", ndim=1), self.reference)
-        self.plant = RestingPlant(self.actuator, self.h, u0)
-        if not 0.0 <= transient < self.h * (self.reference.size - 1):
-            raise ValueError(f"transient must lie within the record, from 0 on, got {transient}")
-        self.counted = slice(math.ceil(transient / self.h), None)
-        self.objective, self.limits = objective, limits
-        self.cycle = np.append(self.plant.y0, self.reference)
-        self.span = float(np.ptp(self.cycle))
-        if self.span == 0.0:
-            raise ValueError(f"the reference stays at the resting displacement {self.plant.y0:g}: nothing to follow")
+    resting: RestingPlant
+    reference: FloatArray
+    counted: slice
+    span: float
+    objective: Callable[[FloatArray], float]
+    limits: tuple[Limits, ...]
+    plants: list[_PlantLoops]
+    max_sensitivity: float
+    max_voltage_noise: float
+    template: StandardForm | FreeGains
+    trials: list[Trial] = field(default_factory=list)
+
+    def starts(self) -> list[FloatArray]:
+        """Stable points of the linear rule, without those far beyond the bounds where there are others."""
+        rule = [*self.template.own(), *self.rule()]
+        each = [self.excess(*self.judge(self.template.controller(x))) for x in rule]
+        least = min(each, default=math.inf)
+        if least == math.inf:
+            raise ValueError("no controller of the linear rule makes the loop stable; is the sample time short enough?")
+        return [x for excess, x in zip(each, rule, strict=True) if excess <= max(1.0, least)]
+
+    def rule(self) -> list[FloatArray]:
+        """Points whose feedback has |L| = 1 at a crossover frequency."""
+        plant, h = self.plants[0], self.resting.sample_time
+        highest = math.pi / h
+        lowest = max(_SLOWEST * highest, 2.0 * math.pi / (self.reference.size * h))
+        points = []
+        for crossover in np.geomspace(lowest, highest, _CROSSOVERS + 2)[1:-1]:
+            at_crossover = LinearLoop(self.resting.actuator, h, [crossover])
+            for gains in self.template.shapes(float(crossover), plant.loop.resonances.imag / h):
+                feedback = self.template.controller(self.template.point(gains))
+                if isinstance(feedback, TrackingController):
+                    feedback = replace(feedback, damping=None)  # it is not proportional to the gains
+                size = abs(plant.secant * at_crossover.response(feedback)[0])
+                points.append(self.template.point(tuple(gain / size for gain in gains)))
+        return points
+
+    def loops(self) -> Iterator[tuple[LinearLoop, float]]:
+        """Linear loops of every plant, at both extreme slopes of its law."""
+        return ((plant.loop, slope) for plant in self.plants for slope in plant.slopes)
+
+    def judge(self, controller: SampledController) -> tuple[float, float]:
+        """Maximum sensitivity and voltage noise of the worst linear loop."""
+        sensitivity = 0.0
+        for loop, slope in self.loops():
+            sensitivity = max(sensitivity, loop.max_sensitivity(controller, slope))
+            if sensitivity == math.inf:
+                return math.inf, math.inf
+        return sensitivity, max(plant.voltage_noise(controller) for plant in self.plants)
+
+    def excess(self, sensitivity: float, noise: float) -> float:
+        """Sum of the parts by which the bounds are exceeded; 0 within."""
+        if sensitivity == math.inf:
+            return math.inf
+        parts = sensitivity / self.max_sensitivity, noise / self.max_voltage_noise
+        return sum(max(0.0, part - 1.0) for part in parts)
 
     def value(self, controller: Tuned) -> float:
+        """Objective of the simulated loop under the worst of the limits; infinite if it diverges."""
         largest = -math.inf
         for limits in self.limits:
-            signals = self.plant.attempt(replace(controller, limits=limits), self.reference)
+            signals = self.resting.attempt(replace(controller, limits=limits), self.reference)
             if signals.lost >= 0:
                 return math.inf
             largest = max(largest, self.objective((self.reference - signals.y)[self.counted] / self.span))
         return largest
 
-    def rests(self, controller: Tuned, decay: float, gain: float) -> bool:
-        """Whether the loop comes to rest where the reference stops, under each of the limits."""
-        asked = self.span / abs(gain)
-        return not any(
-            limit_cycle(
-                self.actuator,
-                replace(controller, limits=limits),
-                self.reference,
-                self.h,
-                self.plant.u0,
-                decay=decay,
-                asked=asked,
-            )
-            for limits in self.limits
-        )
-
-    def limited(self, controller: Tuned) -> int:
-        signals = self.plant.attempt(controller, self.reference)
-        return int(np.count_nonzero(signals.drive != signals.command))
-
-
-class _Search:
-    def __init__(self, loop: _SimulatedLoop, specification: Specification, controller: Tuned | None) -> None:
-        self.loop, self.specification = loop, specification
-        self.template = as_template(controller, math.copysign(1.0, specification.plants[0].gain))
-        self.trials: list[Trial] = []
-
-    def starts(self) -> list[FloatArray]:
-        """Stable points of the linear rule, without those far beyond the bounds where there are others."""
-        rule = [*self.template.own(), *self.rule()]
-        stable = [(excess, x) for x in rule if (excess := self.excess(x)) < math.inf]
-        if not stable:
-            raise ValueError("no controller of the linear rule makes the loop stable; is the sample time short enough?")
-        enough = max(1.0, min(excess for excess, _ in stable))
-        return [x for excess, x in stable if excess <= enough]
-
-    def rule(self) -> list[FloatArray]:
-        """Points whose feedback has |L| = 1 at a crossover frequency."""
-        plant, samples = self.specification.plants[0], self.loop.reference.size
-        highest = math.pi / self.loop.h
-        lowest = max(_SLOWEST * highest, 2.0 * math.pi / (samples * self.loop.h))
-        points = []
-        for crossover in np.geomspace(lowest, highest, _CROSSOVERS + 2)[1:-1]:
-            at_crossover = LinearLoop(self.loop.actuator, self.loop.h, [crossover])
-            for gains in self.template.shapes(float(crossover), plant.loop.resonances.imag / self.loop.h):
-                size = abs(plant.secant * at_crossover.response(self.template.feedback(gains))[0])
-                points.append(self.template.point(tuple(gain / size for gain in gains)))
-        return points
-
-    def excess(self, x: FloatArray) -> float:
-        return self.specification.excess(self.specification.judge(self.template.controller(x)))
-
     def cost(self, x: FloatArray) -> float:
-        controller = replace(self.template.controller(x), limits=self.loop.limits[0])
-        judgement = self.specification.judge(controller)
-        value = self.loop.value(controller) if judgement.max_sensitivity < math.inf else math.inf
-        self.trials.append(Trial(controller=controller, objective=value, **judgement._asdict()))
-        return value * (1.0 + _BARRIER * self.specification.excess(judgement))
-
-    def descend(self, start: FloatArray) -> None:
-        options = {**_SEARCHED, "initial_simplex": self.template.simplex(start)}
-        minimize(self.cost, start, method="Nelder-Mead", options=options)
+        controller = replace(self.template.controller(x), limits=self.limits[0])
+        sensitivity, noise = self.judge(controller)
+        value = self.value(controller) if sensitivity < math.inf else math.inf
+        trial = Trial(controller=controller, max_sensitivity=sensitivity, voltage_noise=noise, objective=value)
+        self.trials.append(trial)
+        return value * (1.0 + _BARRIER * self.excess(sensitivity, noise))
 
     def result(self) -> Tuning:
         """Best controller within the bounds, or the nearest to them, with its margins."""
-        bounds = self.specification
         best, trade_off = self.chosen()
-        gain_margin, phase_margin = bounds.margins(best.controller)
-        limited, samples = self.loop.limited(best.controller), self.loop.reference.size
+        gains, phases = np.array([loop.margins(best.controller, slope) for loop, slope in self.loops()]).T
+        signals = self.resting.attempt(best.controller, self.reference)
+        limited = np.count_nonzero(signals.drive != signals.command)
+        noise = f", voltage noise {best.voltage_noise:.2g} of {self.max_voltage_noise:g}"
         return Tuning(
-            controller=best.controller,
-            objective=best.objective,
-            max_sensitivity=best.max_sensitivity,
-            gain_margin=gain_margin,
-            phase_margin=phase_margin,
-            voltage_noise=best.voltage_noise,
+            **vars(best),
+            gain_margin=float(gains.min()),
+            phase_margin=float(phases.min()),
             trade_off=trade_off,
             trials=tuple(self.trials),
-            success=bounds.excess(best) == 0.0,
+            success=self.excess(best.max_sensitivity, best.voltage_noise) == 0.0,
             message=(
-                f"{len(self.trials)} loops simulated; {bounds.words(best)}; "
-                f"the voltage is limited at {limited} of {samples} samples"
+                f"{len(self.trials)} loops simulated; sensitivity {best.max_sensitivity:.2f} of "
+                f"{self.max_sensitivity:g} allowed{noise if self.max_voltage_noise < math.inf else ''}; "
+                f"the voltage is limited at {limited} of {self.reference.size} samples"
             ),
         )
 
     def chosen(self) -> tuple[Trial, tuple[Trial, ...]]:
         """The best trial and the trade-off, once none of them is in a limit cycle."""
-        bounds = self.specification
         resting: set[int] = set()
         while True:
             simulated = [(k, trial) for k, trial in enumerate(self.trials) if trial.objective < math.inf]
@@ -250,8 +451,8 @@ class _Search:
                 raise ValueError(
                     "every loop that was simulated is in a limit cycle: lower max_sensitivity, or widen the limits"
                 )
-            best = min(simulated, key=lambda each: _rank(bounds.excess(each[1]), each[1]))
-            trade_off = front(trial for _, trial in simulated if trial.voltage_noise <= bounds.max_voltage_noise)
+            best = min(simulated, key=lambda each: self.rank(each[1]))
+            trade_off = front(trial for _, trial in simulated if trial.voltage_noise <= self.max_voltage_noise)
             doubtful = [k for k, trial in simulated if k not in resting and (k == best[0] or trial in trade_off)]
             if not doubtful:
                 return best[1], trade_off
@@ -261,13 +462,15 @@ class _Search:
                 else:
                     self.trials[k] = replace(self.trials[k], objective=math.inf)
 
+    def rank(self, trial: Trial) -> tuple[float, float, float]:
+        return self.excess(trial.max_sensitivity, trial.voltage_noise), trial.objective, trial.max_sensitivity
+
     def rests(self, controller: Tuned) -> bool:
-        plant = self.specification.plants[0]
-        return self.loop.rests(controller, plant.decay(controller), plant.gain)
-
-
-def _rank(excess: float, trial: Trial) -> tuple[float, float, float]:
-    return excess, trial.objective, trial.max_sensitivity
+        """Whether the loop comes to rest where the reference stops, under each of the limits."""
+        plant = self.plants[0]
+        decay, asked = slowest_decay(plant.loop, controller, plant.slopes), self.span / abs(plant.gain)
+        each = (replace(controller, limits=limits) for limits in self.limits)
+        return not any(limit_cycle(self.resting, limited, self.reference, decay, asked) for limited in each)
 
 
 def _each(limits: Any, controller: Any) -> tuple[Limits, ...]:

@@ -1,23 +1,160 @@
 """The verb `design_input`."""
 
-from collections.abc import Mapping, Sequence
-from typing import Any
+from collections.abc import Callable, Mapping, Sequence
+from operator import itemgetter
+from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
-from hysim._frozen import FloatArray, read_only
+from hysim._frozen import FloatArray, check_positive, frozen, read_only
+from hysim._printing import printed, summary_text
 from hysim._results import model_of
-from hysim.design import _search as search
-from hysim.design._candidates import random_segments, random_strokes, through, triangles, usual, usual_of_many_speeds
-from hysim.design._criteria import Criterion, spreads
-from hysim.design._limits import InputLimits
-from hysim.design._result import InputDesign
-from hysim.design._subjects import LawAlone, Subject, sizes_of
-from hysim.design._whole import whole_actuator
+from hysim.design import _inputs as shapes
+from hysim.design._inputs import InputLimits
+from hysim.design._subjects import Criterion, LawAlone, Subject, merit, sizes_of, spreads, whole_actuator
 from hysim.models.law import Law
 from hysim.plants.actuator_structure import ActuatorStructure
 from hysim.plants.linear_parts import FREQUENCY
+
+
+@printed
+@frozen
+class InputDesign:
+    """An input, and what it is expected to tell of a law.
+
+    Attributes
+    ----------
+    t, u : array, shape (n_samples,)
+        Times [s] and input [unit of u], which begins at zero.
+    levels, holds : array, shape (n_levels,)
+        Turning points of the input [unit of u] and how long it is held there [s]; the last ones may lie beyond the end.
+        Empty if a usual input was the best one.
+    expected_stderr : mapping
+        Names of the numbers to their standard errors, those of an efficient estimate [unit of each].
+    covariance : array, shape (n_names, n_names)
+        Their covariance, in the same order.
+    efficiency : mapping
+        Names of the usual inputs to what they tell, in parts of what this one does: the ratio of the criterion, which
+        is proportional to the number of samples.
+    beside : mapping
+        Names of the usual inputs, and of those of your own, to the inputs, shape (n_samples,) each; for an actuator the
+        usual ones are the best of a few speeds.
+    beside_stderr : mapping
+        Their names to the standard errors that are expected of them, by name.
+    criterion : str
+        ``"D"``, ``"A"`` or ``"E"``.
+    noise : float
+        Standard deviation of the output for which all this holds [unit of y].
+    limits : InputLimits
+        The limits that it keeps.
+    remarks : tuple of str
+        What no input within the limits determines, and was taken as known, and what this one determines badly.
+    """
+
+    t: FloatArray
+    u: FloatArray
+    levels: FloatArray
+    holds: FloatArray
+    expected_stderr: Mapping[str, float]
+    covariance: FloatArray
+    efficiency: Mapping[str, float]
+    beside: Mapping[str, FloatArray]
+    beside_stderr: Mapping[str, Mapping[str, float]]
+    criterion: str
+    noise: float
+    limits: InputLimits
+    remarks: tuple[str, ...] = ()
+
+    @property
+    def correlation(self) -> FloatArray:
+        """Correlations of the estimates, (n_names, n_names), in the order of `expected_stderr`."""
+        size = np.sqrt(self.covariance.diagonal())
+        return np.asarray(self.covariance / np.outer(size, size))
+
+    def summary(self) -> str:
+        """The printed result as a text."""
+        return str(self)
+
+    def __str__(self) -> str:
+        head = f"InputDesign: {self.u.size} samples to {self.t[-1]:.4g} s, {self.levels.size} turning points"
+        beside = ", ".join(f"{name} {100.0 * value:.0f} %" for name, value in self.efficiency.items())
+        rows = self._by_part() | {f"{self.criterion}-efficiency of": beside}
+        rows["but"] = "; ".join(self.remarks)
+        return summary_text([head, f"  expected standard errors for noise of {self.noise:.3g}:"], rows)
+
+    def _by_part(self) -> dict[str, str]:
+        """Expected standard errors of a law, or of each part of an actuator."""
+        parts: dict[str, list[str]] = {}
+        for name, value in self.expected_stderr.items():
+            part, _, short = name.rpartition(".")
+            parts.setdefault(part or "law", []).append(f"{short} {value:.3g}")
+        return {part: ", ".join(each[:12]) for part, each in parts.items()}
+
+
+_BEST = 4  # candidates that are improved
+_MOVE = 0.3  # of the amplitude: the first moves of a turning point; the last ones are a tenth of it
+_PAUSES, _PAUSE = 0.3, 0.1  # share of the moves that change a pause, and their size beside _MOVE in parts of the record
+
+Move = Callable[[FloatArray, float], FloatArray]  # strokes and the progress of the search, from 0 to 1, to strokes
+
+
+class Found(NamedTuple):
+    """Strokes (n, 3) and what their input is worth."""
+
+    strokes: FloatArray
+    worth: float
+
+
+def determined(subject: Subject, inputs: Sequence[FloatArray]) -> tuple[Subject, tuple[str, ...]]:
+    """The subject without the numbers that none of these inputs determines, and a remark on each."""
+    if not subject.tolerances:
+        return subject, ()
+    names, sizes = subject.names, sizes_of(subject.values)
+    remarks: list[str] = []
+    known = [subject.information(u) for u in inputs]
+    allowed = np.array([subject.tolerances.get(name, np.inf) for name in names])
+    kept = np.arange(len(names))
+    while kept.size:
+        errors = sizes[kept] * np.min([spreads(each[np.ix_(kept, kept)]) for each in known], axis=0)
+        excess = np.where(np.isinf(allowed[kept]), 0.0, errors / allowed[kept])
+        worst = int(np.argmax(excess))
+        if not excess[worst] > 1.0:
+            break
+        place = kept[worst]
+        enough = f" well enough: {errors[worst]:.3g} at best, and {allowed[place]:.3g} is needed"
+        remarks.append(
+            f"no input within the limits determines {names[place]}{enough * bool(np.isfinite(errors[worst]))}; "
+            f"it is taken as known, {subject.values[place]:.4g}"
+        )
+        kept = np.delete(kept, worst)
+    return subject.only([names[k] for k in kept]) if remarks else subject, tuple(remarks)
+
+
+def searched(drawn: Sequence[FloatArray], worth: Callable[[FloatArray], float], move: Move, moves: int) -> Found:
+    """The best strokes after random moves of the best that were drawn, those that are worth more being kept."""
+    every = [Found(strokes, worth(strokes)) for strokes in drawn]
+    improved = sorted(every, key=lambda each: -each.worth)[:_BEST]
+    for place, best in enumerate(improved):
+        for k in range(moves):
+            strokes = move(best.strokes, k / moves)
+            trial = Found(strokes, worth(strokes))
+            best = trial if trial.worth > best.worth else best
+        improved[place] = best
+    return max(improved, key=lambda each: each.worth, default=Found(np.empty((0, 3)), 0.0))
+
+
+def one_moved(strokes: FloatArray, limits: InputLimits, rng: np.random.Generator, progress: float) -> FloatArray:
+    """The strokes with one turning point, or its pause, moved; less and less as the search goes on."""
+    trial, share = strokes.copy(), _MOVE * 0.1**progress * rng.standard_normal()
+    place = rng.integers(len(trial))
+    if rng.random() < _PAUSES:
+        trial[place, 1] = max(0.0, trial[place, 1] + _PAUSE * share * limits.duration)
+    else:
+        moved = trial[place, 0] + share * limits.amplitude
+        trial[place, 0] = min(max(moved, -limits.amplitude), limits.amplitude)
+    return trial
+
 
 _FASTER = 2.0  # times the frequency of the fastest mode: a multisine that is not told how far to go
 _BELOW_NYQUIST = 0.8  # at most, of half the sampling rate
@@ -98,21 +235,27 @@ def design_input(
     subject = _subject(plant, bounds, free, values, noise, criterion)
     rng, in_time = np.random.default_rng(seed), isinstance(plant, ActuatorStructure)
     if in_time:
-        inputs = usual_of_many_speeds(bounds, _highest(highest_frequency, values or {}, bounds), rng)
+        inputs = shapes.usual_of_many_speeds(bounds, _highest(highest_frequency, values or {}, bounds), rng)
     else:
-        inputs = usual(bounds)
-    drawn = [*triangles(bounds), *triangles(bounds, fading=True)] if in_time else []
-    drawn += [(random_segments if in_time else random_strokes)(bounds, rng) for _ in range(candidates)]
+        inputs = shapes.usual(bounds)
+    drawn = [*shapes.triangles(bounds), *shapes.triangles(bounds, fading=True)] if in_time else []
+    drawn += [(shapes.random_segments if in_time else shapes.random_strokes)(bounds, rng) for _ in range(candidates)]
     inputs |= _own(beside or {}, bounds)
     every = [u for variants in inputs.values() for u in variants]
-    subject, unseen = search.determined(subject, [*every, *(through(strokes, bounds) for strokes in drawn)])
-    worth = search.value_of(subject, criterion)
-    judged = {
-        name: max(((worth(u), u) for u in variants), key=lambda each: each[0]) for name, variants in inputs.items()
-    }
-    move = search.one_redrawn if in_time else search.one_moved
-    strokes, best = search.searched(drawn, worth, bounds, move, moves, rng)
-    u, first = through(strokes, bounds), max(judged.values(), key=lambda each: each[0])
+    subject, unseen = determined(subject, [*every, *(shapes.through(strokes, bounds) for strokes in drawn)])
+
+    def worth(u: FloatArray) -> float:
+        return merit(subject.information(u), criterion)
+
+    judged = {name: max(((worth(u), u) for u in each), key=itemgetter(0)) for name, each in inputs.items()}
+    moved = shapes.with_another_segment if in_time else one_moved
+    strokes, best = searched(
+        drawn,
+        lambda strokes: worth(shapes.through(strokes, bounds)),
+        lambda strokes, progress: moved(strokes, bounds, rng, progress),
+        moves,
+    )
+    u, first = shapes.through(strokes, bounds), max(judged.values(), key=itemgetter(0))
     if first[0] > best:
         (best, u), strokes = first, np.empty((0, 3))
     if not best > 0.0:
@@ -187,8 +330,7 @@ def _subject(
         raise TypeError(f"free must be a sequence of names, got the string {free!r}")
     if criterion not in ("D", "A", "E"):
         raise ValueError(f'criterion must be "D", "A" or "E", got {criterion!r}')
-    if noise is not None and not noise > 0.0:
-        raise ValueError(f"noise must be positive, got {noise}")
+    check_positive(noise=noise)
     if isinstance(plant, ActuatorStructure):
         return whole_actuator(plant, limits, values or {}, free, noise)
     if values:
@@ -197,4 +339,4 @@ def _subject(
         raise ValueError("free must name at least one number")
     if unknown := [name for name in free if name not in plant.scalars]:
         raise ValueError(f"free has {unknown[0]!r}: a {type(plant).__name__} has {', '.join(plant.scalars)}")
-    return LawAlone(plant, tuple(free), 1.0 if noise is None else noise, {})
+    return LawAlone(plant, tuple(free), 1.0 if noise is None else noise)

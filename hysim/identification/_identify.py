@@ -34,7 +34,7 @@ from hysim.metrics.rows import LoopRows
 from hysim.models.dependent import Dependent, on_record
 from hysim.models.dependent_structure import DependentStructure
 from hysim.models.model import family_named
-from hysim.models.protocols import Direct, Identifiable, Recorded, needs_time, placed
+from hysim.models.protocols import Direct, Identifiable, PartByPart, Recorded, needs_time, placed
 from hysim.models.search_space import Freedom
 from hysim.records import Record, several
 

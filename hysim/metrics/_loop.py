@@ -1,4 +1,4 @@
-"""The measures of a loop.
+"""The measures of a loop, and of a magnetic one.
 
 A cycle of the input has a loading branch, on which u rises, and an unloading branch, on which it falls. Both are linear
 between their samples, y_l(u) and y_u(u).
@@ -25,6 +25,22 @@ force, if both have their extremes together.
 
 Sources: L. S. Jacobsen, Trans. ASME 52 (1930) 169, for the equivalence; FEMA 356 (2000), section 2.8.4, and ASCE 41 for
 the secant stiffness between the extremes of displacement, not of force.
+
+Those of a magnetic loop, B over H:
+
+    energy                  integral of H dB around the cycle, positive for a core that dissipates
+    coercivity              half the distance of the two fields at B = 0
+    remanence               half the distance of the two flux densities at H = 0
+    amplitude_permeability  peak_induction / (mu_0 peak_field), half the spans between the loop's ends
+    largest_permeability    largest slope dB/dH of either branch / mu_0, between neighbouring samples
+
+and of the initial curve, where the record begins demagnetised at H = B = 0:
+
+    initial_permeability    B / (mu_0 H) at its first sample with a field
+    maximum_permeability    largest B / (mu_0 H) of its samples
+
+The branches are those of `hysim.loop_metrics`, linear between their samples. Source: IEC 60050-121 and 60404-4 for the
+terms.
 """
 
 import math
@@ -35,9 +51,9 @@ from typing import Literal, NamedTuple, overload
 import numpy as np
 import numpy.typing as npt
 
-from hysim._cycles import ROUNDING, TOLERANCE, Cycle, settled
+from hysim._cycles import ROUNDING, TOLERANCE, Cycle, settled, turns
 from hysim._excursions import measured_cycles
-from hysim._frozen import FloatArray, frozen, vectors
+from hysim._frozen import FloatArray, check_positive, frozen, items, vectors
 from hysim._printing import extent, printed, summary_text
 
 COUNTERCLOCKWISE = (
@@ -47,6 +63,7 @@ COUNTERCLOCKWISE = (
 FORCE = "Energy is the integral of y du: what a force y on a displacement u dissipates."
 
 
+Orientation = Literal["counterclockwise", "clockwise", "none"]
 _SMALLEST_LOBE = 0.02  # of the area of all lobes: where the branches meet at the ends they cross by less
 _CLEAR = 4.0  # standard deviations by which the mean width of a lobe is above the noise of the width
 
@@ -62,7 +79,7 @@ class Lobe(NamedTuple):
     high: float
     area: float
     max_width: float
-    orientation: Literal["counterclockwise", "clockwise"]
+    orientation: Orientation
 
 
 @printed
@@ -111,7 +128,7 @@ class LoopMetrics:
     area: float
     stroke: float
     relative_width: float
-    orientation: Literal["counterclockwise", "clockwise", "none"]
+    orientation: Orientation
     closure_gap: float
     n_cycles: int
     energy: float
@@ -294,9 +311,8 @@ def width_rmse(a: LoopMetrics, b: LoopMetrics) -> float:
     other = b.width_at(a.u)
     common = ~np.isnan(other)
     if not common.any():
-        raise ValueError(
-            f"the loops share no input: one runs from {a.u[0]} to {a.u[-1]}, the other from {b.u[0]} to {b.u[-1]}"
-        )
+        ranges = f"one runs from {a.u[0]} to {a.u[-1]}, the other from {b.u[0]} to {b.u[-1]}"
+        raise ValueError(f"the loops share no input: {ranges}")
     return math.sqrt(np.mean((a.width[common] - other[common]) ** 2))
 
 
@@ -305,25 +321,22 @@ def _lobes(u: FloatArray, width: FloatArray) -> tuple[Lobe, ...]:
     turn = np.flatnonzero(width[:-1] * width[1:] < 0.0)
     zeros = u[turn] + np.diff(u)[turn] * width[turn] / (width[turn] - width[turn + 1])
     x, w = np.insert(u, turn + 1, zeros), np.insert(width, turn + 1, 0.0)
-    middle = 0.5 * (w[1:] + w[:-1])
-    areas = middle * np.diff(x)
+    areas = 0.5 * (w[1:] + w[:-1]) * np.diff(x)
     joints = np.concatenate([[0], np.flatnonzero(w[1:-1] == 0.0) + 1, [x.size - 1]]).astype(int)
     parts = [(int(a), int(b), float(areas[a:b].sum())) for a, b in pairwise(joints) if b > a]
     total, noise = sum(abs(area) for *_, area in parts), _noise(u, width)
     clear = [
-        part
-        for part in parts
-        if abs(part[2]) > _SMALLEST_LOBE * total
-        and abs(part[2]) > _CLEAR * noise * (x[part[1]] - x[part[0]]) / math.sqrt(part[1] - part[0])
+        (a, b, area)
+        for a, b, area in parts
+        if abs(area) > max(_SMALLEST_LOBE * total, _CLEAR * noise * (x[b] - x[a]) / math.sqrt(b - a))
     ]
     runs = [list(run) for _, run in groupby(clear, key=lambda part: part[2] > 0.0)]
     crossed = [(before[-1][1] + after[0][0]) // 2 for before, after in pairwise(runs)]
     lobes = []
     for run, (a, b) in zip(runs, pairwise([0, *crossed, x.size - 1] if runs else []), strict=True):
-        signed = float(areas[a:b].sum())
         highest = max(float(np.abs(w[first : last + 1]).max()) for first, last, _ in run)
-        sense: Literal["counterclockwise", "clockwise"] = "counterclockwise" if run[0][2] > 0.0 else "clockwise"
-        lobes.append(Lobe(float(x[a]), float(x[b]), abs(signed), highest, sense))
+        sense = _orientation(run[0][2])
+        lobes.append(Lobe(float(x[a]), float(x[b]), abs(float(areas[a:b].sum())), highest, sense))
     return tuple(lobes)
 
 
@@ -345,13 +358,11 @@ def common_inputs(inputs: list[FloatArray]) -> FloatArray:
     """Every input of any branch, over their common range."""
     union = np.unique(np.concatenate(inputs))
     low, high = max(x[0] for x in inputs), min(x[-1] for x in inputs)
-    common: FloatArray = union[(union >= low) & (union <= high)]
-    return common
+    return np.asarray(union[(union >= low) & (union <= high)])
 
 
 def _mean_curve(grid: FloatArray, curves: list[tuple[FloatArray, FloatArray]]) -> FloatArray:
-    mean: FloatArray = np.mean([np.interp(grid, x, y) for x, y in curves], axis=0)
-    return mean
+    return np.asarray(np.mean([np.interp(grid, x, y) for x, y in curves], axis=0))
 
 
 def signed_area(u: FloatArray, y: FloatArray) -> FloatArray:
@@ -360,10 +371,8 @@ def signed_area(u: FloatArray, y: FloatArray) -> FloatArray:
     return np.asarray(np.sum(x * np.roll(v, -1, axis=-1) - np.roll(x, -1) * v, axis=-1) / 2)
 
 
-def _orientation(area: float, rounding: float) -> Literal["counterclockwise", "clockwise", "none"]:
-    if abs(area) <= rounding:
-        return "none"
-    return "counterclockwise" if area > 0 else "clockwise"
+def _orientation(area: float, rounding: float = 0.0) -> Orientation:
+    return "none" if abs(area) <= rounding else "counterclockwise" if area > 0 else "clockwise"
 
 
 def samples_of_a_loop(u: npt.ArrayLike, y: npt.ArrayLike) -> tuple[FloatArray, FloatArray]:
@@ -374,3 +383,134 @@ def samples_of_a_loop(u: npt.ArrayLike, y: npt.ArrayLike) -> tuple[FloatArray, F
     if np.ptp(inputs) == 0:
         raise ValueError(f"the input is constant at {inputs[0]}: a loop needs an input that rises and falls")
     return inputs, outputs
+
+
+_VACUUM = 1.25663706212e-6
+_DEMAGNETISED = 1e-3  # of the spans of H and B
+
+
+@printed
+@frozen
+class MagneticMetrics:
+    """The measures of one magnetic loop; the equations stand at the head of `hysim.metrics._loop`.
+
+    Parameters
+    ----------
+    energy : float
+        Energy per cycle and volume [J/m^3]; negative for a loop that runs clockwise.
+    coercivity : float
+        [A/m]; nan if a branch does not cross B = 0.
+    remanence : float
+        [T]; nan if the loop does not cross H = 0.
+    peak_field, peak_induction : float
+        Half the distance of the loop's ends [A/m], [T].
+    amplitude_permeability, largest_permeability : float
+        Relative permeability from end to end, and where a branch is steepest [1]. The latter takes all noise of B.
+    initial_permeability, maximum_permeability : float
+        Relative permeabilities of the initial curve [1]; nan if the record does not begin demagnetised.
+    n_cycles : int
+        Number of averaged cycles.
+    """
+
+    energy: float
+    coercivity: float
+    remanence: float
+    peak_field: float
+    peak_induction: float
+    amplitude_permeability: float
+    largest_permeability: float
+    initial_permeability: float
+    maximum_permeability: float
+    n_cycles: int
+
+    def __str__(self) -> str:
+        initial, largest = self.initial_permeability, self.maximum_permeability
+        return summary_text(
+            [f"MagneticMetrics: {self.energy:.4g} J/m^3 a cycle at {self.peak_induction:.4g} T"],
+            {
+                "coercivity": f"{self.coercivity:.4g} A/m",
+                "remanence": f"{self.remanence:.4g} T",
+                "peak": f"{self.peak_field:.4g} A/m",
+                "permeability": f"amplitude {self.amplitude_permeability:.4g}, largest {self.largest_permeability:.4g}",
+                "initial curve": "" if math.isnan(initial) else f"from {initial:.4g}, at most {largest:.4g}",
+            },
+        )
+
+    def to_dict(self) -> dict[str, float]:
+        """The measures by name, as numbers."""
+        return items(self)
+
+
+def magnetic_metrics(
+    H: npt.ArrayLike, B: npt.ArrayLike, *, cycles: int = 1, tolerance: float = TOLERANCE, mu0: float = _VACUUM
+) -> MagneticMetrics:
+    """Measure the magnetic loop of the last complete cycle, or the average loop of the last few.
+
+    Parameters
+    ----------
+    H : array, shape (n,)
+        Field [A/m].
+    B : array, shape (n,)
+        Flux density, or magnetisation in the same unit [T].
+    cycles, tolerance
+        As of `hysim.loop_metrics`, which says what a complete cycle is.
+    mu0 : float
+        Permeability that counts as one, positive [T m / A]; another one for other units.
+
+    Returns
+    -------
+    MagneticMetrics
+
+    Raises
+    ------
+    ValueError
+        If lengths differ, a value is not finite, there are fewer than 3 samples, H is constant or has fewer cycles
+        than asked for, or mu0 is not positive.
+
+    Examples
+    --------
+    >>> import hysim as hs
+    >>> core = hs.Tellinen(saturation=1.8, coercivity=120.0, squareness=0.5)
+    >>> H = hs.signals.triangle(-3000.0, 3000.0, cycles=2, samples_per_cycle=2000)
+    >>> loop = hs.magnetic_metrics(H, core.response(H))
+    >>> round(loop.energy), round(loop.coercivity, 1), round(loop.remanence, 4)
+    (864, 120.0, 0.9)
+    """
+    check_positive(mu0=mu0)
+    field, induction = samples_of_a_loop(H, B)
+    loop = loop_metrics(field, induction, cycles=cycles, tolerance=tolerance)
+    peak_field = 0.5 * float(np.ptp(loop.u))
+    initial, maximum = _initial_curve(field, induction, tolerance)
+    slopes = np.diff([loop.loading, loop.unloading], axis=1) / np.diff(loop.u)
+    return MagneticMetrics(
+        energy=0.0 - loop.energy,
+        coercivity=0.5 * (_zero(loop.u, loop.loading) - _zero(loop.u, loop.unloading)),
+        remanence=0.5 * loop.width_at(0.0),
+        peak_field=peak_field,
+        peak_induction=loop.secant_stiffness * peak_field,
+        amplitude_permeability=loop.secant_stiffness / mu0,
+        largest_permeability=float(slopes.max()) / mu0,
+        initial_permeability=initial / mu0,
+        maximum_permeability=maximum / mu0,
+        n_cycles=loop.n_cycles,
+    )
+
+
+def _zero(u: FloatArray, y: FloatArray) -> float:
+    """First zero of a polyline; nan if it has none."""
+    crossed = np.flatnonzero(np.sign(y[:-1]) * np.sign(y[1:]) <= 0.0)
+    if not crossed.size:
+        return math.nan
+    k = crossed[0]
+    return float(u[k] - y[k] * (u[k + 1] - u[k]) / (y[k + 1] - y[k])) if y[k] else float(u[k])
+
+
+def _initial_curve(H: FloatArray, B: FloatArray, tolerance: float) -> tuple[float, float]:
+    """First and largest B / H of the first stroke; nan if it does not begin demagnetised."""
+    if abs(H[0]) > _DEMAGNETISED * np.ptp(H) or abs(B[0]) > _DEMAGNETISED * np.ptp(B):
+        return math.nan, math.nan
+    first = turns(H, tolerance).branches[0]
+    field, induction = H[first] - H[0], B[first] - B[0]
+    moved = field != 0.0
+    ratios = induction[moved] / field[moved]
+    return float(ratios[0]), float(ratios.max())

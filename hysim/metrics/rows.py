@@ -22,8 +22,7 @@ class LoopRows:
 
     def max_width(self, y: FloatArray) -> FloatArray:
         """Largest magnitude of the width of each row, shape (n_sets,)."""
-        widths: FloatArray = np.abs(self._widths(y)).max(axis=1)
-        return widths
+        return np.asarray(np.abs(self._widths(y)).max(axis=1))
 
     def max_width_slopes(self, y: FloatArray, slopes: FloatArray) -> FloatArray:
         """Derivatives (n,) of the largest width of the one output `y` (n_samples,), for those of y, (n, n_samples).
@@ -58,5 +57,4 @@ def _interpolated(grid: FloatArray, x: FloatArray, y: FloatArray) -> FloatArray:
     below = np.clip(np.searchsorted(x, grid, side="right") - 1, 0, x.size - 1)
     above = np.minimum(below + 1, x.size - 1)
     spans = np.where(above > below, x[above] - x[below], 1.0)
-    values: FloatArray = (y[:, above] - y[:, below]) / spans * (grid - x[below]) + y[:, below]
-    return values
+    return np.asarray((y[:, above] - y[:, below]) / spans * (grid - x[below]) + y[:, below])

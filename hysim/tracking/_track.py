@@ -1,19 +1,140 @@
-"""The verb `track_parameters`."""
+"""The verb `track_parameters`.
 
-from collections.abc import Mapping, Sequence
+The size of a drift is the one for which the errors of predictions one sample ahead are most likely. A walk that is
+too large follows the noise, and one that is too small comes late: both make these errors larger than the filter
+expects, or smaller. The logarithm of their likelihood (the prediction-error decomposition; A. C. Harvey, Forecasting,
+Structural Time Series Models and the Kalman Filter, 1989, section 3.4) is maximised over the sizes by steps along one
+size at a time, on a logarithmic scale.
+"""
+
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any, Literal
 
 import numpy as np
 import numpy.typing as npt
 
-from hysim._frozen import FloatArray, check_choice
+from hysim._frozen import FloatArray, check_choice, frozen
+from hysim._printing import printed, summary_text
 from hysim._results import model_of
 from hysim.models.law import Law
 from hysim.records import Record
-from hysim.tracking._coordinates import Coordinates, Copies, coordinates_of
-from hysim.tracking._drift import most_likely
-from hysim.tracking._filters import Filtered, Walk, particles, sigma_points
-from hysim.tracking._result import _BAND, ParameterTrack
+from hysim.tracking._filters import Coordinates, Copies, Filtered, Walk, coordinates_of, particles, sigma_points
+
+_BAND = 1.959963984540054  # standard deviations of a band at 95 %
+
+
+@printed
+@frozen
+class ParameterTrack:
+    """Numbers of a law along a record, as far as the samples up to each one tell them.
+
+    Attributes
+    ----------
+    names : tuple of str
+        The numbers that are free to drift.
+    values, lower, upper : array, shape (n_samples, n_names)
+        Estimates and their bands at 95 % [unit of each number].
+    predicted, residual, expected_error : array, shape (n_samples,)
+        Output predicted one sample ahead, measured minus predicted, and the standard deviation that the filter
+        expected of it [unit of y].
+    jumps : tuple of int
+        Samples at which the errors had become too large for a drift; none for particles, of which some always jump.
+    method : str
+        ``"sigma-point"`` or ``"particle"``.
+    noise : float
+        Standard deviation of the measurement [unit of y].
+    drift : mapping
+        Names to the standard deviation of the walk over the whole record [unit of each].
+    searched : tuple of str
+        Names whose drift was not given: it is the most likely one.
+    log_likelihood : float
+        Logarithm of the likelihood of the errors.
+    model : law
+        The law with the last estimates.
+    """
+
+    names: tuple[str, ...]
+    values: FloatArray
+    lower: FloatArray
+    upper: FloatArray
+    predicted: FloatArray
+    residual: FloatArray
+    expected_error: FloatArray
+    jumps: tuple[int, ...]
+    method: str
+    noise: float
+    drift: Mapping[str, float]
+    searched: tuple[str, ...]
+    log_likelihood: float
+    model: Any
+
+    def __getitem__(self, name: str) -> FloatArray:
+        """The path of one number, shape (n_samples,); KeyError if it is not free."""
+        return self.values[:, self._place(name)]
+
+    def band(self, name: str) -> tuple[FloatArray, FloatArray]:
+        """Lower and upper end of the band of a number, (n_samples,) each; KeyError if it is not free."""
+        place = self._place(name)
+        return self.lower[:, place], self.upper[:, place]
+
+    @property
+    def consistency(self) -> float:
+        """Mean square of the errors over the expected ones: near one if noise and drift are what was said."""
+        return float(np.mean((self.residual / self.expected_error) ** 2))
+
+    def _place(self, name: str) -> int:
+        if name not in self.names:
+            raise KeyError(f"{name!r} is not tracked: {', '.join(self.names)}")
+        return self.names.index(name)
+
+    def summary(self) -> str:
+        """The printed result as a text."""
+        return str(self)
+
+    def __str__(self) -> str:
+        rms = float(np.sqrt(np.mean(self.residual**2)))
+        head = f"ParameterTrack by {self.method}s: {len(self.values)} samples, one-step error rms {rms:.4g}"
+        rows = {
+            name: f"{self.values[0, k]:.4g} to {self.values[-1, k]:.4g}, at the end within "
+            f"[{self.lower[-1, k]:.4g}, {self.upper[-1, k]:.4g}] at 95 %"
+            for k, name in enumerate(self.names[:6])
+        }
+        sizes = ", ".join(
+            f"{name} {size:.3g}{' (most likely)' if name in self.searched else ''}"
+            for name, size in list(self.drift.items())[:6]
+        )
+        notes = {
+            "drift over the record": sizes,
+            "consistency": f"{self.consistency:.3g} (near 1 if noise and drift are what was said)",
+            "jumps": f"at samples {', '.join(map(str, self.jumps[:8]))}" if self.jumps else "",
+        }
+        return summary_text([head], rows | notes)
+
+
+_STEPS = (1.0, 0.5, 0.25)  # decades
+_LEAST, _MOST = -4.0, 1.0  # decades beside the first sizes
+
+
+def most_likely(
+    log_likelihood: Callable[[FloatArray], float], sizes: FloatArray, searched: npt.NDArray[np.bool_]
+) -> FloatArray:
+    """The most likely sizes (n_names,), of which only some are searched."""
+    if not searched.any():
+        return sizes
+    exponents, best = np.zeros(sizes.size), log_likelihood(sizes)
+    for step in _STEPS:
+        moved = True
+        while moved:
+            moved = False
+            for k in np.flatnonzero(searched):
+                for direction in (-step, step):
+                    trial = exponents.copy()
+                    trial[k] = min(max(trial[k] + direction, _LEAST), _MOST)
+                    value = best if trial[k] == exponents[k] else log_likelihood(sizes * 10.0**trial)
+                    if value > best:
+                        exponents, best, moved = trial, value, True
+    return np.asarray(sizes * 10.0**exponents)
+
 
 _DRIFT, _JUMP = 0.1, 0.2  # of the value, or of one where that is zero
 _MOST_MEMORIES = 40  # of a filter by sigma points
@@ -90,10 +211,8 @@ def track_parameters(
     copies, x = Copies(law, coordinates), coordinates.encode(coordinates.values)
     if method == "sigma-point" and copies.memory.size > _MOST_MEMORIES:
         raise ValueError(f'this law remembers {copies.memory.size} numbers: use method="particle"')
-    drifts, jumps = (
-        _sizes(coordinates, given, share, what)
-        for given, share, what in ((drift, _DRIFT, "drift"), (jump, _JUMP, "jump"))
-    )
+    drifts = _sizes(coordinates, drift or {}, _DRIFT, "drift")
+    jumps = _sizes(coordinates, jump or {}, _JUMP, "jump")
     first = coordinates.spread(drifts)
 
     def filtered(sizes: FloatArray, by: str) -> Filtered:
@@ -139,9 +258,8 @@ def _result(
     )
 
 
-def _sizes(coordinates: Coordinates, given: Mapping[str, Any] | None, share: float, what: str) -> FloatArray:
+def _sizes(coordinates: Coordinates, given: Mapping[str, Any], share: float, what: str) -> FloatArray:
     """Sizes of changes (n_names,), those that are not given in parts of the values."""
-    given = {} if given is None else given
     if unknown := [name for name in given if name not in coordinates.names]:
         raise ValueError(f"{what} has {unknown[0]!r}, which is not free")
     usual = share * np.where(coordinates.values == 0.0, 1.0, np.abs(coordinates.values))

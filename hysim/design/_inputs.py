@@ -4,10 +4,77 @@ Strokes are an array (n_strokes, 3): the turning point about the centre, how lon
 way to it in parts of the full slew.
 """
 
+import math
+
 import numpy as np
 
-from hysim._frozen import FloatArray
-from hysim.design._limits import InputLimits
+from hysim._frozen import FloatArray, check_positive, checked
+
+
+@checked
+class InputLimits:
+    """Limits of an input.
+
+    Parameters
+    ----------
+    amplitude : float
+        Largest distance of the input from the centre [unit of u].
+    slew : float
+        Largest size of its rate [unit of u / s].
+    duration : float
+        Length of the record [s].
+    sample_time : float
+        Time between two samples [s].
+    centre : float
+        Where the input begins [unit of u].
+
+    Raises
+    ------
+    ValueError
+        If a number is not positive, or the record holds fewer than ten samples.
+
+    Examples
+    --------
+    >>> import hysim as hs
+    >>> hs.InputLimits(amplitude=2.0, slew=4.0, duration=10.0, sample_time=0.1).samples
+    101
+    """
+
+    amplitude: float
+    slew: float
+    duration: float
+    sample_time: float
+    centre: float = 0.0
+
+    def __post_init__(self) -> None:
+        check_positive(amplitude=self.amplitude, slew=self.slew, duration=self.duration, sample_time=self.sample_time)
+        if self.samples < 10:
+            raise ValueError(f"the record must hold at least 10 samples, got {self.samples}")
+
+    @property
+    def samples(self) -> int:
+        """Number of samples."""
+        return 1 + math.floor(self.duration / self.sample_time * (1.0 + 1e-12))
+
+    @property
+    def t(self) -> FloatArray:
+        """Times of the samples [s], shape (samples,)."""
+        return np.asarray(np.arange(self.samples) * self.sample_time, dtype=float)
+
+    @property
+    def stride(self) -> float:
+        """Largest change of the input from sample to sample [unit of u]."""
+        return self.slew * self.sample_time
+
+    def fitted(self, u: FloatArray) -> FloatArray:
+        """An input (samples,) within the limits that follows `u` as fast as the slew allows, from the centre on."""
+        low, high = self.centre - self.amplitude, self.centre + self.amplitude
+        inside, kept, last = np.clip(u, low, high), np.empty(u.size), self.centre
+        for k, wanted in enumerate(inside.tolist()):
+            last = min(max(wanted, last - self.stride), last + self.stride)
+            kept[k] = last
+        return kept
+
 
 _HOLD = 0.02  # of the record, a pause at a turning point in the mean
 _TONES = (1, 3, 5, 7, 11)  # multiples of the lowest frequency of a multisine
@@ -95,7 +162,7 @@ def random_segments(limits: InputLimits, rng: np.random.Generator) -> FloatArray
     count = int(rng.choice(_SEGMENTS))
     strokes = np.empty((0, 3))
     for end in np.append(np.sort(rng.random(count - 1)), 1.0):
-        lasting = end * limits.duration - lasts(strokes, limits)
+        lasting = end * limits.duration - float(_times(strokes, limits).sum())
         if lasting > 0.0:
             strokes = np.concatenate([strokes, random_segment(limits, rng, _last(strokes), lasting)])
     return strokes
@@ -108,8 +175,10 @@ def random_segment(limits: InputLimits, rng: np.random.Generator, last: float, l
     return _segment(limits, rng, last, lasting, hold, speed, least=limits.sample_time)
 
 
-def with_another_segment(strokes: FloatArray, limits: InputLimits, rng: np.random.Generator) -> FloatArray:
-    """The strokes with a random stretch drawn anew."""
+def with_another_segment(
+    strokes: FloatArray, limits: InputLimits, rng: np.random.Generator, progress: float = 0.0
+) -> FloatArray:
+    """The strokes with a random stretch drawn anew, of whatever length at any progress of the search."""
     ends = np.cumsum(_times(strokes, limits))
     lasting = limits.duration * _SHORTEST * (_LONGEST / _SHORTEST) ** float(rng.random())
     begin = float(rng.random()) * (limits.duration - lasting)
@@ -117,11 +186,6 @@ def with_another_segment(strokes: FloatArray, limits: InputLimits, rng: np.rando
     before = strokes[:first]
     segment = random_segment(limits, rng, _last(before), lasting)
     return np.concatenate([before, segment, strokes[behind:]])
-
-
-def lasts(strokes: FloatArray, limits: InputLimits) -> float:
-    """Duration of strokes from the centre on [s]."""
-    return float(_times(strokes, limits).sum())
 
 
 def _times(strokes: FloatArray, limits: InputLimits) -> FloatArray:
