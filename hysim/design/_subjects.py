@@ -82,7 +82,7 @@ class LawAlone:
         return squared(slopes.T)
 
     def covariance(self, u: FloatArray) -> FloatArray:
-        """By exact derivatives."""
+        """By extrapolated differences."""
         return np.asarray(np.linalg.inv(self.law.response_jacobian(u, self.names).information(self.noise)))
 
     def without(self, name: str) -> "LawAlone":
