@@ -10,8 +10,8 @@ import pytest
 from test_packing import LAWS
 
 import hysim as hs
+from hysim.export._scope import plain
 from hysim.kernels._compile import borrowed
-from hysim.models.tracing.routine import plain
 
 FRICTION = {
     "LuGre": hs.LuGre(stribeck_velocity=0.7, damping_velocity=0.5),

@@ -37,7 +37,7 @@ def record():
 def test_a_wide_box_has_the_standard_errors_of_the_exact_derivatives(record, is_short, monkeypatch):
     """A millionth of this box is 0.4: over it exp(-rate z) is no straight line. Long records take shorter steps."""
     if not is_short:
-        monkeypatch.setattr(_uncertainty, "FEW", 0)
+        monkeypatch.setattr(_uncertainty, "_FEW", 0)
     fit = hs.identify(LAW, record, fixed={"z0": 0.0})
     names = ("rate", "gain", "offset")
     jacobian = fit.model.response_jacobian(record.u, names)

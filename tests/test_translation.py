@@ -12,12 +12,12 @@ from square_dahl import SquareDahl
 import hysim as hs
 from hysim.export._c import HELPERS
 from hysim.export._program import entries
+from hysim.export._scope import UntranslatableError
 from hysim.export._translate import Translation
 from hysim.export._types import Scalar, Vector
 from hysim.kernels.stepping import complete
 from hysim.models.compiled_step import startable
 from hysim.models.model import every_family
-from hysim.models.tracing.routine import UntranslatableError
 
 compiler = shutil.which("gcc") or shutil.which("clang")
 needs_compiler = pytest.mark.skipif(compiler is None, reason="there is no C compiler here")

@@ -10,4 +10,4 @@ from hysim.export._page_presets import explorer as explorer
 from hysim.export._program import Field as Field
 from hysim.export._program import Program as Program
 from hysim.export._program import program_of as program_of
-from hysim.models.tracing.routine import UntranslatableError as UntranslatableError
+from hysim.export._scope import UntranslatableError as UntranslatableError

@@ -5,9 +5,8 @@ from typing import Any
 
 from hysim.export._blocks import assignments, counters_used_elsewhere, homes, reads, targets
 from hysim.export._expressions import Expressions
-from hysim.export._scope import PRIMARY, SUM, UNARY, Library, Scope, Stretch, Value
+from hysim.export._scope import PRIMARY, SUM, UNARY, Library, Routine, Scope, Stretch, Value
 from hysim.export._types import Known, Scalar, Several, Type, Vector, joined
-from hysim.models.tracing.routine import Routine
 
 _STEP = "    "
 _MOST_PASSES = 12

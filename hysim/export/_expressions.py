@@ -28,11 +28,12 @@ from hysim.export._scope import (
     Library,
     Scope,
     Stretch,
+    UntranslatableError,
     Value,
+    plain,
 )
 from hysim.export._types import Known, Scalar, Several, Type, Vector
 from hysim.kernels.stepping import borrowed
-from hysim.models.tracing.routine import UntranslatableError, plain
 
 _OPERATORS = MappingProxyType({ast.Add: ("+", SUM), ast.Sub: ("-", SUM), ast.Mult: ("*", PRODUCT)})
 _COMPARED = MappingProxyType(

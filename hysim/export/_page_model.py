@@ -13,6 +13,7 @@ from hysim._frozen import FloatArray
 from hysim.export._packing import packing
 from hysim.export._page_controls import FEW, Control, by_fields, controls_of
 from hysim.export._page_modules import Kernels, kernels_of, module_of
+from hysim.export._scope import plain
 from hysim.kernels import clamps, play_sums
 from hysim.kernels.magnetics import energy_plays
 from hysim.laws.dashpot import Dashpot
@@ -23,7 +24,6 @@ from hysim.laws.static import SingleValued
 from hysim.models.cascade import Cascade
 from hysim.models.law import Law
 from hysim.models.sum import Sum
-from hysim.models.tracing.routine import plain
 
 _CLOCK = "sample_time"
 

@@ -20,8 +20,8 @@ from typing import NamedTuple
 
 from hysim.export._compilers import web_module
 from hysim.export._program import entries
+from hysim.export._scope import plain
 from hysim.models.law import Law
-from hysim.models.tracing.routine import plain
 
 FOLDER = "page/wasm"
 _WRAPPER = """

@@ -7,13 +7,13 @@ from typing import Any, NamedTuple
 from hysim._frozen import FloatArray, frozen, read_only
 from hysim.control import Controller, InverseFeedforward, RestingPlant, TrackingController, begun, preview
 from hysim.export._packing import packing
+from hysim.export._scope import plain
 from hysim.export._translate import Function, Translation
 from hysim.export._types import Known, Scalar, Vector
 from hysim.kernels.controllers import guarded
 from hysim.kernels.stepping import Start, Step, complete
 from hysim.models.law import Law
 from hysim.models.protocols import Startable, Stepwise, needs_time, standing
-from hysim.models.tracing.routine import plain
 from hysim.plants.actuator import as_stepwise
 from hysim.plants.amplifier import Amplifier
 from hysim.plants.creep import Creep

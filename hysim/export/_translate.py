@@ -17,8 +17,8 @@ from typing import Any, NamedTuple
 
 from hysim.export import _c
 from hysim.export._body import Body
+from hysim.export._scope import Routine, plain, routine
 from hysim.export._types import Known, Scalar, Several, Type, Vector
-from hysim.models.tracing.routine import Routine, plain, routine
 
 _ANNOTATED = MappingProxyType({"float": Scalar.DOUBLE, "int": Scalar.INT, "bool": Scalar.BOOL})
 
