@@ -29,7 +29,7 @@ class UntraceableError(ValueError):
 
 
 _FUNCTIONS = (np.sqrt, np.exp, np.expm1, np.log, np.log2, np.log1p, np.tanh, np.floor, np.trunc)
-_SIGNS = {
+_SIGNS: dict[np.ufunc, str] = {
     **{np.add: "+", np.subtract: "-", np.multiply: "*", np.divide: "/"},
     **{np.less: "<", np.less_equal: "<=", np.greater: ">", np.greater_equal: ">=", np.equal: "==", np.not_equal: "!="},
     **{np.logical_and: "&&", np.logical_or: "||"},

@@ -14,7 +14,7 @@ from hysim.laws.differential import _boucwen_conversions, _boucwen_search, _powe
 from hysim.laws.differential._memory_law import MemoryLaw
 from hysim.laws.differential.boucwen import BoucWen
 from hysim.laws.differential.polynomial_boucwen import PolynomialBoucWen
-from hysim.models.holding import Holding
+from hysim.models.by_structure import Holding
 from hysim.models.law import Packed, Stepping
 from hysim.models.model import family
 from hysim.models.search_space import ALL_FREE, Freedom, Parameters, SearchSpace
