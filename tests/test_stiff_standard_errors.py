@@ -37,7 +37,7 @@ def record():
 def test_a_wide_box_has_the_standard_errors_of_the_exact_derivatives(record, is_short, monkeypatch):
     """A millionth of this box is 0.4: over it exp(-rate z) is no straight line. Long records take shorter steps."""
     if not is_short:
-        monkeypatch.setattr(_uncertainty, "FEW", 0)
+        monkeypatch.setattr(_uncertainty, "_FEW", 0)
     fit = hs.identify(LAW, record, fixed={"z0": 0.0})
     names = ("rate", "gain", "offset")
     jacobian = fit.model.response_jacobian(record.u, names)
@@ -51,7 +51,7 @@ def test_a_wide_box_has_the_standard_errors_of_the_exact_derivatives(record, is_
 
 
 def test_two_records_with_states_of_their_own(monkeypatch):
-    """The exact derivatives of both, in the places of their own states, are those by differences."""
+    """The derivatives of both, in the places of their own states, are those by differences."""
     rng, laws = np.random.default_rng(1), [hs.Dahl(stiffness=2.0, coulomb=0.5, z0=z0) for z0 in (0.1, -0.2)]
     records = [hs.Record(u=U[:40], y=law.response(U[:40]) + 1e-3 * rng.normal(size=40)) for law in laws]
     by_differences = hs.identify(hs.Dahl, records, initial="free")

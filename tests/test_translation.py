@@ -10,12 +10,11 @@ import pytest
 from square_dahl import SquareDahl
 
 import hysim as hs
-from hysim.export._c import HELPERS, Scalar, Vector
+from hysim.export._c import HELPERS, Scalar, UntranslatableError, Vector
 from hysim.export._program import Translation, entries
 from hysim.kernels.stepping import complete
 from hysim.models.compiled_step import startable
 from hysim.models.model import every_family
-from hysim.models.tracing.routine import UntranslatableError
 
 compiler = shutil.which("gcc") or shutil.which("clang")
 needs_compiler = pytest.mark.skipif(compiler is None, reason="there is no C compiler here")

@@ -14,7 +14,6 @@ from hysim.control._controller import WithoutFeedback, check_limits
 from hysim.kernels import stepping
 from hysim.kernels.adaptation.inverse import adaptive
 from hysim.models.compiled_step import compiled_step
-from hysim.models.derivatives.packing import packed_rates
 from hysim.models.inverse_search import searched_inverse
 from hysim.models.law import Law
 from hysim.models.model import family
@@ -129,16 +128,27 @@ class AdaptiveInverse(WithoutFeedback):
 
     def _rates(self) -> tuple[FloatArray, FloatArray]:
         """Parameters of the law's step, and their derivatives by the free numbers; ValueError if these are not all."""
-        law, rates = self.law, packed_rates(self.law, self.free)
-        if rates.memory_rates.any():
-            raise ValueError("the memory at the first sample does not drift: leave it out of free")
-        for name, rate in zip(self.free, rates.parameter_rates, strict=True):
-            moved = _PROBE * (law.scalars[name] or 1.0)
-            there = packed_rates(law.with_scalars({name: law.scalars[name] + moved}), self.free).parameters
-            apart = np.abs(there - rates.parameters - moved * rate).max()
-            if apart > _AFFINE * np.abs(there).max():
-                raise ValueError(f"the step of a {type(law).__name__} does not take {name} as it is: it cannot be free")
-        return rates.parameters, rates.parameter_rates
+        law, (here, memory), rates = self.law, self.law.packed, []
+        for name in self.free:
+            refusal = f"the step of a {type(law).__name__} does not take {name} as it is: it cannot be free"
+            if name in law.structural:
+                raise ValueError(refusal)
+            moved = _PROBE * (abs(law.scalars[name]) or 1.0)
+            values = law.scalars[name] + np.array([moved, -moved])
+            (ahead, there), (behind, _) = (self._packed(name, value) for value in values)
+            if not np.array_equal(memory, there):
+                raise ValueError("the memory at the first sample does not drift: leave it out of free")
+            bend = np.where(ahead == behind, 0.0, 0.5 * (ahead + behind) - here)
+            if not np.abs(bend).max() <= _AFFINE * np.nanmax(np.abs(here)):
+                raise ValueError(refusal)
+            rates.append(np.where(ahead == behind, 0.0, (ahead - behind) / (values[0] - values[1])))
+        return here, np.array(rates)
+
+    def _packed(self, name: str, value: float) -> tuple[FloatArray, FloatArray]:
+        """Parameters and memory of the law with another number."""
+        law = self.law
+        parameters, memory = law.pack(law.completed(law.exchanged({name: np.array([[value]])})))
+        return parameters[0], memory[0]
 
     def _begun(self, parameters: FloatArray, u0: float) -> tuple[float, FloatArray]:
         """Output at rest at `u0` of a copy of the law, and its state."""

@@ -92,7 +92,7 @@ class LawAlone:
         return squared(slopes.T)
 
     def covariance(self, u: FloatArray) -> FloatArray:
-        """Expected covariance of the numbers, by exact derivatives."""
+        """Expected covariance of the numbers, by extrapolated differences."""
         return np.asarray(np.linalg.inv(self.law.response_jacobian(u, self.names).information(self.noise)))
 
     def only(self, names: Sequence[str]) -> "LawAlone":

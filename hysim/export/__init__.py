@@ -1,5 +1,6 @@
 """Laws, plants and controllers outside Python: C99, functional mock-up units, pages for a browser."""
 
+from hysim.export._c import UntranslatableError as UntranslatableError
 from hysim.export._c_source import CSource as CSource
 from hysim.export._c_source import to_c as to_c
 from hysim.export._fmu import to_fmu as to_fmu
@@ -10,4 +11,3 @@ from hysim.export._page_presets import explorer as explorer
 from hysim.export._program import Field as Field
 from hysim.export._program import Program as Program
 from hysim.export._program import program_of as program_of
-from hysim.models.tracing.routine import UntranslatableError as UntranslatableError

@@ -7,6 +7,7 @@ from hysim.export import _c
 from hysim.export._c import (
     Known,
     Library,
+    Routine,
     Scalar,
     Scope,
     Several,
@@ -22,7 +23,6 @@ from hysim.export._c import (
     targets,
 )
 from hysim.export._expressions import Expressions
-from hysim.models.tracing.routine import Routine
 
 _STEP = "    "
 _MOST_PASSES = 12

@@ -1,4 +1,4 @@
-"""C99 for the translator: types, expressions and tables as text, the functions of Python that C lacks, and names.
+"""C99 for the translator: functions to be read, types, expressions and tables as text, helpers that C lacks, names.
 
 Types are numbers, vectors of doubles, functions known in advance, and tuples of numbers.
 
@@ -7,15 +7,20 @@ the name before anything else: otherwise the name may keep a value from one pass
 """
 
 import ast
+import inspect
 import math
+import textwrap
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from enum import IntEnum
-from types import MappingProxyType
+from functools import lru_cache
+from pathlib import Path
+from types import FunctionType, MappingProxyType
 from typing import Any, NamedTuple, Protocol
 
 import numpy as np
+from numba.core.dispatcher import Dispatcher
 
-from hysim.models.tracing.routine import Routine
+from hysim.kernels.stepping import Addressed
 
 HELPERS = MappingProxyType(
     {
@@ -145,6 +150,61 @@ def joined(first: Type | None, second: Type) -> Type | None:
     if isinstance(first, Several) and isinstance(second, Several) and len(first.members) == len(second.members):
         return Several(tuple(max(pair) for pair in zip(first.members, second.members, strict=True)))
     return None
+
+
+class UntranslatableError(ValueError):
+    """A step uses Python that has no translation; the message names the file and the line."""
+
+
+class Routine(NamedTuple):
+    """A function: its syntax tree, the values of its global and enclosed names, and the file that it stands in."""
+
+    function: FunctionType
+    tree: ast.FunctionDef
+    names: Mapping[str, Any]
+    file: str
+
+    def refusal(self, node: ast.AST, reason: str) -> UntranslatableError:
+        """The error for a place in the function."""
+        first = node.lineno if isinstance(node, ast.stmt | ast.expr) else 1
+        line = self.function.__code__.co_firstlineno + first - 1
+        return UntranslatableError(f"{self.file}:{line}: {reason}; hysim/kernels/__init__.py says what is translated")
+
+
+def plain(function: Any) -> Any:
+    """The Python function behind a kernel, or the value itself where it is none."""
+    while True:
+        if isinstance(function, Addressed):
+            function = function.function
+        elif isinstance(function, Dispatcher):
+            function = function.py_func
+        else:
+            return function
+
+
+@lru_cache(maxsize=1024)
+def routine(function: Callable[..., Any]) -> Routine:
+    """Read a function.
+
+    Raises
+    ------
+    UntranslatableError
+        If it is no Python function whose source can be read.
+    """
+    if not isinstance(function, FunctionType):
+        raise UntranslatableError(f"a step must be a Python function or a kernel, got {function!r}")
+    try:
+        text = textwrap.dedent(inspect.getsource(function))
+        file = inspect.getsourcefile(function) or "<unknown>"
+    except (OSError, TypeError):
+        name = function.__qualname__
+        raise UntranslatableError(f"the source of {name} cannot be read: define it in a file") from None
+    tree = next((node for node in ast.walk(ast.parse(text)) if isinstance(node, ast.FunctionDef)), None)
+    if tree is None:
+        raise UntranslatableError(f"{function.__qualname__} is not defined by def: a lambda is not translated")
+    cells = function.__closure__ or ()
+    enclosed = {name: cell.cell_contents for name, cell in zip(function.__code__.co_freevars, cells, strict=True)}
+    return Routine(function, tree, {**function.__globals__, **enclosed}, "/".join(Path(file).parts[-3:]))
 
 
 class Value(NamedTuple):

@@ -29,9 +29,9 @@ from types import MappingProxyType
 from typing import NamedTuple
 
 from hysim._versions import optional
+from hysim.export._c import plain
 from hysim.export._program import entries
 from hysim.models.law import Law
-from hysim.models.tracing.routine import plain
 
 OPTIONS = ("-std=c99", "-O2", "-ffp-contract=off", "-fvisibility=hidden", "-fPIC", "-shared", "-s", "-Werror=implicit")
 _WEB = "wasm32-wasi"

@@ -15,9 +15,21 @@ from typing import Any
 import numpy as np
 
 from hysim.export import _c
-from hysim.export._c import Known, Library, Parameter, Scalar, Scope, Several, Stretch, Type, Value, Vector
+from hysim.export._c import (
+    Known,
+    Library,
+    Parameter,
+    Scalar,
+    Scope,
+    Several,
+    Stretch,
+    Type,
+    UntranslatableError,
+    Value,
+    Vector,
+    plain,
+)
 from hysim.kernels.stepping import borrowed
-from hysim.models.tracing.routine import UntranslatableError, plain
 
 _OPERATORS = MappingProxyType({ast.Add: ("+", _c.SUM), ast.Sub: ("-", _c.SUM), ast.Mult: ("*", _c.PRODUCT)})
 _COMPARED = MappingProxyType(

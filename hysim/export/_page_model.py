@@ -16,6 +16,7 @@ import numpy as np
 
 from hysim._frozen import FloatArray
 from hysim.errors import SimulationError
+from hysim.export._c import plain
 from hysim.export._compilers import Kernels, kernels_of, module_of
 from hysim.export._packing import packing
 from hysim.kernels import clamps, play_sums
@@ -28,7 +29,6 @@ from hysim.laws.static import SingleValued
 from hysim.models.cascade import Cascade
 from hysim.models.law import Law
 from hysim.models.sum import Sum
-from hysim.models.tracing.routine import plain
 from hysim.records import Record
 
 _MOST = 3  # elements of a tuple that have a slider each; longer ones have one for all

@@ -21,13 +21,12 @@ from hysim._frozen import FloatArray, frozen, read_only
 from hysim.control import Controller, InverseFeedforward, RestingPlant, TrackingController, begun, preview
 from hysim.export import _c
 from hysim.export._body import Body
-from hysim.export._c import Function, Known, Parameter, Scalar, Several, Type, Vector
+from hysim.export._c import Function, Known, Parameter, Routine, Scalar, Several, Type, Vector, plain, routine
 from hysim.export._packing import packing
 from hysim.kernels.controllers import guarded
 from hysim.kernels.stepping import Start, Step, complete
 from hysim.models.law import Law
 from hysim.models.protocols import Startable, Stepwise, needs_time, standing
-from hysim.models.tracing.routine import Routine, plain, routine
 from hysim.plants.actuator import as_stepwise
 from hysim.plants.amplifier import Amplifier
 from hysim.plants.creep import Creep

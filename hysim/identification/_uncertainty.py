@@ -9,7 +9,7 @@ A coordinate at its search bound counts as known if it has an effect; it and a d
 standard error. The condition number is that of W^(1/2) J with columns of length one.
 
 J is computed by central differences over a millionth of the box. Where a part of that step gives another derivative,
-the output bends within the step, as at a stiff optimum in a wide box: there the derivatives of a law are its exact ones
+the output bends within the step, as at a stiff optimum in a wide box: there the derivatives of a law are extrapolated
 (`hysim.Law.response_jacobian`), and those of others, or of long records, differences over a shorter step.
 """
 
@@ -22,7 +22,6 @@ from hysim._frozen import FloatArray
 from hysim.errors import SimulationError
 from hysim.identification._descent import named_slopes
 from hysim.identification._problem import Problem
-from hysim.models.derivatives.jacobian import FEW
 from hysim.models.law import Law
 from hysim.models.search_space import Flags
 
@@ -31,6 +30,7 @@ _MOST_NAMES = 4  # in a sentence
 _SHARE = 0.125  # of the step, by which a derivative is computed again
 _CLOSE = 1e-4  # difference of both, of the derivative, up to which the first one is taken
 _MOST_SHARES = 4  # beyond which the rounding of the output is most of a difference
+_FEW = 4_000  # samples times numbers up to which a law is run 15 times for each number
 _EDGE = "this law is at the edge of the admissible ones"
 _TAKES_PART = 0.05  # share of a parameter in a direction, of the largest share in it, to be named
 
@@ -116,9 +116,9 @@ def output_slopes(problem: Problem, theta: FloatArray, *, refined: bool = True) 
         shorter = _differences(problem, theta, share)
         if not _apart(slopes, shorter):
             return slopes
-        exact = _exact(problem, theta)
-        if exact is not None:
-            return exact
+        own = _extrapolated(problem, theta)
+        if own is not None:
+            return own
         slopes, share = shorter, _SHARE * share
     return slopes
 
@@ -140,10 +140,10 @@ def _differences(problem: Problem, theta: FloatArray, share: float) -> FloatArra
         return np.column_stack([(outputs[:n_x] - outputs[n_x : 2 * n_x]).T / steps, columns[-1]])
 
 
-def _exact(problem: Problem, theta: FloatArray) -> FloatArray | None:
-    """dm/dtheta along the step of a law; None where the model is none, or its records are long or repeat a cycle."""
+def _extrapolated(problem: Problem, theta: FloatArray) -> FloatArray | None:
+    """dm/dtheta of a law over steps that suit its numbers; None of other models, of long records and of cycles."""
     family, names = problem.family, problem.space.names
-    is_short = problem.y.size * len(names) <= FEW and problem.below is None
+    is_short = problem.y.size * len(names) <= _FEW and problem.below is None
     if (
         not isinstance(family, Law)
         or not is_short

@@ -36,7 +36,7 @@ from hysim.models.tables import Tables, arguments_of, scalars_of, table_of_one, 
 from hysim.records import Record
 
 if TYPE_CHECKING:
-    from hysim.models.derivatives.jacobian import Jacobian
+    from hysim.models.jacobian import Jacobian
 
 State = tuple[float, ...]
 """Last input, and what the law remembers."""
@@ -284,12 +284,12 @@ class Law(Placed, ABC):
         return y, tuple(law.state[: len(start)].tolist()) if y.size else start
 
     def response_jacobian(self, u: npt.ArrayLike, names: Iterable[str] | None = None) -> "Jacobian":
-        """Derivatives of the response by the numbers of the law, to rounding.
+        """Derivatives of the response by the numbers of the law, to 1e-8 of the largest value of each.
 
-        The step is run with each number's rate beside each number (forward mode), which is the variational equation
-        along the exact step; an iteration to a root is differentiated by the theorem of implicit functions. At a kink,
-        where a play is just being pushed, the derivative is that of one side. Short inputs are run by Python; for
-        long ones the step is compiled once, which takes seconds, and kept in numba's cache.
+        They are extrapolated differences of responses, of 14 laws beside this one for each number, and cannot be finer
+        than the rounding of the output. Each sample takes the steps that suit it, so that a kink, such as a play that
+        is just being pushed, does no harm unless it lies within a millionth of the longest step: then the derivative
+        lies between those of both sides. At the boundary of what the constructor takes the differences are one-sided.
 
         Parameters
         ----------
@@ -317,7 +317,7 @@ class Law(Placed, ABC):
         >>> jacobian["n"].round(6).tolist()
         [0.0, 0.123057, 0.123057]
         """
-        from hysim.models.derivatives.jacobian import response_jacobian  # scipy's functions, where they are needed
+        from hysim.models.jacobian import response_jacobian  # loaded where it is needed
 
         return response_jacobian(self, u, names)
 

@@ -240,7 +240,7 @@ class Duhem(Law):
                 field = Polynomials._fields[2 * int(term.absolute) + int(term.rectified)]
                 chosen = np.zeros(tables[field].shape[1:], dtype=bool)
                 chosen[term.i, term.j] = True
-                tables[field] = np.where(chosen, column, tables[field])
+                tables[field] = np.where(chosen, column[:, np.newaxis], tables[field])
         return tables
 
     @classmethod

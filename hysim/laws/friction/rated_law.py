@@ -27,7 +27,7 @@ from hysim.models.tables import Tables, arguments_of, scalars_of
 from hysim.records import Record
 
 if TYPE_CHECKING:
-    from hysim.models.derivatives.jacobian import Jacobian
+    from hysim.models.jacobian import Jacobian
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

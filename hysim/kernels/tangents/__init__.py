@@ -1,1 +1,0 @@
-"""Derivatives of steps need this beside the steps: rules of functions, and one more step of each iteration."""
