@@ -1,48 +1,60 @@
-"""Parts of a design by `hysim control`: the plant, the controller before its tuning, and the task of the loop.
+"""A design by `hysim control`: the plant, the controller before its tuning, the task of the loop, and its results.
 
 By default the triangle is slow beside the plant, a step lasts until the slowest mode has come to rest, and the range is
 the middle 80 % of the displacements that the plant reaches within the limits.
 """
 
-import argparse
 import math
-from collections.abc import Mapping
-from dataclasses import replace
-from typing import Any, NamedTuple
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import asdict, is_dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from scipy.optimize import brentq
 
 from hysim import metrics, signals
 from hysim._frozen import FloatArray, read_only
-from hysim.cli.options import positive
+from hysim._prefixes import label
+from hysim._printing import extent, folded, quantity
+from hysim.cli import models, outputs
+from hysim.cli.control import DesignOptions
+from hysim.cli.options import Pair, positive
 from hysim.control import (
     PID,
+    HysteresisAssessment,
     InverseFeedforward,
     ModeInverse,
     Notch,
     Shaper,
+    StepAssessment,
     TrackingController,
+    Tuning,
     as_actuator,
+    assess_hysteresis,
+    assess_step,
     close_loop,
+    driven_by,
+    tune,
 )
 from hysim.files import load
+from hysim.models.model import in_brief
 from hysim.models.protocols import needs_time
+from hysim.models.storage import to_document
 from hysim.plants.actuator import Actuator
 from hysim.plants.creep import Creep
 from hysim.plants.modes import mode
 from hysim.plants.sensor import Sensor
 from hysim.records import Record, step_if_even
-from hysim.simulation import free_run
+from hysim.simulation import Simulation, free_run
 
-Pair = tuple[float, float]
+if TYPE_CHECKING:
+    from hysim.plot import Figure
 
 INVERTING = ("inverse", "tracking", "model-following")
 """Kinds of controllers that begin with the inverse of the plant."""
 
-CYCLES = 10
-"""Number of cycles of the triangle, of which the last one is measured."""
-
+_CYCLES = 10  # of the triangle, of which the last one is measured
 _MARGIN = 0.1  # of the reachable range, kept free at either end
 _SAMPLES = 1000  # of a cycle and of a step, at least
 _MOST_SAMPLES = 500_000
@@ -50,6 +62,7 @@ _SLOWER_THAN_LAG, _SLOWER_THAN_MODE = 20.0, 200.0  # periods of the slowest pole
 _AT_REST = 12.0  # of its time constants in a step
 _DOUBLINGS = 40  # of a voltage, until it brackets the resting voltage
 _SMOOTHING = 0.3  # of a mode's period, in which a step of the reference becomes a motion
+_TUNED = ("success", "message", "objective", "max_sensitivity", "gain_margin", "phase_margin", "voltage_noise")
 
 
 class Task(NamedTuple):
@@ -69,7 +82,74 @@ class Task(NamedTuple):
         return round(self.period / self.sample_time)
 
 
-def plant(model: Any, options: argparse.Namespace) -> Actuator:
+class Design(NamedTuple):
+    """A controller, its tuning if it has gains, and its achievements."""
+
+    actuator: Actuator
+    controller: Any
+    tuning: Tuning | None
+    task: Task
+    triangle: HysteresisAssessment
+    step: StepAssessment
+    file_rms: float
+    fit_percent: float
+    units: Mapping[str, str]
+    reference: str
+    limits_from: str | None
+
+    @property
+    def last_cycle(self) -> slice:
+        """Samples of the triangle's last cycle."""
+        return slice(-self.task.samples_per_cycle - 1, None)
+
+    @property
+    def open_tracking_rms(self) -> float:
+        """Rms error of the open loop, driven by reference / secant gain, over the last cycle of the triangle."""
+        return metrics.rmse(self.triangle.closed.reference[self.last_cycle], self.triangle.open_y[self.last_cycle])
+
+
+def designed(path: str, options: DesignOptions, exported: Callable[[Any], object]) -> Design:
+    """The controller for the model in a file; `exported` is called before the search with a controller of its kind."""
+    model, units = models.read(path)
+    record = None if options.record is None else load(options.record, u=options.u, y=options.y)
+    if record is not None:
+        signals_in = {name: unit for name, unit in units.items() if name in ("u", "y")}
+        record = in_units(record, signals_in, str(options.record))
+        units = {**units, **record.units}
+    actuator, kind = plant(model, options), options.controller
+    within = limits(options, record)
+    todo = task(actuator, options, within)
+    template = feedback(actuator, kind, within)
+    made = controller(actuator, kind, within, template or PID(kp=1.0, limits=within), preview=options.preview)
+    exported(made)
+    goal = reference(todo, rest(actuator, todo.u0), options.reference, units.get("y"))
+    tuning = None
+    if kind != "inverse":
+        tuning = tune(
+            actuator, goal.t, goal.values, controller=template, objective=goal.objective, limits=within,
+            max_sensitivity=options.max_sensitivity, max_voltage_noise=options.max_voltage_noise,
+            variations=variations(actuator, options.vary_mode), transient=goal.transient,
+            u0=todo.u0 if options.reference == "step" else 0.0,
+        )  # fmt: skip
+        made = controller(actuator, kind, within, tuning.controller, preview=options.preview)
+    low, high, period, u0, step, duration, h = todo
+    triangle = assess_hysteresis(actuator, made, low=low, high=high, period=period, sample_time=h, cycles=_CYCLES)
+    return Design(
+        actuator=actuator,
+        controller=made,
+        tuning=tuning,
+        task=todo,
+        triangle=triangle,
+        step=assess_step(actuator, made, step=step, duration=duration, sample_time=h, u0=u0),
+        file_rms=file_rms(actuator, made, goal, options.reference),
+        fit_percent=fit_percent(model, record),
+        units=units,
+        reference=Path(options.reference).name,
+        limits_from=Path(options.record).name if options.record and options.limits is None else None,
+    )
+
+
+def plant(model: Any, options: DesignOptions) -> Actuator:
     """The model as an actuator, with the stages that the options add or replace."""
     actuator = as_actuator(model)
     stages: dict[str, Any] = {}
@@ -96,7 +176,7 @@ def variations(actuator: Actuator, percent: float | None) -> list[Actuator]:
     return [replace(actuator, vibration=mode(factor * frequency, ratio, gain)) for factor in factors]
 
 
-def limits(options: argparse.Namespace, record: Record | None) -> Pair | None:
+def limits(options: DesignOptions, record: Record | None) -> Pair | None:
     """Limits of the command: those of the options, or the extremes of the measured input."""
     if options.limits is not None:
         low, high = options.limits
@@ -106,7 +186,7 @@ def limits(options: argparse.Namespace, record: Record | None) -> Pair | None:
     return None if record is None else (float(record.u.min()), float(record.u.max()))
 
 
-def task(actuator: Actuator, options: argparse.Namespace, within: Pair | None) -> Task:
+def task(actuator: Actuator, options: DesignOptions, within: Pair | None) -> Task:
     """The task of the loop; a ValueError if no option limits the range, or a number is outside its bounds."""
     h = positive("--sample-time", options.sample_time)
     low, high = options.range or _reach(actuator, within)
@@ -116,8 +196,8 @@ def task(actuator: Actuator, options: argparse.Namespace, within: Pair | None) -
     half = max(1, round(0.5 / (positive("--frequency", frequency) * h)))
     rests = max(_SAMPLES * h, _AT_REST / _slowest_decay(actuator))
     duration = rests if options.duration is None else options.duration
-    longest = max(CYCLES * 2 * half, positive("--duration", duration) / h)
-    if longest > CYCLES * _MOST_SAMPLES:
+    longest = max(_CYCLES * 2 * half, positive("--duration", duration) / h)
+    if longest > _CYCLES * _MOST_SAMPLES:
         raise ValueError(
             f"the loop would take {longest:.2g} samples: the plant is slow beside the sample time; give --frequency "
             "and --duration, or a longer --sample-time"
@@ -277,3 +357,132 @@ def _slow(actuator: Actuator) -> float:
 def _slowest_decay(actuator: Actuator) -> float:
     """The smallest decay rate of a free motion [1/s]; infinite for a plant without vibration."""
     return float(min((-pole.real for pole in _poles(actuator) if pole.real < 0.0), default=math.inf))
+
+
+def document(design: Design) -> dict[str, Any]:
+    """All results, for JSON."""
+    triangle, reduction, task = design.triangle, design.step.reduction, design.task
+    return {
+        "plant": to_document(design.actuator),
+        "controller": to_document(design.controller),
+        "units": design.units,
+        "record_fit_percent": design.fit_percent,
+        "tuning": design.tuning and outputs.fields_of(design.tuning, _TUNED),
+        "triangle": {
+            "low": task.low, "high": task.high, "period": task.period, "cycles": _CYCLES,
+            **outputs.scalars(triangle), "open_tracking_rms": design.open_tracking_rms, "stable": triangle.loop.stable,
+        },
+        "step": {
+            "u0": task.u0, "height": task.step, "duration": task.duration,
+            **outputs.scalars(reduction), "open": asdict(reduction.open), "closed": asdict(reduction.closed),
+            "stable": design.step.loop.stable,
+        },
+        "reference_tracking_rms": design.file_rms,
+        "conditions": {name: value for name, value in triangle.closed.conditions.items() if not is_dataclass(value)},
+    }  # fmt: skip
+
+
+def text(design: Design) -> str:
+    """All results, in words."""
+    lines = [*_head(design), *_triangle(design), *_step(design), *_conditions(design)]
+    return "\n".join(part for line in lines for part in folded(line, indent=12 * " "))
+
+
+def _head(design: Design) -> Iterator[str]:
+    yield f"plant       {in_brief(design.actuator)}"
+    yield f"controller  {in_brief(design.controller)}"
+    if not math.isnan(design.fit_percent):
+        yield f"record      the model fits the {_signal(design, 'y')} by {design.fit_percent:.2f} %"
+    if (tuning := design.tuning) is not None:
+        bounds = "within the bounds" if tuning.success else "NOT within the bounds"
+        yield f"tuning      {bounds}: {tuning.message}"
+        margins = f"gain {tuning.gain_margin:.4g}, phase {tuning.phase_margin:.4g} degrees"
+        yield f"margins     {margins}, maximum sensitivity {tuning.max_sensitivity:.4g}"
+    source = f"{design.reference}, second column" if not math.isnan(design.file_rms) else design.reference
+    rms = f", tracking rms {quantity(design.file_rms, design.units.get('y', ''))}"
+    yield f"reference   {_signal(design, 'y')}: {source}{rms * (not math.isnan(design.file_rms))}"
+    if (limits := design.triangle.closed.conditions["limits"]) is not None:
+        extremes = f", the extremes of {design.limits_from}" * (design.limits_from is not None)
+        yield f"command     {_signal(design, 'u')}: {extent(limits, design.units.get('u', ''))}{extremes}"
+
+
+def _signal(design: Design, name: str) -> str:
+    """The quantity of the input or the output with its unit."""
+    text = label(design.units, name)
+    return text[0].lower() + text[1:]
+
+
+def _triangle(design: Design) -> Iterator[str]:
+    result, task, y = design.triangle, design.task, design.units.get("y", "")
+    driven = driven_by(result.closed)
+    is_lag = result.is_lag
+    reduction = result.lag_reduction_percent if is_lag else result.hysteresis_reduction_percent
+    yield f"triangle    {task.low:.4g} to {quantity(task.high, y)}, {1.0 / task.period:.4g} Hz, cycle {_CYCLES}"
+    yield _row(
+        f"{'lag' if is_lag else 'hysteresis'} reduction",
+        f"{reduction:.2f} %" if result.loop.stable else f"none: {result.loop.message}",
+    )
+    yield _row("width", f"open {result.open_width:.4g}, {driven} {quantity(result.closed_width, y)}")
+    if not is_lag:
+        yield _row(
+            "width without the memory", f"open {result.open_lag_width:.4g}, {driven} {quantity(result.lag_width, y)}"
+        )
+    yield _row("tracking rms", f"open {design.open_tracking_rms:.4g}, {driven} {quantity(result.tracking_rms, y)}")
+    yield _row("closure gap", quantity(result.closure_gap, y))
+
+
+def _step(design: Design) -> Iterator[str]:
+    reduction, u = design.step.reduction, design.units.get("u", "")
+    height = quantity(design.task.step, design.units.get("y", ""))
+    yield f"step        {height} from rest at {quantity(design.task.u0, u)}"
+    if design.step.loop.message:
+        yield _row("no reduction", design.step.loop.message)
+    for name, value in outputs.scalars(reduction).items():
+        percent = "does not exist" if math.isnan(value) else f"{value:.2f} %"
+        yield _row(name.removesuffix("_percent").replace("_", " "), percent)
+    for name, response in (("open", reduction.open), (driven_by(design.step.closed), reduction.closed)):
+        times = f"98 % after {response.t98:.4g} s, settled after {response.settling_time:.4g} s"
+        yield _row(name, f"overshoot {response.overshoot:.2f} %, {times}")
+
+
+def _row(name: str, value: str) -> str:
+    return f"  {name:<27}{value}"
+
+
+def _conditions(design: Design) -> Iterator[str]:
+    """The conditions of all results, with the model as the plant."""
+    conditions, u, y = design.triangle.closed.conditions, design.units.get("u", ""), design.units.get("y", "")
+    limits = "none" if conditions["limits"] is None else extent(conditions["limits"], u)
+    times = ", ".join(
+        f"{name.replace('_', ' ')} {conditions[name]:.4g} s" for name in ("sample_time", "delay", "preview")
+    )
+    noise = f"sensor noise {quantity(conditions['noise'], y)} rms (seed {conditions['seed']})"
+    yield "conditions  simulated, with the model as the plant"
+    yield f"            {times}, limits {limits}"
+    yield f"            {noise}, quantum {quantity(conditions['sensor_quantum'], y)}"
+    for name, closed in (("triangle", design.triangle.closed), ("step", design.step.closed)):
+        limited = f"limited at {closed.conditions['limited_samples']} of {closed.t.size} samples"
+        rms = quantity(closed.conditions["voltage_noise_rms"], u)
+        yield f"            {name}: voltage {extent(closed.u, u)}, {limited}, noise {rms} rms"
+
+
+def picture(design: Design) -> "Figure":
+    """Displacement against reference in open and closed loop, and both steps against time."""
+    from hysim import plot
+
+    triangle, last, units = design.triangle, design.last_cycle, {"t": "s", **design.units}
+    reference = triangle.closed.reference[last]
+    both = {"u": units["y"], "y": units["y"]} if "y" in units else {}
+    t = design.step.closed.t
+    driven = {"closed": "closed loop"}.get(driven_by(triangle.closed), "inverse")
+    loops = {"open loop": triangle.open_y, driven: triangle.closed.y}
+    steps = {"open loop": (t, design.step.open_y), driven: (t, design.step.closed.y)}
+
+    def draw(canvas: "Figure") -> None:
+        upper, lower = canvas.subplots(2)
+        curves = (Simulation(u=reference, y=y[last], units=both, name=name) for name, y in loops.items())
+        plot.loop(*curves, ax=upper)
+        upper.set_xlabel("Reference" + "".join(upper.get_ylabel().partition(" [")[1:]))
+        plot.traces(steps, lower, units=units)
+
+    return outputs.drawn(draw, height=6.4)

@@ -1,69 +1,29 @@
 """Models of the command line: families by name, models in files, and laws of the user by import path."""
 
-import argparse
 import inspect
 import os
 import pkgutil
 import re
 import sys
+from dataclasses import dataclass, fields
 from pathlib import Path
-from typing import Any, Protocol, runtime_checkable
+from typing import Annotated, Any, Literal, Protocol, runtime_checkable
 
 import hysim
-from hysim.cli.options import OWN
+from hysim._names import MODULE_OF
+from hysim.cli.options import INPUT, OWN, Count, Value
 from hysim.cli.records import STANDARD
-from hysim.cli.shell.words import suggestion
-
-FORMS = f"name of a family, such as bouc-wen; MODEL.json; or {OWN}"
-"""Values of an option for models."""
-
-OPTIONS = f"""
---model MODEL  {FORMS}; an unknown name lists the names [required]
-
-structure of the model:
---plays COUNT  number of plays, or of a Maxwell-slip model's elements
---relay-intervals COUNT  number of intervals between the levels of a Preisach model
---one-signed yes|no  whether the weights of plays or relays have one sign (default: chosen by the BIC)
---degree COUNT  degree of a Duhem law's polynomials
-
-transfer function:
---poles N  number of poles
---zeros N  number of zeros, at most that of the poles
---sample start|end  whether an output was read at the start or at the end of the hold
-
-transfer function and oscillator:
---hold zoh|foh|band-limited  input between samples: held (zoh), linear (foh), or of an oscillator the sum of the lines
-    below half the record's rate
-
-oscillator: the model oscillator, a mass on a Bouc-Wen spring
---oversampling N  steps of the simulation between two samples
---period N  samples of a period, with --initial periodic
---excitation force|base  whether the input is a force, or the acceleration of the base
-
-actuator: the model actuator, from records of several rates
---law MODEL  law of the actuator, as --model (default: bouc-wen)
---modes N  number of resonances, 0 to 3 (default: 1)
---creep  creep that grows by so many percent a decade
---creep-elements N  creep of so many log-spaced elements
---delay  a dead time
---first-order-amplifier  a time constant before the law
-"""
-"""The choice of a family and the options of its structure."""
+from hysim.cli.words import suggestion
 
 _SHORT = {
     "zhu-wang": "ZhuWangBoucWen", "baber-noori": "BoucWenBaberNoori", "lugre": "LuGre",
     "oscillator": "BoucWenOscillator",
 }  # fmt: skip
 _PLANTS = ("oscillator", "actuator")
-_STRUCTURAL = (
-    "plays", "relay_intervals", "one_signed", "degree", "poles", "zeros", "sample", "hold", "oversampling", "period",
-    "excitation",
-)  # fmt: skip
 _ARGUMENTS = {"plays": ("plays", "elements"), "relay_intervals": ("intervals",)}
 """Arguments of a structure that an option of another name stands for."""
 
 _NEEDED = ("poles", "zeros", "degree")
-_OF_ACTUATOR = ("law", "modes", "creep", "creep_elements", "delay", "first_order_amplifier")
 
 
 @runtime_checkable
@@ -77,9 +37,8 @@ def names() -> list[str]:
     """Names of all families that can be compared without further arguments; loads every family."""
     from hysim.models.candidates import candidates
 
-    short = {family: name for name, family in _SHORT.items()}
     families = dict.fromkeys(name.split()[0] for name in candidates() if name.split()[0] in hysim.__all__)
-    return [short.get(name, _hyphenated(name)) for name in families]
+    return [*map(_short, families)]
 
 
 def names_to_identify() -> list[str]:
@@ -87,13 +46,110 @@ def names_to_identify() -> list[str]:
     from hysim.models.candidates import is_identifiable
     from hysim.models.model import every_family
 
-    short = {family: name for name, family in _SHORT.items()}
-    laws = [
-        short.get(name, _hyphenated(name))
-        for name, law in every_family().items()
-        if law.__module__.startswith("hysim.laws.") and is_identifiable(law)
-    ]
+    own = {name: law for name, law in every_family().items() if law.__module__.startswith("hysim.laws.")}
+    laws = [_short(name) for name, law in own.items() if is_identifiable(law)]
     return [*dict.fromkeys([*names(), *laws, *_PLANTS])]
+
+
+def _offered() -> list[str]:
+    """Names of laws and plants for a shell to complete, which are known without loading a family."""
+    laws = [name for name, module in MODULE_OF.items() if module.startswith("hysim.laws.") and name[0].isupper()]
+    return [*map(_short, laws), "transfer-function", *_PLANTS]
+
+
+def _short(name: str) -> str:
+    """``bouc-wen`` of ``BoucWen``, and the short name of a family that has one."""
+    return next((short for short, family in _SHORT.items() if family == name), _hyphenated(name))
+
+
+def _hyphenated(name: str) -> str:
+    return re.sub(r"(?<=[a-z])(?=[A-Z])", "-", name).lower()
+
+
+FORMS = f"name of a family, such as bouc-wen; MODEL.json; or {OWN}"
+"""Values of an option for models."""
+
+ToCompare = Annotated[
+    str,
+    Value(
+        name="MODEL", role=INPUT, offers=_offered, help=FORMS, note=lambda: f"Names of models: {', '.join(names())}."
+    ),
+]
+ToIdentify = Annotated[
+    str,
+    Value(
+        name="MODEL",
+        role=INPUT,
+        offers=_offered,
+        help=FORMS,
+        note=lambda: f"Names of models: {', '.join(names_to_identify())}. A structure is a model in a file.",
+    ),
+]
+Law = Annotated[str, Value(name="MODEL", offers=_offered)]
+
+
+@dataclass(kw_only=True)
+class ActuatorOptions:
+    """Options of the model actuator.
+
+    actuator: the model actuator, from records of several rates
+    ------
+    law : law of the actuator, as --model (default: bouc-wen)
+    modes : number of resonances, 0 to 3 (default: 1)
+    creep : creep that grows by so many percent a decade
+    creep_elements : creep of so many log-spaced elements
+    delay : a dead time
+    first_order_amplifier : a time constant before the law
+    """
+
+    law: Law | None = None
+    modes: int | None = None
+    creep: bool = False
+    creep_elements: int | None = None
+    delay: bool = False
+    first_order_amplifier: bool = False
+
+
+@dataclass(kw_only=True)
+class StructureOptions:
+    """Options of the structure of other models.
+
+    structure of the model
+    ------
+    plays : number of plays, or of a Maxwell-slip model's elements
+    relay_intervals : number of intervals between the levels of a Preisach model
+    one_signed : whether the weights of plays or relays have one sign (default: chosen by the BIC)
+    degree : degree of a Duhem law's polynomials
+
+    transfer function
+    ------
+    poles : number of poles
+    zeros : number of zeros, at most that of the poles
+    sample : whether an output was read at the start or at the end of the hold
+
+    transfer function and oscillator
+    ------
+    hold : input between samples: held (zoh), linear (foh), or of an oscillator the sum of the lines below half the
+        record's rate
+
+    oscillator: the model oscillator, a mass on a Bouc-Wen spring
+    ------
+    oversampling : steps of the simulation between two samples
+    period : samples of a period, with --initial periodic
+    excitation : whether the input is a force, or the acceleration of the base
+    """
+
+    plays: Count | None = None
+    relay_intervals: Count | None = None
+    one_signed: Literal["yes", "no"] | None = None
+    degree: Count | None = None
+    poles: int | None = None
+    zeros: int | None = None
+    sample: Literal["start", "end"] | None = None
+    hold: Literal["zoh", "foh", "band-limited"] | None = None
+    oversampling: int | None = None
+    period: int | None = None
+    excitation: Literal["force", "base"] | None = None
 
 
 def family(name: str) -> Any:
@@ -113,12 +169,7 @@ def family(name: str) -> Any:
 
 def _public() -> dict[str, str]:
     """Names of classes by their names on the command line."""
-    return {_hyphenated(each): each for each in hysim.__all__ if each[0].isupper()} | _SHORT
-
-
-def _hyphenated(name: str) -> str:
-    """``bouc-wen`` of ``BoucWen``."""
-    return re.sub(r"(?<=[a-z])(?=[A-Z])", "-", name).lower()
+    return {_hyphenated(name): name for name in hysim.__all__ if name[0].isupper()} | _SHORT
 
 
 def resolved(path: str) -> Any:
@@ -126,7 +177,7 @@ def resolved(path: str) -> Any:
 
     A ValueError is raised if there is no such module, or it does not have the name.
     """
-    module, _, name = path.partition(":")
+    module, _, _ = path.partition(":")
     if os.getcwd() not in sys.path:
         sys.path.insert(0, os.getcwd())  # as `python -m hysim` has it
     try:
@@ -136,7 +187,7 @@ def resolved(path: str) -> Any:
             raise  # the module is there, and imports another one that is missing
         raise ValueError(f"there is no module {module!r} in {os.getcwd()} or among the installed packages") from None
     except AttributeError:
-        raise ValueError(f"{sys.modules[module]!r} has no {name!r}") from None
+        raise ValueError(f"{sys.modules[module]!r} has no {path.partition(':')[2]!r}") from None
 
 
 def is_import_path(text: str) -> bool:
@@ -166,40 +217,45 @@ def model_or_family(text: str) -> Any:
     return family(text)
 
 
-def to_identify(options: argparse.Namespace) -> Any:
-    """The argument of `identify` for these options.
+def to_identify(
+    name: str, structure: StructureOptions, actuator: ActuatorOptions, initial: str | None
+) -> tuple[Any, str | None]:
+    """The model and the `initial` that `identify` takes for these options.
 
     A ValueError is raised if there is no such model, an option belongs to another one, or one that this model needs is
     missing.
     """
     from hysim.models.model import FAMILIES
 
-    whole = {name: value for name in _OF_ACTUATOR if (value := vars(options)[name]) is not None and value is not False}
-    used = {name: vars(options)[name] for name in _STRUCTURAL if vars(options)[name] is not None}
-    if foreign := [*used] if options.model == "actuator" else [*whole]:
-        raise ValueError(f"--{foreign[0].replace('_', '-')} is no option of the model {options.model}")
-    if options.model == "actuator":
-        return _actuator(whole)
-    model = model_or_family(options.model)
+    of_actuator, used = _used(actuator), _used(structure)
+    if foreign := [*used] if name == "actuator" else [*of_actuator]:
+        raise ValueError(f"{_flag(foreign[0])} is no option of the model {name}")
+    if name == "actuator":
+        return _actuator(actuator), initial
+    model = model_or_family(name)
     oscillator, linear = (FAMILIES.get(name) for name in ("BoucWenOscillator", "TransferFunction"))  # if it is loaded
     if oscillator is not None and isinstance(model, oscillator):  # its numbers are searched anew, in the same setting
-        for name in ("excitation", "hold"):
-            setattr(options, name, vars(options)[name] or vars(model)[name])
+        used = {"excitation": vars(model)["excitation"], "hold": vars(model)["hold"]} | used
         model = oscillator
-    used = {name: vars(options)[name] for name in _STRUCTURAL if vars(options)[name] is not None}
-    taken = {name: argument for name in _STRUCTURAL if (argument := _argument(model, name))}
-    if foreign := [name for name in used if name not in taken]:
-        others = [name for name in names_to_identify() if _argument(family(name), foreign[0])]
-        raise ValueError(
-            f"--{foreign[0].replace('_', '-')} is no option of the model {options.model}, but of {', '.join(others)}"
-        )
-    if missing := [name for name in _NEEDED if name in taken and name not in used]:
-        raise ValueError(f"the model {options.model} needs --{missing[0]}")
-    structure = {taken[name]: value == "yes" if name == "one_signed" else value for name, value in used.items()}
-    if model is oscillator and options.initial is not None:
-        structure["initial"], options.initial = options.initial, None  # its structure says how the record begins
-    is_structure_needed = structure or any(model is each for each in (oscillator, linear))
-    return model.structure(**structure) if is_structure_needed else model
+    taken = {field.name: argument for field in fields(structure) if (argument := _argument(model, field.name))}
+    if foreign := [each for each in used if each not in taken]:
+        others = [each for each in names_to_identify() if _argument(family(each), foreign[0])]
+        raise ValueError(f"{_flag(foreign[0])} is no option of the model {name}, but of {', '.join(others)}")
+    if missing := [each for each in _NEEDED if each in taken and each not in used]:
+        raise ValueError(f"the model {name} needs {_flag(missing[0])}")
+    arguments = {taken[each]: value == "yes" if each == "one_signed" else value for each, value in used.items()}
+    if model is oscillator and initial is not None:
+        arguments["initial"], initial = initial, None  # its structure says how the record begins
+    is_structure_needed = arguments or any(model is each for each in (oscillator, linear))
+    return (model.structure(**arguments) if is_structure_needed else model), initial
+
+
+def _used(options: StructureOptions | ActuatorOptions) -> dict[str, Any]:
+    return {name: value for name, value in vars(options).items() if value is not None and value is not False}
+
+
+def _flag(name: str) -> str:
+    return f"--{name.replace('_', '-')}"
 
 
 def _argument(model: Any, option: str) -> str | None:
@@ -210,14 +266,14 @@ def _argument(model: Any, option: str) -> str | None:
     return next((name for name in _ARGUMENTS.get(option, (option,)) if name in arguments), None)
 
 
-def _actuator(structure: dict[str, Any]) -> Any:
+def _actuator(options: ActuatorOptions) -> Any:
     """The structure of an actuator with these options."""
     return hysim.Actuator.structure(
-        model_or_family(structure.get("law", "bouc-wen")),
-        creep=structure.get("creep_elements", "creep" in structure),
-        modes=structure.get("modes", 1),
-        delay="delay" in structure,
-        amplifier="first-order" if "first_order_amplifier" in structure else None,
+        model_or_family(options.law or "bouc-wen"),
+        creep=options.creep if options.creep_elements is None else options.creep_elements,
+        modes=1 if options.modes is None else options.modes,
+        delay=options.delay,
+        amplifier="first-order" if options.first_order_amplifier else None,
     )
 
 

@@ -1,16 +1,19 @@
 """Options by which every command reads a record from a file."""
 
-import argparse
 import io
 import os
 import sys
-from collections.abc import Callable
-from typing import Any
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
-from hysim._frozen import FloatArray
-from hysim.cli.options import positive
-from hysim.cli.shell.ranges import cut
-from hysim.records import Record
+from hysim._prefixes import power_of_ten
+from hysim.cli.options import Channel, Column, Count, Place, PlaceIn, RecordIn, Sensor, Unit, Value, exclusive, positive
+
+if TYPE_CHECKING:
+    from hysim._frozen import FloatArray
+    from hysim.plants.structures.records import StructureRecord
+    from hysim.records import Record
 
 STANDARD = "-"
 """Stands for the standard input or output."""
@@ -19,61 +22,113 @@ DETECT = "detect"
 """Stands for the resolution that the outputs show."""
 
 _DELIMITERS = {"tab": "\t", "semicolon": ";", "comma": ",", "blank": " "}
-
-FILE = "file FILE  text with one sample a line, NPZ, NPY, MAT or HDF5; or - for the standard input"
-FILES = f"{FILE}\nothers FILE...  further records with the same columns, such as those of other rates"
-_INPUT = "--u COLUMN  input: name of its column, or its number from 0 (default: u)"
-_OUTPUT = "--y COLUMN  output: name or number of its column (default: y)"
-OF_A_TEXT = f"""--delimiter SIGN  sign between cells of a text, or {", ".join(_DELIMITERS)} (default: detected)
---decimal .|,  sign before the decimals of a text (default: detected)
---thousands SIGN  sign between thousands of a text (default: none, but where a number can mean nothing else)
---skip N  number of lines at the top of a text that are neither samples nor names of columns
---encoding NAME  encoding of a text, such as latin-1 (default: UTF-8, -16 or -32)"""
-"""Options for a file of text."""
-
-_OTHERS = f"""
-either --t COLUMN  time: name or number of its column (default: t, if there is one)
-or --no-t  read no time from the file
---sample-time STEP  time between two samples of a file without time [unit of t]; with --t, the record is interpolated
-    linearly to even times with this step
---on-missing error|drop  samples without a value [default: error]
-{OF_A_TEXT}
---resolution QUANTUM  resolution of the output's sensor [unit of y]; or detect: the step of which all outputs are
-    multiples
---unit SIGNAL=UNIT...  label of the unit of t, u or y, as in u=V; no value is converted
---from PLACE  first sample to use: its number from 0, or its time with a unit, as in 2.5s
---to PLACE  first sample behind those to use, likewise
---every COUNT  use each N-th of these samples only: a turn between two of them is lost
-"""
-WEIGHTS = (
-    "--weights COLUMN  weight of each sample in the sum of squares, 0 to leave it out: name or number of its column"
-)
-_SECOND = """--y-file FILE_OF_Y  file of the output, if the first holds the input only; if both have a time, the input
-    is interpolated linearly at the times of the output"""
-OPTIONS_WITHOUT_FILE = f"record:\n{_INPUT}\n{_OUTPUT}\n{_SECOND}{_OTHERS}"
-"""Options for a record whose file is named by an option of the command."""
-
-OPTIONS = f"{FILE}\n\n{OPTIONS_WITHOUT_FILE}"
-OPTIONS_WITH_WEIGHTS = f"""{OPTIONS.rstrip()}
---weights COLUMN  weight of each sample in the sum of squares, 0 to leave it out: name or number of its column
---channel CHANNEL=COLUMN...  further quantity, such as a temperature, and its column: T=temp (default: those of a file
-    that hysim has saved)
-"""
-OPTIONS_OF_AN_INPUT = f"{FILE}\n\nrecord:\n{_INPUT}{_OTHERS}"
-"""Options for a file that needs no column of the output."""
+_ROUNDING = 1e-9  # of the record's time: 0.3 s is found among times that were added up
+_OF_NODES, _OF_ELEMENTS = ("displacement", "velocity", "acceleration"), ("drift", "force")
+Quantum = Annotated[float | str, Value(name="QUANTUM", words=(DETECT,), read=float, expected=f"a number or {DETECT}")]
 
 
-def read(options: argparse.Namespace, file: str | None = None, *, uncut: bool = False) -> Record:
-    """The record that the options describe, or that of another `file`; without an output column, y is u.
+@dataclass(kw_only=True)
+class TextOptions:
+    """Options for a file of text.
+
+    text
+    ----
+    delimiter : sign between cells of a text, or tab, semicolon, comma, blank (default: detected)
+    decimal : sign before the decimals of a text (default: detected)
+    thousands : sign between thousands of a text (default: none, but where a number can mean nothing else)
+    skip : number of lines at the top of a text that are neither samples nor names of columns
+    encoding : encoding of a text, such as latin-1 (default: UTF-8, -16 or -32)
+    """
+
+    delimiter: str | None = None
+    decimal: Literal[".", ","] | None = None
+    thousands: str | None = None
+    skip: int = 0
+    encoding: str | None = None
+
+    def for_load(self) -> dict[str, Any]:
+        """The options of texts, as `hysim.load` takes them."""
+        others = {name: vars(self)[name] for name in ("decimal", "thousands", "skip", "encoding")}
+        return {"delimiter": _DELIMITERS.get(self.delimiter or "", self.delimiter), **others}
+
+
+@dataclass(kw_only=True)
+class InputOptions(TextOptions):
+    """Options for a file that needs no column of the output.
+
+    record
+    ------
+    u : input: name of its column, or its number from 0 (default: u)
+    t : time: name or number of its column (default: t, if there is one)
+    no_t : read no time from the file
+    sample_time : time between two samples of a file without time [unit of t]; with --t, the record is interpolated
+        linearly to even times with this step
+    on_missing : samples without a value
+    resolution : resolution of the output's sensor [unit of y]; or detect: the step of which all outputs are multiples
+    unit : label of the unit of t, u or y, as in u=V; no value is converted
+    from_ : first sample to use: its number from 0, or its time with a unit, as in 2.5s
+    to : first sample behind those to use, likewise
+    every : use each N-th of these samples only: a turn between two of them is lost
+    """
+
+    u: Column | None = None
+    t: Column | None = None
+    no_t: bool = False
+    sample_time: float | None = None
+    on_missing: Literal["error", "drop"] = "error"
+    resolution: Quantum | None = None
+    unit: tuple[Unit, ...] = ()
+    from_: PlaceIn | None = None
+    to: PlaceIn | None = None
+    every: Count | None = None
+
+    def __post_init__(self) -> None:
+        exclusive(t=self.t, no_t=self.no_t)
+
+
+@dataclass(kw_only=True)
+class RecordOptions(InputOptions):
+    """Options for a record.
+
+    record
+    ------
+    u : input: name of its column, or its number from 0 (default: u)
+    y : output: name or number of its column (default: y)
+    y_file : file of the output, if the first holds the input only; if both have a time, the input is interpolated
+        linearly at the times of the output
+    """
+
+    y: Column | None = None
+    y_file: RecordIn | None = None
+
+
+@dataclass(kw_only=True)
+class WeighedOptions(RecordOptions):
+    """Options for a record with further columns.
+
+    record
+    ------
+    weights : weight of each sample in the sum of squares, 0 to leave it out: name or number of its column
+    channel : further quantity, such as a temperature, and its column: T=temp (default: those of a file that hysim has
+        saved)
+    sensor : what a sensor on a structure measured, by the names of hysim simulate, and its column: drift_0, or
+        acceleration_2=roof (default: the structure's own output, in the column --y)
+    """
+
+    weights: Column | None = None
+    channel: tuple[Channel, ...] = ()
+    sensor: tuple[Sensor, ...] = ()
+
+
+def read(options: InputOptions, path: str, *, uncut: bool = False) -> "Record":
+    """The record that the options describe in a file; without an output column, y is u.
 
     With `uncut` all samples are used, whatever `--from`, `--to` and `--every` say.
     """
-    path = options.file if file is None else file
-    y = options.y if "y" in options else None
-    return _read(options, path, source_of(path), y, options.resolution, uncut=uncut)
+    return _read(options, path, source_of(path), uncut=uncut)
 
 
-def read_input(options: argparse.Namespace, *, of_the_ground: bool) -> Record:
+def read_input(options: InputOptions, path: str, *, of_the_ground: bool) -> "Record":
     """The input that the options describe, as a record with y = u.
 
     A ground motion in m/s^2 is read from an AT2 file, and with `of_the_ground` from a file that has no column u where
@@ -81,48 +136,126 @@ def read_input(options: argparse.Namespace, *, of_the_ground: bool) -> Record:
     """
     from hysim.files import column_names, is_at2
 
-    source = _repeatable(options.file)
+    source = _repeatable(path)
     if is_at2(source(), options.encoding):
         if options.u is not None or options.t is not None or options.no_t:
-            raise ValueError(f"{options.file} is an AT2 file, which has no columns: leave out --u, --t and --no-t")
+            raise ValueError(f"{path} is an AT2 file, which has no columns: leave out --u, --t and --no-t")
         return cut(_ground_motion(options, source), options)
     if of_the_ground and options.u is None and not options.no_t:
         try:
-            names = column_names(source(), **text_options(options))
+            names = column_names(source(), **options.for_load())
         except ValueError:
             names = ()  # a list, or a fault that is named where the file is read
         if "u" not in names:
             return cut(_ground_motion(options, source), options)
     if options.u is None:
         options.u = _only_column(options, source(), "u")
-    return _read(options, options.file, source(), None, options.resolution)
+    return _read(options, path, source())
 
 
-def _ground_motion(options: argparse.Namespace, source: Callable[[], Any]) -> Record:
+def read_with_weights(options: WeighedOptions, path: str) -> "tuple[Record, FloatArray | None]":
+    """The record that the options describe, and the column of weights that they name.
+
+    Columns of sensors are channels of the record, the first of them the output unless another one is named.
+    """
+    if options.sensor and options.y is None:
+        options.y = options.sensor[0][1]
+    options.channel += options.sensor
+    if options.weights is None:
+        return read(options, path), None
+    source = _repeatable(path)
+    weights = _read(replace(options, y=options.weights, resolution=None), path, source()).y
+    return _read(options, path, source()), weights
+
+
+def source_of(path: str) -> Any:
+    """The path, or the standard input."""
+    if path != STANDARD:
+        return path
+    return sys.stdin.buffer if isinstance(sys.stdin, io.TextIOWrapper) else sys.stdin
+
+
+def cut(record: "Record", options: InputOptions) -> "Record":
+    """The part of the record that the options name; a ValueError if fewer than two samples are in it."""
+    used = {"--from": options.from_, "--to": options.to, "--every": options.every}
+    names = [name for name, value in used.items() if value is not None]
+    if not names:
+        return record
+    part = slice(_sample(record, options.from_, "--from"), _sample(record, options.to, "--to"), options.every)
+    n = len(range(*part.indices(len(record))))
+    if n < 2:
+        t, unit = record.t, record.units.get("t", "")
+        extent = "" if t is None else f" between {t[0]:g} and {t[-1]:g} {unit}".rstrip()
+        raise ValueError(
+            f"{n} of {len(record)} samples{extent} remain by {' and '.join(names)}: a record needs at least 2"
+        )
+    return record[part]
+
+
+def _sample(record: "Record", place: Place | None, option: str) -> int | None:
+    """The number of the first sample at or after a place."""
+    import numpy as np
+
+    if place is None or not place.unit:
+        return None if place is None else int(place.value)
+    if record.t is None:
+        raise ValueError(f"{option} {place.value:g}{place.unit} needs a time: name its column by --t, or give a number")
+    seconds: Any = 10.0 ** power_of_ten(place.unit, record.units.get("t", "s"))
+    tolerance = _ROUNDING * float(record.t[-1] - record.t[0])
+    return int(np.searchsorted(record.t, place.value * seconds - tolerance))
+
+
+def of_structure(structure: Any, record: "Record", columns: Mapping[str, Any]) -> "StructureRecord":
+    """The record of a structure, with the channels of these names as its sensors.
+
+    A ValueError is raised if the model is no structure, a name is none of its signals, or the record has no time.
+    """
+    import numpy as np
+
+    from hysim.plants.structures.records import StructureRecord
+    from hysim.plants.structures.structure import Structure
+
+    if not isinstance(structure, Structure):
+        name = structure.__name__ if isinstance(structure, type) else type(structure).__name__
+        raise ValueError(f"--sensor is for structures in a file, got a {name}: name its output by --y")
+    if record.t is None:
+        raise ValueError("a structure needs the times of its record: name their column by --t, or use --sample-time")
+    sizes = dict.fromkeys(_OF_NODES, structure.n_nodes) | dict.fromkeys(_OF_ELEMENTS, len(structure.elements))
+    places = {
+        f"{signal}_{k + (signal in _OF_NODES)}": (signal, k) for signal, size in sizes.items() for k in range(size)
+    }  # masses are counted from 1
+    signals: dict[str, Any] = {}
+    for name in columns:
+        if name not in places:
+            known = ", ".join(
+                f"{each}_{first} to {each}_{first + size - 1}"
+                for each, size in sizes.items()
+                for first in [int(each in _OF_NODES)]
+            )
+            raise ValueError(f"the structure has no signal {name!r}: its signals are {known}")
+        signal, k = places[name]
+        signals.setdefault(signal, np.full((len(record), sizes[signal]), np.nan))[:, k] = record.channel(name)
+    return StructureRecord(t=record.t, u=record.u, name=record.name, **signals)
+
+
+def _ground_motion(options: InputOptions, source: Callable[[], Any]) -> "Record":
     """A ground motion; a step is that of a list without times, or new even steps for one with times."""
     from hysim.files import load_ground_motion
+    from hysim.records import Record
 
-    arguments = {"t": options.t, "units": dict(options.unit).get("u"), **text_options(options)}
+    arguments = {"t": options.t, "units": dict(options.unit).get("u"), **options.for_load()}
     del arguments["thousands"]
-    if options.sample_time is None:
-        return _of_the_ground(*load_ground_motion(source(), **arguments))
-    step = positive("--sample-time", options.sample_time)
+    step = None if options.sample_time is None else positive("--sample-time", options.sample_time)
+    has_times = True
     try:
-        motion = load_ground_motion(source(), **arguments)
+        t, acceleration = load_ground_motion(source(), **arguments)
     except ValueError:
-        return _of_the_ground(*load_ground_motion(source(), sample_time=step, **arguments))
-    return _of_the_ground(*motion).resample(step)
-
-
-def _of_the_ground(t: FloatArray, acceleration: FloatArray) -> Record:
-    return Record(t=t, u=acceleration, y=acceleration, units={"t": "s", "u": "m/s^2"})
-
-
-def text_options(options: argparse.Namespace) -> dict[str, Any]:
-    """The options of `OF_A_TEXT`, as `hysim.load` takes them."""
-    delimiter = _DELIMITERS.get(options.delimiter, options.delimiter)
-    others = {name: vars(options)[name] for name in ("decimal", "thousands", "encoding")}
-    return {"delimiter": delimiter, "skip": options.skip or 0, **others}
+        if step is None:
+            raise
+        has_times = False
+        t, acceleration = load_ground_motion(source(), sample_time=step, **arguments)
+    motion = Record(t=t, u=acceleration, y=acceleration, units={"t": "s", "u": "m/s^2"})
+    return motion.resample(step) if step is not None and has_times else motion
 
 
 def _repeatable(path: str) -> Callable[[], Any]:
@@ -144,51 +277,26 @@ def _repeatable(path: str) -> Callable[[], Any]:
     return begin
 
 
-def read_with_weights(options: argparse.Namespace) -> tuple[Record, FloatArray | None]:
-    """The record that the options describe, and the column of weights that they name.
-
-    Columns of sensors are channels of the record, the first of them the output unless another one is named.
-    """
-    for name, column in options.sensor:
-        options.channel = [*options.channel, (name, column)]
-        options.y = column if options.y is None else options.y
-    if options.weights is None:
-        return read(options), None
-    source = _repeatable(options.file)
-    record = _read(options, options.file, source(), options.y, options.resolution)
-    return record, _read(options, options.file, source(), options.weights, None).y
-
-
-def source_of(path: str) -> Any:
-    """The path, or the standard input."""
-    if path != STANDARD:
-        return path
-    return sys.stdin.buffer if isinstance(sys.stdin, io.TextIOWrapper) else sys.stdin
-
-
-def _read(
-    options: argparse.Namespace, path: str, source: Any, y: str | None, resolution: Any, *, uncut: bool = False
-) -> Record:
-    from dataclasses import replace
-
+def _read(options: InputOptions, path: str, source: Any, *, uncut: bool = False) -> "Record":
     import numpy as np
 
-    u = options.u if "y" in options or options.u is not None else "u"
-    if "y_file" in options and options.y_file is not None:
-        record = _from_two_files(options, path, source, y, resolution)
-    else:
-        names = ("u" if u is None else u, "y" if y is None else y)
-        if "y" in options and names[0] == names[1]:
-            raise ValueError(f"the input and the output are both the column {names[0]}: name them by --u and --y")
-        record = _loaded(options, path, source, u, y if "y" in options else u, resolution)
+    u = "u" if options.u is None else options.u
     step = None if options.sample_time is None else positive("--sample-time", options.sample_time)
+    if isinstance(options, RecordOptions) and options.y_file is not None:
+        record = _from_two_files(options, path, source, options.y_file)
+    elif isinstance(options, RecordOptions):
+        if u == ("y" if options.y is None else options.y):
+            raise ValueError(f"the input and the output are both the column {u}: name them by --u and --y")
+        record = _loaded(options, path, source, options.u, options.y)
+    else:
+        record = _loaded(options, path, source, u, u)
     if step is not None and record.t is None:
         record, step = replace(record, t=step * np.arange(float(len(record)))), None
     record = record if uncut else cut(record, options)
     return record if step is None else record.resample(step)
 
 
-def _loaded(options: argparse.Namespace, path: str, source: Any, u: Any, y: Any, resolution: Any) -> Record:
+def _loaded(options: InputOptions, path: str, source: Any, u: Any, y: Any, **settings: Any) -> "Record":
     from hysim.files import load
 
     record: Record = load(
@@ -199,29 +307,29 @@ def _loaded(options: argparse.Namespace, path: str, source: Any, u: Any, y: Any,
         units=dict(options.unit),
         name="record" if path == STANDARD else None,
         on_missing=options.on_missing,
-        resolution=resolution,
-        channels=dict(options.channel) or None if "channel" in options else None,
-        **text_options(options),
+        channels=dict(options.channel) or None if isinstance(options, WeighedOptions) else None,
+        **{"resolution": options.resolution, **settings},
+        **options.for_load(),
     )
     return record
 
 
-def _from_two_files(options: argparse.Namespace, path: str, source: Any, y: Any, resolution: Any) -> Record:
+def _from_two_files(options: RecordOptions, path: str, source: Any, y_file: str) -> "Record":
     """The record of an input in one file and an output in another; a file's only column need not be named."""
     from hysim.files import join_records
 
-    first, second = _repeatable(path) if path == STANDARD else lambda: source, _repeatable(options.y_file)
+    first, second = _repeatable(path) if path == STANDARD else lambda: source, _repeatable(y_file)
     u = _only_column(options, first(), "u") if options.u is None else options.u
-    y = _only_column(options, second(), "y") if y is None else y
-    drive = _loaded(options, path, first(), u, u, None)
-    return join_records(drive, _loaded(options, options.y_file, second(), y, y, resolution))
+    y = _only_column(options, second(), "y") if options.y is None else options.y
+    drive = _loaded(options, path, first(), u, u, resolution=None)
+    return join_records(drive, _loaded(options, y_file, second(), y, y))
 
 
-def _only_column(options: argparse.Namespace, source: Any, name: str) -> str:
+def _only_column(options: InputOptions, source: Any, name: str) -> str:
     """This name, or that of the only column beside the time; a ValueError if there are several others."""
     from hysim.files import column_names
 
-    others = [each for each in column_names(source, **text_options(options)) if each not in ("t", options.t)]
+    others = [each for each in column_names(source, **options.for_load()) if each not in ("t", options.t)]
     if name in others or not others:
         return name
     if len(others) > 1:

@@ -1,0 +1,427 @@
+"""`hysim identify`, `posterior`, `compare` and `discover`: from records in files to models."""
+
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, Literal
+
+from hysim.cli import models, outputs, records
+from hysim.cli.options import (
+    Count,
+    Depends,
+    Fixed,
+    Folds,
+    ModelOut,
+    Picture,
+    Range,
+    RecordIn,
+    Result,
+    Value,
+    at_least,
+    exclusive,
+)
+from hysim.errors import Interrupted
+
+if TYPE_CHECKING:
+    from hysim.comparison import Comparison
+    from hysim.plot import Figure
+    from hysim.posterior import Posterior
+
+SUCCESS, NOT_CONVERGED, NO_MODEL = 0, 1, 1
+Initial = Literal["free", "rest", "still", "periodic"]
+Noise = Literal["gaussian", "quantised", "robust"]
+
+_IDENTIFIED = (
+    "estimates", "stderr", "intervals", "interval_method", "free_names", "n_parameters", "noise", "sigma",
+    "fit_percent", "rmse", "cv_rmse", "fpe", "aic", "bic", "whiteness", "seed", "success", "message",
+    "warnings", "unsafe",
+)  # fmt: skip
+
+
+def identify(
+    file: RecordIn,
+    others: tuple[RecordIn, ...] = (),
+    *,
+    options: records.WeighedOptions,
+    model: models.ToIdentify,
+    structure: models.StructureOptions,
+    actuator: models.ActuatorOptions,
+    fix: tuple[Fixed, ...] = (),
+    free: tuple[str, ...] = (),
+    bounds: tuple[Range, ...] = (),
+    depends: tuple[Depends, ...] = (),
+    initial: Initial | None = None,
+    noise: Noise | None = None,
+    intervals: Literal["linear", "profile", "bootstrap"] = "linear",
+    cross_validate: Folds | None = None,
+    max_evaluations: int | None = None,
+    admissible: Literal["yes", "no"] | None = None,
+    seed: int = 0,
+    out: ModelOut | None = None,
+    plot: Picture | None = None,
+    json: bool = False,
+) -> int:
+    """Identify a model's parameters by its error in free run, and print them with their standard errors.
+
+    Exit code 1: the search did not converge, or the law is unsafe on smaller cycles.
+
+    Parameters
+    ----------
+    others : further records with the same columns, such as those of other rates
+    fix : parameter that is not free: n=1 [unit of the parameter]
+    free : parameter that is free, where it is fixed by default
+    bounds : bounds of a parameter: beta=0:2 [unit of the parameter]
+    depends : parameter that is a polynomial in a channel: gain=T:1
+    initial : state at the first sample (default: chosen by the BIC, or free)
+    noise : noise of the output; quantised needs --resolution (default: gaussian)
+    intervals : method of the 95 % intervals
+    cross_validate : leave out one sample at a time, one cycle, or one of K blocks
+    max_evaluations : most parameter sets that the search simulates; a fit that ends by it is partial
+    admissible : whether the law must be safe on smaller cycles, whatever its fit (default: where noise and creep allow
+        the loss of fit)
+    out : write the model; - writes it to the standard output
+    plot : draw the record and the model
+
+    Examples
+    --------
+    hysim identify loop.csv --model polynomial-bouc-wen --out law.json --plot fit.svg
+    hysim identify loop.csv --u voltage --y displacement --model bouc-wen --fix n=1
+    hysim identify drive.csv --y-file sensor.csv --model prandtl-ishlinskii --plays 8
+    hysim identify test.csv --model oscillator --excitation base
+    hysim identify quake.csv --model frame.json --free damping --sensor acceleration_2
+    """
+    from hysim import identification
+    from hysim.models.storage import to_json
+    from hysim.simulation import simulate
+
+    subject, initial = models.to_identify(model, structure, actuator, initial)
+    if others and (options.weights is not None or options.sensor or options.y_file is not None):
+        raise ValueError("--weights, --sensor and --y-file are for one file: leave out the others, or use Python")
+    record, weights = records.read_with_weights(options, file)
+    further = [records.read(options, path) for path in others]
+    sensors = dict(options.sensor)
+    measured: Any = records.of_structure(subject, record, sensors) if sensors else record
+    fit = identification.identify(
+        subject, [measured, *further] if further else measured, fixed=dict(fix), free=free, bounds=dict(bounds),
+        depends=dict(depends) or None, weights=weights, initial=initial, noise=noise, intervals=intervals,
+        cross_validate=cross_validate, max_evaluations=max_evaluations, seed=seed,
+        admissible=None if admissible is None else admissible == "yes",
+    )  # fmt: skip
+
+    def picture() -> "Figure":
+        if sensors:  # the record of one sensor is not the output of the structure
+            return outputs.picture_of(simulate(fit, record.t, record.u))
+        return outputs.loop(record, fit)
+
+    files: outputs.Files = {out: lambda: to_json(fit, units=record.units), plot: picture}
+    family = {"family": type(fit.model).__name__}
+    outputs.write(files, fit.summary, lambda: family | outputs.fields_of(fit, _IDENTIFIED))
+    return SUCCESS if fit.success else NOT_CONVERGED
+
+
+def posterior(
+    file: RecordIn,
+    others: tuple[RecordIn, ...] = (),
+    *,
+    options: records.RecordOptions,
+    model: models.ToIdentify,
+    structure: models.StructureOptions,
+    actuator: models.ActuatorOptions,
+    fix: tuple[Fixed, ...] = (),
+    free: tuple[str, ...] = (),
+    prior: tuple[Range, ...] = (),
+    initial: Initial | None = None,
+    noise: Noise | None = None,
+    samples: Count = 10000,
+    seed: int = 0,
+    out: str | None = None,
+    json: bool = False,
+) -> int:
+    """Identify a model, draw its parameters from their posterior distribution, and print medians and intervals at 95 %.
+
+    It needs the extra bayes. Exit code 1: the search did not converge, or the draws are too few to use.
+
+    Parameters
+    ----------
+    others : further records with the same columns, such as those of other rates
+    fix : parameter that is not free: n=1 [unit of the parameter]
+    free : parameter that is free, where it is fixed by default
+    prior : flat prior of a parameter, or of sigma: n=1:3 (default: the box of the search) [unit of the parameter]
+    initial : state at the first sample (default: chosen by the BIC, or free)
+    noise : noise of the output; quantised needs --resolution (default: gaussian)
+    samples : effective draws of each parameter
+    out : folder to write into: parameters.csv, samples.csv, corner.svg and posterior.json
+
+    Examples
+    --------
+    hysim posterior loop.csv --model bouc-wen --out posterior
+    hysim posterior loop.csv --model play --resolution detect --noise quantised --samples 1000
+    hysim posterior loop.csv --model bouc-wen --fix n=1 --prior sigma=0.01:0.1 --json
+    """
+    from hysim._printing import csv_text
+    from hysim.identification import identify
+    from hysim.posterior import sample_posterior
+
+    subject, initial = models.to_identify(model, structure, actuator, initial)
+    measured: Any = [records.read(options, path) for path in (file, *others)]
+    measured = measured if others else measured[0]
+    if out is not None:
+        results = [str(Path(out, name)) for name in ("parameters.csv", "samples.csv", "corner.svg", "posterior.json")]
+        outputs.keep([file, *others, model], results)
+        Path(out).mkdir(parents=True, exist_ok=True)
+    fit = identify(subject, measured, fixed=dict(fix), free=free, initial=initial, noise=noise, seed=seed)
+    draws = sample_posterior(
+        fit, measured, priors=dict(prior), initial=initial, noise=noise, samples=samples, seed=seed
+    )
+    rows = _rows(draws)
+    settings = outputs.fields_of(draws, ("noise", "resolution", "priors", "n_evaluations", "seed", "warnings"))
+    document = {"family": type(draws.model).__name__, "parameters": rows, **settings}
+    contents = (
+        lambda: csv_text([rows[0], *(row.values() for row in rows)]),
+        draws.to_csv,
+        lambda: _corner(draws),
+        lambda: outputs.to_json(document),
+    )
+    files: outputs.Files = {} if out is None else dict(zip(results, contents, strict=True))
+    outputs.write(files, draws.summary, lambda: document)
+    return NOT_CONVERGED if draws.warnings or not fit.success else SUCCESS
+
+
+def _rows(posterior: "Posterior") -> list[dict[str, Any]]:
+    """Each parameter with its median, interval at 95 % and diagnostics."""
+    ends, median = posterior.interval(), posterior.median
+    return [
+        {
+            "name": name,
+            "median": median[name],
+            "lower": ends[name][0],
+            "upper": ends[name][1],
+            "mean": float(draws.mean()),
+            "standard_deviation": float(draws.std(ddof=1)),
+            "effective_samples": posterior.effective_samples[name],
+            "rhat": posterior.rhat[name],
+        }
+        for name, draws in posterior.samples.items()
+    ]
+
+
+def _corner(posterior: "Posterior") -> "Figure":
+    from hysim import plot
+
+    n = len(posterior.names)
+    side = max(1.25 * n, 4.0)  # inches, of a panel 1.25
+    return outputs.drawn(lambda canvas: plot.corner(posterior, axes=canvas.subplots(n, n)), side, side)
+
+
+def compare(
+    file: RecordIn,
+    *,
+    options: records.RecordOptions,
+    model: tuple[models.ToCompare, ...] = (),
+    cross_validate: Folds | None = None,
+    test: RecordIn | None = None,
+    test_cycles: int | None = None,
+    max_evaluations: int | None = None,
+    seed: int = 0,
+    csv: Result | None = None,
+    markdown: Result | None = None,
+    latex: Result | None = None,
+    out: ModelOut | None = None,
+    plot: Picture | None = None,
+    json: bool = False,
+) -> int:
+    """Identify models on a record, all by the same protocol, and print them side by side.
+
+    Beside them stands what the record cannot decide.
+
+    Parameters
+    ----------
+    model : name of a family, such as bouc-wen; MODEL.json; or module:name of your own, which executes ./module.py or an
+        installed module; once or more (default: all families)
+    cross_validate : leave out one sample at a time, one cycle, or one of K blocks (default: loo up to 200 samples, then
+        10)
+    test : another record with the same columns, for the test only
+    test_cycles : keep the last N cycles for the test
+    max_evaluations : most parameter sets that the search of each model simulates; a fit that ends by it is partial
+    csv : write the table; - writes it to the standard output, so too with the next two options
+    markdown : write the table in Markdown
+    latex : write the table in LaTeX
+    out : write the model that predicts best, as identify does
+    plot : draw the best models
+
+    Examples
+    --------
+    hysim compare loop.csv
+    hysim compare loop.csv --model bouc-wen --model preisach --model law.json --test-cycles 1
+    hysim compare loop.csv --csv table.csv --plot loops.svg --out best.json
+    """
+    from hysim import comparison
+
+    exclusive(test=test, test_cycles=test_cycles)
+    record = records.read(options, file)
+    kept: Any = test_cycles if test is None else records.read(options, test, uncut=True)
+    subjects: dict[str, Any] = {}
+    for name in model:
+        subjects |= _subjects(name)
+    try:
+        table = comparison.compare(
+            subjects or None, record, cross_validate=cross_validate or "auto", test=kept, seed=seed,
+            max_evaluations=max_evaluations,
+        )  # fmt: skip
+    except Interrupted as interrupt:
+        if not json:
+            print(interrupt.finished.to_text())
+        raise
+    files: outputs.Files = {
+        out: lambda: _best(table),
+        csv: lambda: table.to_csv(),
+        markdown: lambda: table.to_markdown() + "\n",
+        latex: lambda: table.to_latex() + "\n",
+        plot: lambda: _picture(table),
+    }
+    outputs.write(files, lambda: table.to_text(), lambda: _document(table))
+    return SUCCESS
+
+
+def _subjects(name: str) -> dict[str, Any]:
+    """Subjects of the comparison for a family's name, a file or an import path."""
+    from hysim.models.candidates import candidates_named
+
+    model = models.model_or_family(name)
+    if name.endswith(".json") or models.is_import_path(name):
+        return {models.name_of(name): model}
+    try:
+        of_family = candidates_named(model.__name__)
+    except ValueError:
+        raise ValueError(f"the model {name} cannot be compared without further arguments: give a .json file") from None
+    return of_family if len(of_family) > 1 else dict.fromkeys([name], *of_family.values())
+
+
+def _best(table: "Comparison") -> str:
+    """The model that predicts best; if no errors of prediction are known, the one with the smallest rmse."""
+    from hysim.models.storage import to_json
+
+    ranked = table.ranked() or table.ranked("rmse")
+    if not ranked:
+        raise ValueError(f"no model could be compared: {'; '.join(table.failed.values())}")
+    return to_json(ranked[0].model, units=table.record.units)
+
+
+def _document(table: "Comparison") -> dict[str, Any]:
+    fields = ("rmse_ratio", "typical_ratio", "probability", "diverged")
+    contrasts = {each.name: outputs.fields_of(each, fields) for each in table.contrasts}
+    return {
+        "record": table.record.name,
+        "units": table.record.units,
+        "winner": table.winner,
+        "undecided": table.undecided,
+        "verdict": table.verdict,
+        "warnings": table.warnings,
+        "rows": [outputs.scalars(row) | contrasts.get(row.name, dict.fromkeys(fields)) for row in table.rows],
+        "failed": table.failed,
+    }
+
+
+def _picture(table: "Comparison") -> "Figure":
+    from hysim import plot
+
+    rows = min(4, len(table.rows))
+    return outputs.drawn(
+        lambda canvas: plot.comparison(table, axes=plot.panels(canvas, 3 * rows, columns=3)), 9.0, 2.2 * rows
+    )
+
+
+def _terms(text: str) -> str | list[str]:
+    """The name of a library, or its terms."""
+    names = [name.strip() for name in text.split(",")]
+    return names if len(names) > 1 or "'" in text else text
+
+
+PLANT, WITHOUT_PLANT = ("mass", "damping", "stiffness"), ("library", "cross_validate", "initial")
+
+
+def discover(
+    file: RecordIn,
+    *,
+    options: records.RecordOptions,
+    route: Literal["auto", "memory", "output", "oscillator"] = "auto",
+    library: Annotated[str | list[str], Value(name="NAME|TERMS", read=_terms)] | None = None,
+    degree: int | None = None,
+    symmetry: Literal["odd", "even"] | None = None,
+    mass: float | None = None,
+    damping: float | None = None,
+    stiffness: float | None = None,
+    cross_validate: Annotated[
+        str | int,
+        Value(name="loo|K", words=("loo",), read=at_least(2), expected="loo or a number of blocks from 2 on"),
+    ]
+    | None = None,
+    initial: Literal["auto", "free", "rest"] | None = None,
+    seed: int = 0,
+    out: ModelOut | None = None,
+    plot: Picture | None = None,
+    json: bool = False,
+) -> int:
+    """Find the law of a memory by sparse regression (PySINDy) and free runs, and print it with its verdict.
+
+    The verdict is hysteresis, a linear lag, or that records of one rate cannot decide.
+
+    Parameters
+    ----------
+    route : meaning of the output: the memory, a feedthrough and a memory, or the displacement of an oscillator; auto
+        tries the first two
+    library : bouc-wen, duhem, or terms with commas between them: "u',|u'| z,u' |z|"
+    degree : largest degree of the library's monomials; 2 by default, of an oscillator's 3
+    symmetry : symmetry of the response; only odd for an oscillator
+    mass : mass of an oscillator, if it is known [units of u s^2/y]
+    damping : damping of an oscillator, if it is known [units of u s/y]
+    stiffness : stiffness of an oscillator, if it is known [units of u/y]
+    cross_validate : repeat the whole search without one sample at a time, or one of K blocks; not for an oscillator
+    initial : whether the memory begins at a value of its own or at zero; by default the BIC decides
+    out : write the model; - writes it to the standard output
+    plot : draw the record and the law
+
+    Examples
+    --------
+    hysim discover loop.csv --plot law.svg
+    hysim discover test.csv --route oscillator --mass 2.5
+    """
+    from hysim import discovery
+    from hysim.models.storage import to_json
+
+    values = {
+        "mass": mass, "damping": damping, "stiffness": stiffness, "library": library,
+        "cross_validate": cross_validate, "initial": initial, "degree": degree, "symmetry": symmetry,
+    }  # fmt: skip
+    used: dict[str, Any] = {name: value for name, value in values.items() if value is not None}
+    is_oscillator = _is_oscillator(route, used)
+    record = records.read(options, file)
+    if is_oscillator:
+        result: Any = discovery.discover_oscillator(record, seed=seed, **used)
+    else:
+        result = discovery.discover(record, seed=seed, route=route, **used)
+    model = result.model
+    files: dict[str | None, Any] = {
+        out: lambda: to_json(model, units=record.units),
+        plot: lambda: outputs.loop(record, model),
+    }
+    if model is None:
+        files = {path: lambda: "" for path in files if path == records.STANDARD}
+    outputs.write(files, result.to_json if json else result.summary)
+    unwritten = [name for name, path in (("--out", out), ("--plot", plot)) if path and model is None]
+    if unwritten:
+        print(f"hysim: {' and '.join(unwritten)} not written: {result.warnings[0]}", file=sys.stderr)
+    return NO_MODEL if unwritten else SUCCESS
+
+
+def _is_oscillator(route: str, used: dict[str, Any]) -> bool:
+    """Whether the record is an oscillator's; options that are not used by it are refused."""
+    is_oscillator = route == "oscillator" or (route == "auto" and any(name in used for name in PLANT))
+    for name in WITHOUT_PLANT if is_oscillator else PLANT:
+        if name in used:
+            user = "an oscillator" if is_oscillator else f"--route {route}"
+            raise ValueError(f"--{name.replace('_', '-')} is not used by {user}: leave it out")
+    if is_oscillator and used.get("symmetry") == "even":
+        raise ValueError("--symmetry even is not used by an oscillator: leave it out, or use --symmetry odd")
+    if "degree" in used and isinstance(used.get("library"), list):
+        raise ValueError("--degree is not used with a library of names: leave it out")
+    return is_oscillator
