@@ -98,9 +98,7 @@ def declared(
     group: Group,
     unit: tuple[options.Unit, ...] = (),
     no_t: bool = False,
-    cycles: Annotated[
-        int, options.Value(name="CYCLES", read=lambda text: 0 if text == "all" else int(text), bare="all")
-    ] = 1,
+    cycles: Annotated[int, options.Value("CYCLES", lambda text: 0 if text == "all" else int(text), bare="all")] = 1,
     plot: options.Picture | None = None,
     scale: float,
 ):
@@ -301,7 +299,7 @@ def test_a_link_is_followed_and_a_pipe_is_written_to(tmp_path):
 
 def test_a_folder_that_may_not_be_written_to_is_refused_before_anything_is_computed(run, monkeypatch):
     monkeypatch.setattr(outputs.os, "access", lambda *_: False)
-    monkeypatch.setattr("hysim.identification.identify", lambda *_, **__: pytest.fail("computed all the same"))
+    monkeypatch.setattr("hysim.identify", lambda *_, **__: pytest.fail("computed all the same"))
     code, _, err = run("identify", "loop.csv", *COLUMNS, "--model", "line", "--out", "model.json")
     assert (code, err) == (2, "hysim: error: cannot write model.json: its folder may not be written to\n")
 
@@ -312,7 +310,7 @@ def test_too_little_memory_and_missing_libraries_are_one_line(run, monkeypatch):
         def fails(*_, error=error, **__):
             raise error
 
-        monkeypatch.setattr("hysim.metrics.loop_metrics", fails)
+        monkeypatch.setattr("hysim.loop_metrics", fails)
         assert run("metrics", "loop.csv", *COLUMNS) == (2, "", f"hysim: error: {line}\n")
 
 

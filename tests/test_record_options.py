@@ -41,7 +41,7 @@ def arguments_of(*words):
 
 def chosen(*words):
     """The options for a record."""
-    return arguments_of("loop.csv", *words, "--model", "line")["options"]
+    return arguments_of("loop.csv", *words, "--model", "line")["settings"]
 
 
 def read(file, *words):

@@ -4,20 +4,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any
 
-from hysim.cli import outputs
-from hysim.cli.options import (
-    INPUT,
-    RESULT,
-    Column,
-    ModelIn,
-    ModelOut,
-    Pair,
-    Picture,
-    RecordIn,
-    file,
-    numbers,
-    one_of,
-)
+import hysim as hs
+from hysim.cli import options, outputs
 
 SUCCESS, NOT_WITHIN_BOUNDS = 0, 1
 CONTROLLERS = {
@@ -66,35 +54,35 @@ class DesignOptions:
     y : output of the record: name or number of its column (default: y)
     """
 
-    mode: Annotated[tuple[float, float], numbers("FREQUENCY,DAMPING")] | None = None
+    mode: options.Mode | None = None
     creep: float | None = None
     noise: float | None = None
     quantum: float | None = None
     delay: float | None = None
-    controller: Annotated[str, one_of(CONTROLLERS)] = "pid"
+    controller: Annotated[str, options.one_of(CONTROLLERS)] = "pid"
     sample_time: float
-    limits: Pair | None = None
+    limits: options.Pair | None = None
     max_sensitivity: float = 2.0
     max_voltage_noise: float | None = None
     vary_mode: float | None = None
     preview: bool = False
-    reference: Annotated[str, file("triangle|step|FILE", INPUT)] = "triangle"
-    range: Pair | None = None
+    reference: Annotated[str, options.file("triangle|step|FILE", options.INPUT)] = "triangle"
+    range: options.Pair | None = None
     frequency: float | None = None
     step: float | None = None
     duration: float | None = None
-    record: RecordIn | None = None
-    u: Column | None = None
-    y: Column | None = None
+    record: options.RecordIn | None = None
+    u: options.Column | None = None
+    y: options.Column | None = None
 
 
 def control(
-    model: ModelIn,
+    model: options.ModelIn,
     *,
-    options: DesignOptions,
-    out: ModelOut | None = None,
-    c: Annotated[str | None, file("CONTROLLER.c", RESULT)] = None,
-    plot: Picture | None = None,
+    settings: DesignOptions,
+    out: options.ModelOut | None = None,
+    c: options.Source | None = None,
+    plot: options.Picture | None = None,
     json: bool = False,
 ) -> int:
     """Tune a sampled controller on a model's simulated loop, and measure what it achieves.
@@ -115,24 +103,20 @@ def control(
     hysim control law.json --limits 0,100 --sample-time 1e-4 --controller inverse --c stage.c
     """
     from hysim.cli import designs
-    from hysim.export import to_c
     from hysim.models.storage import to_json
 
-    source = None if c is None else Path(c)
-    header = None if source is None else str(source.with_suffix(".h"))
-    if source is not None:
-        if source.suffix != ".c":
-            raise ValueError(f"C code is a file and its header beside it: call the file .c, got {c}")
-        outputs.keep([model, options.record, options.reference], [header])
+    source = Path(c or "")
+    header = None if c is None else str(source.with_suffix(".h"))
+    if c is not None and source.suffix != ".c":
+        raise ValueError(f"C code is a file and its header beside it: call the file .c, got {c}")
+    outputs.keep([model, settings.record, settings.reference], [header])
 
     def code(controller: Any) -> Any:
-        return to_c(controller, options.sample_time, name=source.stem) if source is not None else None
+        return None if c is None else hs.to_c(controller, settings.sample_time, name=source.stem)
 
-    design = designs.designed(
-        model, options, code
-    )  # a controller that cannot be exported is an error before the search
+    design = designs.designed(model, settings, code)
     written = code(design.controller)
-    files: dict[str | None, Any] = {
+    files: outputs.Files = {
         out: lambda: to_json(design.controller, units=design.units),
         c: lambda: written.source,
         header: lambda: written.header,

@@ -8,48 +8,24 @@ import math
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import asdict, is_dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from scipy.optimize import brentq
 
-from hysim import metrics, signals
+import hysim as hs
 from hysim._frozen import FloatArray, read_only
 from hysim._prefixes import label
 from hysim._printing import extent, folded, quantity
 from hysim.cli import models, outputs
 from hysim.cli.control import DesignOptions
 from hysim.cli.options import Pair, positive
-from hysim.control import (
-    PID,
-    HysteresisAssessment,
-    InverseFeedforward,
-    ModeInverse,
-    Notch,
-    Shaper,
-    StepAssessment,
-    TrackingController,
-    Tuning,
-    as_actuator,
-    assess_hysteresis,
-    assess_step,
-    close_loop,
-    driven_by,
-    tune,
-)
-from hysim.files import load
+from hysim.control import HysteresisAssessment, StepAssessment, as_actuator, assess_hysteresis, assess_step, driven_by
 from hysim.models.model import in_brief
 from hysim.models.protocols import needs_time
 from hysim.models.storage import to_document
-from hysim.plants.actuator import Actuator
-from hysim.plants.creep import Creep
-from hysim.plants.modes import mode
-from hysim.plants.sensor import Sensor
-from hysim.records import Record, step_if_even
-from hysim.simulation import Simulation, free_run
-
-if TYPE_CHECKING:
-    from hysim.plot import Figure
+from hysim.records import step_if_even
+from hysim.simulation import free_run
 
 INVERTING = ("inverse", "tracking", "model-following")
 """Kinds of controllers that begin with the inverse of the plant."""
@@ -85,9 +61,9 @@ class Task(NamedTuple):
 class Design(NamedTuple):
     """A controller, its tuning if it has gains, and its achievements."""
 
-    actuator: Actuator
+    actuator: hs.Actuator
     controller: Any
-    tuning: Tuning | None
+    tuning: hs.Tuning | None
     task: Task
     triangle: HysteresisAssessment
     step: StepAssessment
@@ -105,13 +81,13 @@ class Design(NamedTuple):
     @property
     def open_tracking_rms(self) -> float:
         """Rms error of the open loop, driven by reference / secant gain, over the last cycle of the triangle."""
-        return metrics.rmse(self.triangle.closed.reference[self.last_cycle], self.triangle.open_y[self.last_cycle])
+        return hs.metrics.rmse(self.triangle.closed.reference[self.last_cycle], self.triangle.open_y[self.last_cycle])
 
 
 def designed(path: str, options: DesignOptions, exported: Callable[[Any], object]) -> Design:
     """The controller for the model in a file; `exported` is called before the search with a controller of its kind."""
     model, units = models.read(path)
-    record = None if options.record is None else load(options.record, u=options.u, y=options.y)
+    record = None if options.record is None else hs.load(options.record, u=options.u, y=options.y)
     if record is not None:
         signals_in = {name: unit for name, unit in units.items() if name in ("u", "y")}
         record = in_units(record, signals_in, str(options.record))
@@ -120,12 +96,12 @@ def designed(path: str, options: DesignOptions, exported: Callable[[Any], object
     within = limits(options, record)
     todo = task(actuator, options, within)
     template = feedback(actuator, kind, within)
-    made = controller(actuator, kind, within, template or PID(kp=1.0, limits=within), preview=options.preview)
+    made = controller(actuator, kind, within, template or hs.PID(kp=1.0, limits=within), preview=options.preview)
     exported(made)
     goal = reference(todo, rest(actuator, todo.u0), options.reference, units.get("y"))
     tuning = None
     if kind != "inverse":
-        tuning = tune(
+        tuning = hs.tune(
             actuator, goal.t, goal.values, controller=template, objective=goal.objective, limits=within,
             max_sensitivity=options.max_sensitivity, max_voltage_noise=options.max_voltage_noise,
             variations=variations(actuator, options.vary_mode), transient=goal.transient,
@@ -149,22 +125,22 @@ def designed(path: str, options: DesignOptions, exported: Callable[[Any], object
     )
 
 
-def plant(model: Any, options: DesignOptions) -> Actuator:
+def plant(model: Any, options: DesignOptions) -> hs.Actuator:
     """The model as an actuator, with the stages that the options add or replace."""
     actuator = as_actuator(model)
     stages: dict[str, Any] = {}
     if options.mode is not None:
         frequency, ratio = options.mode
-        stages["vibration"] = mode(2.0 * math.pi * frequency, ratio)
+        stages["vibration"] = hs.mode(2.0 * math.pi * frequency, ratio)
     if options.creep is not None:
-        stages["creep"] = Creep.per_decade(options.creep)
+        stages["creep"] = hs.Creep.per_decade(options.creep)
     settings = {name: vars(options)[name] for name in ("noise", "quantum", "delay") if vars(options)[name] is not None}
     if settings:
-        stages["sensor"] = replace(actuator.sensor or Sensor(), **settings)
+        stages["sensor"] = replace(actuator.sensor or hs.Sensor(), **settings)
     return replace(actuator, **stages)
 
 
-def variations(actuator: Actuator, percent: float | None) -> list[Actuator]:
+def variations(actuator: hs.Actuator, percent: float | None) -> list[hs.Actuator]:
     """The plant with its only mode at a lower and at a higher frequency."""
     if percent is None:
         return []
@@ -173,10 +149,10 @@ def variations(actuator: Actuator, percent: float | None) -> list[Actuator]:
     frequency, ratio = _only_mode(actuator, "--vary-mode")
     gain = 1.0 if actuator.vibration is None else actuator.vibration.dc_gain
     factors = 1.0 - percent / 100.0, 1.0 + percent / 100.0
-    return [replace(actuator, vibration=mode(factor * frequency, ratio, gain)) for factor in factors]
+    return [replace(actuator, vibration=hs.mode(factor * frequency, ratio, gain)) for factor in factors]
 
 
-def limits(options: DesignOptions, record: Record | None) -> Pair | None:
+def limits(options: DesignOptions, record: hs.Record | None) -> Pair | None:
     """Limits of the command: those of the options, or the extremes of the measured input."""
     if options.limits is not None:
         low, high = options.limits
@@ -186,7 +162,7 @@ def limits(options: DesignOptions, record: Record | None) -> Pair | None:
     return None if record is None else (float(record.u.min()), float(record.u.max()))
 
 
-def task(actuator: Actuator, options: DesignOptions, within: Pair | None) -> Task:
+def task(actuator: hs.Actuator, options: DesignOptions, within: Pair | None) -> Task:
     """The task of the loop; a ValueError if no option limits the range, or a number is outside its bounds."""
     h = positive("--sample-time", options.sample_time)
     low, high = options.range or _reach(actuator, within)
@@ -209,19 +185,19 @@ def task(actuator: Actuator, options: DesignOptions, within: Pair | None) -> Tas
     return Task(low, high, 2 * half * h, _resting_voltage(actuator, begin, within), step, duration, h)
 
 
-def rest(actuator: Actuator, u: float) -> float:
+def rest(actuator: hs.Actuator, u: float) -> float:
     """Displacement at which the plant rests at a command [unit of y]."""
     return float(replace(actuator, amplifier=None).dc_gain * actuator.level([u])[0])
 
 
-def fit_percent(model: Any, record: Record | None) -> float:
+def fit_percent(model: Any, record: hs.Record | None) -> float:
     """Fit of the model's free run to the record; nan without a record, or without the even times that a model needs."""
     if record is None or (needs_time(model) and (record.t is None or step_if_even(record.t) is None)):
         return math.nan
-    return metrics.fit_percent(record.y, free_run(model, record).y)
+    return hs.metrics.fit_percent(record.y, free_run(model, record).y)
 
 
-def in_units(record: Record, units: Mapping[str, str], source: str) -> Record:
+def in_units(record: hs.Record, units: Mapping[str, str], source: str) -> hs.Record:
     """The record in these units, where it has others; ValueError if they differ by more than a prefix."""
     other = {name: unit for name, unit in units.items() if record.units.get(name, unit) != unit}
     try:
@@ -230,11 +206,11 @@ def in_units(record: Record, units: Mapping[str, str], source: str) -> Record:
         raise ValueError(f"{source} is not in the units of the model: {error}") from None
 
 
-def file_rms(actuator: Actuator, controller: Any, reference: "Reference", kind: str) -> float:
+def file_rms(actuator: hs.Actuator, controller: Any, reference: "Reference", kind: str) -> float:
     """Tracking rms along the reference in a file; nan for the triangle and the step, which have other measures."""
     if kind in ("triangle", "step"):
         return math.nan
-    return metrics.rmse(reference.values, close_loop(actuator, controller, reference.t, reference.values).y)
+    return hs.metrics.rmse(reference.values, hs.close_loop(actuator, controller, reference.t, reference.values).y)
 
 
 class Reference(NamedTuple):
@@ -257,13 +233,13 @@ def reference(task: Task, rest: float, kind: str, unit: str | None) -> Reference
     if kind == "step":
         return Reference(h, np.full(round(task.duration / h) + 1, rest + task.step), 0.0, "itae")
     if kind == "triangle":
-        values = signals.triangle(task.low, task.high, cycles=2, samples_per_cycle=task.samples_per_cycle)
+        values = hs.signals.triangle(task.low, task.high, cycles=2, samples_per_cycle=task.samples_per_cycle)
         return Reference(h, values, task.period, "rms")
     units = {} if unit is None else {"u": unit}
-    return Reference(h, in_units(load(kind, t=0, u=1, y=1), units, kind).resample(h).u, 0.0, "rms")
+    return Reference(h, in_units(hs.load(kind, t=0, u=1, y=1), units, kind).resample(h).u, 0.0, "rms")
 
 
-def feedback(actuator: Actuator, kind: str, within: Pair | None) -> PID | TrackingController | None:
+def feedback(actuator: hs.Actuator, kind: str, within: Pair | None) -> hs.PID | hs.TrackingController | None:
     """The feedback before its tuning, whose nonzero gains are free; None for the default of `tune`.
 
     It is tuned without the inverse: the inverse knows the simulated plant exactly, and would leave it nothing to do.
@@ -271,13 +247,13 @@ def feedback(actuator: Actuator, kind: str, within: Pair | None) -> PID | Tracki
     if kind == "pid":
         return None
     if kind != "notch":
-        return PID(ki=1.0, limits=within)
+        return hs.PID(ki=1.0, limits=within)
     frequency, ratio = _only_mode(actuator, "the controller notch")
-    notch = Notch(natural_frequency=frequency, damping_ratio=ratio)
-    return TrackingController(feedback=PID(ki=1.0), notch=notch, limits=within)
+    notch = hs.Notch(natural_frequency=frequency, damping_ratio=ratio)
+    return hs.TrackingController(feedback=hs.PID(ki=1.0), notch=notch, limits=within)
 
 
-def controller(actuator: Actuator, kind: str, within: Pair | None, tuned: Any, *, preview: bool) -> Any:
+def controller(actuator: hs.Actuator, kind: str, within: Pair | None, tuned: Any, *, preview: bool) -> Any:
     """The controller of a kind, with a tuned feedback.
 
     A TypeError or ValueError is raised if the plant lacks the inverse or the single mode that the kind needs, or a
@@ -287,15 +263,15 @@ def controller(actuator: Actuator, kind: str, within: Pair | None, tuned: Any, *
         if preview:
             raise ValueError(f"--preview is for {', '.join(INVERTING)}: the controller {kind} has no inverse")
         return tuned
-    inverse = InverseFeedforward.of(actuator)
-    open_loop = TrackingController(feedforward=inverse, preview=preview, limits=within)
+    inverse = hs.InverseFeedforward.of(actuator)
+    open_loop = hs.TrackingController(feedforward=inverse, preview=preview, limits=within)
     if kind == "inverse":
         return open_loop
     tracking = replace(open_loop, feedback=replace(tuned, limits=None))
     return tracking if kind == "tracking" else _following(tracking, actuator)
 
 
-def _following(controller: TrackingController, actuator: Actuator) -> TrackingController:
+def _following(controller: hs.TrackingController, actuator: hs.Actuator) -> hs.TrackingController:
     """A controller with the plant as its model; before a mode, the reference is smoothed and known ahead."""
     if actuator.vibration is None:
         return replace(controller, model=actuator)
@@ -303,30 +279,30 @@ def _following(controller: TrackingController, actuator: Actuator) -> TrackingCo
     return replace(
         controller,
         model=actuator,
-        shaper=Shaper(smoothing=_SMOOTHING * 2.0 * math.pi / frequency),
-        mode_inverse=ModeInverse(natural_frequency=frequency, damping_ratio=ratio),
+        shaper=hs.Shaper(smoothing=_SMOOTHING * 2.0 * math.pi / frequency),
+        mode_inverse=hs.ModeInverse(natural_frequency=frequency, damping_ratio=ratio),
         preview=True,
     )
 
 
-def _reach(actuator: Actuator, within: Pair | None) -> Pair:
+def _reach(actuator: hs.Actuator, within: Pair | None) -> Pair:
     """The range that is reached at rest within the limits, less the margins."""
     span = within or (actuator.amplifier.limits if actuator.amplifier else None)
     if span is None or not np.isfinite(span).all():
         raise ValueError(
             "the range of the loop is unknown: give --range LOW,HIGH, or --limits LOW,HIGH, or --record FILE"
         )
-    u = signals.triangle(float(span[0]), float(span[1]), cycles=2, samples_per_cycle=2 * _SAMPLES)
+    u = hs.signals.triangle(float(span[0]), float(span[1]), cycles=2, samples_per_cycle=2 * _SAMPLES)
     y = replace(actuator, amplifier=None).dc_gain * actuator.level(u)[-2 * _SAMPLES :]
     margin = _MARGIN * float(np.ptp(y))
     return float(y.min()) + margin, float(y.max()) - margin
 
 
-def _poles(actuator: Actuator) -> Any:
+def _poles(actuator: hs.Actuator) -> Any:
     return np.empty(0) if actuator.vibration is None else actuator.vibration.poles
 
 
-def _resting_voltage(actuator: Actuator, displacement: float, within: Pair | None) -> float:
+def _resting_voltage(actuator: hs.Actuator, displacement: float, within: Pair | None) -> float:
     """The command at which the plant rests at a displacement; 0 if there is no such command."""
 
     def excess(u: float) -> float:
@@ -338,7 +314,7 @@ def _resting_voltage(actuator: Actuator, displacement: float, within: Pair | Non
     return 0.0
 
 
-def _only_mode(actuator: Actuator, user: str) -> tuple[float, float]:
+def _only_mode(actuator: hs.Actuator, user: str) -> tuple[float, float]:
     """Natural frequency [rad/s] and damping ratio of the only mode, which the `user` of this function needs."""
     modes = [(float(abs(pole)), float(-pole.real / abs(pole))) for pole in _poles(actuator) if pole.imag > 0.0]
     if len(modes) != 1:
@@ -347,14 +323,14 @@ def _only_mode(actuator: Actuator, user: str) -> tuple[float, float]:
     return modes[0]
 
 
-def _slow(actuator: Actuator) -> float:
+def _slow(actuator: hs.Actuator) -> float:
     """A frequency beside which the plant is fast [Hz]; infinite for a plant without vibration."""
     slower = {True: _SLOWER_THAN_LAG, False: _SLOWER_THAN_MODE}
     frequencies = (abs(pole) / (2.0 * math.pi * slower[pole.imag == 0.0]) for pole in _poles(actuator))
     return float(min(frequencies, default=math.inf))
 
 
-def _slowest_decay(actuator: Actuator) -> float:
+def _slowest_decay(actuator: hs.Actuator) -> float:
     """The smallest decay rate of a free motion [1/s]; infinite for a plant without vibration."""
     return float(min((-pole.real for pole in _poles(actuator) if pole.real < 0.0), default=math.inf))
 
@@ -466,10 +442,8 @@ def _conditions(design: Design) -> Iterator[str]:
         yield f"            {name}: voltage {extent(closed.u, u)}, {limited}, noise {rms} rms"
 
 
-def picture(design: Design) -> "Figure":
+def picture(design: Design) -> Any:
     """Displacement against reference in open and closed loop, and both steps against time."""
-    from hysim import plot
-
     triangle, last, units = design.triangle, design.last_cycle, {"t": "s", **design.units}
     reference = triangle.closed.reference[last]
     both = {"u": units["y"], "y": units["y"]} if "y" in units else {}
@@ -478,11 +452,11 @@ def picture(design: Design) -> "Figure":
     loops = {"open loop": triangle.open_y, driven: triangle.closed.y}
     steps = {"open loop": (t, design.step.open_y), driven: (t, design.step.closed.y)}
 
-    def draw(canvas: "Figure") -> None:
+    def draw(canvas: Any) -> None:
         upper, lower = canvas.subplots(2)
-        curves = (Simulation(u=reference, y=y[last], units=both, name=name) for name, y in loops.items())
-        plot.loop(*curves, ax=upper)
+        curves = (hs.Simulation(u=reference, y=y[last], units=both, name=name) for name, y in loops.items())
+        hs.plot.loop(*curves, ax=upper)
         upper.set_xlabel("Reference" + "".join(upper.get_ylabel().partition(" [")[1:]))
-        plot.traces(steps, lower, units=units)
+        hs.plot.traces(steps, lower, units=units)
 
     return outputs.drawn(draw, height=6.4)

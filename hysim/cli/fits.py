@@ -2,29 +2,11 @@
 
 import sys
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from typing import Any, Literal
 
-from hysim.cli import models, outputs, records
-from hysim.cli.options import (
-    Count,
-    Depends,
-    Fixed,
-    Folds,
-    ModelOut,
-    Picture,
-    Range,
-    RecordIn,
-    Result,
-    Value,
-    at_least,
-    exclusive,
-)
+import hysim as hs
+from hysim.cli import models, options, outputs, records
 from hysim.errors import Interrupted
-
-if TYPE_CHECKING:
-    from hysim.comparison import Comparison
-    from hysim.plot import Figure
-    from hysim.posterior import Posterior
 
 SUCCESS, NOT_CONVERGED, NO_MODEL = 0, 1, 1
 Initial = Literal["free", "rest", "still", "periodic"]
@@ -38,26 +20,26 @@ _IDENTIFIED = (
 
 
 def identify(
-    file: RecordIn,
-    others: tuple[RecordIn, ...] = (),
+    file: options.RecordIn,
+    others: tuple[options.RecordIn, ...] = (),
     *,
-    options: records.WeighedOptions,
+    settings: records.WeighedOptions,
     model: models.ToIdentify,
     structure: models.StructureOptions,
     actuator: models.ActuatorOptions,
-    fix: tuple[Fixed, ...] = (),
+    fix: tuple[options.Fixed, ...] = (),
     free: tuple[str, ...] = (),
-    bounds: tuple[Range, ...] = (),
-    depends: tuple[Depends, ...] = (),
+    bounds: tuple[options.Range, ...] = (),
+    depends: tuple[options.Depends, ...] = (),
     initial: Initial | None = None,
     noise: Noise | None = None,
     intervals: Literal["linear", "profile", "bootstrap"] = "linear",
-    cross_validate: Folds | None = None,
+    cross_validate: options.Folds | None = None,
     max_evaluations: int | None = None,
     admissible: Literal["yes", "no"] | None = None,
     seed: int = 0,
-    out: ModelOut | None = None,
-    plot: Picture | None = None,
+    out: options.ModelOut | None = None,
+    plot: options.Picture | None = None,
     json: bool = False,
 ) -> int:
     """Identify a model's parameters by its error in free run, and print them with their standard errors.
@@ -89,27 +71,25 @@ def identify(
     hysim identify test.csv --model oscillator --excitation base
     hysim identify quake.csv --model frame.json --free damping --sensor acceleration_2
     """
-    from hysim import identification
     from hysim.models.storage import to_json
-    from hysim.simulation import simulate
 
     subject, initial = models.to_identify(model, structure, actuator, initial)
-    if others and (options.weights is not None or options.sensor or options.y_file is not None):
+    if others and (settings.weights is not None or settings.sensor or settings.y_file is not None):
         raise ValueError("--weights, --sensor and --y-file are for one file: leave out the others, or use Python")
-    record, weights = records.read_with_weights(options, file)
-    further = [records.read(options, path) for path in others]
-    sensors = dict(options.sensor)
+    record, weights = records.read_with_weights(settings, file)
+    further = [records.read(settings, path) for path in others]
+    sensors = dict(settings.sensor)
     measured: Any = records.of_structure(subject, record, sensors) if sensors else record
-    fit = identification.identify(
+    fit = hs.identify(
         subject, [measured, *further] if further else measured, fixed=dict(fix), free=free, bounds=dict(bounds),
         depends=dict(depends) or None, weights=weights, initial=initial, noise=noise, intervals=intervals,
         cross_validate=cross_validate, max_evaluations=max_evaluations, seed=seed,
         admissible=None if admissible is None else admissible == "yes",
     )  # fmt: skip
 
-    def picture() -> "Figure":
+    def picture() -> Any:
         if sensors:  # the record of one sensor is not the output of the structure
-            return outputs.picture_of(simulate(fit, record.t, record.u))
+            return outputs.picture_of(hs.simulate(fit, record.t, record.u))
         return outputs.loop(record, fit)
 
     files: outputs.Files = {out: lambda: to_json(fit, units=record.units), plot: picture}
@@ -119,19 +99,19 @@ def identify(
 
 
 def posterior(
-    file: RecordIn,
-    others: tuple[RecordIn, ...] = (),
+    file: options.RecordIn,
+    others: tuple[options.RecordIn, ...] = (),
     *,
-    options: records.RecordOptions,
+    settings: records.RecordOptions,
     model: models.ToIdentify,
     structure: models.StructureOptions,
     actuator: models.ActuatorOptions,
-    fix: tuple[Fixed, ...] = (),
+    fix: tuple[options.Fixed, ...] = (),
     free: tuple[str, ...] = (),
-    prior: tuple[Range, ...] = (),
+    prior: tuple[options.Range, ...] = (),
     initial: Initial | None = None,
     noise: Noise | None = None,
-    samples: Count = 10000,
+    samples: options.Count = 10000,
     seed: int = 0,
     out: str | None = None,
     json: bool = False,
@@ -158,18 +138,16 @@ def posterior(
     hysim posterior loop.csv --model bouc-wen --fix n=1 --prior sigma=0.01:0.1 --json
     """
     from hysim._printing import csv_text
-    from hysim.identification import identify
-    from hysim.posterior import sample_posterior
 
     subject, initial = models.to_identify(model, structure, actuator, initial)
-    measured: Any = [records.read(options, path) for path in (file, *others)]
+    measured: Any = [records.read(settings, path) for path in (file, *others)]
     measured = measured if others else measured[0]
     if out is not None:
         results = [str(Path(out, name)) for name in ("parameters.csv", "samples.csv", "corner.svg", "posterior.json")]
         outputs.keep([file, *others, model], results)
         Path(out).mkdir(parents=True, exist_ok=True)
-    fit = identify(subject, measured, fixed=dict(fix), free=free, initial=initial, noise=noise, seed=seed)
-    draws = sample_posterior(
+    fit = hs.identify(subject, measured, fixed=dict(fix), free=free, initial=initial, noise=noise, seed=seed)
+    draws = hs.sample_posterior(
         fit, measured, priors=dict(prior), initial=initial, noise=noise, samples=samples, seed=seed
     )
     rows = _rows(draws)
@@ -186,7 +164,7 @@ def posterior(
     return NOT_CONVERGED if draws.warnings or not fit.success else SUCCESS
 
 
-def _rows(posterior: "Posterior") -> list[dict[str, Any]]:
+def _rows(posterior: "hs.Posterior") -> list[dict[str, Any]]:
     """Each parameter with its median, interval at 95 % and diagnostics."""
     ends, median = posterior.interval(), posterior.median
     return [
@@ -204,29 +182,27 @@ def _rows(posterior: "Posterior") -> list[dict[str, Any]]:
     ]
 
 
-def _corner(posterior: "Posterior") -> "Figure":
-    from hysim import plot
-
+def _corner(posterior: "hs.Posterior") -> Any:
     n = len(posterior.names)
     side = max(1.25 * n, 4.0)  # inches, of a panel 1.25
-    return outputs.drawn(lambda canvas: plot.corner(posterior, axes=canvas.subplots(n, n)), side, side)
+    return outputs.drawn(lambda canvas: hs.plot.corner(posterior, axes=canvas.subplots(n, n)), side, side)
 
 
 def compare(
-    file: RecordIn,
+    file: options.RecordIn,
     *,
-    options: records.RecordOptions,
+    settings: records.RecordOptions,
     model: tuple[models.ToCompare, ...] = (),
-    cross_validate: Folds | None = None,
-    test: RecordIn | None = None,
+    cross_validate: options.Folds | None = None,
+    test: options.RecordIn | None = None,
     test_cycles: int | None = None,
     max_evaluations: int | None = None,
     seed: int = 0,
-    csv: Result | None = None,
-    markdown: Result | None = None,
-    latex: Result | None = None,
-    out: ModelOut | None = None,
-    plot: Picture | None = None,
+    csv: options.Result | None = None,
+    markdown: options.Result | None = None,
+    latex: options.Result | None = None,
+    out: options.ModelOut | None = None,
+    plot: options.Picture | None = None,
     json: bool = False,
 ) -> int:
     """Identify models on a record, all by the same protocol, and print them side by side.
@@ -254,16 +230,14 @@ def compare(
     hysim compare loop.csv --model bouc-wen --model preisach --model law.json --test-cycles 1
     hysim compare loop.csv --csv table.csv --plot loops.svg --out best.json
     """
-    from hysim import comparison
-
-    exclusive(test=test, test_cycles=test_cycles)
-    record = records.read(options, file)
-    kept: Any = test_cycles if test is None else records.read(options, test, uncut=True)
+    options.exclusive(test=test, test_cycles=test_cycles)
+    record = records.read(settings, file)
+    kept: Any = test_cycles if test is None else records.read(settings, test, uncut=True)
     subjects: dict[str, Any] = {}
     for name in model:
         subjects |= _subjects(name)
     try:
-        table = comparison.compare(
+        table = hs.compare(
             subjects or None, record, cross_validate=cross_validate or "auto", test=kept, seed=seed,
             max_evaluations=max_evaluations,
         )  # fmt: skip
@@ -296,7 +270,7 @@ def _subjects(name: str) -> dict[str, Any]:
     return of_family if len(of_family) > 1 else dict.fromkeys([name], *of_family.values())
 
 
-def _best(table: "Comparison") -> str:
+def _best(table: "hs.Comparison") -> str:
     """The model that predicts best; if no errors of prediction are known, the one with the smallest rmse."""
     from hysim.models.storage import to_json
 
@@ -306,7 +280,7 @@ def _best(table: "Comparison") -> str:
     return to_json(ranked[0].model, units=table.record.units)
 
 
-def _document(table: "Comparison") -> dict[str, Any]:
+def _document(table: "hs.Comparison") -> dict[str, Any]:
     fields = ("rmse_ratio", "typical_ratio", "probability", "diverged")
     contrasts = {each.name: outputs.fields_of(each, fields) for each in table.contrasts}
     return {
@@ -321,44 +295,32 @@ def _document(table: "Comparison") -> dict[str, Any]:
     }
 
 
-def _picture(table: "Comparison") -> "Figure":
-    from hysim import plot
-
+def _picture(table: "hs.Comparison") -> Any:
     rows = min(4, len(table.rows))
     return outputs.drawn(
-        lambda canvas: plot.comparison(table, axes=plot.panels(canvas, 3 * rows, columns=3)), 9.0, 2.2 * rows
+        lambda canvas: hs.plot.comparison(table, axes=hs.plot.panels(canvas, 3 * rows, columns=3)), 9.0, 2.2 * rows
     )
-
-
-def _terms(text: str) -> str | list[str]:
-    """The name of a library, or its terms."""
-    names = [name.strip() for name in text.split(",")]
-    return names if len(names) > 1 or "'" in text else text
 
 
 PLANT, WITHOUT_PLANT = ("mass", "damping", "stiffness"), ("library", "cross_validate", "initial")
 
 
 def discover(
-    file: RecordIn,
+    file: options.RecordIn,
     *,
-    options: records.RecordOptions,
+    settings: records.RecordOptions,
     route: Literal["auto", "memory", "output", "oscillator"] = "auto",
-    library: Annotated[str | list[str], Value(name="NAME|TERMS", read=_terms)] | None = None,
+    library: options.Terms | None = None,
     degree: int | None = None,
     symmetry: Literal["odd", "even"] | None = None,
     mass: float | None = None,
     damping: float | None = None,
     stiffness: float | None = None,
-    cross_validate: Annotated[
-        str | int,
-        Value(name="loo|K", words=("loo",), read=at_least(2), expected="loo or a number of blocks from 2 on"),
-    ]
-    | None = None,
+    cross_validate: options.Blocks | None = None,
     initial: Literal["auto", "free", "rest"] | None = None,
     seed: int = 0,
-    out: ModelOut | None = None,
-    plot: Picture | None = None,
+    out: options.ModelOut | None = None,
+    plot: options.Picture | None = None,
     json: bool = False,
 ) -> int:
     """Find the law of a memory by sparse regression (PySINDy) and free runs, and print it with its verdict.
@@ -385,7 +347,6 @@ def discover(
     hysim discover loop.csv --plot law.svg
     hysim discover test.csv --route oscillator --mass 2.5
     """
-    from hysim import discovery
     from hysim.models.storage import to_json
 
     values = {
@@ -394,11 +355,11 @@ def discover(
     }  # fmt: skip
     used: dict[str, Any] = {name: value for name, value in values.items() if value is not None}
     is_oscillator = _is_oscillator(route, used)
-    record = records.read(options, file)
+    record = records.read(settings, file)
     if is_oscillator:
-        result: Any = discovery.discover_oscillator(record, seed=seed, **used)
+        result: Any = hs.discover_oscillator(record, seed=seed, **used)
     else:
-        result = discovery.discover(record, seed=seed, route=route, **used)
+        result = hs.discover(record, seed=seed, route=route, **used)
     model = result.model
     files: dict[str | None, Any] = {
         out: lambda: to_json(model, units=record.units),

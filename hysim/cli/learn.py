@@ -5,21 +5,14 @@ import tempfile
 from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Literal, NamedTuple
+from typing import Annotated, Any, Literal, NamedTuple
 
 import click
 from click.shell_completion import BashComplete, FishComplete, ZshComplete
 
-from hysim.cli import outputs
-from hysim.cli.options import RESULT, Table, file, one_of
+import hysim as hs
+from hysim.cli import options, outputs
 from hysim.cli.records import STANDARD
-
-if TYPE_CHECKING:
-    import numpy as np
-
-    from hysim.paper.claims import Claim
-    from hysim.paper.study import Study
-    from hysim.records import Record
 
 SUCCESS, NOT_CONVERGED = 0, 1
 _SEED = 1
@@ -29,50 +22,40 @@ class Device(NamedTuple):
     """A device whose record is written: what it is, the record, and commands to try on the file."""
 
     what: str
-    record: "Callable[[], Record]"
+    record: "Callable[[], hs.Record]"
     tries: tuple[str, ...]
 
 
-def _piezo() -> "Record":
-    from hysim.datasets import table1
-
-    return table1(dwell=1.0)
-
-
-def _damper() -> "Record":
+def _damper() -> "hs.Record":
     """Cycles of growing amplitude on a steel damper, whose load cell has noise."""
     import numpy as np
 
-    import hysim
-
     phase = np.linspace(0.0, 2.0 * np.pi, 120, endpoint=False)
     u = np.concatenate([*(amplitude * np.sin(phase) for amplitude in (2.0, 4.0, 6.0, 8.0, 10.0, 10.0)), [0.0]])
-    law = hysim.BoucWen(A=1.0, beta=0.35, gamma=0.15, n=1.5, feedthrough=1.2, gain=18.0)
+    law = hs.BoucWen(A=1.0, beta=0.35, gamma=0.15, n=1.5, feedthrough=1.2, gain=18.0)
     noise = 0.1 * np.random.default_rng(_SEED).standard_normal(u.size)
     t = 0.1 * np.arange(float(u.size))
     units = {"t": "s", "u": "mm", "y": "kN"}
-    return hysim.Record(t=t, u=u, y=law.response(u) + noise, units=units, name="steel damper, simulated")
+    return hs.Record(t=t, u=u, y=law.response(u) + noise, units=units, name="steel damper, simulated")
 
 
-def _magnet() -> "Record":
+def _magnet() -> "hs.Record":
     """First-order reversal curves of relays with two bells of thresholds."""
     import numpy as np
 
-    import hysim
-
-    def density(up: "np.ndarray", down: "np.ndarray") -> "np.ndarray":
+    def density(up: Any, down: Any) -> Any:
         return np.asarray(np.exp(-((up + down) ** 2) / 800.0 - ((up - down - 80.0) ** 2) / 1800.0))
 
-    law = hysim.Preisach.from_density(np.linspace(-100.0, 100.0, 41), density)
-    u = hysim.signals.reversal_curves(-100.0, 100.0, curves=20, samples_per_step=2)
+    law = hs.Preisach.from_density(np.linspace(-100.0, 100.0, 41), density)
+    u = hs.signals.reversal_curves(-100.0, 100.0, curves=20, samples_per_step=2)
     y = law.response(u)
-    return hysim.Record(u=u, y=1.5 * y / np.abs(y).max(), units={"u": "kA/m", "y": "T"}, name="magnet, simulated")
+    return hs.Record(u=u, y=1.5 * y / np.abs(y).max(), units={"u": "kA/m", "y": "T"}, name="magnet, simulated")
 
 
 DEVICES = {
     "piezo": Device(
         "voltages and displacements measured on a piezo stack",
-        _piezo,
+        lambda: hs.datasets.table1(dwell=1.0),
         ("metrics {}", "identify {} --model polynomial-bouc-wen --plot fit.svg"),
     ),
     "damper": Device(
@@ -89,11 +72,11 @@ DEVICES = {
 """Devices that `--device` takes."""
 
 
-Kind = Annotated[str, one_of({name: device.what for name, device in DEVICES.items()})]
+Kind = Annotated[str, options.one_of({name: device.what for name, device in DEVICES.items()})]
 _SCRIPTS = {"bash": BashComplete, "zsh": ZshComplete, "fish": FishComplete}
 
 
-def example(path: Table | None = None, *, device: Kind = "piezo") -> int:
+def example(path: options.Table | None = None, *, device: Kind = "piezo") -> int:
     """Write a record as a file like one of your own.
 
     The piezo's 52 samples were measured for a paper of 2016, which prints no times: one second a sample is an
@@ -131,7 +114,7 @@ def example(path: Table | None = None, *, device: Kind = "piezo") -> int:
     return SUCCESS
 
 
-def explore(*, out: Annotated[str, file("PAGE.html", RESULT)] | None = None, no_browser: bool = False) -> int:
+def explore(*, out: options.Page | None = None, no_browser: bool = False) -> int:
     """Open a page with a choice of families and devices, whose loops follow sliders. It works offline.
 
     Parameters
@@ -183,7 +166,7 @@ def reproduce(*, out: str = "reproduction", quick: bool = False, page: bool = Fa
     return SUCCESS if all(fit.success for fit in study.fits.values()) else NOT_CONVERGED
 
 
-def _lines(study: "Study") -> Iterator[str]:
+def _lines(study: Any) -> Iterator[str]:
     comparison, loop = study.comparison, study.comparison.loop
     yield (
         f"Table 1: {len(comparison.record)} points, stroke {loop.stroke:.3f} um; the loop is {loop.max_width:.3f} um "
@@ -196,7 +179,7 @@ def _lines(study: "Study") -> Iterator[str]:
     yield f"sindy: {study.discovery.equation}  ({study.discovery.verdict})"
 
 
-def _verdicts(claims: "Sequence[Claim]") -> Iterator[str]:
+def _verdicts(claims: Sequence[Any]) -> Iterator[str]:
     """The number of claims with each verdict, and the verdicts on the two headline figures."""
     counts = Counter(claim.verdict for claim in claims)
     yield f"{len(claims)} claims: " + ", ".join(f"{number} {verdict}" for verdict, number in counts.most_common())

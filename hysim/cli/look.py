@@ -2,39 +2,15 @@
 
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import replace
-from typing import TYPE_CHECKING, Annotated, Any, Literal, NamedTuple
+from typing import Annotated, Any, Literal, NamedTuple
 
-from hysim.cli import models, outputs, records
-from hysim.cli.options import (
-    INPUT,
-    PRINTED,
-    Column,
-    ModelIn,
-    Picture,
-    RecordIn,
-    Result,
-    Table,
-    Value,
-    at_least,
-    file,
-    numbers,
-    one_of,
-    positive,
-)
-
-if TYPE_CHECKING:
-    from hysim._frozen import FloatArray
-    from hysim.files import FileColumn
-    from hysim.metrics import LoopMetrics
-    from hysim.plot import Figure
-    from hysim.records import Record
-    from hysim.simulation import Simulation
-    from hysim.vision import Displacement
+import hysim as hs
+from hysim.cli import models, options, outputs, records
 
 _MANY, _AMPLITUDES = 100, 50
 
 
-def columns(file: RecordIn, *, options: records.TextOptions, json: bool = False) -> int:
+def columns(file: options.RecordIn, *, settings: records.TextOptions, json: bool = False) -> int:
     """List the columns of a file, with units, numbers of samples and ranges.
 
     Their names and numbers are what --u, --y and --t take.
@@ -48,9 +24,7 @@ def columns(file: RecordIn, *, options: records.TextOptions, json: bool = False)
     hysim columns rig.mat
     hysim columns export.csv --encoding latin-1
     """
-    from hysim.files import list_columns
-
-    listed = list_columns(records.source_of(file), **options.for_load())
+    listed = hs.list_columns(records.source_of(file), **settings.for_load())
     width = max((len(column.name) for column in listed), default=0)
     lines = [
         f"{'' if column.number is None else column.number:>3}  {column.name:<{width}}  {_content(column)}"
@@ -61,7 +35,7 @@ def columns(file: RecordIn, *, options: records.TextOptions, json: bool = False)
     return 0
 
 
-def _content(column: "FileColumn") -> str:
+def _content(column: Any) -> str:
     if column.problem:
         return column.problem
     span = f"{column.lowest:.6g} to {column.highest:.6g} {column.unit}" if column.n_samples else "no values"
@@ -69,26 +43,15 @@ def _content(column: "FileColumn") -> str:
     return f"{column.n_samples} samples{missing}, {span.rstrip()}{', increases throughout' if column.increases else ''}"
 
 
-Cycles = Annotated[
-    int,
-    Value(
-        name="CYCLES",
-        read=lambda text: 0 if text == "all" else at_least(1)(text),
-        bare="all",
-        expected="a number of cycles, at least 1; the table needs the file before --cycles",
-    ),
-]
-
-
 def metrics(
-    file: RecordIn,
+    file: options.RecordIn,
     *,
-    options: records.RecordOptions,
-    cycles: Cycles = 1,
+    settings: records.RecordOptions,
+    cycles: options.Cycles = 1,
     tolerance: float | None = None,
-    out: Annotated[str | None, file("FILE", PRINTED)] = None,
-    csv: Result | None = None,
-    plot: Picture | None = None,
+    out: options.Copy | None = None,
+    csv: options.Result | None = None,
+    plot: options.Picture | None = None,
     json: bool = False,
 ) -> int:
     """Measure the loop of the input's last complete cycle, the average loop of the last few, or every cycle.
@@ -109,21 +72,19 @@ def metrics(
     hysim metrics damper.csv --cycles --csv cycles.csv
     hysim metrics loop.csv --from 2s --to 4s --plot loop.svg
     """
-    from hysim.metrics import cycle_metrics, loop_metrics
-
     if csv is not None and cycles:
         raise ValueError("--csv writes the table of every cycle: give --cycles without a number too")
-    record = records.read(options, file)
+    record = records.read(settings, file)
     accuracy = {} if tolerance is None else {"tolerance": tolerance}
     files: dict[str | None, Any] = {plot: lambda: outputs.loop(record)}
     measured: Any
     if cycles:
-        measured = loop_metrics(record.u, record.y, cycles=cycles, **accuracy)
+        measured = hs.loop_metrics(record.u, record.y, cycles=cycles, **accuracy)
         lines = [*_lines(measured, record.units)]
         lobes = [lobe._asdict() for lobe in measured.lobes]
         document = outputs.scalars(measured) | {"crossings": list(measured.crossings), "lobes": lobes}
     else:
-        measured = cycle_metrics(record.u, record.y, **accuracy)
+        measured = hs.cycle_metrics(record.u, record.y, **accuracy)
         lines = [measured.to_text(record.units)]
         document = {"cycles": measured.rows(), "level": measured.level, "energy_outside": measured.energy_outside}
         files[csv] = lambda: measured.to_csv(record.units)
@@ -137,7 +98,7 @@ def metrics(
     return 0
 
 
-def _lines(loop: "LoopMetrics", units: Mapping[str, str]) -> Iterator[str]:
+def _lines(loop: "hs.LoopMetrics", units: Mapping[str, str]) -> Iterator[str]:
     from hysim._printing import folded, quantity
 
     u, y = (units.get(signal, "") for signal in ("u", "y"))
@@ -170,22 +131,22 @@ def _lines(loop: "LoopMetrics", units: Mapping[str, str]) -> Iterator[str]:
         yield from folded(loop.sign_convention)
 
 
-def _step(record: "Record") -> Iterator[str]:
+def _step(record: "hs.Record") -> Iterator[str]:
     """The resolution that the outputs show, if none was given."""
     if record.resolution is None and (step := record.detect_resolution()) is not None:
         unit = record.units.get("y", "")
-        yield f"the output has steps of {f'{step:.6g} {unit}'.rstrip()}: --resolution {records.DETECT} takes them"
+        yield f"the output has steps of {f'{step:.6g} {unit}'.rstrip()}: --resolution detect takes them"
 
 
 class Contents(NamedTuple):
     """Contents of a picture: records, models by name, and their free runs over the input of the first record."""
 
-    measured: "list[Record]"
+    measured: "list[hs.Record]"
     laws: dict[str, Any]
-    simulated: "list[Simulation]"
+    simulated: "list[hs.Simulation]"
 
     @property
-    def results(self) -> "list[Record | Simulation]":
+    def results(self) -> "list[Any]":
         """Records, and the runs of models by their names."""
         named = zip(self.laws, self.simulated, strict=True)
         return [*self.measured, *(replace(run, name=name) for name, run in named)]
@@ -195,59 +156,60 @@ class Kind(NamedTuple):
     """A kind of picture: its description, its drawing, and bounds of the numbers of records and models."""
 
     shows: str
-    draw: "Callable[[Any, Figure, Contents], object]"
+    draw: Callable[[Any, Contents], object]
     records: tuple[int, int] = (1, _MANY)
     models: tuple[int, int] = (0, _MANY)
 
 
-def _history(plot: Any, canvas: "Figure", contents: Contents) -> None:
-    panels = plot.panels(canvas, 2)
+def _history(canvas: Any, contents: Contents) -> None:
+    panels = hs.plot.panels(canvas, 2)
     for result in contents.results:
-        plot.history(result, panels)
+        hs.plot.history(result, panels)
         panels[0].lines[-1].set_label(result.name)
     if len(contents.results) > 1:
         panels[0].legend()
 
 
-def _each(name: str) -> "Callable[[Any, Figure, Contents], None]":
+def _each(name: str) -> Callable[[Any, Contents], None]:
     """A drawing of every result in a panel of its own."""
 
-    def draw(plot: Any, canvas: "Figure", contents: Contents) -> None:
-        for result, ax in zip(contents.results, plot.panels(canvas, len(contents.results)), strict=True):
-            vars(plot)[name](result, ax)
+    def draw(canvas: Any, contents: Contents) -> None:
+        for result, ax in zip(contents.results, hs.plot.panels(canvas, len(contents.results)), strict=True):
+            vars(hs.plot)[name](result, ax)
             ax.set_title(result.name)
 
     return draw
 
 
-def _describing_function(plot: Any, canvas: "Figure", contents: Contents) -> None:
+def _describing_function(canvas: Any, contents: Contents) -> None:
     import numpy as np
 
     record = contents.measured[0]
     lowest, highest = float(record.u.min()), float(record.u.max())
     amplitudes = np.linspace(0.0, 0.5 * (highest - lowest), _AMPLITUDES + 1)[1:]
-    middle = 0.5 * (lowest + highest)
-    plot.describing_function(contents.laws, amplitudes, plot.panels(canvas, 2), mean=middle, units=record.units)
+    middle, axes = 0.5 * (lowest + highest), hs.plot.panels(canvas, 2)
+    hs.plot.describing_function(contents.laws, amplitudes, axes, mean=middle, units=record.units)
+
+
+def _residual_map(canvas: Any, contents: Contents) -> None:
+    hs.plot.residual_map(contents.measured[0], contents.simulated[0], canvas.subplots(1, 2, sharey=True))
 
 
 KINDS = {
-    "loop": Kind("output against input", lambda plot, canvas, c: plot.loop(*c.results, ax=canvas.add_subplot())),
+    "loop": Kind("output against input", lambda canvas, c: hs.plot.loop(*c.results, ax=canvas.add_subplot())),
     "history": Kind("output and input against time", _history),
     "width": Kind(
         "width of the last cycle against the input",
-        lambda plot, canvas, c: plot.width(*c.results, ax=canvas.add_subplot()),
+        lambda canvas, c: hs.plot.width(*c.results, ax=canvas.add_subplot()),
     ),
     "cycles": Kind("each cycle in a colour, from the first, dark, to the last, light", _each("cycles")),
     "minor-loops": Kind("each cycle as a loop, the smaller the darker", _each("minor_loops")),
     "residual-map": Kind(
-        "measured minus model over input and cycles; one file, one model",
-        lambda plot, canvas, c: plot.residual_map(c.measured[0], c.simulated[0], canvas.subplots(1, 2, sharey=True)),
-        records=(1, 1),
-        models=(1, 1),
+        "measured minus model over input and cycles; one file, one model", _residual_map, (1, 1), (1, 1)
     ),
     "forc": Kind(
         "density of relays, from first-order reversal curves; one file",
-        lambda plot, canvas, c: plot.forc(c.measured[0], canvas.add_subplot()),
+        lambda canvas, c: hs.plot.forc(c.measured[0], canvas.add_subplot()),
         records=(1, 1),
         models=(0, 0),
     ),
@@ -259,13 +221,13 @@ KINDS = {
 
 
 def plot(
-    file: RecordIn,
-    others: tuple[RecordIn, ...] = (),
+    file: options.RecordIn,
+    others: tuple[options.RecordIn, ...] = (),
     *,
-    options: records.RecordOptions,
-    kind: Annotated[str, one_of({name: kind.shows for name, kind in KINDS.items()})] = "loop",
-    model: tuple[ModelIn, ...] = (),
-    out: Picture,
+    settings: records.RecordOptions,
+    kind: Annotated[str, options.one_of({name: kind.shows for name, kind in KINDS.items()})] = "loop",
+    model: tuple[options.ModelIn, ...] = (),
+    out: options.Picture,
 ) -> int:
     """Draw records over each other, and the free run of models over the input of the first.
 
@@ -289,48 +251,32 @@ def plot(
             raise ValueError(f"--kind {kind} takes {number} {name}, got {len(paths)}")
     if [*files, *model].count(records.STANDARD) > 1:
         raise ValueError("the standard input holds one record or one model, not both: give files for the others")
-    from hysim import plot
-
-    measured = [records.read(options, path) for path in files]
+    measured = [records.read(settings, path) for path in files]
     read = {models.name_of(path): models.read(path) for path in model}
     runs = [models.simulated(law, measured[0], {**measured[0].units, **units}) for law, units in read.values()]
     laws = {name: law for name, (law, _) in read.items()}
     named = laws if len(laws) > 1 else {type(law).__name__: law for law in laws.values()}
     contents = Contents(measured, named, runs)
-    outputs.write({out: lambda: outputs.drawn(lambda canvas: chosen.draw(plot, canvas, contents))})
+    outputs.write({out: lambda: outputs.drawn(lambda canvas: chosen.draw(canvas, contents))})
     return 0
 
 
-Angle = Annotated[
-    float | str, Value(name="x|y|DEGREES", words=("x", "y"), read=float, expected="x, y or an angle in degrees")
-]
-Frame = Annotated[
-    int | str,
-    Value(
-        name="first|running|N",
-        words=("first", "running"),
-        read=at_least(0),
-        expected="first, running or the number of a frame",
-    ),
-]
-
-
 def measure(
-    frames: Annotated[str, file("FRAMES", INPUT)],
+    frames: Annotated[str, options.file("FRAMES", options.INPUT)],
     *,
     scale: float,
     unit: str = "um",
-    region: Annotated[tuple[int, int, int, int] | None, numbers("T,B,L,R", int)] = None,
-    direction: Angle | None = None,
-    reference: Frame = "first",
+    region: options.Region | None = None,
+    direction: options.Angle | None = None,
+    reference: options.Frame = "first",
     method: Literal["subpixel", "whole-pixel"] = "subpixel",
     frame_rate: float | None = None,
-    voltage: RecordIn | None = None,
-    u: Column | None = None,
-    t: Column | None = None,
+    voltage: options.RecordIn | None = None,
+    u: options.Column | None = None,
+    t: options.Column | None = None,
     on_lost: Literal["error", "drop"] = "error",
-    out: Table,
-    plot: Picture | None = None,
+    out: options.Table,
+    plot: options.Picture | None = None,
     json: bool = False,
 ) -> int:
     """Measure the displacement of the picture in each frame, to a fraction of a pixel, and write it as columns.
@@ -344,7 +290,7 @@ def measure(
     scale : length of a pixel [unit of y]
     unit : unit of the scale
     region : rows and columns of the moving part [pixel]
-    direction : direction of positive y (default: that of the motion)
+    direction : direction of options.positive y (default: that of the motion)
     reference : frame from which displacements are measured
     method : whether fractions of a pixel are measured
     frame_rate : frames per second: frame k is at the time k / frame rate [Hz]
@@ -368,42 +314,35 @@ def measure(
     """
     import numpy as np
 
-    from hysim.files import load
-    from hysim.vision import displacement
-
     if frame_rate is not None:
-        positive("--frame-rate", frame_rate)
+        options.positive("--frame-rate", frame_rate)
     if voltage is None and (u is not None or t is not None):
         raise ValueError("--u and --t are columns of a file with voltages: give --voltage FILE")
     if voltage is not None and u is None:
         raise ValueError("--voltage needs --u COLUMN")
-    log = None if voltage is None else load(voltage, u=u, y=u, t=t)
-    motion = displacement(
+    log = None if voltage is None else hs.load(voltage, u=u, y=u, t=t)
+    motion = hs.vision.displacement(
         frames, scale, region=region, direction=direction, reference=reference, method=method, unit=unit
     )
     times = None if frame_rate is None else np.arange(len(motion)) / frame_rate
     table, units = _table(motion, log, times, on_lost)
 
-    def picture() -> "Figure":
-        from hysim import plot
-
-        return outputs.drawn(lambda canvas: plot.displacement(motion, ax=canvas.add_subplot()))
-
-    files: outputs.Files = {out: lambda: outputs.table(out, table, units), plot: picture}
+    files: outputs.Files = {
+        out: lambda: outputs.table(out, table, units),
+        plot: lambda: outputs.drawn(lambda canvas: hs.plot.displacement(motion, ax=canvas.add_subplot())),
+    }
     outputs.write(files, motion.summary, lambda: _document(motion))
     return 0
 
 
-def _table(
-    motion: "Displacement", log: "Record | None", times: "FloatArray | None", on_lost: Any
-) -> "tuple[dict[str, FloatArray], dict[str, str]]":
+def _table(motion: Any, log: "hs.Record | None", times: Any, on_lost: Any) -> tuple[dict[str, Any], dict[str, str]]:
     """Columns and their units."""
     import numpy as np
 
     unit = motion.units["y"]
     quality = {"uncertainty": motion.uncertainty, "quality": motion.quality}
     units = {"t": "s", "y": unit, "uncertainty": unit}
-    columns: dict[str, FloatArray | None] = {"t": times, "y": motion.y, **quality}
+    columns: dict[str, Any] = {"t": times, "y": motion.y, **quality}
     if log is not None:
         record = motion.record(
             log.u,
@@ -420,7 +359,7 @@ def _table(
     return {name: values for name, values in columns.items() if values is not None}, units
 
 
-def _document(motion: "Displacement") -> dict[str, Any]:
+def _document(motion: Any) -> dict[str, Any]:
     import numpy as np
 
     measured = np.isfinite(motion.y)

@@ -5,13 +5,14 @@ import os
 import pkgutil
 import re
 import sys
+from collections.abc import Callable
 from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Annotated, Any, Literal, Protocol, runtime_checkable
 
-import hysim
+import hysim as hs
 from hysim._names import MODULE_OF
-from hysim.cli.options import INPUT, OWN, Count, Value
+from hysim.cli.options import INPUT, OWN, Count, Value, flag
 from hysim.cli.records import STANDARD
 from hysim.cli.words import suggestion
 
@@ -37,7 +38,7 @@ def names() -> list[str]:
     """Names of all families that can be compared without further arguments; loads every family."""
     from hysim.models.candidates import candidates
 
-    families = dict.fromkeys(name.split()[0] for name in candidates() if name.split()[0] in hysim.__all__)
+    families = dict.fromkeys(name.split()[0] for name in candidates() if name.split()[0] in hs.__all__)
     return [*map(_short, families)]
 
 
@@ -69,23 +70,16 @@ def _hyphenated(name: str) -> str:
 FORMS = f"name of a family, such as bouc-wen; MODEL.json; or {OWN}"
 """Values of an option for models."""
 
-ToCompare = Annotated[
-    str,
-    Value(
-        name="MODEL", role=INPUT, offers=_offered, help=FORMS, note=lambda: f"Names of models: {', '.join(names())}."
-    ),
-]
-ToIdentify = Annotated[
-    str,
-    Value(
-        name="MODEL",
-        role=INPUT,
-        offers=_offered,
-        help=FORMS,
-        note=lambda: f"Names of models: {', '.join(names_to_identify())}. A structure is a model in a file.",
-    ),
-]
-Law = Annotated[str, Value(name="MODEL", offers=_offered)]
+_NOTE = "A structure is a model in a file."
+
+
+def _named(note: Callable[[], str]) -> Value:
+    return Value("MODEL", role=INPUT, offers=_offered, help=FORMS, note=note)
+
+
+ToCompare = Annotated[str, _named(lambda: f"Names of models: {', '.join(names())}.")]
+ToIdentify = Annotated[str, _named(lambda: f"Names of models: {', '.join(names_to_identify())}. {_NOTE}")]
+Law = Annotated[str, Value("MODEL", offers=_offered)]
 
 
 @dataclass(kw_only=True)
@@ -169,7 +163,7 @@ def family(name: str) -> Any:
 
 def _public() -> dict[str, str]:
     """Names of classes by their names on the command line."""
-    return {_hyphenated(name): name for name in hysim.__all__ if name[0].isupper()} | _SHORT
+    return {_hyphenated(name): name for name in hs.__all__ if name[0].isupper()} | _SHORT
 
 
 def resolved(path: str) -> Any:
@@ -229,7 +223,7 @@ def to_identify(
 
     of_actuator, used = _used(actuator), _used(structure)
     if foreign := [*used] if name == "actuator" else [*of_actuator]:
-        raise ValueError(f"{_flag(foreign[0])} is no option of the model {name}")
+        raise ValueError(f"{flag(foreign[0])} is no option of the model {name}")
     if name == "actuator":
         return _actuator(actuator), initial
     model = model_or_family(name)
@@ -240,9 +234,9 @@ def to_identify(
     taken = {field.name: argument for field in fields(structure) if (argument := _argument(model, field.name))}
     if foreign := [each for each in used if each not in taken]:
         others = [each for each in names_to_identify() if _argument(family(each), foreign[0])]
-        raise ValueError(f"{_flag(foreign[0])} is no option of the model {name}, but of {', '.join(others)}")
+        raise ValueError(f"{flag(foreign[0])} is no option of the model {name}, but of {', '.join(others)}")
     if missing := [each for each in _NEEDED if each in taken and each not in used]:
-        raise ValueError(f"the model {name} needs {_flag(missing[0])}")
+        raise ValueError(f"the model {name} needs {flag(missing[0])}")
     arguments = {taken[each]: value == "yes" if each == "one_signed" else value for each, value in used.items()}
     if model is oscillator and initial is not None:
         arguments["initial"], initial = initial, None  # its structure says how the record begins
@@ -252,10 +246,6 @@ def to_identify(
 
 def _used(options: StructureOptions | ActuatorOptions) -> dict[str, Any]:
     return {name: value for name, value in vars(options).items() if value is not None and value is not False}
-
-
-def _flag(name: str) -> str:
-    return f"--{name.replace('_', '-')}"
 
 
 def _argument(model: Any, option: str) -> str | None:
@@ -268,7 +258,7 @@ def _argument(model: Any, option: str) -> str | None:
 
 def _actuator(options: ActuatorOptions) -> Any:
     """The structure of an actuator with these options."""
-    return hysim.Actuator.structure(
+    return hs.Actuator.structure(
         model_or_family(options.law or "bouc-wen"),
         creep=options.creep if options.creep_elements is None else options.creep_elements,
         modes=1 if options.modes is None else options.modes,
@@ -302,7 +292,7 @@ def name_of(path: str) -> str:
     return path.rpartition(":")[2] if is_import_path(path) else Path(path).stem
 
 
-def simulated(model: Any, record: "hysim.Record", units: dict[str, str]) -> "hysim.Simulation":
+def simulated(model: Any, record: "hs.Record", units: dict[str, str]) -> "hs.Simulation":
     """The model's free run over the record's input; a ValueError if it has no response, such as a controller."""
     from hysim.models.protocols import Responding
     from hysim.simulation import free_run

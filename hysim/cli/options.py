@@ -23,7 +23,8 @@ import re
 import types
 import typing
 from collections.abc import Callable, Iterable, Iterator, Mapping
-from dataclasses import dataclass
+from contextlib import suppress
+from dataclasses import KW_ONLY, dataclass
 from typing import Annotated, Any, Literal, NamedTuple
 
 import click
@@ -47,9 +48,9 @@ _HELP = {
 """Help of options whose docstring says nothing about them."""
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True)
 class Value:
-    """The value of an option: its name, how it is read, and the role of a file that it names.
+    """The value of an option: its name, how it is read, what is expected, and the role of a file that it names.
 
     `words` are taken as they are, and `bare` is the text if the value is left out. `offers` are what a shell completes
     beside files, `note` is a paragraph for the end of the help, and `help` stands for a docstring that says nothing.
@@ -58,8 +59,9 @@ class Value:
     name: str
     read: Callable[[str], Any] | None = str
     expected: str = ""
-    words: tuple[str, ...] = ()
     role: str = ""
+    _: KW_ONLY
+    words: tuple[str, ...] = ()
     bare: str | None = None
     offers: Callable[[], Iterable[str]] = tuple
     note: Callable[[], str] | None = None
@@ -69,11 +71,9 @@ class Value:
         """The value that a text stands for, or a default as it is."""
         if not isinstance(text, str) or text in self.words:
             return text
-        try:
+        with suppress(ValueError):
             if self.read is not None:
                 return self.read(text)
-        except ValueError:
-            pass
         near = suggestion(text, self.words)
         raise click.BadParameter(f"expected {self.expected}, got {text!r}{near and f': {near}'}")
 
@@ -101,14 +101,14 @@ def parameters(function: Callable[..., int]) -> Iterator[Parameter]:
 
 def call(function: Callable[..., int], values: Mapping[str, Any]) -> int:
     """Call the function of a command with the values of its options."""
-    hints = typing.get_type_hints(function)
-    groups = {name: hint for name, hint in hints.items() if dataclasses.is_dataclass(hint)}
-    own = {name: values[name] for name in inspect.signature(function).parameters if name not in groups}
-    filled = {
-        name: hint(**{field.name: values[field.name] for field in dataclasses.fields(hint)})
-        for name, hint in groups.items()
-    }
-    return function(**own, **filled)
+    arguments = {}
+    for name, hint in typing.get_type_hints(function).items():
+        if dataclasses.is_dataclass(hint):
+            build: Any = hint
+            arguments[name] = build(**{field.name: values[field.name] for field in dataclasses.fields(hint)})
+        elif name != "return":
+            arguments[name] = values[name]
+    return function(**arguments)
 
 
 def sections(subject: Any) -> dict[str, str]:
@@ -155,11 +155,12 @@ def _parameter(own: inspect.Parameter, title: str, text: str) -> Parameter:
         settings = {"is_flag": True}
     elif value.bare is not None:
         settings |= {"is_flag": False, "flag_value": value.bare, "metavar": f"[{value.name}]"}
-    option = click.Option([_flag(own.name), own.name], help=text, multiple=is_multiple, **settings)
+    option = click.Option([flag(own.name), own.name], help=text, multiple=is_multiple, **settings)
     return Parameter(option, value, text, title)
 
 
-def _flag(name: str) -> str:
+def flag(name: str) -> str:
+    """The option for an argument, such as ``--sample-time``."""
     return f"--{name.rstrip('_').replace('_', '-')}"
 
 
@@ -174,15 +175,13 @@ def _value(hint: Any) -> Value:
     if typing.get_origin(hint) is Annotated:
         value: Value = hint.__metadata__[0]
         return value
-    if typing.get_origin(hint) is Literal:
-        return one_of(dict.fromkeys(typing.get_args(hint), ""))
-    return _PLAIN[hint]
+    return one_of(dict.fromkeys(typing.get_args(hint), "")) if typing.get_origin(hint) is Literal else _PLAIN[hint]
 
 
 def one_of(words: Mapping[str, str]) -> Value:
     """Values that are one of some words, with what each stands for."""
     text = "; ".join(f"{word}: {meaning}" for word, meaning in words.items())
-    return Value(name=f"[{'|'.join(words)}]", read=None, words=(*words,), expected=", ".join(words), help=text)
+    return Value(f"[{'|'.join(words)}]", None, ", ".join(words), words=(*words,), help=text)
 
 
 def at_least(least: float, number: Callable[[str], Any] = int) -> Callable[[str], Any]:
@@ -196,32 +195,29 @@ def at_least(least: float, number: Callable[[str], Any] = int) -> Callable[[str]
     return read
 
 
-def numbers(form: str, number: Callable[[str], float] = float) -> Value:
-    """Values of numbers with the signs between them that a form has, such as ``LOW,HIGH`` or ``NAME=LOW:HIGH``."""
-    names, equals, values = form.rpartition("=")
-    separator = ":" if ":" in values else ","
+def of_form(form: str, number: Callable[[str], Any] = float) -> Callable[[str], Any]:
+    """A reader of numbers with the signs between them that a form has, such as ``LOW,HIGH`` or ``LOW:HIGH``."""
+    separator = ":" if ":" in form else ","
 
-    def read(text: str) -> Any:
-        name, _, rest = text.partition("=") if equals else ("", "", text)
-        parts = tuple(map(number, rest.split(separator)))
-        if len(parts) != len(values.split(separator)):
+    def read(text: str) -> tuple[Any, ...]:
+        parts = text.split(separator)
+        if len(parts) != len(form.split(separator)):
             raise ValueError(text)
-        content = parts[0] if len(parts) == 1 else parts
-        return (name, content) if names else content
+        return tuple(map(number, parts))
 
-    return Value(name=form, read=read, expected=f"{form} with numbers")
+    return read
 
 
-def named(form: str, read: Callable[[str], Any], example: str = "", separator: str = "=") -> Value:
+def named(form: str, read: Callable[[str], Any], more: str = "") -> Value:
     """Values of a name and a value of some other reader, in a form such as ``NAME=COLUMN``."""
 
     def read_both(text: str) -> tuple[str, Any]:
-        name, _, value = text.partition(separator)
+        name, _, value = text.partition("=")
         if not name or not value:
             raise ValueError(text)
         return name, read(value)
 
-    return Value(name=form, read=read_both, expected=form + example)
+    return Value(form, read_both, form + more)
 
 
 def positive(option: str, value: float) -> float:
@@ -233,7 +229,7 @@ def positive(option: str, value: float) -> float:
 
 def exclusive(**values: Any) -> None:
     """ValueError if more than one of some options is used."""
-    used = [_flag(name) for name, value in values.items() if value not in (None, False)]
+    used = [flag(name) for name, value in values.items() if value not in (None, False)]
     if len(used) > 1:
         raise ValueError(f"{' and '.join(used)} exclude each other: leave one of them out")
 
@@ -250,17 +246,10 @@ class Place(NamedTuple):
     unit: str
 
 
-def place(text: str) -> Place:
+def _place(text: str) -> Place:
     """A place in a record, such as ``100`` or ``2.5s``."""
     number, unit = re.fullmatch(r"(.*?)((?:[mun]?s)?)", text, re.DOTALL).groups()  # type: ignore[union-attr]
     return Place(float(number), unit) if unit else Place(at_least(0)(number), "")
-
-
-def _sensor(text: str) -> tuple[str, str | int]:
-    name, equals, key = text.partition("=")
-    if not name or (equals and not key):
-        raise ValueError(text)
-    return name, column(key) if equals else name
 
 
 def _degree(text: str) -> tuple[str, int]:
@@ -270,6 +259,13 @@ def _degree(text: str) -> tuple[str, int]:
     return channel, int(degree)
 
 
+def _sensor(text: str) -> tuple[str, str | int]:
+    name, equals, key = text.partition("=")
+    if not name or (equals and not key):
+        raise ValueError(text)
+    return name, column(key) if equals else name
+
+
 def _unit(text: str) -> tuple[str, str]:
     signal, equals, label = text.partition("=")
     if not equals or signal not in ("t", "u", "y"):
@@ -277,48 +273,59 @@ def _unit(text: str) -> tuple[str, str]:
     return signal, label
 
 
-def file(name: str, role: str) -> Value:
+def _terms(text: str) -> str | list[str]:
+    names = [name.strip() for name in text.split(",")]
+    return names if len(names) > 1 or "'" in text else text
+
+
+def file(name: str, role: str = RESULT, help_: str = "") -> Value:
     """Values that name a file."""
-    return Value(name=name, role=role)
+    return Value(name, role=role, help=help_)
 
 
 _PLAIN = {
-    str: Value(name="TEXT"),
-    bool: Value(name=""),
-    int: Value(name="N", read=int, expected="a whole number"),
-    float: Value(name="NUMBER", read=float, expected="a number without a unit"),
+    str: Value("TEXT"),
+    bool: Value(""),
+    int: Value("N", int, "a whole number"),
+    float: Value("NUMBER", float, "a number without a unit"),
 }
+_CYCLES = "a number of cycles, at least 1; the table needs the file before --cycles"
+_MODEL = f"model file as identify writes it, - for the standard input, or {OWN}"
+_RECORD = "text with one sample a line, NPZ, NPY, MAT or HDF5; or - for the standard input"
+_PLACE = "the number of a sample from 0, or a time with its unit such as 2.5s or 300ms"
 
-Column = Annotated[str | int, Value(name="COLUMN", read=column)]
-Count = Annotated[int, Value(name="COUNT", read=at_least(1), expected="a number from 1 on")]
-Pair = Annotated[tuple[float, float], numbers("LOW,HIGH")]
-Fixed = Annotated[tuple[str, float], numbers("NAME=VALUE")]
-Range = Annotated[tuple[str, tuple[float, float]], numbers("NAME=LOW:HIGH")]
-PlaceIn = Annotated[
-    Place,
-    Value(name="PLACE", read=place, expected="the number of a sample from 0, or a time with its unit such as 2.5s"),
-]
-Unit = Annotated[tuple[str, str], Value(name="SIGNAL=UNIT", read=_unit, expected="t=, u= or y= and a unit")]
+Column = Annotated[str | int, Value("COLUMN", column)]
+Count = Annotated[int, Value("COUNT", at_least(1), "a number from 1 on")]
+Pair = Annotated[tuple[float, float], Value("LOW,HIGH", of_form("LOW,HIGH"), "LOW,HIGH with numbers")]
+Mode = Annotated[tuple[float, float], Value("FREQUENCY,DAMPING", of_form("F,D"), "FREQUENCY,DAMPING with numbers")]
+Region = Annotated[tuple[int, int, int, int], Value("T,B,L,R", of_form("T,B,L,R", int), "T,B,L,R with numbers")]
+Fixed = Annotated[tuple[str, float], named("NAME=VALUE", float, " with numbers")]
+Range = Annotated[tuple[str, tuple[float, float]], named("NAME=LOW:HIGH", of_form("LOW:HIGH"), " with numbers")]
+PlaceIn = Annotated[Place, Value("PLACE", _place, _PLACE)]
+Unit = Annotated[tuple[str, str], Value("SIGNAL=UNIT", _unit, "t=, u= or y= and a unit")]
 Channel = Annotated[tuple[str, str | int], named("CHANNEL=COLUMN", column)]
 Depends = Annotated[tuple[str, tuple[str, int]], named("NAME=CHANNEL:DEGREE", _degree, ", such as gain=T:1")]
-Sensor = Annotated[
-    tuple[str, str | int], Value(name="SENSOR=COLUMN", read=_sensor, expected="SENSOR=COLUMN, or the name of both")
-]
+Sensor = Annotated[tuple[str, str | int], Value("SENSOR=COLUMN", _sensor, "SENSOR=COLUMN, or the name of both")]
+Quantum = Annotated[float | str, Value("QUANTUM", float, "a number or detect", words=("detect",))]
+Cycles = Annotated[int, Value("CYCLES", lambda text: 0 if text == "all" else at_least(1)(text), _CYCLES, bare="all")]
 Folds = Annotated[
-    str | int,
-    Value(name="loo|cycles|K", words=("loo", "cycles"), read=at_least(0), expected="loo, cycles or a number of blocks"),
+    str | int, Value("loo|cycles|K", at_least(0), "loo, cycles or a number of blocks", words=("loo", "cycles"))
 ]
-RecordIn = Annotated[
-    str,
-    Value(
-        name="FILE", role=INPUT, help="text with one sample a line, NPZ, NPY, MAT or HDF5; or - for the standard input"
-    ),
+Blocks = Annotated[str | int, Value("loo|K", at_least(2), "loo or a number of blocks from 2 on", words=("loo",))]
+Terms = Annotated[str | list[str], Value("NAME|TERMS", _terms)]
+Angle = Annotated[
+    float | Literal["x", "y"], Value("x|y|DEGREES", float, "x, y or an angle in degrees", words=("x", "y"))
 ]
-ModelIn = Annotated[
-    str,
-    Value(name="MODEL", role=INPUT, help=f"model file as identify writes it, - for the standard input, or {OWN}"),
+Frame = Annotated[
+    int | Literal["first", "running"],
+    Value("first|running|N", at_least(0), "first, running or the number of a frame", words=("first", "running")),
 ]
-Result = Annotated[str, file("FILE", RESULT)]
+RecordIn = Annotated[str, file("FILE", INPUT, _RECORD)]
+ModelIn = Annotated[str, file("MODEL", INPUT, _MODEL)]
+Result = Annotated[str, file("FILE")]
+Copy = Annotated[str, file("FILE", PRINTED)]
 Picture = Annotated[str, file("PICTURE.svg", PICTURE)]
 Table = Annotated[str, file("TABLE.csv", TABLE)]
 ModelOut = Annotated[str, file("MODEL.json", MODEL)]
+Page = Annotated[str, file("PAGE.html")]
+Source = Annotated[str, file("MODEL.c")]

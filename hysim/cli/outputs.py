@@ -7,19 +7,15 @@ import os
 import sys
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import click
 
+import hysim as hs
 from hysim._atomic import write_all
 from hysim.cli.options import INPUT, MODEL, PICTURE, PRINTED, TABLE
 from hysim.cli.records import STANDARD
 from hysim.cli.words import in_shell_words
-
-if TYPE_CHECKING:
-    from hysim._frozen import FloatArray
-    from hysim.plot import Figure
-    from hysim.simulation import Simulation
 
 Files = Mapping[str | None, Callable[[], Any]]
 """Functions of the contents of files, which are texts, bytes or figures, by the paths; None stands for no file."""
@@ -95,12 +91,10 @@ def write(
         print(contents[STANDARD].decode(), end="", flush=True)
 
 
-def _encoded(path: str, content: "str | bytes | Figure") -> bytes:
+def _encoded(path: str, content: Any) -> bytes:
     if isinstance(content, str | bytes):
         return content.encode() if isinstance(content, str) else content
-    from hysim import plot
-
-    return plot.to_bytes(content, "svg" if path == STANDARD else Path(path).suffix[1:].lower(), name="picture")
+    return hs.plot.to_bytes(content, "svg" if path == STANDARD else Path(path).suffix[1:].lower(), name="picture")
 
 
 def printed(text: Callable[[], str], document: Callable[[], Mapping[str, Any]] | None) -> str:
@@ -142,7 +136,7 @@ def fields_of(result: Any, names: Iterable[str]) -> dict[str, Any]:
     return {name: vars(result)[name] for name in names}
 
 
-def table(path: str, columns: Mapping[str, "FloatArray"], units: Mapping[str, str]) -> bytes:
+def table(path: str, columns: Mapping[str, Any], units: Mapping[str, str]) -> bytes:
     """Columns in the format of their path's ending; the standard output gets comma-separated text.
 
     A ValueError is raised if the ending is unknown, or its format needs an extra.
@@ -153,26 +147,21 @@ def table(path: str, columns: Mapping[str, "FloatArray"], units: Mapping[str, st
     return packed(columns, "output.csv" if path == STANDARD else path, notes)
 
 
-def drawn(draw: "Callable[[Figure], object]", width: float = 6.0, height: float = 4.0) -> "Figure":
+def drawn(draw: Callable[[Any], object], width: float = 6.0, height: float = 4.0) -> Any:
     """A figure in the house style, which a function has drawn on."""
-    from hysim import plot
-
-    with plot.house_style():
-        canvas = plot.figure(width, height)
+    with hs.plot.house_style():
+        canvas = hs.plot.figure(width, height)
         draw(canvas)
     return canvas
 
 
-def loop(*results: Any) -> "Figure":
+def loop(*results: Any) -> Any:
     """Picture of loops over each other: of records, simulations, and models and fits on the record before them."""
-    from hysim import plot
-
-    return drawn(lambda canvas: plot.loop(*results, ax=canvas.add_subplot()))
+    return drawn(lambda canvas: hs.plot.loop(*results, ax=canvas.add_subplot()))
 
 
-def picture_of(run: "Simulation") -> "Figure":
+def picture_of(run: "hs.Simulation") -> Any:
     """Picture of a simulation: the loops of a structure's elements, or the loop of output against input."""
-    from hysim import plot
     from hysim.simulation import has_elements
 
     if not has_elements(run):
@@ -180,7 +169,7 @@ def picture_of(run: "Simulation") -> "Figure":
     n = run.signals["drift"].shape[1]
     columns, rows = min(n, _LOOPS_IN_A_ROW), math.ceil(n / _LOOPS_IN_A_ROW)
     return drawn(
-        lambda canvas: plot.element_loops(run, plot.panels(canvas, n, columns=columns, sharex=False)),
+        lambda canvas: hs.plot.element_loops(run, hs.plot.panels(canvas, n, columns=columns, sharex=False)),
         width=3.0 * columns + 1.0,
         height=3.0 * rows,
     )

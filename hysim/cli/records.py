@@ -5,26 +5,18 @@ import os
 import sys
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from typing import Any, Literal
 
+import hysim as hs
 from hysim._prefixes import power_of_ten
-from hysim.cli.options import Channel, Column, Count, Place, PlaceIn, RecordIn, Sensor, Unit, Value, exclusive, positive
-
-if TYPE_CHECKING:
-    from hysim._frozen import FloatArray
-    from hysim.plants.structures.records import StructureRecord
-    from hysim.records import Record
+from hysim.cli import options
 
 STANDARD = "-"
 """Stands for the standard input or output."""
 
-DETECT = "detect"
-"""Stands for the resolution that the outputs show."""
-
 _DELIMITERS = {"tab": "\t", "semicolon": ";", "comma": ",", "blank": " "}
 _ROUNDING = 1e-9  # of the record's time: 0.3 s is found among times that were added up
 _OF_NODES, _OF_ELEMENTS = ("displacement", "velocity", "acceleration"), ("drift", "force")
-Quantum = Annotated[float | str, Value(name="QUANTUM", words=(DETECT,), read=float, expected=f"a number or {DETECT}")]
 
 
 @dataclass(kw_only=True)
@@ -71,19 +63,19 @@ class InputOptions(TextOptions):
     every : use each N-th of these samples only: a turn between two of them is lost
     """
 
-    u: Column | None = None
-    t: Column | None = None
+    u: options.Column | None = None
+    t: options.Column | None = None
     no_t: bool = False
     sample_time: float | None = None
     on_missing: Literal["error", "drop"] = "error"
-    resolution: Quantum | None = None
-    unit: tuple[Unit, ...] = ()
-    from_: PlaceIn | None = None
-    to: PlaceIn | None = None
-    every: Count | None = None
+    resolution: options.Quantum | None = None
+    unit: tuple[options.Unit, ...] = ()
+    from_: options.PlaceIn | None = None
+    to: options.PlaceIn | None = None
+    every: options.Count | None = None
 
     def __post_init__(self) -> None:
-        exclusive(t=self.t, no_t=self.no_t)
+        options.exclusive(t=self.t, no_t=self.no_t)
 
 
 @dataclass(kw_only=True)
@@ -98,8 +90,8 @@ class RecordOptions(InputOptions):
         linearly at the times of the output
     """
 
-    y: Column | None = None
-    y_file: RecordIn | None = None
+    y: options.Column | None = None
+    y_file: options.RecordIn | None = None
 
 
 @dataclass(kw_only=True)
@@ -115,21 +107,21 @@ class WeighedOptions(RecordOptions):
         acceleration_2=roof (default: the structure's own output, in the column --y)
     """
 
-    weights: Column | None = None
-    channel: tuple[Channel, ...] = ()
-    sensor: tuple[Sensor, ...] = ()
+    weights: options.Column | None = None
+    channel: tuple[options.Channel, ...] = ()
+    sensor: tuple[options.Sensor, ...] = ()
 
 
-def read(options: InputOptions, path: str, *, uncut: bool = False) -> "Record":
-    """The record that the options describe in a file; without an output column, y is u.
+def read(settings: InputOptions, path: str, *, uncut: bool = False) -> "hs.Record":
+    """The record that the settings describe in a file; without an output column, y is u.
 
     With `uncut` all samples are used, whatever `--from`, `--to` and `--every` say.
     """
-    return _read(options, path, source_of(path), uncut=uncut)
+    return _read(settings, path, source_of(path), uncut=uncut)
 
 
-def read_input(options: InputOptions, path: str, *, of_the_ground: bool) -> "Record":
-    """The input that the options describe, as a record with y = u.
+def read_input(settings: InputOptions, path: str, *, of_the_ground: bool) -> "hs.Record":
+    """The input that the settings describe, as a record with y = u.
 
     A ground motion in m/s^2 is read from an AT2 file, and with `of_the_ground` from a file that has no column u where
     none is named.
@@ -137,35 +129,35 @@ def read_input(options: InputOptions, path: str, *, of_the_ground: bool) -> "Rec
     from hysim.files import column_names, is_at2
 
     source = _repeatable(path)
-    if is_at2(source(), options.encoding):
-        if options.u is not None or options.t is not None or options.no_t:
+    if is_at2(source(), settings.encoding):
+        if settings.u is not None or settings.t is not None or settings.no_t:
             raise ValueError(f"{path} is an AT2 file, which has no columns: leave out --u, --t and --no-t")
-        return cut(_ground_motion(options, source), options)
-    if of_the_ground and options.u is None and not options.no_t:
+        return cut(_ground_motion(settings, source), settings)
+    if of_the_ground and settings.u is None and not settings.no_t:
         try:
-            names = column_names(source(), **options.for_load())
+            names = column_names(source(), **settings.for_load())
         except ValueError:
             names = ()  # a list, or a fault that is named where the file is read
         if "u" not in names:
-            return cut(_ground_motion(options, source), options)
-    if options.u is None:
-        options.u = _only_column(options, source(), "u")
-    return _read(options, path, source())
+            return cut(_ground_motion(settings, source), settings)
+    if settings.u is None:
+        settings.u = _only_column(settings, source(), "u")
+    return _read(settings, path, source())
 
 
-def read_with_weights(options: WeighedOptions, path: str) -> "tuple[Record, FloatArray | None]":
-    """The record that the options describe, and the column of weights that they name.
+def read_with_weights(settings: WeighedOptions, path: str) -> "tuple[hs.Record, Any]":
+    """The record that the settings describe, and the column of weights that they name.
 
     Columns of sensors are channels of the record, the first of them the output unless another one is named.
     """
-    if options.sensor and options.y is None:
-        options.y = options.sensor[0][1]
-    options.channel += options.sensor
-    if options.weights is None:
-        return read(options, path), None
+    if settings.sensor and settings.y is None:
+        settings.y = settings.sensor[0][1]
+    settings.channel += settings.sensor
+    if settings.weights is None:
+        return read(settings, path), None
     source = _repeatable(path)
-    weights = _read(replace(options, y=options.weights, resolution=None), path, source()).y
-    return _read(options, path, source()), weights
+    weights = _read(replace(settings, y=settings.weights, resolution=None), path, source()).y
+    return _read(settings, path, source()), weights
 
 
 def source_of(path: str) -> Any:
@@ -175,13 +167,13 @@ def source_of(path: str) -> Any:
     return sys.stdin.buffer if isinstance(sys.stdin, io.TextIOWrapper) else sys.stdin
 
 
-def cut(record: "Record", options: InputOptions) -> "Record":
-    """The part of the record that the options name; a ValueError if fewer than two samples are in it."""
-    used = {"--from": options.from_, "--to": options.to, "--every": options.every}
+def cut(record: "hs.Record", settings: InputOptions) -> "hs.Record":
+    """The part of the record that the settings name; a ValueError if fewer than two samples are in it."""
+    used = {"--from": settings.from_, "--to": settings.to, "--every": settings.every}
     names = [name for name, value in used.items() if value is not None]
     if not names:
         return record
-    part = slice(_sample(record, options.from_, "--from"), _sample(record, options.to, "--to"), options.every)
+    part = slice(_sample(record, settings.from_, "--from"), _sample(record, settings.to, "--to"), settings.every)
     n = len(range(*part.indices(len(record))))
     if n < 2:
         t, unit = record.t, record.units.get("t", "")
@@ -192,7 +184,7 @@ def cut(record: "Record", options: InputOptions) -> "Record":
     return record[part]
 
 
-def _sample(record: "Record", place: Place | None, option: str) -> int | None:
+def _sample(record: "hs.Record", place: options.Place | None, option: str) -> int | None:
     """The number of the first sample at or after a place."""
     import numpy as np
 
@@ -205,17 +197,14 @@ def _sample(record: "Record", place: Place | None, option: str) -> int | None:
     return int(np.searchsorted(record.t, place.value * seconds - tolerance))
 
 
-def of_structure(structure: Any, record: "Record", columns: Mapping[str, Any]) -> "StructureRecord":
+def of_structure(structure: Any, record: "hs.Record", columns: Mapping[str, Any]) -> "hs.StructureRecord":
     """The record of a structure, with the channels of these names as its sensors.
 
     A ValueError is raised if the model is no structure, a name is none of its signals, or the record has no time.
     """
     import numpy as np
 
-    from hysim.plants.structures.records import StructureRecord
-    from hysim.plants.structures.structure import Structure
-
-    if not isinstance(structure, Structure):
+    if not isinstance(structure, hs.Structure):
         name = structure.__name__ if isinstance(structure, type) else type(structure).__name__
         raise ValueError(f"--sensor is for structures in a file, got a {name}: name its output by --y")
     if record.t is None:
@@ -235,26 +224,23 @@ def of_structure(structure: Any, record: "Record", columns: Mapping[str, Any]) -
             raise ValueError(f"the structure has no signal {name!r}: its signals are {known}")
         signal, k = places[name]
         signals.setdefault(signal, np.full((len(record), sizes[signal]), np.nan))[:, k] = record.channel(name)
-    return StructureRecord(t=record.t, u=record.u, name=record.name, **signals)
+    return hs.StructureRecord(t=record.t, u=record.u, name=record.name, **signals)
 
 
-def _ground_motion(options: InputOptions, source: Callable[[], Any]) -> "Record":
+def _ground_motion(settings: InputOptions, source: Callable[[], Any]) -> "hs.Record":
     """A ground motion; a step is that of a list without times, or new even steps for one with times."""
-    from hysim.files import load_ground_motion
-    from hysim.records import Record
-
-    arguments = {"t": options.t, "units": dict(options.unit).get("u"), **options.for_load()}
+    arguments = {"t": settings.t, "units": dict(settings.unit).get("u"), **settings.for_load()}
     del arguments["thousands"]
-    step = None if options.sample_time is None else positive("--sample-time", options.sample_time)
+    step = None if settings.sample_time is None else options.positive("--sample-time", settings.sample_time)
     has_times = True
     try:
-        t, acceleration = load_ground_motion(source(), **arguments)
+        t, acceleration = hs.load_ground_motion(source(), **arguments)
     except ValueError:
         if step is None:
             raise
         has_times = False
-        t, acceleration = load_ground_motion(source(), sample_time=step, **arguments)
-    motion = Record(t=t, u=acceleration, y=acceleration, units={"t": "s", "u": "m/s^2"})
+        t, acceleration = hs.load_ground_motion(source(), sample_time=step, **arguments)
+    motion = hs.Record(t=t, u=acceleration, y=acceleration, units={"t": "s", "u": "m/s^2"})
     return motion.resample(step) if step is not None and has_times else motion
 
 
@@ -277,59 +263,49 @@ def _repeatable(path: str) -> Callable[[], Any]:
     return begin
 
 
-def _read(options: InputOptions, path: str, source: Any, *, uncut: bool = False) -> "Record":
+def _read(settings: InputOptions, path: str, source: Any, *, uncut: bool = False) -> "hs.Record":
     import numpy as np
 
-    u = "u" if options.u is None else options.u
-    step = None if options.sample_time is None else positive("--sample-time", options.sample_time)
-    if isinstance(options, RecordOptions) and options.y_file is not None:
-        record = _from_two_files(options, path, source, options.y_file)
-    elif isinstance(options, RecordOptions):
-        if u == ("y" if options.y is None else options.y):
+    u = "u" if settings.u is None else settings.u
+    step = None if settings.sample_time is None else options.positive("--sample-time", settings.sample_time)
+    if isinstance(settings, RecordOptions) and settings.y_file is not None:
+        record = _from_two_files(settings, path, source, settings.y_file)
+    elif isinstance(settings, RecordOptions):
+        if u == ("y" if settings.y is None else settings.y):
             raise ValueError(f"the input and the output are both the column {u}: name them by --u and --y")
-        record = _loaded(options, path, source, options.u, options.y)
+        record = _loaded(settings, path, source, settings.u, settings.y)
     else:
-        record = _loaded(options, path, source, u, u)
+        record = _loaded(settings, path, source, u, u)
     if step is not None and record.t is None:
         record, step = replace(record, t=step * np.arange(float(len(record)))), None
-    record = record if uncut else cut(record, options)
+    record = record if uncut else cut(record, settings)
     return record if step is None else record.resample(step)
 
 
-def _loaded(options: InputOptions, path: str, source: Any, u: Any, y: Any, **settings: Any) -> "Record":
-    from hysim.files import load
-
-    record: Record = load(
-        source,
-        u=u,
-        y=y,
-        t=False if options.no_t else options.t,
-        units=dict(options.unit),
-        name="record" if path == STANDARD else None,
-        on_missing=options.on_missing,
-        channels=dict(options.channel) or None if isinstance(options, WeighedOptions) else None,
-        **{"resolution": options.resolution, **settings},
-        **options.for_load(),
-    )
-    return record
+def _loaded(settings: InputOptions, path: str, source: Any, u: Any, y: Any, **changed: Any) -> "hs.Record":
+    channels = dict(settings.channel) if isinstance(settings, WeighedOptions) else {}
+    arguments = {
+        "t": False if settings.no_t else settings.t, "units": dict(settings.unit), "on_missing": settings.on_missing,
+        "name": "record" if path == STANDARD else None, "channels": channels or None,
+        "resolution": settings.resolution, **settings.for_load(), **changed,
+    }  # fmt: skip
+    return hs.load(source, u=u, y=y, **arguments)
 
 
-def _from_two_files(options: RecordOptions, path: str, source: Any, y_file: str) -> "Record":
+def _from_two_files(settings: RecordOptions, path: str, source: Any, y_file: str) -> "hs.Record":
     """The record of an input in one file and an output in another; a file's only column need not be named."""
-    from hysim.files import join_records
-
     first, second = _repeatable(path) if path == STANDARD else lambda: source, _repeatable(y_file)
-    u = _only_column(options, first(), "u") if options.u is None else options.u
-    y = _only_column(options, second(), "y") if options.y is None else options.y
-    drive = _loaded(options, path, first(), u, u, resolution=None)
-    return join_records(drive, _loaded(options, y_file, second(), y, y))
+    u = _only_column(settings, first(), "u") if settings.u is None else settings.u
+    y = _only_column(settings, second(), "y") if settings.y is None else settings.y
+    drive = _loaded(settings, path, first(), u, u, resolution=None)
+    return hs.join_records(drive, _loaded(settings, y_file, second(), y, y))
 
 
-def _only_column(options: InputOptions, source: Any, name: str) -> str:
+def _only_column(settings: InputOptions, source: Any, name: str) -> str:
     """This name, or that of the only column beside the time; a ValueError if there are several others."""
     from hysim.files import column_names
 
-    others = [each for each in column_names(source, **options.for_load()) if each not in ("t", options.t)]
+    others = [each for each in column_names(source, **settings.for_load()) if each not in ("t", settings.t)]
     if name in others or not others:
         return name
     if len(others) > 1:

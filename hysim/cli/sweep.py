@@ -13,33 +13,29 @@ import tomllib
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Literal, NamedTuple
+from typing import Annotated, Any, Literal, NamedTuple
 
+import hysim as hs
 from hysim._versions import optional
-from hysim.cli import models, outputs
-from hysim.cli.options import INPUT, RESULT, Picture, Result, exclusive, file
+from hysim.cli import models, options, outputs
 from hysim.cli.records import STANDARD
-
-if TYPE_CHECKING:
-    from hysim.plot import Figure
-    from hysim.sweeps import Sweep
 
 SUCCESS, SOME_FAILED = 0, 1
 _SPACES = ("grid", "list", "sample")
 
 
 def sweep(
-    study: Annotated[str | None, file("STUDY.toml", INPUT)] = None,
+    study: Annotated[str, options.file("STUDY.toml", options.INPUT)] | None = None,
     *,
-    out: Annotated[str | None, file("RESULTS.sqlite", RESULT)] = None,
+    out: Annotated[str, options.file("RESULTS.sqlite")] | None = None,
     resume: bool = False,
     on_change: Literal["error", "keep", "restart"] = "error",
     processes: bool = False,
     dask: str | None = None,
     workers: int | None = None,
-    show: Annotated[str | None, file("DATABASE", INPUT)] = None,
-    csv: Result | None = None,
-    plot: Picture | None = None,
+    show: Annotated[str, options.file("DATABASE", options.INPUT)] | None = None,
+    csv: options.Result | None = None,
+    plot: options.Picture | None = None,
     of: str | None = None,
     json: bool = False,
 ) -> int:
@@ -77,15 +73,13 @@ def sweep(
     hysim sweep study.toml --out rows.sqlite --resume
     hysim sweep --show rows.sqlite
     """
-    from hysim import sweeps
-
-    exclusive(processes=processes, dask=dask)
+    options.exclusive(processes=processes, dask=dask)
     if out == STANDARD:
         raise ValueError("the rows are kept in a database: give --out a file")
     if show is not None:
         if study or out:
             raise ValueError("--show takes a database and computes nothing: leave the study and --out out")
-        result = sweeps.load_sweep(show)
+        result = hs.load_sweep(show)
     else:
         if not study:
             raise ValueError("give a study, such as study.toml, and --out RESULTS.sqlite, or --show RESULTS.sqlite")
@@ -96,7 +90,7 @@ def sweep(
         task, space, seed, files = read(study)
         outputs.keep(files, [out, csv, plot])
         with _executor(dask, processes) as executor:
-            result = sweeps.sweep(
+            result = hs.sweep(
                 task, space, executor=executor, store=out, seed=seed, workers=workers, on_change=on_change
             )
     pictures: outputs.Files = {csv: result.to_csv, plot: lambda: _picture(result, of)}
@@ -114,7 +108,7 @@ def _executor(dask: str | None, processes: bool) -> Iterator[Any]:
         yield client
 
 
-def _document(result: "Sweep") -> dict[str, Any]:
+def _document(result: "hs.Sweep") -> dict[str, Any]:
     import numpy as np
 
     finite = {name: values[np.isfinite(values)] for name, values in result.outputs.items()}
@@ -132,13 +126,11 @@ def _document(result: "Sweep") -> dict[str, Any]:
     }
 
 
-def _picture(result: "Sweep", output: str | None) -> "Figure":
-    from hysim import plot
-
+def _picture(result: "hs.Sweep", output: str | None) -> Any:
     name = output or next(iter(result.outputs), None)
     if name is None or name not in result.outputs:
         raise ValueError(f"no output {name!r} to draw: there are {', '.join(result.outputs) or 'none'}")
-    return outputs.drawn(lambda canvas: plot.parallel_coordinates(result, name, ax=canvas.add_subplot()))
+    return outputs.drawn(lambda canvas: hs.plot.parallel_coordinates(result, name, ax=canvas.add_subplot()))
 
 
 class Study(NamedTuple):
@@ -203,20 +195,18 @@ def _function(text: str, folder: Path) -> Any:
 
 
 def _response(table: Mapping[str, Any], folder: Path) -> Any:
-    import hysim
-
     _check(table, {"law", "record", "u", "y", "measure"}, "[response]")
     name = table["law"]
     is_file = name.endswith(".json") or (folder / name).is_file()
     if not is_file and models.is_import_path(name):
         raise ValueError(f"law takes a family or a file, got {name!r}: a law of your own is code, which a task can use")
-    law = hysim.load_model(folder / name) if is_file else models.family(name)
+    law = hs.load_model(folder / name) if is_file else models.family(name)
     if table["record"] == "table1":
-        record = hysim.datasets.table1()
+        record = hs.datasets.table1()
     else:
-        record = hysim.load(folder / table["record"], u=table.get("u"), y=table.get("y"))
+        record = hs.load(folder / table["record"], u=table.get("u"), y=table.get("y"))
     measure = table.get("measure", "rmse")
-    return hysim.response_task(law, record.u, record.y if measure in ("rmse", "sse") else None, measure)
+    return hs.response_task(law, record.u, record.y if measure in ("rmse", "sse") else None, measure)
 
 
 def _space(kind: str, content: Any) -> Any:
@@ -224,11 +214,9 @@ def _space(kind: str, content: Any) -> Any:
         return {name: _values(values) for name, values in content.items()}
     if kind == "list":
         return content
-    from hysim.sweeps import Sample
-
     _check(content, {"n", "method", "seed", "distributions"}, "[sample]")
     distributions = {name: _distribution(value) for name, value in content["distributions"].items()}
-    return Sample(**{**content, "distributions": distributions})
+    return hs.Sample(**{**content, "distributions": distributions})
 
 
 def _values(values: Any) -> Any:

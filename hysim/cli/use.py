@@ -3,21 +3,9 @@
 from pathlib import Path
 from typing import Annotated, Any, Literal, Protocol, runtime_checkable
 
+import hysim as hs
 from hysim._atomic import write_all
-from hysim.cli import models, outputs, records
-from hysim.cli.options import (
-    INPUT,
-    RESULT,
-    ModelIn,
-    Pair,
-    Picture,
-    RecordIn,
-    Table,
-    Unit,
-    Value,
-    file,
-    positive,
-)
+from hysim.cli import models, options, outputs, records
 
 
 @runtime_checkable
@@ -28,12 +16,12 @@ class _Shaken(Protocol):
 
 
 def simulate(
-    model: ModelIn,
-    file: RecordIn,
+    model: options.ModelIn,
+    file: options.RecordIn,
     *,
-    options: records.InputOptions,
-    out: Table | None = None,
-    plot: Picture | None = None,
+    settings: records.InputOptions,
+    out: options.Table | None = None,
+    plot: options.Picture | None = None,
     json: bool = False,
 ) -> int:
     """Simulate a model in free run, and write its signals as columns.
@@ -62,8 +50,8 @@ def simulate(
         raise ValueError(f"the model stands before the record: hysim simulate {file} {model}")
     law, units = models.read(model)
     of_the_ground = isinstance(law, _Shaken) and law.excitation == "base"
-    record = records.read_input(options, file, of_the_ground=of_the_ground)
-    units |= dict(options.unit) | {signal: unit for signal, unit in record.units.items() if signal != "y"}
+    record = records.read_input(settings, file, of_the_ground=of_the_ground)
+    units |= dict(settings.unit) | {signal: unit for signal, unit in record.units.items() if signal != "y"}
     simulation = models.simulated(law, record, units)
     columns, named = simulation.columns, [item for item in simulation.signals.items() if item[0] in units]
     labels = {column: units[name] for name, values in named for column in columns_of(name, values)}
@@ -81,13 +69,13 @@ def simulate(
 
 
 def page(
-    model: ModelIn,
+    model: options.ModelIn,
     *,
-    out: Annotated[str, file("PAGE.html", RESULT)],
-    data: Annotated[str | None, file("FILE", INPUT)] = None,
-    between: Pair | None = None,
+    out: options.Page,
+    data: options.RecordIn | None = None,
+    between: options.Pair | None = None,
     title: str | None = None,
-    options: records.RecordOptions,
+    settings: records.RecordOptions,
 ) -> int:
     """Write a page on which the loop of a law follows sliders, one HTML file that works offline.
 
@@ -105,13 +93,11 @@ def page(
     hysim page law.json --out law.html
     hysim page law.json --data loop.csv --out law.html
     """
-    from hysim.export import to_page
-
     _one_standard_input(model, data)
     law, units = models.read(model)
-    record = None if data is None else records.read(options, data)
-    units |= ({} if record is None else dict(record.units)) | dict(options.unit)
-    to_page(law, out, record, between=between, units=units, title=title)
+    record = None if data is None else records.read(settings, data)
+    units |= ({} if record is None else dict(record.units)) | dict(settings.unit)
+    hs.to_page(law, out, record, between=between, units=units, title=title)
     return 0
 
 
@@ -121,9 +107,9 @@ def _one_standard_input(model: str, record: str | None) -> None:
 
 
 def c(
-    model: ModelIn,
+    model: options.ModelIn,
     *,
-    out: Annotated[str, file("MODEL.c", RESULT)],
+    out: options.Source,
     inverse: bool = False,
     sample_time: float | None = None,
     u0: float = 0.0,
@@ -145,16 +131,14 @@ def c(
     hysim c law.json --out law.c
     hysim c law.json --inverse --out inverse.c
     """
-    from hysim.export import to_c
-
     path = Path(out)
     if path.suffix != ".c":
         raise ValueError(f"--out is a C source, and its header stands beside it: call the file .c, got {out}")
     paths = {end: str(path.with_name(path.stem + end)) for end in (".h", ".c", "_main.c")}
     outputs.keep([model], paths.values())
     law, _ = models.read(model)
-    step = None if sample_time is None else positive("--sample-time", sample_time)
-    code = to_c(_inverse(law) if inverse else law, step, name=path.stem, u0=u0)
+    step = None if sample_time is None else options.positive("--sample-time", sample_time)
+    code = hs.to_c(hs.InverseFeedforward(law=law) if inverse else law, step, name=path.stem, u0=u0)
     texts = {".h": code.header, ".c": code.source, "_main.c": code.main}
     write_all({paths[end]: text for end, text in texts.items()})
     print(f"wrote {', '.join(paths.values())}; a program that reads one input in each line is compiled by")
@@ -162,27 +146,21 @@ def c(
     return 0
 
 
-def _inverse(model: Any) -> Any:
-    from hysim.control import InverseFeedforward
-
-    return InverseFeedforward(law=model)
-
-
 def _platforms(text: str) -> tuple[str, ...]:
     return () if text == "none" else tuple(name.strip() for name in text.split(","))
 
 
 def fmu(
-    model: ModelIn,
+    model: options.ModelIn,
     *,
-    out: Annotated[str, file("MODEL.fmu", RESULT)],
+    out: Annotated[str, options.file("MODEL.fmu")],
     version: Literal["2.0", "3.0"] = "2.0",
     sample_time: float | None = None,
     name: str | None = None,
-    unit: tuple[Unit, ...] = (),
+    unit: tuple[options.Unit, ...] = (),
     u0: float = 0.0,
     y0: float = 0.0,
-    platforms: Annotated[tuple[str, ...], Value(name="PLATFORMS", read=_platforms)] | None = None,
+    platforms: Annotated[tuple[str, ...], options.Value("PLATFORMS", _platforms)] | None = None,
 ) -> int:
     """Write a model as a functional mock-up unit (FMU) for co-simulation.
 
@@ -205,10 +183,8 @@ def fmu(
     hysim fmu law.json --out law.fmu
     hysim fmu actuator.json --sample-time 1e-4 --version 3.0 --out actuator.fmu
     """
-    from hysim.export import to_fmu
-
     law, units = models.read(model)
-    step = None if sample_time is None else positive("--sample-time", sample_time)
+    step = None if sample_time is None else options.positive("--sample-time", sample_time)
     units |= dict(unit)
-    to_fmu(law, out, version, step, name=name, units=units, platforms=platforms, u0=u0, y0=y0)
+    hs.to_fmu(law, out, version, step, name=name, units=units, platforms=platforms, u0=u0, y0=y0)
     return 0
