@@ -133,9 +133,7 @@ def test_joined_times_have_the_unit_of_the_input_and_lie_within_its_own():
 
 
 def model_of(*words):
-    arguments = arguments_of("loop.csv", *words)
-    names = ("model", "structure", "actuator", "initial")
-    return models.to_identify(*(arguments[name] for name in names))[0]
+    return models.to_identify(arguments_of("loop.csv", *words)["fit"])
 
 
 @pytest.mark.parametrize(

@@ -160,7 +160,7 @@ def test_errors_of_the_library_name_options(run):
         (("identify", "loop.csv", "--model", "line", "--fixed", "a=1"), "no option --fixed: did you mean --fix?"),
         (("identify", "loop.csv", "--model", "line", "--sampletime=1"), "did you mean --sample-time?"),
         (("metrics", "loop.csv", "loop.csv"), "Got unexpected extra argument (loop.csv) (see hysim metrics --help)"),
-        (("identify", "loop.csv", "--model", "boucwen"), "did you mean bouc-wen? (models of your own: MODEL.json"),
+        (("identify", "loop.csv", "--model", "boucwem"), "did you mean bouc-wen? (models of your own: MODEL.json"),
         (("identify", "loop.csv", "--model", "Oscilator"), "did you mean oscillator?"),
         (("identify", "loop.csv", "--modle", "line"), "no option --modle: did you mean --model? (see hysim identify"),
         (("identify", "loop.csv", "--model", "lu-gree"), "did you mean lugre?"),

@@ -20,40 +20,19 @@ from hysim.cli import options, outputs, signals
 from hysim.cli.words import OTHER_NAMES, in_shell_words, suggestion
 from hysim.errors import SimulationError
 
-GROUPS: Mapping[str, Mapping[str, tuple[str, str]]] = {
-    "look at a file": {
-        "example": ("learn", "write a file to try the other commands on"),
-        "columns": ("look", "list what a file holds"),
-        "metrics": ("look", "measure the loop in a file of your own"),
-        "plot": ("look", "draw files of your own"),
-    },
-    "from a file to a model": {
-        "identify": ("fits", "identify a model on a file of your own"),
-        "posterior": ("fits", "draw the distribution of a model's parameters given a file"),
-        "compare": ("fits", "compare models on a file of your own"),
-        "discover": ("fits", "find the law of the memory in a file of your own"),
-    },
-    "use a model": {
-        "simulate": ("use", "drive a model with the input in a file of your own"),
-        "control": ("control", "design a controller for a model, and print what it achieves"),
-        "page": ("use", "write a law with sliders as a page for a browser"),
-    },
-    "take a model elsewhere": {
-        "c": ("use", "write a model, or its inverse, as C99 for the device that it runs on"),
-        "fmu": ("use", "write a model as a functional mock-up unit for Simulink, Modelica and other tools"),
-    },
-    "many simulations": {"sweep": ("sweep", "compute a study over many parameters, or continue one")},
-    "camera frames": {"measure": ("look", "measure the displacement in camera frames")},
-    "learn and set up": {
-        "explore": ("learn", "play with the families of laws in a browser"),
-        "reproduce": ("learn", "rebuild the paper's results and write a report"),
-        "completion": ("learn", "write a script by which a shell completes commands and options"),
-    },
+GROUPS: Mapping[str, Mapping[str, str]] = {
+    "look at a file": {"example": "learn", "columns": "look", "metrics": "look", "plot": "look"},
+    "from a file to a model": dict.fromkeys(("identify", "posterior", "compare", "discover"), "fits"),
+    "use a model": {"simulate": "use", "control": "control", "page": "use"},
+    "take a model elsewhere": {"c": "use", "fmu": "use"},
+    "many simulations": {"sweep": "sweep"},
+    "camera frames": {"measure": "look"},
+    "learn and set up": dict.fromkeys(("explore", "reproduce", "completion"), "learn"),
 }
-"""Module and help of every command, in groups as the help shows them; a command's module is loaded when it runs."""
+"""Module of every command, in groups as the help shows them; it is loaded when the command runs, or for the help."""
 
-COMMANDS = {name: place for commands in GROUPS.values() for name, place in commands.items()}
-"""Module and help of every command by its name."""
+COMMANDS = {name: module for commands in GROUPS.values() for name, module in commands.items()}
+"""Module of every command by its name."""
 
 DONE, BAD_INPUT = 0, 2
 _SETTINGS = {"help_option_names": ["-h", "--help"], "max_content_width": 120}
@@ -63,10 +42,12 @@ class Command(click.Command):
     """A command from a function of the same name, whose help ends with the names of models and with examples."""
 
     def __init__(self, name: str) -> None:
-        self.function = vars(importlib.import_module(f"hysim.cli.{COMMANDS[name][0]}"))[name]
+        self.function = vars(importlib.import_module(f"hysim.cli.{COMMANDS[name]}"))[name]
         self.declared = [*options.parameters(self.function)]
         self.sections = options.sections(self.function)
-        super().__init__(name, params=[each.click for each in self.declared], context_settings=_SETTINGS)
+        summary = self.sections[""].partition(".\n")[0]
+        params = [each.click for each in self.declared]
+        super().__init__(name, params=params, context_settings=_SETTINGS, short_help=summary)
 
     def format_help_text(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
         """Write the first part of the function's docstring."""
@@ -131,7 +112,7 @@ class Hysim(click.Group):
         """Write a paragraph for each group of commands."""
         for title, commands in GROUPS.items():
             with formatter.section(title):
-                formatter.write_dl([(name, text) for name, (_, text) in commands.items()])
+                formatter.write_dl([(name, str(self.get_command(ctx, name).short_help)) for name in commands])
 
 
 HYSIM = click.version_option(__version__, message="hysim %(version)s")(

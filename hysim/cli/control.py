@@ -85,7 +85,9 @@ def control(
     plot: options.Picture | None = None,
     json: bool = False,
 ) -> int:
-    """Tune a sampled controller on a model's simulated loop, and measure what it achieves.
+    """Design a controller for a model, and print what it achieves.
+
+    Tune a sampled controller on a model's simulated loop, and measure what it achieves.
 
     It is measured how far it reduces the hysteresis along a slow triangle and the vibration after a step. Exit code 1:
     no controller within the bounds was found.

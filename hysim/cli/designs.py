@@ -14,7 +14,7 @@ import numpy as np
 from scipy.optimize import brentq
 
 import hysim as hs
-from hysim._frozen import FloatArray, read_only
+from hysim._frozen import FloatArray
 from hysim._prefixes import label
 from hysim._printing import extent, folded, quantity
 from hysim.cli import models, outputs
@@ -98,26 +98,28 @@ def designed(path: str, options: DesignOptions, exported: Callable[[Any], object
     template = feedback(actuator, kind, within)
     made = controller(actuator, kind, within, template or hs.PID(kp=1.0, limits=within), preview=options.preview)
     exported(made)
-    goal = reference(todo, rest(actuator, todo.u0), options.reference, units.get("y"))
+    values, transient, objective = reference(todo, rest(actuator, todo.u0), options.reference, units.get("y"))
+    low, high, period, u0, step, duration, h = todo
+    t = h * np.arange(values.size)
     tuning = None
     if kind != "inverse":
         tuning = hs.tune(
-            actuator, goal.t, goal.values, controller=template, objective=goal.objective, limits=within,
+            actuator, t, values, controller=template, objective=objective, limits=within,
             max_sensitivity=options.max_sensitivity, max_voltage_noise=options.max_voltage_noise,
-            variations=variations(actuator, options.vary_mode), transient=goal.transient,
-            u0=todo.u0 if options.reference == "step" else 0.0,
+            variations=variations(actuator, options.vary_mode), transient=transient,
+            u0=u0 if options.reference == "step" else 0.0,
         )  # fmt: skip
         made = controller(actuator, kind, within, tuning.controller, preview=options.preview)
-    low, high, period, u0, step, duration, h = todo
-    triangle = assess_hysteresis(actuator, made, low=low, high=high, period=period, sample_time=h, cycles=_CYCLES)
+    is_file = options.reference not in ("triangle", "step")  # which have measures of their own
+    rms = hs.metrics.rmse(values, hs.close_loop(actuator, made, t, values).y) if is_file else math.nan
     return Design(
         actuator=actuator,
         controller=made,
         tuning=tuning,
         task=todo,
-        triangle=triangle,
+        triangle=assess_hysteresis(actuator, made, low=low, high=high, period=period, sample_time=h, cycles=_CYCLES),
         step=assess_step(actuator, made, step=step, duration=duration, sample_time=h, u0=u0),
-        file_rms=file_rms(actuator, made, goal, options.reference),
+        file_rms=rms,
         fit_percent=fit_percent(model, record),
         units=units,
         reference=Path(options.reference).name,
@@ -206,37 +208,19 @@ def in_units(record: hs.Record, units: Mapping[str, str], source: str) -> hs.Rec
         raise ValueError(f"{source} is not in the units of the model: {error}") from None
 
 
-def file_rms(actuator: hs.Actuator, controller: Any, reference: "Reference", kind: str) -> float:
-    """Tracking rms along the reference in a file; nan for the triangle and the step, which have other measures."""
-    if kind in ("triangle", "step"):
-        return math.nan
-    return hs.metrics.rmse(reference.values, hs.close_loop(actuator, controller, reference.t, reference.values).y)
+def reference(task: Task, rest: float, kind: str, unit: str | None) -> tuple[FloatArray, float, str]:
+    """Values for the tuning, the first seconds that do not count, and the objective.
 
-
-class Reference(NamedTuple):
-    """Reference of the tuning: evenly sampled values, the first seconds that do not count, and the objective."""
-
-    sample_time: float
-    values: FloatArray
-    transient: float
-    objective: str
-
-    @property
-    def t(self) -> FloatArray:
-        """Times of the values [s]."""
-        return read_only(self.sample_time * np.arange(self.values.size))
-
-
-def reference(task: Task, rest: float, kind: str, unit: str | None) -> Reference:
-    """The triangle, the step from a displacement at rest, or the reference in a file, in the unit of the output."""
+    They are the triangle, the step from a displacement at rest, or the reference in a file, in the unit of the output.
+    """
     h = task.sample_time
     if kind == "step":
-        return Reference(h, np.full(round(task.duration / h) + 1, rest + task.step), 0.0, "itae")
+        return np.full(round(task.duration / h) + 1, rest + task.step), 0.0, "itae"
     if kind == "triangle":
         values = hs.signals.triangle(task.low, task.high, cycles=2, samples_per_cycle=task.samples_per_cycle)
-        return Reference(h, values, task.period, "rms")
+        return values, task.period, "rms"
     units = {} if unit is None else {"u": unit}
-    return Reference(h, in_units(hs.load(kind, t=0, u=1, y=1), units, kind).resample(h).u, 0.0, "rms")
+    return in_units(hs.load(kind, t=0, u=1, y=1), units, kind).resample(h).u, 0.0, "rms"
 
 
 def feedback(actuator: hs.Actuator, kind: str, within: Pair | None) -> hs.PID | hs.TrackingController | None:

@@ -1,6 +1,7 @@
 """`hysim identify`, `posterior`, `compare` and `discover`: from records in files to models."""
 
 import sys
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any, Literal
 
@@ -9,9 +10,8 @@ from hysim.cli import models, options, outputs, records
 from hysim.errors import Interrupted
 
 SUCCESS, NOT_CONVERGED, NO_MODEL = 0, 1, 1
-Initial = Literal["free", "rest", "still", "periodic"]
-Noise = Literal["gaussian", "quantised", "robust"]
 
+_FOLDER = ("parameters.csv", "samples.csv", "corner.svg", "posterior.json")
 _IDENTIFIED = (
     "estimates", "stderr", "intervals", "interval_method", "free_names", "n_parameters", "noise", "sigma",
     "fit_percent", "rmse", "cv_rmse", "fpe", "aic", "bic", "whiteness", "seed", "success", "message",
@@ -24,37 +24,28 @@ def identify(
     others: tuple[options.RecordIn, ...] = (),
     *,
     settings: records.WeighedOptions,
-    model: models.ToIdentify,
-    structure: models.StructureOptions,
-    actuator: models.ActuatorOptions,
-    fix: tuple[options.Fixed, ...] = (),
-    free: tuple[str, ...] = (),
+    fit: models.FitOptions,
     bounds: tuple[options.Range, ...] = (),
     depends: tuple[options.Depends, ...] = (),
-    initial: Initial | None = None,
-    noise: Noise | None = None,
     intervals: Literal["linear", "profile", "bootstrap"] = "linear",
     cross_validate: options.Folds | None = None,
     max_evaluations: int | None = None,
     admissible: Literal["yes", "no"] | None = None,
-    seed: int = 0,
     out: options.ModelOut | None = None,
     plot: options.Picture | None = None,
     json: bool = False,
 ) -> int:
-    """Identify a model's parameters by its error in free run, and print them with their standard errors.
+    """Identify a model on a file of your own.
+
+    Identify a model's parameters by its error in free run, and print them with their standard errors.
 
     Exit code 1: the search did not converge, or the law is unsafe on smaller cycles.
 
     Parameters
     ----------
     others : further records with the same columns, such as those of other rates
-    fix : parameter that is not free: n=1 [unit of the parameter]
-    free : parameter that is free, where it is fixed by default
     bounds : bounds of a parameter: beta=0:2 [unit of the parameter]
     depends : parameter that is a polynomial in a channel: gain=T:1
-    initial : state at the first sample (default: chosen by the BIC, or free)
-    noise : noise of the output; quantised needs --resolution (default: gaussian)
     intervals : method of the 95 % intervals
     cross_validate : leave out one sample at a time, one cycle, or one of K blocks
     max_evaluations : most parameter sets that the search simulates; a fit that ends by it is partial
@@ -73,29 +64,35 @@ def identify(
     """
     from hysim.models.storage import to_json
 
-    subject, initial = models.to_identify(model, structure, actuator, initial)
+    subject = models.to_identify(fit)
     if others and (settings.weights is not None or settings.sensor or settings.y_file is not None):
         raise ValueError("--weights, --sensor and --y-file are for one file: leave out the others, or use Python")
     record, weights = records.read_with_weights(settings, file)
     further = [records.read(settings, path) for path in others]
     sensors = dict(settings.sensor)
     measured: Any = records.of_structure(subject, record, sensors) if sensors else record
-    fit = hs.identify(
-        subject, [measured, *further] if further else measured, fixed=dict(fix), free=free, bounds=dict(bounds),
-        depends=dict(depends) or None, weights=weights, initial=initial, noise=noise, intervals=intervals,
-        cross_validate=cross_validate, max_evaluations=max_evaluations, seed=seed,
+    result = hs.identify(
+        subject,
+        [measured, *further] if further else measured,
+        bounds=dict(bounds),
+        depends=dict(depends) or None,
+        weights=weights,
+        intervals=intervals,
+        cross_validate=cross_validate,
+        max_evaluations=max_evaluations,
         admissible=None if admissible is None else admissible == "yes",
-    )  # fmt: skip
+        **fit.for_identify(),
+    )
 
     def picture() -> Any:
         if sensors:  # the record of one sensor is not the output of the structure
-            return outputs.picture_of(hs.simulate(fit, record.t, record.u))
-        return outputs.loop(record, fit)
+            return outputs.picture_of(hs.simulate(result, record.t, record.u))
+        return outputs.loop(record, result)
 
-    files: outputs.Files = {out: lambda: to_json(fit, units=record.units), plot: picture}
-    family = {"family": type(fit.model).__name__}
-    outputs.write(files, fit.summary, lambda: family | outputs.fields_of(fit, _IDENTIFIED))
-    return SUCCESS if fit.success else NOT_CONVERGED
+    files: outputs.Files = {out: lambda: to_json(result, units=record.units), plot: picture}
+    family = {"family": type(result.model).__name__}
+    outputs.write(files, result.summary, lambda: family | outputs.fields_of(result, _IDENTIFIED))
+    return SUCCESS if result.success else NOT_CONVERGED
 
 
 def posterior(
@@ -103,31 +100,22 @@ def posterior(
     others: tuple[options.RecordIn, ...] = (),
     *,
     settings: records.RecordOptions,
-    model: models.ToIdentify,
-    structure: models.StructureOptions,
-    actuator: models.ActuatorOptions,
-    fix: tuple[options.Fixed, ...] = (),
-    free: tuple[str, ...] = (),
+    fit: models.FitOptions,
     prior: tuple[options.Range, ...] = (),
-    initial: Initial | None = None,
-    noise: Noise | None = None,
     samples: options.Count = 10000,
-    seed: int = 0,
     out: str | None = None,
     json: bool = False,
 ) -> int:
-    """Identify a model, draw its parameters from their posterior distribution, and print medians and intervals at 95 %.
+    """Draw the distribution of a model's parameters given a file.
+
+    Identify a model, draw its parameters from their posterior distribution, and print medians and intervals at 95 %.
 
     It needs the extra bayes. Exit code 1: the search did not converge, or the draws are too few to use.
 
     Parameters
     ----------
     others : further records with the same columns, such as those of other rates
-    fix : parameter that is not free: n=1 [unit of the parameter]
-    free : parameter that is free, where it is fixed by default
     prior : flat prior of a parameter, or of sigma: n=1:3 (default: the box of the search) [unit of the parameter]
-    initial : state at the first sample (default: chosen by the BIC, or free)
-    noise : noise of the output; quantised needs --resolution (default: gaussian)
     samples : effective draws of each parameter
     out : folder to write into: parameters.csv, samples.csv, corner.svg and posterior.json
 
@@ -139,47 +127,42 @@ def posterior(
     """
     from hysim._printing import csv_text
 
-    subject, initial = models.to_identify(model, structure, actuator, initial)
+    subject = models.to_identify(fit)
     measured: Any = [records.read(settings, path) for path in (file, *others)]
     measured = measured if others else measured[0]
     if out is not None:
-        results = [str(Path(out, name)) for name in ("parameters.csv", "samples.csv", "corner.svg", "posterior.json")]
-        outputs.keep([file, *others, model], results)
+        outputs.keep([file, *others, fit.model], [str(Path(out, name)) for name in _FOLDER])
         Path(out).mkdir(parents=True, exist_ok=True)
-    fit = hs.identify(subject, measured, fixed=dict(fix), free=free, initial=initial, noise=noise, seed=seed)
+    result = hs.identify(subject, measured, **fit.for_identify())
     draws = hs.sample_posterior(
-        fit, measured, priors=dict(prior), initial=initial, noise=noise, samples=samples, seed=seed
+        result, measured, initial=fit.initial, noise=fit.noise, priors=dict(prior), samples=samples, seed=fit.seed
     )
     rows = _rows(draws)
-    settings = outputs.fields_of(draws, ("noise", "resolution", "priors", "n_evaluations", "seed", "warnings"))
-    document = {"family": type(draws.model).__name__, "parameters": rows, **settings}
-    contents = (
-        lambda: csv_text([rows[0], *(row.values() for row in rows)]),
-        draws.to_csv,
-        lambda: _corner(draws),
-        lambda: outputs.to_json(document),
-    )
-    files: outputs.Files = {} if out is None else dict(zip(results, contents, strict=True))
+    conditions = outputs.fields_of(draws, ("noise", "resolution", "priors", "n_evaluations", "seed", "warnings"))
+    document = {"family": type(draws.model).__name__, "parameters": rows, **conditions}
+    contents: dict[str, Callable[[], Any]] = {
+        "parameters.csv": lambda: csv_text([rows[0], *(row.values() for row in rows)]),
+        "samples.csv": draws.to_csv,
+        "corner.svg": lambda: _corner(draws),
+        "posterior.json": lambda: outputs.to_json(document),
+    }
+    files: outputs.Files = {} if out is None else {str(Path(out, name)): contents[name] for name in _FOLDER}
     outputs.write(files, draws.summary, lambda: document)
-    return NOT_CONVERGED if draws.warnings or not fit.success else SUCCESS
+    return NOT_CONVERGED if draws.warnings or not result.success else SUCCESS
 
 
 def _rows(posterior: "hs.Posterior") -> list[dict[str, Any]]:
     """Each parameter with its median, interval at 95 % and diagnostics."""
-    ends, median = posterior.interval(), posterior.median
-    return [
-        {
-            "name": name,
-            "median": median[name],
-            "lower": ends[name][0],
-            "upper": ends[name][1],
-            "mean": float(draws.mean()),
-            "standard_deviation": float(draws.std(ddof=1)),
-            "effective_samples": posterior.effective_samples[name],
-            "rhat": posterior.rhat[name],
-        }
-        for name, draws in posterior.samples.items()
-    ]
+    columns: dict[str, Any] = {
+        "median": posterior.median,
+        "lower": {name: low for name, (low, _) in posterior.interval().items()},
+        "upper": {name: high for name, (_, high) in posterior.interval().items()},
+        "mean": {name: float(draws.mean()) for name, draws in posterior.samples.items()},
+        "standard_deviation": {name: float(draws.std(ddof=1)) for name, draws in posterior.samples.items()},
+        "effective_samples": posterior.effective_samples,
+        "rhat": posterior.rhat,
+    }
+    return [{"name": name, **{key: column[name] for key, column in columns.items()}} for name in posterior.samples]
 
 
 def _corner(posterior: "hs.Posterior") -> Any:
@@ -205,7 +188,9 @@ def compare(
     plot: options.Picture | None = None,
     json: bool = False,
 ) -> int:
-    """Identify models on a record, all by the same protocol, and print them side by side.
+    """Compare models on a file of your own.
+
+    Identify models on a record, all by the same protocol, and print them side by side.
 
     Beside them stands what the record cannot decide.
 
@@ -283,16 +268,9 @@ def _best(table: "hs.Comparison") -> str:
 def _document(table: "hs.Comparison") -> dict[str, Any]:
     fields = ("rmse_ratio", "typical_ratio", "probability", "diverged")
     contrasts = {each.name: outputs.fields_of(each, fields) for each in table.contrasts}
-    return {
-        "record": table.record.name,
-        "units": table.record.units,
-        "winner": table.winner,
-        "undecided": table.undecided,
-        "verdict": table.verdict,
-        "warnings": table.warnings,
-        "rows": [outputs.scalars(row) | contrasts.get(row.name, dict.fromkeys(fields)) for row in table.rows],
-        "failed": table.failed,
-    }
+    rows = [outputs.scalars(row) | contrasts.get(row.name, dict.fromkeys(fields)) for row in table.rows]
+    verdict = outputs.fields_of(table, ("winner", "undecided", "verdict", "warnings"))
+    return {"record": table.record.name, "units": table.record.units, **verdict, "rows": rows, "failed": table.failed}
 
 
 def _picture(table: "hs.Comparison") -> Any:
@@ -302,7 +280,7 @@ def _picture(table: "hs.Comparison") -> Any:
     )
 
 
-PLANT, WITHOUT_PLANT = ("mass", "damping", "stiffness"), ("library", "cross_validate", "initial")
+PLANT, WITHOUT_PLANT = (("mass", "damping", "stiffness"), ("library", "cross_validate", "initial"))
 
 
 def discover(
@@ -323,7 +301,9 @@ def discover(
     plot: options.Picture | None = None,
     json: bool = False,
 ) -> int:
-    """Find the law of a memory by sparse regression (PySINDy) and free runs, and print it with its verdict.
+    """Find the law of the memory in a file of your own.
+
+    Find the law of a memory by sparse regression (PySINDy) and free runs, and print it with its verdict.
 
     The verdict is hysteresis, a linear lag, or that records of one rate cannot decide.
 

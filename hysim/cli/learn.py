@@ -77,7 +77,9 @@ _SCRIPTS = {"bash": BashComplete, "zsh": ZshComplete, "fish": FishComplete}
 
 
 def example(path: options.Table | None = None, *, device: Kind = "piezo") -> int:
-    """Write a record as a file like one of your own.
+    """Write a file to try the other commands on.
+
+    Write a record as a file like one of your own.
 
     The piezo's 52 samples were measured for a paper of 2016, which prints no times: one second a sample is an
     assumption. The other devices are simulated.
@@ -115,7 +117,9 @@ def example(path: options.Table | None = None, *, device: Kind = "piezo") -> int
 
 
 def explore(*, out: options.Page | None = None, no_browser: bool = False) -> int:
-    """Open a page with a choice of families and devices, whose loops follow sliders. It works offline.
+    """Play with the families of laws in a browser.
+
+    Open a page with a choice of families and devices, whose loops follow sliders. It works offline.
 
     Parameters
     ----------
@@ -139,7 +143,9 @@ def explore(*, out: options.Page | None = None, no_browser: bool = False) -> int
 
 
 def reproduce(*, out: str = "reproduction", quick: bool = False, page: bool = False, json: bool = False) -> int:
-    """Identify, discover and compare models on the 52 voltage-displacement points of the paper.
+    """Rebuild the paper's results and write a report.
+
+    Identify, discover and compare models on the 52 voltage-displacement points of the paper.
 
     The folder holds report.html, summary.json, figures and tables.
 
@@ -189,7 +195,9 @@ def _verdicts(claims: Sequence[Any]) -> Iterator[str]:
 
 
 def completion(shell: Literal["bash", "zsh", "fish"]) -> int:
-    """Write a script for a shell to the standard output.
+    """Write a script by which a shell completes commands and options.
+
+    Write a script for a shell to the standard output.
 
     For the running shell: source <(hysim completion bash), or hysim completion fish | source; for all: write it to a
     file where the shell looks for such scripts.

@@ -11,7 +11,9 @@ _MANY, _AMPLITUDES = 100, 50
 
 
 def columns(file: options.RecordIn, *, settings: records.TextOptions, json: bool = False) -> int:
-    """List the columns of a file, with units, numbers of samples and ranges.
+    """List what a file holds.
+
+    List the columns of a file, with units, numbers of samples and ranges.
 
     Their names and numbers are what --u, --y and --t take.
 
@@ -37,7 +39,7 @@ def columns(file: options.RecordIn, *, settings: records.TextOptions, json: bool
 
 def _content(column: Any) -> str:
     if column.problem:
-        return column.problem
+        return str(column.problem)
     span = f"{column.lowest:.6g} to {column.highest:.6g} {column.unit}" if column.n_samples else "no values"
     missing = f", {column.n_missing} missing" if column.n_missing else ""
     return f"{column.n_samples} samples{missing}, {span.rstrip()}{', increases throughout' if column.increases else ''}"
@@ -54,7 +56,9 @@ def metrics(
     plot: options.Picture | None = None,
     json: bool = False,
 ) -> int:
-    """Measure the loop of the input's last complete cycle, the average loop of the last few, or every cycle.
+    """Measure the loop in a file of your own.
+
+    Measure the loop of the input's last complete cycle, the average loop of the last few, or every cycle.
 
     The table of every cycle is of growing protocols, and of 0, max, min, 0.
 
@@ -229,7 +233,9 @@ def plot(
     model: tuple[options.ModelIn, ...] = (),
     out: options.Picture,
 ) -> int:
-    """Draw records over each other, and the free run of models over the input of the first.
+    """Draw files of your own.
+
+    Draw records over each other, and the free run of models over the input of the first.
 
     Parameters
     ----------
@@ -279,7 +285,9 @@ def measure(
     plot: options.Picture | None = None,
     json: bool = False,
 ) -> int:
-    """Measure the displacement of the picture in each frame, to a fraction of a pixel, and write it as columns.
+    """Measure the displacement in camera frames.
+
+    Measure the displacement of the picture in each frame, to a fraction of a pixel, and write it as columns.
 
     The columns are t if there is a time, u if there are voltages, y, its standard error and the correlation with the
     reference.

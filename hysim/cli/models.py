@@ -11,15 +11,17 @@ from pathlib import Path
 from typing import Annotated, Any, Literal, Protocol, runtime_checkable
 
 import hysim as hs
-from hysim._names import MODULE_OF
-from hysim.cli.options import INPUT, OWN, Count, Value, flag
+from hysim._names import MODULE_OF, plain
+from hysim.cli import options
 from hysim.cli.records import STANDARD
 from hysim.cli.words import suggestion
 
 _SHORT = {
-    "zhu-wang": "ZhuWangBoucWen", "baber-noori": "BoucWenBaberNoori", "lugre": "LuGre",
-    "oscillator": "BoucWenOscillator",
+    "ZhuWangBoucWen": "zhu-wang", "BoucWenBaberNoori": "baber-noori", "LuGre": "lugre",
+    "BoucWenOscillator": "oscillator",
 }  # fmt: skip
+"""Short names of families."""
+
 _PLANTS = ("oscillator", "actuator")
 _ARGUMENTS = {"plays": ("plays", "elements"), "relay_intervals": ("intervals",)}
 """Arguments of a structure that an option of another name stands for."""
@@ -60,26 +62,22 @@ def _offered() -> list[str]:
 
 def _short(name: str) -> str:
     """``bouc-wen`` of ``BoucWen``, and the short name of a family that has one."""
-    return next((short for short, family in _SHORT.items() if family == name), _hyphenated(name))
+    return _SHORT.get(name, re.sub(r"(?<=[a-z])(?=[A-Z])", "-", name).lower())
 
 
-def _hyphenated(name: str) -> str:
-    return re.sub(r"(?<=[a-z])(?=[A-Z])", "-", name).lower()
-
-
-FORMS = f"name of a family, such as bouc-wen; MODEL.json; or {OWN}"
+FORMS = f"name of a family, such as bouc-wen; MODEL.json; or {options.OWN}"
 """Values of an option for models."""
 
 _NOTE = "A structure is a model in a file."
 
 
-def _named(note: Callable[[], str]) -> Value:
-    return Value("MODEL", role=INPUT, offers=_offered, help=FORMS, note=note)
+def _named(note: Callable[[], str]) -> options.Value:
+    return options.Value("MODEL", role=options.INPUT, offers=_offered, help=FORMS, note=note)
 
 
 ToCompare = Annotated[str, _named(lambda: f"Names of models: {', '.join(names())}.")]
 ToIdentify = Annotated[str, _named(lambda: f"Names of models: {', '.join(names_to_identify())}. {_NOTE}")]
-Law = Annotated[str, Value("MODEL", offers=_offered)]
+Law = Annotated[str, options.Value("MODEL", offers=_offered)]
 
 
 @dataclass(kw_only=True)
@@ -133,10 +131,10 @@ class StructureOptions:
     excitation : whether the input is a force, or the acceleration of the base
     """
 
-    plays: Count | None = None
-    relay_intervals: Count | None = None
+    plays: options.Count | None = None
+    relay_intervals: options.Count | None = None
     one_signed: Literal["yes", "no"] | None = None
-    degree: Count | None = None
+    degree: options.Count | None = None
     poles: int | None = None
     zeros: int | None = None
     sample: Literal["start", "end"] | None = None
@@ -146,24 +144,46 @@ class StructureOptions:
     excitation: Literal["force", "base"] | None = None
 
 
+@dataclass(kw_only=True)
+class FitOptions(StructureOptions, ActuatorOptions):
+    """Options of a model to identify.
+
+    Parameters
+    ----------
+    model :
+    fix : parameter that is not free: n=1 [unit of the parameter]
+    free : parameter that is free, where it is fixed by default
+    initial : state at the first sample (default: chosen by the BIC, or free)
+    noise : noise of the output; quantised needs --resolution (default: gaussian)
+    seed :
+    """
+
+    model: ToIdentify
+    fix: tuple[options.Fixed, ...] = ()
+    free: tuple[str, ...] = ()
+    initial: Literal["free", "rest", "still", "periodic"] | None = None
+    noise: Literal["gaussian", "quantised", "robust"] | None = None
+    seed: int = 0
+
+    def for_identify(self) -> dict[str, Any]:
+        """Arguments of `hysim.identify` beside the model, of which `to_identify` may have taken `initial`."""
+        others = {name: vars(self)[name] for name in ("free", "initial", "noise", "seed")}
+        return {"fixed": dict(self.fix), **others}
+
+
 def family(name: str) -> Any:
     """The family with a name such as ``bouc-wen``; a ValueError, which lists the names, if there is none."""
-    from hysim.models.model import FAMILIES
+    from hysim.models.candidates import family_named
 
-    public = _public()
-    law = resolved(f"hysim:{public[name]}") if name in public else None
-    if law is None or FAMILIES.get(public[name]) is not law:
-        known = names_to_identify()
-        near = suggestion(name, known) or f"give one of {', '.join(known)}"
-        raise ValueError(f"there is no model {name!r}: {near} (models of your own: MODEL.json or module:name)")
     if name == "structure":
         raise ValueError("a structure has no default: give one in a file, MODEL.json, which hs.save writes")
-    return law
-
-
-def _public() -> dict[str, str]:
-    """Names of classes by their names on the command line."""
-    return {_hyphenated(name): name for name in hs.__all__ if name[0].isupper()} | _SHORT
+    try:
+        return family_named("BoucWenOscillator" if name == "oscillator" else name)
+    except ValueError:
+        known = names_to_identify()
+        near = suggestion(name, known) or f"give one of {', '.join(known)}"
+        words = f"there is no model {name!r}: {near} (models of your own: MODEL.json or module:name)"
+        raise ValueError(words) from None
 
 
 def resolved(path: str) -> Any:
@@ -211,41 +231,40 @@ def model_or_family(text: str) -> Any:
     return family(text)
 
 
-def to_identify(
-    name: str, structure: StructureOptions, actuator: ActuatorOptions, initial: str | None
-) -> tuple[Any, str | None]:
-    """The model and the `initial` that `identify` takes for these options.
+def to_identify(chosen: FitOptions) -> Any:
+    """The argument of `identify` for these options, whose `initial` becomes None where the structure takes it.
 
     A ValueError is raised if there is no such model, an option belongs to another one, or one that this model needs is
     missing.
     """
     from hysim.models.model import FAMILIES
 
-    of_actuator, used = _used(actuator), _used(structure)
+    name, of_actuator, used = (chosen.model, _used(chosen, ActuatorOptions), _used(chosen, StructureOptions))
     if foreign := [*used] if name == "actuator" else [*of_actuator]:
-        raise ValueError(f"{flag(foreign[0])} is no option of the model {name}")
+        raise ValueError(f"{options.flag(foreign[0])} is no option of the model {name}")
     if name == "actuator":
-        return _actuator(actuator), initial
+        return _actuator(chosen)
     model = model_or_family(name)
-    oscillator, linear = (FAMILIES.get(name) for name in ("BoucWenOscillator", "TransferFunction"))  # if it is loaded
+    oscillator, linear = (FAMILIES.get(each) for each in ("BoucWenOscillator", "TransferFunction"))  # if it is loaded
     if oscillator is not None and isinstance(model, oscillator):  # its numbers are searched anew, in the same setting
         used = {"excitation": vars(model)["excitation"], "hold": vars(model)["hold"]} | used
         model = oscillator
-    taken = {field.name: argument for field in fields(structure) if (argument := _argument(model, field.name))}
+    taken = {each.name: argument for each in fields(StructureOptions) if (argument := _argument(model, each.name))}
     if foreign := [each for each in used if each not in taken]:
         others = [each for each in names_to_identify() if _argument(family(each), foreign[0])]
-        raise ValueError(f"{flag(foreign[0])} is no option of the model {name}, but of {', '.join(others)}")
+        raise ValueError(f"{options.flag(foreign[0])} is no option of the model {name}, but of {', '.join(others)}")
     if missing := [each for each in _NEEDED if each in taken and each not in used]:
-        raise ValueError(f"the model {name} needs {flag(missing[0])}")
-    arguments = {taken[each]: value == "yes" if each == "one_signed" else value for each, value in used.items()}
-    if model is oscillator and initial is not None:
-        arguments["initial"], initial = initial, None  # its structure says how the record begins
-    is_structure_needed = arguments or any(model is each for each in (oscillator, linear))
-    return (model.structure(**arguments) if is_structure_needed else model), initial
+        raise ValueError(f"the model {name} needs {options.flag(missing[0])}")
+    structure = {taken[each]: value == "yes" if each == "one_signed" else value for each, value in used.items()}
+    if model is oscillator and chosen.initial is not None:
+        structure["initial"], chosen.initial = (chosen.initial, None)  # its structure says how the record begins
+    is_structure_needed = structure or any(model is each for each in (oscillator, linear))
+    return model.structure(**structure) if is_structure_needed else model
 
 
-def _used(options: StructureOptions | ActuatorOptions) -> dict[str, Any]:
-    return {name: value for name, value in vars(options).items() if value is not None and value is not False}
+def _used(chosen: FitOptions, group: type[StructureOptions | ActuatorOptions]) -> dict[str, Any]:
+    values = {each.name: vars(chosen)[each.name] for each in fields(group)}
+    return {name: value for name, value in values.items() if value is not None and value is not False}
 
 
 def _argument(model: Any, option: str) -> str | None:
@@ -256,14 +275,14 @@ def _argument(model: Any, option: str) -> str | None:
     return next((name for name in _ARGUMENTS.get(option, (option,)) if name in arguments), None)
 
 
-def _actuator(options: ActuatorOptions) -> Any:
-    """The structure of an actuator with these options."""
+def _actuator(chosen: ActuatorOptions) -> Any:
+    """The structure of an actuator with these chosen."""
     return hs.Actuator.structure(
-        model_or_family(options.law or "bouc-wen"),
-        creep=options.creep if options.creep_elements is None else options.creep_elements,
-        modes=1 if options.modes is None else options.modes,
-        delay=options.delay,
-        amplifier="first-order" if options.first_order_amplifier else None,
+        model_or_family(chosen.law or "bouc-wen"),
+        creep=chosen.creep if chosen.creep_elements is None else chosen.creep_elements,
+        modes=1 if chosen.modes is None else chosen.modes,
+        delay=chosen.delay,
+        amplifier="first-order" if chosen.first_order_amplifier else None,
     )
 
 
@@ -282,7 +301,7 @@ def read(path: str) -> tuple[Any, dict[str, str]]:
             raise ValueError(f"{path} needs values for its parameters: give an instance ({error})") from None
     if path == STANDARD:
         return from_json(sys.stdin.read(), "the standard input")
-    if path in _public() and not Path(path).exists():
+    if plain(path) in map(plain, (*MODULE_OF, *_SHORT.values())) and not Path(path).exists():
         raise ValueError(f"{path} is a family without numbers: write a model of it by hysim identify --out {path}.json")
     return from_json(Path(path).read_bytes(), path)
 

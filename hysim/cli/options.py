@@ -130,7 +130,7 @@ def documented(subject: Any) -> dict[str, tuple[str, str]]:
 
 
 def _declared(subject: Any, texts: Mapping[str, tuple[str, str]]) -> Iterator[Parameter]:
-    hints, signature = typing.get_type_hints(subject, include_extras=True), inspect.signature(subject)
+    hints, signature = (typing.get_type_hints(subject, include_extras=True), inspect.signature(subject))
     for name in texts if isinstance(subject, type) else signature.parameters:
         own, hint = signature.parameters[name], hints[name]
         if dataclasses.is_dataclass(hint):
@@ -184,40 +184,27 @@ def one_of(words: Mapping[str, str]) -> Value:
     return Value(f"[{'|'.join(words)}]", None, ", ".join(words), words=(*words,), help=text)
 
 
-def at_least(least: float, number: Callable[[str], Any] = int) -> Callable[[str], Any]:
-    """A reader of numbers that are not below a least one; nan is refused where it is used."""
+def at_least(least: int) -> Callable[[str], Any]:
+    """A reader of whole numbers that are not below a least one."""
 
-    def read(text: str) -> Any:
-        if (value := number(text)) < least:
+    def read(text: str) -> int:
+        if (value := int(text)) < least:
             raise ValueError(text)
         return value
 
     return read
 
 
-def of_form(form: str, number: Callable[[str], Any] = float) -> Callable[[str], Any]:
-    """A reader of numbers with the signs between them that a form has, such as ``LOW,HIGH`` or ``LOW:HIGH``."""
-    separator = ":" if ":" in form else ","
+def matched(pattern: str, *readers: Callable[[str], Any]) -> Callable[[str], Any]:
+    """A reader of texts of a pattern, each group of which has its own reader."""
 
     def read(text: str) -> tuple[Any, ...]:
-        parts = text.split(separator)
-        if len(parts) != len(form.split(separator)):
+        match = re.fullmatch(pattern, text, re.DOTALL)
+        if match is None:
             raise ValueError(text)
-        return tuple(map(number, parts))
+        return tuple(each(part) for each, part in zip(readers, match.groups(), strict=True))
 
     return read
-
-
-def named(form: str, read: Callable[[str], Any], more: str = "") -> Value:
-    """Values of a name and a value of some other reader, in a form such as ``NAME=COLUMN``."""
-
-    def read_both(text: str) -> tuple[str, Any]:
-        name, _, value = text.partition("=")
-        if not name or not value:
-            raise ValueError(text)
-        return name, read(value)
-
-    return Value(form, read_both, form + more)
 
 
 def positive(option: str, value: float) -> float:
@@ -239,24 +226,14 @@ def column(text: str) -> str | int:
     return int(text) if text.isascii() and text.isdigit() else text
 
 
-class Place(NamedTuple):
-    """A place in a record: the number of a sample from 0 if there is no unit, else a time."""
-
-    value: float
-    unit: str
+Place = tuple[float, str]
+"""A place in a record: the number of a sample from 0 if there is no unit, else a time and its unit."""
 
 
 def _place(text: str) -> Place:
     """A place in a record, such as ``100`` or ``2.5s``."""
-    number, unit = re.fullmatch(r"(.*?)((?:[mun]?s)?)", text, re.DOTALL).groups()  # type: ignore[union-attr]
-    return Place(float(number), unit) if unit else Place(at_least(0)(number), "")
-
-
-def _degree(text: str) -> tuple[str, int]:
-    channel, _, degree = text.rpartition(":")
-    if not channel:
-        raise ValueError(text)
-    return channel, int(degree)
+    number, unit = matched(r"(.*?)((?:[mun]?s)?)", str, str)(text)
+    return (float(number) if unit else at_least(0)(number)), unit
 
 
 def _sensor(text: str) -> tuple[str, str | int]:
@@ -264,13 +241,6 @@ def _sensor(text: str) -> tuple[str, str | int]:
     if not name or (equals and not key):
         raise ValueError(text)
     return name, column(key) if equals else name
-
-
-def _unit(text: str) -> tuple[str, str]:
-    signal, equals, label = text.partition("=")
-    if not equals or signal not in ("t", "u", "y"):
-        raise ValueError(text)
-    return signal, label
 
 
 def _terms(text: str) -> str | list[str]:
@@ -292,19 +262,36 @@ _PLAIN = {
 _CYCLES = "a number of cycles, at least 1; the table needs the file before --cycles"
 _MODEL = f"model file as identify writes it, - for the standard input, or {OWN}"
 _RECORD = "text with one sample a line, NPZ, NPY, MAT or HDF5; or - for the standard input"
+_bounds, _degree = matched("(.*):(.*)", float, float), matched("(.+):(.*)", str, int)
 _PLACE = "the number of a sample from 0, or a time with its unit such as 2.5s or 300ms"
 
 Column = Annotated[str | int, Value("COLUMN", column)]
 Count = Annotated[int, Value("COUNT", at_least(1), "a number from 1 on")]
-Pair = Annotated[tuple[float, float], Value("LOW,HIGH", of_form("LOW,HIGH"), "LOW,HIGH with numbers")]
-Mode = Annotated[tuple[float, float], Value("FREQUENCY,DAMPING", of_form("F,D"), "FREQUENCY,DAMPING with numbers")]
-Region = Annotated[tuple[int, int, int, int], Value("T,B,L,R", of_form("T,B,L,R", int), "T,B,L,R with numbers")]
-Fixed = Annotated[tuple[str, float], named("NAME=VALUE", float, " with numbers")]
-Range = Annotated[tuple[str, tuple[float, float]], named("NAME=LOW:HIGH", of_form("LOW:HIGH"), " with numbers")]
+Pair = Annotated[tuple[float, float], Value("LOW,HIGH", matched("(.*),(.*)", float, float), "LOW,HIGH with numbers")]
+Mode = Annotated[
+    tuple[float, float],
+    Value("FREQUENCY,DAMPING", matched("(.*),(.*)", float, float), "FREQUENCY,DAMPING with numbers"),
+]
+Region = Annotated[
+    tuple[int, int, int, int],
+    Value("T,B,L,R", matched("(.*),(.*),(.*),(.*)", int, int, int, int), "T,B,L,R with numbers"),
+]
+Fixed = Annotated[
+    tuple[str, float], Value("NAME=VALUE", matched("([^=]+)=(.*)", str, float), "NAME=VALUE with numbers")
+]
+Range = Annotated[
+    tuple[str, tuple[float, float]],
+    Value("NAME=LOW:HIGH", matched("([^=]+)=(.*)", str, _bounds), "NAME=LOW:HIGH with numbers"),
+]
 PlaceIn = Annotated[Place, Value("PLACE", _place, _PLACE)]
-Unit = Annotated[tuple[str, str], Value("SIGNAL=UNIT", _unit, "t=, u= or y= and a unit")]
-Channel = Annotated[tuple[str, str | int], named("CHANNEL=COLUMN", column)]
-Depends = Annotated[tuple[str, tuple[str, int]], named("NAME=CHANNEL:DEGREE", _degree, ", such as gain=T:1")]
+Unit = Annotated[tuple[str, str], Value("SIGNAL=UNIT", matched("([tuy])=(.*)", str, str), "t=, u= or y= and a unit")]
+Channel = Annotated[
+    tuple[str, str | int], Value("CHANNEL=COLUMN", matched("([^=]+)=(.+)", str, column), "CHANNEL=COLUMN")
+]
+Depends = Annotated[
+    tuple[str, tuple[str, int]],
+    Value("NAME=CHANNEL:DEGREE", matched("([^=]+)=(.*)", str, _degree), "NAME=CHANNEL:DEGREE, such as gain=T:1"),
+]
 Sensor = Annotated[tuple[str, str | int], Value("SENSOR=COLUMN", _sensor, "SENSOR=COLUMN, or the name of both")]
 Quantum = Annotated[float | str, Value("QUANTUM", float, "a number or detect", words=("detect",))]
 Cycles = Annotated[int, Value("CYCLES", lambda text: 0 if text == "all" else at_least(1)(text), _CYCLES, bare="all")]

@@ -6,6 +6,7 @@ import math
 import os
 import sys
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from operator import attrgetter
 from pathlib import Path
 from typing import Any
 
@@ -133,7 +134,7 @@ def scalars(result: Any) -> dict[str, Any]:
 
 def fields_of(result: Any, names: Iterable[str]) -> dict[str, Any]:
     """Some fields of a result by name."""
-    return {name: vars(result)[name] for name in names}
+    return {name: attrgetter(name)(result) for name in names}
 
 
 def table(path: str, columns: Mapping[str, Any], units: Mapping[str, str]) -> bytes:

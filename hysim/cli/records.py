@@ -4,6 +4,7 @@ import io
 import os
 import sys
 from collections.abc import Callable, Mapping
+from contextlib import nullcontext
 from dataclasses import dataclass, replace
 from typing import Any, Literal
 
@@ -16,7 +17,7 @@ STANDARD = "-"
 
 _DELIMITERS = {"tab": "\t", "semicolon": ";", "comma": ",", "blank": " "}
 _ROUNDING = 1e-9  # of the record's time: 0.3 s is found among times that were added up
-_OF_NODES, _OF_ELEMENTS = ("displacement", "velocity", "acceleration"), ("drift", "force")
+_OF_NODES, _OF_ELEMENTS = (("displacement", "velocity", "acceleration"), ("drift", "force"))
 
 
 @dataclass(kw_only=True)
@@ -188,13 +189,16 @@ def _sample(record: "hs.Record", place: options.Place | None, option: str) -> in
     """The number of the first sample at or after a place."""
     import numpy as np
 
-    if place is None or not place.unit:
-        return None if place is None else int(place.value)
+    if place is None:
+        return None
+    value, unit = place
+    if not unit:
+        return int(value)
     if record.t is None:
-        raise ValueError(f"{option} {place.value:g}{place.unit} needs a time: name its column by --t, or give a number")
-    seconds: Any = 10.0 ** power_of_ten(place.unit, record.units.get("t", "s"))
+        raise ValueError(f"{option} {value:g}{unit} needs a time: name its column by --t, or give a number")
+    seconds: Any = 10.0 ** power_of_ten(unit, record.units.get("t", "s"))
     tolerance = _ROUNDING * float(record.t[-1] - record.t[0])
-    return int(np.searchsorted(record.t, place.value * seconds - tolerance))
+    return int(np.searchsorted(record.t, value * seconds - tolerance))
 
 
 def of_structure(structure: Any, record: "hs.Record", columns: Mapping[str, Any]) -> "hs.StructureRecord":
@@ -210,20 +214,17 @@ def of_structure(structure: Any, record: "hs.Record", columns: Mapping[str, Any]
     if record.t is None:
         raise ValueError("a structure needs the times of its record: name their column by --t, or use --sample-time")
     sizes = dict.fromkeys(_OF_NODES, structure.n_nodes) | dict.fromkeys(_OF_ELEMENTS, len(structure.elements))
-    places = {
-        f"{signal}_{k + (signal in _OF_NODES)}": (signal, k) for signal, size in sizes.items() for k in range(size)
-    }  # masses are counted from 1
+    names = {  # masses are counted from 1
+        signal: [f"{signal}_{k + (signal in _OF_NODES)}" for k in range(size)] for signal, size in sizes.items()
+    }
     signals: dict[str, Any] = {}
     for name in columns:
-        if name not in places:
-            known = ", ".join(
-                f"{each}_{first} to {each}_{first + size - 1}"
-                for each, size in sizes.items()
-                for first in [int(each in _OF_NODES)]
-            )
+        signal = name.rpartition("_")[0]
+        if name not in names.get(signal, ()):
+            known = ", ".join(f"{each[0]} to {each[-1]}" for each in names.values())
             raise ValueError(f"the structure has no signal {name!r}: its signals are {known}")
-        signal, k = places[name]
-        signals.setdefault(signal, np.full((len(record), sizes[signal]), np.nan))[:, k] = record.channel(name)
+        values = signals.setdefault(signal, np.full((len(record), sizes[signal]), np.nan))
+        values[:, names[signal].index(name)] = record.channel(name)
     return hs.StructureRecord(t=record.t, u=record.u, name=record.name, **signals)
 
 
@@ -248,17 +249,13 @@ def _repeatable(path: str) -> Callable[[], Any]:
     """A function that returns the file, or all that a stream holds, from its begin each time."""
     if path != STANDARD and (os.path.isfile(path) or not os.path.exists(path)):
         return lambda: path
-    if path == STANDARD:
-        content = source_of(path).read()
-    else:  # a pipe
-        with open(path, "rb") as pipe:
-            content = pipe.read()
-    content = content.encode() if isinstance(content, str) else content
+    with nullcontext(source_of(path)) if path == STANDARD else open(path, "rb") as stream:  # else a pipe
+        content = stream.read()
 
     def begin() -> Any:
-        stream: Any = io.BytesIO(content)
-        stream.name = "<stdin>" if path == STANDARD else path
-        return stream
+        copy: Any = io.BytesIO(content.encode() if isinstance(content, str) else content)
+        copy.name = "<stdin>" if path == STANDARD else path
+        return copy
 
     return begin
 
@@ -289,12 +286,13 @@ def _loaded(settings: InputOptions, path: str, source: Any, u: Any, y: Any, **ch
         "name": "record" if path == STANDARD else None, "channels": channels or None,
         "resolution": settings.resolution, **settings.for_load(), **changed,
     }  # fmt: skip
-    return hs.load(source, u=u, y=y, **arguments)
+    record: hs.Record = hs.load(source, u=u, y=y, **arguments)
+    return record
 
 
 def _from_two_files(settings: RecordOptions, path: str, source: Any, y_file: str) -> "hs.Record":
     """The record of an input in one file and an output in another; a file's only column need not be named."""
-    first, second = _repeatable(path) if path == STANDARD else lambda: source, _repeatable(y_file)
+    first, second = (_repeatable(path) if path == STANDARD else lambda: source, _repeatable(y_file))
     u = _only_column(settings, first(), "u") if settings.u is None else settings.u
     y = _only_column(settings, second(), "y") if settings.y is None else settings.y
     drive = _loaded(settings, path, first(), u, u, resolution=None)

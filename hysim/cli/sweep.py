@@ -39,7 +39,9 @@ def sweep(
     of: str | None = None,
     json: bool = False,
 ) -> int:
-    """Compute a task for many sets of parameters, as a TOML file says, and keep every finished row in a database.
+    """Compute a study over many parameters, or continue one.
+
+    Compute a task for many sets of parameters, as a TOML file says, and keep every finished row in a database.
 
     An interrupted study continues with --resume. Exit code 1: some tasks failed. A study of the error of a law on a
     record, beside both files:

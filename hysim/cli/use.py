@@ -24,7 +24,9 @@ def simulate(
     plot: options.Picture | None = None,
     json: bool = False,
 ) -> int:
-    """Simulate a model in free run, and write its signals as columns.
+    """Drive a model with the input in a file of your own.
+
+    Simulate a model in free run, and write its signals as columns.
 
     The columns are t if there is a time, u, y, the memory z of a law and further signals of a plant, those of a
     structure as drift_0, drift_1, ... for its elements and displacement_1, ... for its nodes. An AT2 file of PEER is
@@ -77,7 +79,9 @@ def page(
     title: str | None = None,
     settings: records.RecordOptions,
 ) -> int:
-    """Write a page on which the loop of a law follows sliders, one HTML file that works offline.
+    """Write a law with sliders as a page for a browser.
+
+    Write a page on which the loop of a law follows sliders, one HTML file that works offline.
 
     With --data the measured points are part of it.
 
@@ -114,7 +118,9 @@ def c(
     sample_time: float | None = None,
     u0: float = 0.0,
 ) -> int:
-    """Write a law, a sum, a cascade or a plant as C99 with math.h alone.
+    """Write a model, or its inverse, as C99 for the device that it runs on.
+
+    Write a law, a sum, a cascade or a plant as C99 with math.h alone.
 
     The files are MODEL.h, MODEL.c, and MODEL_main.c, a program that reads inputs, one in each line, and prints outputs.
     A controller that is tuned on the model is written by hysim control --c.
@@ -146,6 +152,9 @@ def c(
     return 0
 
 
+Platform = Literal["linux", "windows", "mac"]
+
+
 def _platforms(text: str) -> tuple[str, ...]:
     return () if text == "none" else tuple(name.strip() for name in text.split(","))
 
@@ -160,9 +169,11 @@ def fmu(
     unit: tuple[options.Unit, ...] = (),
     u0: float = 0.0,
     y0: float = 0.0,
-    platforms: Annotated[tuple[str, ...], options.Value("PLATFORMS", _platforms)] | None = None,
+    platforms: Annotated[tuple[Platform, ...], options.Value("PLATFORMS", _platforms)] | None = None,
 ) -> int:
-    """Write a model as a functional mock-up unit (FMU) for co-simulation.
+    """Write a model as a functional mock-up unit for Simulink, Modelica and other tools.
+
+    Write a model as a functional mock-up unit (FMU) for co-simulation.
 
     It holds its description, its C sources, and shared libraries. The output is one communication step late.
 
