@@ -17,7 +17,7 @@ import pytest
 
 import hysim as hs
 from hysim._atomic import write_all
-from hysim.cli import COMMANDS, Command, control, designs, main, options, outputs
+from hysim.cli import COMMANDS, Command, designs, main, models, options, outputs
 from hysim.cli.look import KINDS
 
 LAW = hs.BoucWen(beta=0.03, gamma=0.02, gain=-0.01, feedthrough=0.03)
@@ -436,7 +436,7 @@ def test_a_design_that_makes_no_sense_is_refused_in_one_line(run, arguments, mes
 
 def test_the_kinds_of_controllers_are_the_same_in_help_and_in_designs():
     made = hs.Actuator(hysteresis=LAW, vibration=hs.mode(10.0, 0.1))
-    for kind in control.CONTROLLERS:
+    for kind in models.CONTROLLERS:
         tuned = designs.feedback(made, kind, None) or hs.PID(kp=1.0)
         controller = designs.controller(made, kind, None, tuned, preview=False)
         assert (getattr(controller, "feedforward", None) is not None) == (kind in designs.INVERTING)

@@ -18,7 +18,7 @@ from hysim._frozen import FloatArray
 from hysim._prefixes import label
 from hysim._printing import extent, folded, quantity
 from hysim.cli import models, outputs
-from hysim.cli.control import DesignOptions
+from hysim.cli.models import DesignOptions
 from hysim.cli.options import Pair, positive
 from hysim.control import HysteresisAssessment, StepAssessment, as_actuator, assess_hysteresis, assess_step, driven_by
 from hysim.models.model import in_brief

@@ -171,6 +171,74 @@ class FitOptions(StructureOptions, ActuatorOptions):
         return {"fixed": dict(self.fix), **others}
 
 
+CONTROLLERS = {
+    "pid": "with filter and setpoint weight",
+    "integral": "integral action alone",
+    "notch": "integral action behind a notch at the mode",
+    "inverse": "of law, creep and amplifier, without feedback",
+    "tracking": "that inverse and integral action",
+    "model-following": "that inverse, the mode's, and integral action on the errors of the model",
+}
+"""Controllers that `--controller` takes."""
+
+
+@dataclass(kw_only=True)
+class DesignOptions:
+    """Options of a design.
+
+    plant: stages around the model, which replace its own
+    -----
+    mode : a resonance behind the law: natural frequency [Hz], damping ratio [1]
+    creep : growth in a decade of time [%]
+    noise : noise of the sensor [unit of y]
+    quantum : step of the sensor's readings [unit of y]
+    delay : age of the sensor's readings [s]
+
+    controller
+    ----------
+    controller :
+    sample_time : sample time of the controller [s]
+    limits : limits of the command [unit of u] (default: the record's extremes, else none)
+    max_sensitivity : largest |1/(1 + L)| at any frequency and slope of the law [1]
+    max_voltage_noise : largest voltage noise that the sensor's noise may cause [unit of u]
+    vary_mode : keep the bounds also where the mode's frequency is lower or higher by this [%]
+    preview : the reference is known ahead, for as long as the inverse needs
+
+    task of the loop
+    ----------------
+    reference : reference for which the gains are tuned; a text file has times [s] and values [unit of y] in its first
+        two columns
+    range : range of the triangle [unit of y] (default: the middle 80 % of the range that the limits allow)
+    frequency : frequency of the triangle [Hz] (default: 1000 samples, 200 periods of a mode or 20 of a lag a cycle)
+    step : step from a quarter of the range, or downwards from three [unit of y] (default: half the range)
+    duration : duration of the step [s] (default: until the slowest mode is at rest)
+    record : measured loop: its input's extremes are the limits, and its output is compared with the model's
+    u : input of the record: name or number of its column (default: u)
+    y : output of the record: name or number of its column (default: y)
+    """
+
+    mode: options.Mode | None = None
+    creep: float | None = None
+    noise: float | None = None
+    quantum: float | None = None
+    delay: float | None = None
+    controller: Annotated[str, options.one_of(CONTROLLERS)] = "pid"
+    sample_time: float
+    limits: options.Pair | None = None
+    max_sensitivity: float = 2.0
+    max_voltage_noise: float | None = None
+    vary_mode: float | None = None
+    preview: bool = False
+    reference: Annotated[str, options.file("triangle|step|FILE", options.INPUT)] = "triangle"
+    range: options.Pair | None = None
+    frequency: float | None = None
+    step: float | None = None
+    duration: float | None = None
+    record: options.RecordIn | None = None
+    u: options.Column | None = None
+    y: options.Column | None = None
+
+
 def family(name: str) -> Any:
     """The family with a name such as ``bouc-wen``; a ValueError, which lists the names, if there is none."""
     from hysim.models.candidates import family_named
