@@ -7,7 +7,6 @@ or any at all where it exits with 2, but for the rows of a study, which are kept
 for a network are left out, and so are fits that take seconds: the records have five samples.
 """
 
-import argparse
 import contextlib
 import io
 import itertools
@@ -25,8 +24,9 @@ from pathlib import Path
 from unittest import mock
 
 import hysim as hs
+from hysim.cli import Command
 from hysim.cli import main as hysim_command
-from hysim.cli import parsers
+from hysim.cli.options import Parameter
 from hysim.models.storage import to_json
 from hysim.plot import Figure, figure
 
@@ -113,25 +113,22 @@ def case(seed: int) -> tuple[str, list[str], dict[str, bytes]]:
 
 def with_options(command: str, arguments: list[str], rng: random.Random) -> list[str]:
     """The arguments with some options more, and sometimes one word less."""
-    known = [
-        action
-        for action in parsers()[1][command]._actions
-        if action.option_strings and action.option_strings[-1] not in LEFT_OUT
-    ]
-    for action in rng.sample(known, min(len(known), rng.choice((0, 1, 1, 2, 3)))):
-        arguments.append(action.option_strings[-1])
-        if action.nargs != 0:
-            arguments.append(value(action, rng))
+    options = [each for each in Command(command).declared if each.title != "Arguments"]
+    known = [option for option in options if option.click.opts[0] not in LEFT_OUT]
+    for option in rng.sample(known, min(len(known), rng.choice((0, 1, 1, 2, 3)))):
+        arguments.append(option.click.opts[0])
+        if option.value.name:
+            arguments.append(value(option, rng))
     if rng.random() < 0.2:
         del arguments[rng.randrange(1, len(arguments))]
     return arguments
 
 
-def value(action: argparse.Action, rng: random.Random) -> str:
+def value(option: Parameter, rng: random.Random) -> str:
     """What may be given to an option: one of its words, a path, or a word that fits or does not."""
-    if action.choices is not None and rng.random() < 0.8:
-        return str(rng.choice(list(action.choices)))
-    return rng.choice(PATHS if "." in str(action.metavar) else WORDS)
+    if option.value.words and rng.random() < 0.8:
+        return rng.choice(option.value.words)
+    return rng.choice(PATHS if option.value.role else WORDS)
 
 
 def changed(text: str, rng: random.Random) -> bytes:

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 import hysim as hs
-from hysim.cli import COMMANDS, parsers
+from hysim.cli import COMMANDS, Command
 
 ROOT = Path(__file__).parent.parent
 CHANGELOG = (ROOT / "CHANGELOG.md").read_text(encoding="utf-8")
@@ -23,7 +23,7 @@ def test_every_name_of_the_changelog_exists(name):
 
 
 def test_every_command_and_option_of_the_changelog_exists():
-    known = {option for parser in parsers()[1].values() for option in parser._option_string_actions}
+    known = {option for name in COMMANDS for each in Command(name).params for option in each.opts}
     options = {option for text in QUOTED for option in re.findall(r"(?<!\S)--[a-z][\w-]*", text)}
     assert options
     assert options <= known

@@ -1,6 +1,5 @@
 """What holds for every command: help with units, exit codes, JSON, pictures, and files that are whole or not there."""
 
-import argparse
 import dataclasses
 import io
 import json
@@ -8,27 +7,24 @@ import os
 import re
 import subprocess
 import sys
+from dataclasses import dataclass
 from types import SimpleNamespace
+from typing import Annotated, Literal
 
+import click
 import numpy as np
 import pytest
 
 import hysim as hs
 from hysim._atomic import write_all
-from hysim.cli import COMMANDS, control, designs, main, outputs, parsers
-from hysim.cli.options import REAL, Command
-from hysim.cli.plot import KINDS
+from hysim.cli import COMMANDS, Command, designs, main, models, options, outputs
+from hysim.cli.look import KINDS
 
 LAW = hs.BoucWen(beta=0.03, gamma=0.02, gain=-0.01, feedthrough=0.03)
 COLUMNS = ("--u", "voltage", "--y", "displacement")
-PARSER, PARSERS = parsers()
-QUANTITIES = (*REAL, "LOW,HIGH", "FREQUENCY,DAMPING", "NAME=VALUE", "NAME=LOW:HIGH", "QUANTUM")
-OPTIONS = {
-    f"{name} {action.dest}": action
-    for name, parser in (("hysim", PARSER), *PARSERS.items())
-    for action in parser._actions
-    if not isinstance(action, argparse._SubParsersAction)
-}
+PARSERS = {name: Command(name) for name in COMMANDS}
+QUANTITIES = ("NUMBER", "LOW,HIGH", "FREQUENCY,DAMPING", "NAME=VALUE", "NAME=LOW:HIGH", "QUANTUM")
+OPTIONS = {f"{name} {each.click.name}": each for name, command in PARSERS.items() for each in command.declared}
 
 
 @pytest.fixture(scope="module")
@@ -52,11 +48,7 @@ def run(folder, monkeypatch, capsys):
     monkeypatch.chdir(folder)
 
     def command(*arguments):
-        try:
-            code = main([*map(str, arguments)])
-        except SystemExit as exit_:
-            code = exit_.code
-        return code, *capsys.readouterr()
+        return main([*map(str, arguments)]), *capsys.readouterr()
 
     return command
 
@@ -69,61 +61,90 @@ def test_the_commands_are_those_of_the_design():
 
 @pytest.mark.parametrize("name", OPTIONS)
 def test_every_option_has_help_and_every_quantity_a_unit(name):
-    action = OPTIONS[name]
-    assert action.help, name
-    if action.metavar in QUANTITIES:
-        assert re.search(r"\[(1|s|Hz|%%|units? of .+)\]", action.help), (name, action.help)
+    option = OPTIONS[name]
+    assert option.help, name
+    if option.value.name in QUANTITIES:
+        assert re.search(r"\[(1|s|Hz|%|units? of .+)\]", option.help), (name, option.help)
 
 
 @pytest.mark.parametrize("name", ["identify", "compare", "simulate", "plot", "control", "page", "c", "fmu"])
 def test_the_help_says_that_a_model_of_ones_own_is_code_that_is_executed(name):
-    assert "module:name of your own, which executes ./module.py" in " ".join(PARSERS[name].format_help().split())
+    assert "module:name of your own, which executes ./module.py" in " ".join(help_of(name).split())
 
 
-def test_options_are_declared_as_their_help_shows_them():
-    text = """
-file FILE  an argument
-others FILE...  more of them
+def help_of(name):
+    return PARSERS[name].get_help(click.Context(PARSERS[name]))
 
-some numbers:
---limits LOW,HIGH  a text that goes on
-    in another line, 100 %
---unit SIGNAL=UNIT...  more than once
---hold zoh|foh  one of two words [default: zoh]
-either --t COLUMN  this
-or --no-t  or that
---cycles [CYCLES]  with or without a number [default: 1]
---plot LOOP.svg  a picture
---scale LENGTH  a number [required]
-"""
-    parser = argparse.ArgumentParser()
-    commands = parser.add_subparsers()
-    own = Command("try", "help", "description", text, lambda _: 0).add_to(commands)
-    options = parser.parse_args(
-        ["try", "a", "b", "c", "--limits", "1,2", "--unit", "u=V", "--unit", "y=m", "--scale", "3"]
-    )
-    assert (options.file, options.others, options.limits, options.scale) == ("a", ["b", "c"], (1.0, 2.0), 3.0)
-    assert (options.unit, options.hold, options.cycles) == ([("u", "V"), ("y", "m")], "zoh", 1)
-    assert options.roles == {
-        "file": "input", "others": "input", "limits": "", "unit": "", "hold": "", "t": "", "no_t": "", "cycles": "",
-        "plot": "picture", "scale": "",
-    }  # fmt: skip
-    assert parser.parse_args(["try", "a", "--scale", "3", "--cycles"]).cycles is None
-    help_ = " ".join(own.format_help().split())
+
+@dataclass(kw_only=True)
+class Group:
+    """Some options.
+
+    some numbers
+    ------------
+    limits : a text that goes on
+        in another line, 100 %
+    hold : one of two words
+    """
+
+    limits: options.Pair | None = None
+    hold: Literal["zoh", "foh"] = "zoh"
+
+
+def declared(
+    file: options.RecordIn,
+    others: tuple[options.RecordIn, ...] = (),
+    *,
+    group: Group,
+    unit: tuple[options.Unit, ...] = (),
+    no_t: bool = False,
+    cycles: Annotated[int, options.Value("CYCLES", lambda text: 0 if text == "all" else int(text), bare="all")] = 1,
+    plot: options.Picture | None = None,
+    scale: float,
+):
+    """A command.
+
+    Parameters
+    ----------
+    file : an argument
+    others : more of them
+    unit : more than once
+    no_t : without a value
+    cycles : with or without a number
+    plot : a picture
+    scale : a number
+    """
+    return file, others, group, unit, no_t, cycles, plot, scale
+
+
+def test_options_follow_from_signature_annotations_and_docstring():
+    parameters = {each.click.name: each for each in options.parameters(declared)}
+    command = click.Command("try", params=[each.click for each in parameters.values()])
+
+    def called(*arguments):
+        return options.call(declared, command.make_context("try", ["a", "--scale", "3", *arguments]).params)
+
+    used = ("b", "c", "--limits", "-1,2", "--unit", "u=V", "--unit", "y=m", "--no-t", "--cycles", "--plot", "x.svg")
+    units = (("u", "V"), ("y", "m"))
+    assert called(*used) == ("a", ("b", "c"), Group(limits=(-1.0, 2.0)), units, True, 0, "x.svg", 3.0)
+    assert called() == ("a", (), Group(), (), False, 1, None, 3.0)
+    roles = {name: each.value.role for name, each in parameters.items() if each.value.role}
+    assert roles == {"file": "input", "others": "input", "plot": "picture"}
+    assert {each.title for each in parameters.values()} == {"Arguments", "some numbers", "Options"}
+    help_ = " ".join(command.get_help(click.Context(command)).split())
     assert "a text that goes on in another line, 100 %" in help_
     assert "a picture; written as SVG, PNG or PDF by its ending" in help_
-    assert "one of two words (default: zoh)" in help_
-    for wrong in (["--t", "0", "--no-t"], ["--limits", "1"], ["--hold", "hold"]):
-        with pytest.raises(SystemExit):
-            parser.parse_args(["try", "a", "--scale", "3", *wrong])
-    with pytest.raises(ValueError, match="expected an option, its value, two spaces and a text, got '--t COLUMN time'"):
-        Command("wrong", "help", "description", "--t COLUMN time", lambda _: 0).add_to(commands)
+    assert "one of two words [default: zoh]" in help_
+    assert "a number [required]" in help_
+    for wrong in (["--limits", "1"], ["--hold", "hold"], ["--unit", "x=m"], ["--scale", "3um"]):
+        with pytest.raises(click.BadParameter, match=f"expected .*, got '{wrong[1]}'"):
+            called(*wrong)
 
 
 def test_without_a_command_help_is_printed_and_nothing_done(run):
     code, out, err = run()
     assert (code, out) == (2, "")
-    assert err.startswith("usage: hysim")
+    assert err.startswith("Usage: hysim")
     assert all(name in err for name in PARSERS)
 
 
@@ -278,7 +299,7 @@ def test_a_link_is_followed_and_a_pipe_is_written_to(tmp_path):
 
 def test_a_folder_that_may_not_be_written_to_is_refused_before_anything_is_computed(run, monkeypatch):
     monkeypatch.setattr(outputs.os, "access", lambda *_: False)
-    monkeypatch.setattr("hysim.identification.identify", lambda *_, **__: pytest.fail("computed all the same"))
+    monkeypatch.setattr("hysim.identify", lambda *_, **__: pytest.fail("computed all the same"))
     code, _, err = run("identify", "loop.csv", *COLUMNS, "--model", "line", "--out", "model.json")
     assert (code, err) == (2, "hysim: error: cannot write model.json: its folder may not be written to\n")
 
@@ -289,7 +310,7 @@ def test_too_little_memory_and_missing_libraries_are_one_line(run, monkeypatch):
         def fails(*_, error=error, **__):
             raise error
 
-        monkeypatch.setattr("hysim.metrics.loop_metrics", fails)
+        monkeypatch.setattr("hysim.loop_metrics", fails)
         assert run("metrics", "loop.csv", *COLUMNS) == (2, "", f"hysim: error: {line}\n")
 
 
@@ -415,7 +436,7 @@ def test_a_design_that_makes_no_sense_is_refused_in_one_line(run, arguments, mes
 
 def test_the_kinds_of_controllers_are_the_same_in_help_and_in_designs():
     made = hs.Actuator(hysteresis=LAW, vibration=hs.mode(10.0, 0.1))
-    for kind in control.CONTROLLERS:
+    for kind in models.CONTROLLERS:
         tuned = designs.feedback(made, kind, None) or hs.PID(kp=1.0)
         controller = designs.controller(made, kind, None, tuned, preview=False)
         assert (getattr(controller, "feedforward", None) is not None) == (kind in designs.INVERTING)

@@ -203,7 +203,7 @@ def test_the_command_line_prints_the_models_that_were_compared(monkeypatch, caps
         raise Interrupted("1 of 2", hs.Comparison(record=table1, loop=hs.loop_metrics(table1.u, table1.y), rows=()))
 
     hs.save_record(table1, tmp_path / "loop.csv")
-    monkeypatch.setattr("hysim.comparison.compare", interrupted)
+    monkeypatch.setattr("hysim.compare", interrupted)
     assert main(["compare", str(tmp_path / "loop.csv")]) == 130
     printed = capsys.readouterr()
     assert printed.out.startswith("model")

@@ -234,7 +234,7 @@ def test_a_known_mass_means_an_oscillator(tmp_path, capsys, kinds, monkeypatch):
         arguments.append(options)
         return found
 
-    monkeypatch.setattr("hysim.discovery.discover_oscillator", verb)
+    monkeypatch.setattr("hysim.discover_oscillator", verb)
     columns = np.stack([record.u, record.y, record.t], axis=1)
     np.savetxt(tmp_path / "r.csv", columns, delimiter=",", header="u,y,t", comments="")
     assert main(["discover", str(tmp_path / "r.csv"), "--mass", "2", "--degree", "2"]) == 0

@@ -16,7 +16,7 @@ from hysim import _atomic, _parallel
 from hysim._atomic import write_all
 from hysim._parallel import in_chunks, map_on_threads, processes, second_process, threads
 from hysim.cli import main
-from hysim.cli.shell.signals import Ended
+from hysim.cli.signals import Ended
 
 ON_LINUX = sys.platform.startswith("linux")
 linux = pytest.mark.skipif(not ON_LINUX, reason="processes are found by /proc, and forked on Linux alone")

@@ -3,17 +3,18 @@
 import io
 import json
 import math
-import re
+import os
 import shlex
 import subprocess
+import sys
 
+import click
 import numpy as np
 import pytest
 
 import hysim as hs
-from hysim.cli import COMMANDS, GROUPS, main, parsers
-from hysim.cli.example import DEVICES
-from hysim.cli.shell.completion import bash, fish, zsh
+from hysim.cli import COMMANDS, GROUPS, HYSIM, Command, main
+from hysim.cli.learn import DEVICES
 from hysim.files import FileColumn
 
 
@@ -40,7 +41,7 @@ def test_what_the_example_says_to_try_runs(run):
     tries = [line.split()[1:] for line in text.splitlines() if line.startswith("  hysim ")]
     assert len(tries) == 2
     assert run(*tries[0])[0] == 0
-    assert COMMANDS[tries[1][0]].name == "identify"
+    assert tries[1][0] == "identify"
 
 
 def test_the_example_overwrites_nothing(run, tmp_path):
@@ -93,36 +94,50 @@ def test_hysim_columns_prints_what_u_and_y_take(run, tmp_path):
     assert run("columns", "none.csv")[0] == 2
 
 
-def completed(folder, *words):
-    """What bash offers for the last of these words."""
-    script = folder / "hysim.bash"
-    script.write_text(bash(parsers()[1]))
-    line = " ".join(f"'{word}'" for word in words)
-    text = f"source {script}; COMP_WORDS=({line}); COMP_CWORD={len(words) - 1}; _hysim; echo ${{COMPREPLY[@]}}"
-    return subprocess.run(["bash", "-c", text], capture_output=True, text=True, check=True).stdout.split()
+def completed(monkeypatch, capsys, *words):
+    """What the script of bash is told to offer for the last of these words, with the kind of each."""
+    monkeypatch.setenv("_HYSIM_COMPLETE", "bash_complete")
+    monkeypatch.setenv("COMP_WORDS", shlex.join(words))
+    monkeypatch.setenv("COMP_CWORD", str(len(words) - 1))
+    assert main([]) == 0
+    return capsys.readouterr().out.split()
 
 
-def test_bash_completes_commands_options_values_and_models(tmp_path):
-    assert completed(tmp_path, "hysim", "id") == ["identify"]
-    assert completed(tmp_path, "hysim", "identify", "--noi") == ["--noise"]
-    assert completed(tmp_path, "hysim", "identify", "x.csv", "--noise", "") == ["gaussian", "quantised", "robust"]
-    assert completed(tmp_path, "hysim", "identify", "--model", "prandtl") == ["prandtl-ishlinskii"]
-    assert completed(tmp_path, "hysim", "completion", "z") == ["zsh"]
-    assert completed(tmp_path, "hysim", "identify", "--u", "") == []  # bash goes on with the names of files
+def test_commands_options_values_and_models_are_completed(monkeypatch, capsys):
+    def of(*words):
+        return completed(monkeypatch, capsys, "hysim", *words)
+
+    assert of("id") == ["plain,identify"]
+    assert of("identify", "--noi") == ["plain,--noise"]
+    assert of("identify", "x.csv", "--noise", "") == ["plain,gaussian", "plain,quantised", "plain,robust"]
+    assert of("identify", "--model", "prandtl") == ["file,prandtl", "plain,prandtl-ishlinskii"]
+    assert of("completion", "z") == ["plain,zsh"]
+    assert of("identify", "--u", "v") == ["file,v"]  # the shell goes on with the names of files
+    assert of("metrics", "lo") == ["file,lo"]
 
 
-@pytest.mark.parametrize("script", [bash, zsh, fish])
-def test_every_option_is_in_the_script_of_each_shell(script):
-    text = script(parsers()[1])
-    for name, parser in parsers()[1].items():
-        assert re.search(rf"\b{name}\b", text)
-        for action in parser._actions:
-            for option in action.option_strings:
-                assert option == "-h" or re.search(rf"(--|-l ){option.removeprefix('--')}\b", text), option
+@pytest.mark.parametrize("name", COMMANDS)
+def test_every_option_is_completed(monkeypatch, capsys, name):
+    offered = completed(monkeypatch, capsys, "hysim", name, "--")
+    assert {f"plain,{each.opts[0]}" for each in Command(name).params if each.opts[0].startswith("--")} <= {*offered}
 
 
-def test_the_command_prints_the_script(run):
-    assert run("completion", "bash")[1] == bash(parsers()[1]) + "\n"
+def test_bash_offers_what_its_script_is_told(run, tmp_path):
+    (tmp_path / "hysim").write_text(f'#!/bin/sh\nexec {sys.executable} -m hysim "$@"\n')
+    (tmp_path / "hysim").chmod(0o755)
+    (tmp_path / "hysim.bash").write_text(run("completion", "bash")[1])
+    words = "COMP_WORDS=(hysim identify --intervals pro); COMP_CWORD=3"
+    text = f"source ./hysim.bash; {words}; _hysim_completion ./hysim; echo ${{COMPREPLY[@]}}"
+    environment = {**os.environ, "PYTHONPATH": os.path.dirname(os.path.dirname(__file__))}
+    done = subprocess.run(["bash", "-c", text], capture_output=True, text=True, check=True, env=environment)
+    assert done.stdout == "profile\n"
+
+
+@pytest.mark.parametrize("shell", ["bash", "zsh", "fish"])
+def test_a_script_for_each_shell_is_printed(run, shell):
+    code, out, err = run("completion", shell)
+    assert (code, err) == (0, "")
+    assert f"_HYSIM_COMPLETE={shell}_complete" in out
 
 
 def test_each_device_has_an_example_whose_tries_are_commands(run, tmp_path):
@@ -132,24 +147,36 @@ def test_each_device_has_an_example_whose_tries_are_commands(run, tmp_path):
         assert len(record) == len(device.record())
         assert "y" in record.units
         for line in device.tries:
-            parsers()[0].parse_args(line.format(f"{name}.csv").split())
+            parsed(line.format(f"{name}.csv").split())
+
+
+def parsed(words):
+    """Name of the command in these words, whose arguments and options it takes."""
+    Command(words[0]).make_context(words[0], words[1:])
+    return words[0]
 
 
 @pytest.mark.parametrize("name", COMMANDS)
 def test_the_examples_in_each_help_are_commands(name):
-    parser, of_commands = parsers()
-    lines = COMMANDS[name].examples.strip().splitlines()
+    command = Command(name)
+    lines = command.sections["Examples"].splitlines()
     assert lines
-    assert of_commands[name].format_help().endswith("".join(f"  {line}\n" for line in lines))
+    assert command.get_help(click.Context(command)).endswith("\n".join(f"  {line}" for line in lines))
     for line in lines:
-        for command in line.split(" | "):
-            words = shlex.split(command)
+        for each in line.split(" | "):
+            words = shlex.split(each)
             assert words[0] == "hysim"
-            assert parser.parse_args(words[1:]).command.name in (name, "plot")
+            assert parsed(words[1:]) in (name, "plot")
 
 
-def test_the_help_shows_every_command_in_a_group(run):
-    text = parsers()[0].format_help()
+def test_the_help_shows_every_command_in_a_group():
+    text = HYSIM.get_help(click.Context(HYSIM))
     assert all(f"\n{title}:\n  " in text for title in GROUPS)
     assert all(f"\n  {name} " in text for name in COMMANDS)
     assert sum(map(len, GROUPS.values())) == len(COMMANDS)
+
+
+@pytest.mark.parametrize("arguments", [["--help"], ["--version"], ["metrics", "--help"], []])
+def test_help_loads_no_numpy(arguments):
+    code = f"import sys; from hysim.cli import main; main({arguments}); sys.exit('numpy' in sys.modules)"
+    assert subprocess.run([sys.executable, "-c", code], capture_output=True).returncode == 0

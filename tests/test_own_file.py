@@ -266,7 +266,7 @@ def test_without_models_all_families_are_compared(run, monkeypatch):
 def test_a_search_that_does_not_converge_exits_with_1(run, monkeypatch):
     fit = hs.identify(hs.Line, hs.datasets.table1())
     unfinished = dataclasses.replace(fit, success=False)
-    monkeypatch.setattr("hysim.identification.identify", lambda *_, **__: unfinished)
+    monkeypatch.setattr("hysim.identify", lambda *_, **__: unfinished)
     assert run("identify", "loop.csv", *COLUMNS, "--model", "line")[0] == 1
 
 

@@ -1,12 +1,13 @@
 """Ranges of samples, input and output in two files, structures of models and sensors, by options of the commands."""
 
 import dataclasses
+import functools
 
 import numpy as np
 import pytest
 
 import hysim as hs
-from hysim.cli import main, models, parsers, records, sensors
+from hysim.cli import Command, main, models, options, records
 
 RECORD = hs.Record(
     t=0.1 * np.arange(60),
@@ -29,12 +30,22 @@ def folder(tmp_path, monkeypatch):
     return tmp_path
 
 
-def options(*arguments):
-    return parsers()[0].parse_args(["identify", *arguments, "--model", "line"])
+def arguments_of(*words):
+    """Arguments of the function of `hysim identify`."""
+    arguments = {}
+    command = Command("identify")
+    values = command.make_context("identify", [*words]).params
+    options.call(functools.wraps(command.function)(lambda **named: arguments.update(named)), values)
+    return arguments
 
 
-def read(*arguments):
-    return records.read(options(*arguments))
+def chosen(*words):
+    """The options for a record."""
+    return arguments_of("loop.csv", *words, "--model", "line")["settings"]
+
+
+def read(file, *words):
+    return records.read(chosen(*words), file)
 
 
 @pytest.mark.parametrize(
@@ -72,9 +83,8 @@ def test_a_range_counts_before_the_record_is_resampled(folder):
 
 
 def test_the_test_record_of_a_comparison_is_not_cut(folder):
-    chosen = options("loop.csv", "--to", "10")
-    assert len(records.read(chosen)) == 10
-    assert len(records.read(chosen, "loop.csv", uncut=True)) == 60
+    assert len(records.read(chosen("--to", "10"), "loop.csv")) == 10
+    assert len(records.read(chosen("--to", "10"), "loop.csv", uncut=True)) == 60
 
 
 @pytest.mark.parametrize(
@@ -92,8 +102,7 @@ def test_a_range_without_samples_is_refused(folder, arguments, message):
 
 @pytest.mark.parametrize(("option", "value"), [("--from", "-1"), ("--from", "1.5"), ("--to", "3min"), ("--every", "0")])
 def test_a_place_is_a_number_or_a_time(folder, capsys, option, value):
-    with pytest.raises(SystemExit):
-        options("loop.csv", f"{option}={value}")
+    assert main(["metrics", "loop.csv", f"{option}={value}"]) == 2
     assert "expected" in capsys.readouterr().err
 
 
@@ -101,7 +110,7 @@ def test_an_output_in_a_file_of_its_own_is_joined_by_times(folder):
     rec = read("drive.csv", "--y-file", "sensor.csv")
     assert (rec.t.tolist(), rec.u.tolist(), rec.y.tolist()) == ([0.5, 1.5, 2.5, 3.5], [5, 15, 25, 35], [0, 1, 2, 3])
     assert dict(rec.units) == {"u": "V", "y": "um"}
-    both = records.read_with_weights(options("drive.csv", "--y-file", "sensor.csv", "--weights", "w"))
+    both = records.read_with_weights(chosen("--y-file", "sensor.csv", "--weights", "w"), "drive.csv")
     assert both[1].tolist() == [0.0, 1.0, 0.0, 1.0]
 
 
@@ -123,8 +132,8 @@ def test_joined_times_have_the_unit_of_the_input_and_lie_within_its_own():
         hs.join_records(dataclasses.replace(slow, t=slow.t + 5.0), fast)
 
 
-def chosen(*arguments):
-    return models.to_identify(parsers()[0].parse_args(["identify", "loop.csv", *arguments]))
+def model_of(*words):
+    return models.to_identify(arguments_of("loop.csv", *words)["fit"])
 
 
 @pytest.mark.parametrize(
@@ -143,7 +152,7 @@ def chosen(*arguments):
     ],
 )  # fmt: skip
 def test_options_choose_the_structure_of_a_model(arguments, structure):
-    assert chosen("--model", *arguments) == structure
+    assert model_of("--model", *arguments) == structure
 
 
 @pytest.mark.parametrize(
@@ -158,24 +167,24 @@ def test_options_choose_the_structure_of_a_model(arguments, structure):
 )
 def test_an_option_of_another_model_is_refused(arguments, message):
     with pytest.raises(ValueError, match=message):
-        chosen("--model", *arguments)
+        model_of("--model", *arguments)
 
 
 def test_an_oscillator_in_a_file_is_searched_in_its_own_setting(folder):
     hs.save(hs.BoucWenOscillator(mass=1.0, damping=0.1, stiffness=1.0, law=hs.BoucWen(), excitation="base"), "o.json")
-    assert chosen("--model", "o.json") == hs.BoucWenOscillator.structure(excitation="base")
-    assert chosen("--model", "o.json", "--excitation", "force") == hs.BoucWenOscillator.structure()
+    assert model_of("--model", "o.json") == hs.BoucWenOscillator.structure(excitation="base")
+    assert model_of("--model", "o.json", "--excitation", "force") == hs.BoucWenOscillator.structure()
 
 
 def test_sensors_of_a_structure_have_the_names_of_its_signals(folder, capsys):
     frame = hs.shear_frame([1.0, 1.0], laws=[hs.BoucWen(gain=5.0), hs.BoucWen(gain=4.0)])
     record = dataclasses.replace(RECORD, channels={"acceleration_2": RECORD.y, "drift_0": RECORD.u})
-    measured = sensors.of_structure(frame, record, dict(record.channels))
+    measured = records.of_structure(frame, record, dict(record.channels))
     assert measured.sensors == (("acceleration", 1), ("drift", 0))
     assert measured.acceleration[:, 1].tolist() == RECORD.y.tolist()
     for name in ("drift_2", "acceleration_0", "speed_1", "drift"):
         with pytest.raises(ValueError, match=f"no signal '{name}': its signals are displacement_1 to displacement_2"):
-            sensors.of_structure(frame, record, {name: 0})
+            records.of_structure(frame, record, {name: 0})
     hs.save(frame, "frame.json")
     arguments = ("identify", "loop.csv", "--model", "line", "--sensor", "drift_0=y")
     assert main(arguments) == 2
@@ -183,8 +192,8 @@ def test_sensors_of_a_structure_have_the_names_of_its_signals(folder, capsys):
 
 
 def test_the_columns_of_a_file_are_named_as_sensors(folder):
-    with_sensors = options("loop.csv", "--sensor", "drift_0=y", "--sensor", "force_0=u")
-    record, _ = records.read_with_weights(with_sensors)
+    with_sensors = chosen("--sensor", "drift_0=y", "--sensor", "force_0=u")
+    record, _ = records.read_with_weights(with_sensors, "loop.csv")
     assert dict(with_sensors.sensor) == {"drift_0": "y", "force_0": "u"}
     assert record.channel("drift_0").tolist() == record.y.tolist() == RECORD.y.tolist()
     assert sorted(record.channels) == ["drift_0", "force_0"]

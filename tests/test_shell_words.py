@@ -1,21 +1,19 @@
 """Errors and warnings name options as a shell takes them, and suggest the one that was meant."""
 
 import ast
+import inspect
 import re
 from pathlib import Path
 
 import pytest
 
 import hysim as hs
-from hysim.cli import main, parsers
-from hysim.cli.shell.words import OTHER_NAMES, in_shell_words, suggestion
+from hysim.cli import COMMANDS, Command, main
+from hysim.cli.outputs import flags
+from hysim.cli.words import OTHER_NAMES, in_shell_words, suggestion
 
-FLAGS = {
-    action.dest: action.option_strings[0]
-    for parser in parsers()[1].values()
-    for action in parser._actions
-    if action.option_strings
-}
+FLAGS_OF = {name: flags(Command(name)) for name in COMMANDS}
+FLAGS = {name: flag for flags_of_one in FLAGS_OF.values() for name, flag in flags_of_one.items()}
 PACKAGE = Path(hs.__file__).parent
 PYTHON_ONLY = (
     "paper",
@@ -43,11 +41,7 @@ def run(tmp_path, monkeypatch, capsys):
     (tmp_path / "latin.csv").write_bytes("u,y [µm]\n0,1\n1,2\n".encode("latin-1"))
 
     def command(*arguments):
-        try:
-            code = main([*arguments])
-        except SystemExit as exit_:
-            code = exit_.code
-        return code, *capsys.readouterr()
+        return main([*arguments]), *capsys.readouterr()
 
     return command
 
@@ -116,7 +110,7 @@ def test_no_message_of_the_library_keeps_an_argument_that_is_an_option():
 READ_BY = {"files": "--encoding", "_load.py": "--on-missing"}
 READ_BY |= dict.fromkeys(("_accelerations.py", "_ground_motion.py", "_number_lists.py", "records.py"), "--sample-time")
 """Where messages come from that reach the commands with an option alone: those that read texts, records or times."""
-OPTIONS = {name: set(parser._option_string_actions) for name, parser in parsers()[1].items()}
+OPTIONS = {name: {*flags_of_one.values(), "--help"} for name, flags_of_one in FLAGS_OF.items()}
 ADVISED = re.compile(r"(?:hysim (\w+) )?(?<![\w-])(--[a-z][\w-]*)")
 
 
@@ -130,13 +124,10 @@ def messages():
 
 @pytest.mark.parametrize("name", OPTIONS)
 def test_every_option_in_a_message_is_one_of_the_command_or_named_with_another_one(name, messages):
-    flags = {
-        action.dest: action.option_strings[-1] for action in parsers(name)[1][name]._actions if action.option_strings
-    }
     arguments = re.compile(rf"(?<![\w.\"'-])({'|'.join(each for each in (*FLAGS, *OTHER_NAMES) if len(each) > 2)})=")
     for parts, text in messages:
         if all(READ_BY.get(part, "--help") in OPTIONS[name] for part in parts):
-            words = re.sub(r"\w+\([^()]*\)", "", in_shell_words(text, flags))
+            words = re.sub(r"\w+\([^()]*\)", "", in_shell_words(text, FLAGS_OF[name]))
             assert not arguments.search(words), (parts, words)
             assert all(option in OPTIONS[command or name] for command, option in ADVISED.findall(words)), (parts, words)
 
@@ -144,8 +135,7 @@ def test_every_option_in_a_message_is_one_of_the_command_or_named_with_another_o
 def test_every_option_in_an_error_that_a_command_raises_is_one_of_its_own():
     named = 0
     for name in OPTIONS:
-        path = PACKAGE / "cli" / f"{name}.py"
-        tree = ast.parse(path.read_text() if path.exists() else "")
+        tree = ast.parse(inspect.getsource(Command(name).function))
         raised = [ast.unparse(node) for node in ast.walk(tree) if isinstance(node, ast.Raise)]
         for command, option in ADVISED.findall("\n".join(raised)):
             named += 1
@@ -169,8 +159,8 @@ def test_errors_of_the_library_name_options(run):
         (("metrics", "--U", "u", "loop.csv"), "there is no option --U: did you mean --u? (see hysim metrics --help)"),
         (("identify", "loop.csv", "--model", "line", "--fixed", "a=1"), "no option --fixed: did you mean --fix?"),
         (("identify", "loop.csv", "--model", "line", "--sampletime=1"), "did you mean --sample-time?"),
-        (("plot", "loop.csv", "--out", "a.svg", "loop.csv"), "unexpected argument 'loop.csv': names of files"),
-        (("identify", "loop.csv", "--model", "boucwen"), "did you mean bouc-wen? (models of your own: MODEL.json"),
+        (("metrics", "loop.csv", "loop.csv"), "Got unexpected extra argument (loop.csv) (see hysim metrics --help)"),
+        (("identify", "loop.csv", "--model", "boucwem"), "did you mean bouc-wen? (models of your own: MODEL.json"),
         (("identify", "loop.csv", "--model", "Oscilator"), "did you mean oscillator?"),
         (("identify", "loop.csv", "--modle", "line"), "no option --modle: did you mean --model? (see hysim identify"),
         (("identify", "loop.csv", "--model", "lu-gree"), "did you mean lugre?"),

@@ -4,55 +4,128 @@ Exit codes: 0 done, 1 a search did not converge, 2 bad input, 130 interrupted, 1
 SIGHUP. Results go to the standard output, progress and errors to the standard error, an error in one line.
 """
 
-import argparse
+import importlib
 import os
 import signal
 import sys
-from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager, nullcontext
+from collections.abc import Mapping, Sequence
+from contextlib import nullcontext
+
+import click
+from click.shell_completion import shell_complete
 
 from hysim import __version__
 from hysim._progress import silent
-from hysim.cli import (
-    c,
-    columns,
-    compare,
-    control,
-    discover,
-    example,
-    fmu,
-    identify,
-    measure,
-    metrics,
-    outputs,
-    page,
-    plot,
-    posterior,
-    reproduce,
-    simulate,
-    sweep,
-)
-from hysim.cli.options import Command
-from hysim.cli.shell import completion, signals
-from hysim.cli.shell.parser import BAD_INPUT, Parser, in_groups, one_line, unexpected, unknown_options
-from hysim.cli.shell.words import in_shell_words, suggestion
+from hysim.cli import options, outputs, signals
+from hysim.cli.words import OTHER_NAMES, in_shell_words, suggestion
 from hysim.errors import SimulationError
 
-GROUPS: Mapping[str, Sequence[Command]] = {
-    "look at a file": (example.COMMAND, columns.COMMAND, metrics.COMMAND, plot.COMMAND),
-    "from a file to a model": (identify.COMMAND, posterior.COMMAND, compare.COMMAND, discover.COMMAND),
-    "use a model": (simulate.COMMAND, control.COMMAND, page.COMMAND),
-    "take a model elsewhere": (c.COMMAND, fmu.COMMAND),
-    "many simulations": (sweep.COMMAND,),
-    "camera frames": (measure.COMMAND,),
-    "learn and set up": (page.EXPLORE, reproduce.COMMAND, completion.command(lambda: parsers()[1])),
+GROUPS: Mapping[str, Mapping[str, str]] = {
+    "look at a file": {"example": "learn", "columns": "look", "metrics": "look", "plot": "look"},
+    "from a file to a model": dict.fromkeys(("identify", "posterior", "compare", "discover"), "fits"),
+    "use a model": {"simulate": "use", "control": "control", "page": "use"},
+    "take a model elsewhere": {"c": "use", "fmu": "use"},
+    "many simulations": {"sweep": "sweep"},
+    "camera frames": {"measure": "look"},
+    "learn and set up": dict.fromkeys(("explore", "reproduce", "completion"), "learn"),
 }
-"""Every command, in groups as the help shows them."""
+"""Module of every command, in groups as the help shows them; it is loaded when the command runs, or for the help."""
 
-COMMANDS = {command.name: command for commands in GROUPS.values() for command in commands}
-"""Every command by its name."""
+COMMANDS = {name: module for commands in GROUPS.values() for name, module in commands.items()}
+"""Module of every command by its name."""
 
-DONE = 0
+DONE, BAD_INPUT = 0, 2
+_SETTINGS = {"help_option_names": ["-h", "--help"], "max_content_width": 120}
+
+
+class Command(click.Command):
+    """A command from a function of the same name, whose help ends with the names of models and with examples."""
+
+    def __init__(self, name: str) -> None:
+        self.function = vars(importlib.import_module(f"hysim.cli.{COMMANDS[name]}"))[name]
+        self.declared = [*options.parameters(self.function)]
+        self.sections = options.sections(self.function)
+        summary = self.sections[""].partition(".\n")[0]
+        params = [each.click for each in self.declared]
+        super().__init__(name, params=params, context_settings=_SETTINGS, short_help=summary)
+
+    def format_help_text(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
+        """Write the first part of the function's docstring."""
+        formatter.write("\n")
+        paragraphs = self.sections[""].split("\n\n")
+        formatter.write_text("\n\n".join(f"\b\n{text}" if text.startswith("  ") else text for text in paragraphs))
+
+    def format_options(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
+        """Write arguments and options in their groups."""
+        groups: dict[str, list[tuple[str, str]]] = {}
+        for each in self.declared:
+            own = (str(each.click.metavar), each.help)  # since click helps with options only
+            row = own if isinstance(each.click, click.Argument) else each.click.get_help_record(ctx) or own
+            groups.setdefault(each.title, []).append(row)
+        groups.setdefault("Options", []).append(("-h, --help", "show this help and exit"))
+        for title, rows in groups.items():
+            with formatter.section(title):
+                formatter.write_dl(rows)
+
+    def format_epilog(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
+        """Write what the values of options say at the end, and the examples."""
+        for note in {each.value.note for each in self.declared if each.value.note is not None}:
+            formatter.write("\n")
+            formatter.write_text(note())
+        with formatter.section("Examples"):
+            for line in self.sections["Examples"].splitlines():
+                formatter.write(f"  {line}\n")
+
+    def invoke(self, ctx: click.Context) -> int:
+        """Run the function; an error of the library is raised again as one that names options."""
+        import numpy as np
+
+        values = ctx.params
+        roles = [(values[str(each.click.name)], each.value.role) for each in self.declared if each.value.role]
+        lists = [(value if isinstance(value, tuple) else (value,), role) for value, role in roles]
+        files = [(path, role) for paths, role in lists for path in paths if path is not None]
+        reporting = silent() if values["quiet"] else nullcontext()
+        try:
+            with np.errstate(all="ignore"), reporting:  # an overflow is inf or nan: null in JSON
+                outputs.check(files, prints=values.get("json", False))
+                return options.call(self.function, values)
+        except (ValueError, TypeError, SimulationError) as error:
+            words = in_shell_words(str(error) or type(error).__name__, outputs.flags(self))
+            raise ValueError(words) from error
+
+
+class Hysim(click.Group):
+    """All commands, each loaded when it is named."""
+
+    def list_commands(self, ctx: click.Context) -> list[str]:
+        """Names of the commands."""
+        return [*COMMANDS]
+
+    def get_command(self, ctx: click.Context, cmd_name: str) -> Command:
+        """The command of this name; a UsageError with the nearest one if there is none."""
+        if cmd_name not in COMMANDS:
+            advice = suggestion(cmd_name, ["--help", *COMMANDS]) or f"there are {', '.join(COMMANDS)}"
+            raise click.UsageError(f"there is no command {cmd_name!r}: {advice}", ctx)
+        return Command(cmd_name)
+
+    def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
+        """Write a paragraph for each group of commands."""
+        for title, commands in GROUPS.items():
+            with formatter.section(title):
+                formatter.write_dl([(name, str(self.get_command(ctx, name).short_help)) for name in commands])
+
+
+HYSIM = click.version_option(__version__, message="hysim %(version)s")(
+    Hysim(
+        "hysim",
+        help="Simulate, identify, discover, compare and compensate hysteresis.",
+        epilog="Each command has its own help: hysim COMMAND --help. To begin: hysim example.",
+        context_settings=_SETTINGS,
+        subcommand_metavar="COMMAND ...",
+        add_help_option=True,
+    )
+)
+"""The whole command line."""
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -65,6 +138,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
             print(end="", flush=True)
     except (KeyboardInterrupt, signals.Ended) as request:
         return _ended(request)
+    except click.exceptions.Exit as request:  # after --help and --version
+        return request.exit_code
+    except click.UsageError as error:
+        path = error.ctx.command_path if error.ctx else "hysim"
+        print(f"{path}: error: {one_line(_advice(error))} (see {path} --help)", file=sys.stderr)
+        return BAD_INPUT
     except BrokenPipeError:  # the reader of the output has closed it
         return _discard(DONE)
     except MemoryError:
@@ -78,58 +157,20 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return _failed(BAD_INPUT, f"error: {_line(error)}")
 
 
+def _run(arguments: list[str]) -> int:
+    if instruction := os.environ.get("_HYSIM_COMPLETE"):
+        return shell_complete(HYSIM, {}, "hysim", "_HYSIM_COMPLETE", instruction)
+    if not arguments:
+        print(HYSIM.get_help(click.Context(HYSIM, info_name="hysim")), file=sys.stderr)
+        return BAD_INPUT
+    with HYSIM.make_context("hysim", arguments) as context:
+        code: int = HYSIM.invoke(context)
+        return code
+
+
 def _ended(request: "KeyboardInterrupt | signals.Ended") -> int:
     number = request.number if isinstance(request, signals.Ended) else signal.SIGINT
     return _failed(128 + number, signals.message(number))
-
-
-def parsers(only: str | None = None) -> tuple[argparse.ArgumentParser, dict[str, argparse.ArgumentParser]]:
-    """The parser of the whole command line, and the parsers of each command, or of one command only."""
-    parser = Parser(
-        prog="hysim",
-        usage="hysim COMMAND ...",
-        description="Simulate, identify, discover, compare and compensate hysteresis.",
-        epilog=f"{in_groups(GROUPS)}\n\nEach command has its own help: hysim COMMAND --help. To begin: hysim example.",
-    )
-    parser.add_argument("--version", action="version", version=f"hysim {__version__}")
-    commands = parser.add_subparsers(prog="hysim", metavar="COMMAND", help=argparse.SUPPRESS)
-    for name, command in COMMANDS.items():
-        if only in (None, name):
-            command.add_to(commands)
-    return parser, dict(commands.choices)
-
-
-def _run(arguments: list[str]) -> int:
-    named = next((argument for argument in arguments if not argument.startswith("-")), None)
-    parser, of_commands = parsers(named if named in COMMANDS and arguments[0] == named else None)
-    if named is not None and named not in COMMANDS:
-        advice = suggestion(named, ["--help", *COMMANDS]) or f"there are {', '.join(COMMANDS)}"
-        parser.error(f"there is no command {named!r}: {advice}")
-    asked = parser if named is None else of_commands[named]
-    own = arguments if named is None else arguments[arguments.index(named) + 1 :]
-    if misspelt := unknown_options(own, asked):  # which argparse would take for a required option that is missing
-        asked.error(unexpected(misspelt, asked))
-    options, unknown = parser.parse_known_args(arguments)
-    if unknown:
-        asked.error(unexpected(unknown, asked))
-    if named is None:
-        parser.print_help(sys.stderr)
-        return BAD_INPUT
-    import numpy as np
-
-    reporting = silent() if options.quiet else nullcontext()
-    with np.errstate(all="ignore"), reporting, _told_in_shell_words(options):  # an overflow is inf or nan: null in JSON
-        outputs.check(options)
-        return int(options.command.run(options))
-
-
-@contextmanager
-def _told_in_shell_words(options: argparse.Namespace) -> Iterator[None]:
-    """Raise an error of the library again as one that names options in place of arguments."""
-    try:
-        yield
-    except (ValueError, TypeError, SimulationError) as error:
-        raise ValueError(in_shell_words(str(error) or type(error).__name__, options.flags)) from error
 
 
 def _failed(code: int, text: str) -> int:
@@ -149,6 +190,18 @@ def _discard(code: int) -> int:
     return code
 
 
+def _advice(error: click.UsageError) -> str:
+    """Message of an error, with the option that may be meant by an unknown one."""
+    if not isinstance(error, click.NoSuchOption) or error.ctx is None:
+        return error.format_message()
+    word = error.option_name
+    name = word.lstrip("-").partition("=")[0].replace("-", "_")
+    meant = f"--{OTHER_NAMES.get(name, name).replace('_', '-')}"
+    known = [each for option in error.ctx.command.get_params(error.ctx) for each in option.opts]
+    near = f"did you mean {meant}?" if meant in known else suggestion(word, known)
+    return f"there is no option {word}" + (near and f": {near}")
+
+
 def _line(error: BaseException) -> str:
     if isinstance(error, FileNotFoundError) and error.filename and (near := _near_file(str(error.filename))):
         return one_line(f"{error.filename}: {error.strerror}: {near}")
@@ -165,3 +218,8 @@ def _near_file(path: str) -> str:
     except OSError:
         return ""
     return near and f"did you mean {os.path.join(folder, near.removeprefix('did you mean '))}"
+
+
+def one_line(text: str) -> str:
+    """The text in one line; characters that a terminal would obey are printed as their codes."""
+    return "".join(sign if sign.isprintable() else repr(sign)[1:-1] for sign in " ".join(text.split()))

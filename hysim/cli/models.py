@@ -1,69 +1,32 @@
 """Models of the command line: families by name, models in files, and laws of the user by import path."""
 
-import argparse
 import inspect
 import os
 import pkgutil
 import re
 import sys
+from collections.abc import Callable
+from dataclasses import dataclass, fields
 from pathlib import Path
-from typing import Any, Protocol, runtime_checkable
+from typing import Annotated, Any, Literal, Protocol, runtime_checkable
 
-import hysim
-from hysim.cli.options import OWN
+import hysim as hs
+from hysim._names import MODULE_OF, plain
+from hysim.cli import options
 from hysim.cli.records import STANDARD
-from hysim.cli.shell.words import suggestion
-
-FORMS = f"name of a family, such as bouc-wen; MODEL.json; or {OWN}"
-"""Values of an option for models."""
-
-OPTIONS = f"""
---model MODEL  {FORMS}; an unknown name lists the names [required]
-
-structure of the model:
---plays COUNT  number of plays, or of a Maxwell-slip model's elements
---relay-intervals COUNT  number of intervals between the levels of a Preisach model
---one-signed yes|no  whether the weights of plays or relays have one sign (default: chosen by the BIC)
---degree COUNT  degree of a Duhem law's polynomials
-
-transfer function:
---poles N  number of poles
---zeros N  number of zeros, at most that of the poles
---sample start|end  whether an output was read at the start or at the end of the hold
-
-transfer function and oscillator:
---hold zoh|foh|band-limited  input between samples: held (zoh), linear (foh), or of an oscillator the sum of the lines
-    below half the record's rate
-
-oscillator: the model oscillator, a mass on a Bouc-Wen spring
---oversampling N  steps of the simulation between two samples
---period N  samples of a period, with --initial periodic
---excitation force|base  whether the input is a force, or the acceleration of the base
-
-actuator: the model actuator, from records of several rates
---law MODEL  law of the actuator, as --model (default: bouc-wen)
---modes N  number of resonances, 0 to 3 (default: 1)
---creep  creep that grows by so many percent a decade
---creep-elements N  creep of so many log-spaced elements
---delay  a dead time
---first-order-amplifier  a time constant before the law
-"""
-"""The choice of a family and the options of its structure."""
+from hysim.cli.words import suggestion
 
 _SHORT = {
-    "zhu-wang": "ZhuWangBoucWen", "baber-noori": "BoucWenBaberNoori", "lugre": "LuGre",
-    "oscillator": "BoucWenOscillator",
+    "ZhuWangBoucWen": "zhu-wang", "BoucWenBaberNoori": "baber-noori", "LuGre": "lugre",
+    "BoucWenOscillator": "oscillator",
 }  # fmt: skip
+"""Short names of families."""
+
 _PLANTS = ("oscillator", "actuator")
-_STRUCTURAL = (
-    "plays", "relay_intervals", "one_signed", "degree", "poles", "zeros", "sample", "hold", "oversampling", "period",
-    "excitation",
-)  # fmt: skip
 _ARGUMENTS = {"plays": ("plays", "elements"), "relay_intervals": ("intervals",)}
 """Arguments of a structure that an option of another name stands for."""
 
 _NEEDED = ("poles", "zeros", "degree")
-_OF_ACTUATOR = ("law", "modes", "creep", "creep_elements", "delay", "first_order_amplifier")
 
 
 @runtime_checkable
@@ -77,47 +40,217 @@ def names() -> list[str]:
     """Names of all families that can be compared without further arguments; loads every family."""
     from hysim.models.model import candidates
 
-    short = {family: name for name, family in _SHORT.items()}
-    families = dict.fromkeys(name.split()[0] for name in candidates() if name.split()[0] in hysim.__all__)
-    return [short.get(name, _hyphenated(name)) for name in families]
+    families = dict.fromkeys(name.split()[0] for name in candidates() if name.split()[0] in hs.__all__)
+    return [*map(_short, families)]
 
 
 def names_to_identify() -> list[str]:
     """Names of all models that `hysim identify` takes: those to compare, further laws and plants."""
     from hysim.models.model import every_family, is_identifiable
 
-    short = {family: name for name, family in _SHORT.items()}
-    laws = [
-        short.get(name, _hyphenated(name))
-        for name, law in every_family().items()
-        if law.__module__.startswith("hysim.laws.") and is_identifiable(law)
-    ]
+    own = {name: law for name, law in every_family().items() if law.__module__.startswith("hysim.laws.")}
+    laws = [_short(name) for name, law in own.items() if is_identifiable(law)]
     return [*dict.fromkeys([*names(), *laws, *_PLANTS])]
+
+
+def _offered() -> list[str]:
+    """Names of laws and plants for a shell to complete, which are known without loading a family."""
+    laws = [name for name, module in MODULE_OF.items() if module.startswith("hysim.laws.") and name[0].isupper()]
+    return [*map(_short, laws), "transfer-function", *_PLANTS]
+
+
+def _short(name: str) -> str:
+    """``bouc-wen`` of ``BoucWen``, and the short name of a family that has one."""
+    return _SHORT.get(name, re.sub(r"(?<=[a-z])(?=[A-Z])", "-", name).lower())
+
+
+FORMS = f"name of a family, such as bouc-wen; MODEL.json; or {options.OWN}"
+"""Values of an option for models."""
+
+_NOTE = "A structure is a model in a file."
+
+
+def _named(note: Callable[[], str]) -> options.Value:
+    return options.Value("MODEL", role=options.INPUT, offers=_offered, help=FORMS, note=note)
+
+
+ToCompare = Annotated[str, _named(lambda: f"Names of models: {', '.join(names())}.")]
+ToIdentify = Annotated[str, _named(lambda: f"Names of models: {', '.join(names_to_identify())}. {_NOTE}")]
+Law = Annotated[str, options.Value("MODEL", offers=_offered)]
+
+
+@dataclass(kw_only=True)
+class ActuatorOptions:
+    """Options of the model actuator.
+
+    actuator: the model actuator, from records of several rates
+    ------
+    law : law of the actuator, as --model (default: bouc-wen)
+    modes : number of resonances, 0 to 3 (default: 1)
+    creep : creep that grows by so many percent a decade
+    creep_elements : creep of so many log-spaced elements
+    delay : a dead time
+    first_order_amplifier : a time constant before the law
+    """
+
+    law: Law | None = None
+    modes: int | None = None
+    creep: bool = False
+    creep_elements: int | None = None
+    delay: bool = False
+    first_order_amplifier: bool = False
+
+
+@dataclass(kw_only=True)
+class StructureOptions:
+    """Options of the structure of other models.
+
+    structure of the model
+    ------
+    plays : number of plays, or of a Maxwell-slip model's elements
+    relay_intervals : number of intervals between the levels of a Preisach model
+    one_signed : whether the weights of plays or relays have one sign (default: chosen by the BIC)
+    degree : degree of a Duhem law's polynomials
+
+    transfer function
+    ------
+    poles : number of poles
+    zeros : number of zeros, at most that of the poles
+    sample : whether an output was read at the start or at the end of the hold
+
+    transfer function and oscillator
+    ------
+    hold : input between samples: held (zoh), linear (foh), or of an oscillator the sum of the lines below half the
+        record's rate
+
+    oscillator: the model oscillator, a mass on a Bouc-Wen spring
+    ------
+    oversampling : steps of the simulation between two samples
+    period : samples of a period, with --initial periodic
+    excitation : whether the input is a force, or the acceleration of the base
+    """
+
+    plays: options.Count | None = None
+    relay_intervals: options.Count | None = None
+    one_signed: Literal["yes", "no"] | None = None
+    degree: options.Count | None = None
+    poles: int | None = None
+    zeros: int | None = None
+    sample: Literal["start", "end"] | None = None
+    hold: Literal["zoh", "foh", "band-limited"] | None = None
+    oversampling: int | None = None
+    period: int | None = None
+    excitation: Literal["force", "base"] | None = None
+
+
+@dataclass(kw_only=True)
+class FitOptions(StructureOptions, ActuatorOptions):
+    """Options of a model to identify.
+
+    Parameters
+    ----------
+    model :
+    fix : parameter that is not free: n=1 [unit of the parameter]
+    free : parameter that is free, where it is fixed by default
+    initial : state at the first sample (default: chosen by the BIC, or free)
+    noise : noise of the output; quantised needs --resolution (default: gaussian)
+    seed :
+    """
+
+    model: ToIdentify
+    fix: tuple[options.Fixed, ...] = ()
+    free: tuple[str, ...] = ()
+    initial: Literal["free", "rest", "still", "periodic"] | None = None
+    noise: Literal["gaussian", "quantised", "robust"] | None = None
+    seed: int = 0
+
+    def for_identify(self) -> dict[str, Any]:
+        """Arguments of `hysim.identify` beside the model, of which `to_identify` may have taken `initial`."""
+        others = {name: vars(self)[name] for name in ("free", "initial", "noise", "seed")}
+        return {"fixed": dict(self.fix), **others}
+
+
+CONTROLLERS = {
+    "pid": "with filter and setpoint weight",
+    "integral": "integral action alone",
+    "notch": "integral action behind a notch at the mode",
+    "inverse": "of law, creep and amplifier, without feedback",
+    "tracking": "that inverse and integral action",
+    "model-following": "that inverse, the mode's, and integral action on the errors of the model",
+}
+"""Controllers that `--controller` takes."""
+
+
+@dataclass(kw_only=True)
+class DesignOptions:
+    """Options of a design.
+
+    plant: stages around the model, which replace its own
+    -----
+    mode : a resonance behind the law: natural frequency [Hz], damping ratio [1]
+    creep : growth in a decade of time [%]
+    noise : noise of the sensor [unit of y]
+    quantum : step of the sensor's readings [unit of y]
+    delay : age of the sensor's readings [s]
+
+    controller
+    ----------
+    controller :
+    sample_time : sample time of the controller [s]
+    limits : limits of the command [unit of u] (default: the record's extremes, else none)
+    max_sensitivity : largest |1/(1 + L)| at any frequency and slope of the law [1]
+    max_voltage_noise : largest voltage noise that the sensor's noise may cause [unit of u]
+    vary_mode : keep the bounds also where the mode's frequency is lower or higher by this [%]
+    preview : the reference is known ahead, for as long as the inverse needs
+
+    task of the loop
+    ----------------
+    reference : reference for which the gains are tuned; a text file has times [s] and values [unit of y] in its first
+        two columns
+    range : range of the triangle [unit of y] (default: the middle 80 % of the range that the limits allow)
+    frequency : frequency of the triangle [Hz] (default: 1000 samples, 200 periods of a mode or 20 of a lag a cycle)
+    step : step from a quarter of the range, or downwards from three [unit of y] (default: half the range)
+    duration : duration of the step [s] (default: until the slowest mode is at rest)
+    record : measured loop: its input's extremes are the limits, and its output is compared with the model's
+    u : input of the record: name or number of its column (default: u)
+    y : output of the record: name or number of its column (default: y)
+    """
+
+    mode: options.Mode | None = None
+    creep: float | None = None
+    noise: float | None = None
+    quantum: float | None = None
+    delay: float | None = None
+    controller: Annotated[str, options.one_of(CONTROLLERS)] = "pid"
+    sample_time: float
+    limits: options.Pair | None = None
+    max_sensitivity: float = 2.0
+    max_voltage_noise: float | None = None
+    vary_mode: float | None = None
+    preview: bool = False
+    reference: Annotated[str, options.file("triangle|step|FILE", options.INPUT)] = "triangle"
+    range: options.Pair | None = None
+    frequency: float | None = None
+    step: float | None = None
+    duration: float | None = None
+    record: options.RecordIn | None = None
+    u: options.Column | None = None
+    y: options.Column | None = None
 
 
 def family(name: str) -> Any:
     """The family with a name such as ``bouc-wen``; a ValueError, which lists the names, if there is none."""
-    from hysim.models.model import FAMILIES
+    from hysim.models.model import family_named
 
-    public = _public()
-    law = resolved(f"hysim:{public[name]}") if name in public else None
-    if law is None or FAMILIES.get(public[name]) is not law:
-        known = names_to_identify()
-        near = suggestion(name, known) or f"give one of {', '.join(known)}"
-        raise ValueError(f"there is no model {name!r}: {near} (models of your own: MODEL.json or module:name)")
     if name == "structure":
         raise ValueError("a structure has no default: give one in a file, MODEL.json, which hs.save writes")
-    return law
-
-
-def _public() -> dict[str, str]:
-    """Names of classes by their names on the command line."""
-    return {_hyphenated(each): each for each in hysim.__all__ if each[0].isupper()} | _SHORT
-
-
-def _hyphenated(name: str) -> str:
-    """``bouc-wen`` of ``BoucWen``."""
-    return re.sub(r"(?<=[a-z])(?=[A-Z])", "-", name).lower()
+    try:
+        return family_named("BoucWenOscillator" if name == "oscillator" else name)
+    except ValueError:
+        known = names_to_identify()
+        near = suggestion(name, known) or f"give one of {', '.join(known)}"
+        words = f"there is no model {name!r}: {near} (models of your own: MODEL.json or module:name)"
+        raise ValueError(words) from None
 
 
 def resolved(path: str) -> Any:
@@ -125,7 +258,7 @@ def resolved(path: str) -> Any:
 
     A ValueError is raised if there is no such module, or it does not have the name.
     """
-    module, _, name = path.partition(":")
+    module, _, _ = path.partition(":")
     if os.getcwd() not in sys.path:
         sys.path.insert(0, os.getcwd())  # as `python -m hysim` has it
     try:
@@ -135,7 +268,7 @@ def resolved(path: str) -> Any:
             raise  # the module is there, and imports another one that is missing
         raise ValueError(f"there is no module {module!r} in {os.getcwd()} or among the installed packages") from None
     except AttributeError:
-        raise ValueError(f"{sys.modules[module]!r} has no {name!r}") from None
+        raise ValueError(f"{sys.modules[module]!r} has no {path.partition(':')[2]!r}") from None
 
 
 def is_import_path(text: str) -> bool:
@@ -165,40 +298,40 @@ def model_or_family(text: str) -> Any:
     return family(text)
 
 
-def to_identify(options: argparse.Namespace) -> Any:
-    """The argument of `identify` for these options.
+def to_identify(chosen: FitOptions) -> Any:
+    """The argument of `identify` for these options, whose `initial` becomes None where the structure takes it.
 
     A ValueError is raised if there is no such model, an option belongs to another one, or one that this model needs is
     missing.
     """
     from hysim.models.model import FAMILIES
 
-    whole = {name: value for name in _OF_ACTUATOR if (value := vars(options)[name]) is not None and value is not False}
-    used = {name: vars(options)[name] for name in _STRUCTURAL if vars(options)[name] is not None}
-    if foreign := [*used] if options.model == "actuator" else [*whole]:
-        raise ValueError(f"--{foreign[0].replace('_', '-')} is no option of the model {options.model}")
-    if options.model == "actuator":
-        return _actuator(whole)
-    model = model_or_family(options.model)
-    oscillator, linear = (FAMILIES.get(name) for name in ("BoucWenOscillator", "TransferFunction"))  # if it is loaded
+    name, of_actuator, used = (chosen.model, _used(chosen, ActuatorOptions), _used(chosen, StructureOptions))
+    if foreign := [*used] if name == "actuator" else [*of_actuator]:
+        raise ValueError(f"{options.flag(foreign[0])} is no option of the model {name}")
+    if name == "actuator":
+        return _actuator(chosen)
+    model = model_or_family(name)
+    oscillator, linear = (FAMILIES.get(each) for each in ("BoucWenOscillator", "TransferFunction"))  # if it is loaded
     if oscillator is not None and isinstance(model, oscillator):  # its numbers are searched anew, in the same setting
-        for name in ("excitation", "hold"):
-            setattr(options, name, vars(options)[name] or vars(model)[name])
+        used = {"excitation": vars(model)["excitation"], "hold": vars(model)["hold"]} | used
         model = oscillator
-    used = {name: vars(options)[name] for name in _STRUCTURAL if vars(options)[name] is not None}
-    taken = {name: argument for name in _STRUCTURAL if (argument := _argument(model, name))}
-    if foreign := [name for name in used if name not in taken]:
-        others = [name for name in names_to_identify() if _argument(family(name), foreign[0])]
-        raise ValueError(
-            f"--{foreign[0].replace('_', '-')} is no option of the model {options.model}, but of {', '.join(others)}"
-        )
-    if missing := [name for name in _NEEDED if name in taken and name not in used]:
-        raise ValueError(f"the model {options.model} needs --{missing[0]}")
-    structure = {taken[name]: value == "yes" if name == "one_signed" else value for name, value in used.items()}
-    if model is oscillator and options.initial is not None:
-        structure["initial"], options.initial = options.initial, None  # its structure says how the record begins
+    taken = {each.name: argument for each in fields(StructureOptions) if (argument := _argument(model, each.name))}
+    if foreign := [each for each in used if each not in taken]:
+        others = [each for each in names_to_identify() if _argument(family(each), foreign[0])]
+        raise ValueError(f"{options.flag(foreign[0])} is no option of the model {name}, but of {', '.join(others)}")
+    if missing := [each for each in _NEEDED if each in taken and each not in used]:
+        raise ValueError(f"the model {name} needs {options.flag(missing[0])}")
+    structure = {taken[each]: value == "yes" if each == "one_signed" else value for each, value in used.items()}
+    if model is oscillator and chosen.initial is not None:
+        structure["initial"], chosen.initial = (chosen.initial, None)  # its structure says how the record begins
     is_structure_needed = structure or any(model is each for each in (oscillator, linear))
     return model.structure(**structure) if is_structure_needed else model
+
+
+def _used(chosen: FitOptions, group: type[StructureOptions | ActuatorOptions]) -> dict[str, Any]:
+    values = {each.name: vars(chosen)[each.name] for each in fields(group)}
+    return {name: value for name, value in values.items() if value is not None and value is not False}
 
 
 def _argument(model: Any, option: str) -> str | None:
@@ -209,14 +342,14 @@ def _argument(model: Any, option: str) -> str | None:
     return next((name for name in _ARGUMENTS.get(option, (option,)) if name in arguments), None)
 
 
-def _actuator(structure: dict[str, Any]) -> Any:
-    """The structure of an actuator with these options."""
-    return hysim.Actuator.structure(
-        model_or_family(structure.get("law", "bouc-wen")),
-        creep=structure.get("creep_elements", "creep" in structure),
-        modes=structure.get("modes", 1),
-        delay="delay" in structure,
-        amplifier="first-order" if "first_order_amplifier" in structure else None,
+def _actuator(chosen: ActuatorOptions) -> Any:
+    """The structure of an actuator with these chosen."""
+    return hs.Actuator.structure(
+        model_or_family(chosen.law or "bouc-wen"),
+        creep=chosen.creep if chosen.creep_elements is None else chosen.creep_elements,
+        modes=1 if chosen.modes is None else chosen.modes,
+        delay=chosen.delay,
+        amplifier="first-order" if chosen.first_order_amplifier else None,
     )
 
 
@@ -235,7 +368,7 @@ def read(path: str) -> tuple[Any, dict[str, str]]:
             raise ValueError(f"{path} needs values for its parameters: give an instance ({error})") from None
     if path == STANDARD:
         return from_json(sys.stdin.read(), "the standard input")
-    if path in _public() and not Path(path).exists():
+    if plain(path) in map(plain, (*MODULE_OF, *_SHORT.values())) and not Path(path).exists():
         raise ValueError(f"{path} is a family without numbers: write a model of it by hysim identify --out {path}.json")
     return from_json(Path(path).read_bytes(), path)
 
@@ -245,7 +378,7 @@ def name_of(path: str) -> str:
     return path.rpartition(":")[2] if is_import_path(path) else Path(path).stem
 
 
-def simulated(model: Any, record: "hysim.Record", units: dict[str, str]) -> "hysim.Simulation":
+def simulated(model: Any, record: "hs.Record", units: dict[str, str]) -> "hs.Simulation":
     """The model's free run over the record's input; a ValueError if it has no response, such as a controller."""
     from hysim.models.protocols import Responding
     from hysim.simulation import free_run

@@ -1,149 +1,208 @@
-"""Options of the commands, written as their help shows them, and the readers of their values.
+"""Options and arguments of the commands, which follow from signatures, annotations and docstrings.
 
-    file FILE                  an argument by its place: its name, its value, two spaces and the text
-    --limits LOW,HIGH          an option; the text may go on
-                               in indented lines
-    --unit SIGNAL=UNIT...      an option that may be used more than once, or an argument for any number of files
-    --cycles [N]               an option or argument whose value may be left out
-    --hold zoh|foh             an option that takes one of some words
-    --json                     an option without a value
-    either --t COLUMN          two options that exclude each other
-    or --no-t
-    --seed NUMBER              a default value [default: 0]
-    --out PATH                 an option that must be used [required]
+    def simulate(model: ModelIn, file: RecordIn, *, options: InputOptions, out: Table | None = None) -> int:
+        '''Drive a model with the input in a file.
 
-    plant: description         a title for the options that follow, as far as the next empty line
+        Parameters
+        ----------
+        out : the columns (default: the standard output)
 
-The name of a value decides how it is read (`READERS`) and which role the file has that it names (`role`).
+        Examples
+        --------
+        hysim simulate law.json drive.csv
+        '''
+
+A parameter before the star is an argument by its place, and one behind it an option: a `bool` without a value, a tuple
+one that may be used more than once, a `Literal` one that takes some words. A dataclass stands for its fields, with its
+own docstring. Any other section of a docstring is a group of options with this title.
 """
 
-import argparse
+import dataclasses
+import inspect
 import re
-from collections.abc import Callable
-from typing import Any, NamedTuple
+import types
+import typing
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from contextlib import suppress
+from dataclasses import KW_ONLY, dataclass
+from typing import Annotated, Any, Literal, NamedTuple
+
+import click
+from click.shell_completion import CompletionItem
+
+from hysim.cli.words import suggestion
 
 INPUT, RESULT, PRINTED, PICTURE, TABLE, MODEL = "input", "result", "printed result", "picture", "table", "model"
 """Roles of files: read, written, written with what is printed too, drawn, written as columns, written as a model."""
 
-_ROLES = {"PATH": RESULT, "COPY": PRINTED, "OUT": TABLE}
-_ROLES |= dict.fromkeys(("FILE", "FILE_OF_Y", "MODEL", "FRAMES", "DATABASE", "STUDY.toml", "triangle|step|FILE"), INPUT)
 _FORMS = {
     PICTURE: "; written as SVG, PNG or PDF by its ending; - writes SVG to the standard output",
     TABLE: "; written as .csv, .tsv, .npz, .mat or .h5 by its ending; - writes CSV to the standard output",
 }
-_OPTION = re.compile(r"(either |or |)(-{0,2}[a-z][\w-]*)(?: (\S+))?  +(.*?)(?: \[default: (\S+)\]| (\[required\]))?")
-_TITLE = re.compile(r"([a-z ]+):(?: (.*))?")
-
 OWN = "module:name of your own, which executes ./module.py or an installed module"
-MODEL_IN = f"model MODEL  model file as identify writes it, - for the standard input, or {OWN}"
-MODEL_OUT = "--out MODEL.json  write the model; - writes it to the standard output"
-SEED = "--seed NUMBER  seed of the random starts [default: 0]"
-JSON = "--json  print the result as JSON"
+_HELP = {
+    "json": "print the result as JSON",
+    "seed": "seed of the random starts",
+    "quiet": "report no progress of long calls on standard error",
+}
+"""Help of options whose docstring says nothing about them."""
 
 
-class Command(NamedTuple):
-    """A command of the command line; `run` takes the values of the options, and returns the exit code.
+@dataclass(frozen=True)
+class Value:
+    """The value of an option: its name, how it is read, what is expected, and the role of a file that it names.
 
-    `examples` are lines as they are typed, which stand at the end of the help.
+    `words` are taken as they are, and `bare` is the text if the value is left out. `offers` are what a shell completes
+    beside files, `note` is a paragraph for the end of the help, and `help` stands for a docstring that says nothing.
     """
 
     name: str
-    help: str
-    description: str
-    options: str
-    run: Callable[[argparse.Namespace], int]
-    examples: str = ""
+    read: Callable[[str], Any] | None = str
+    expected: str = ""
+    role: str = ""
+    _: KW_ONLY
+    words: tuple[str, ...] = ()
+    bare: str | None = None
+    offers: Callable[[], Iterable[str]] = tuple
+    note: Callable[[], str] | None = None
+    help: str = ""
 
-    def add_to(self, commands: Any) -> Any:
-        """Add the command to those of a parser."""
-        parser = commands.add_parser(self.name, description=self.description)
-        roles = dict(_declare(parser, self.options))
-        parser.add_argument("--quiet", action="store_true", help="report no progress of long calls on standard error")
-        flags = {action.dest: action.option_strings[0] for action in parser._actions if action.option_strings}
-        parser.set_defaults(command=self, roles=roles, flags=flags)
-        return parser
-
-
-def _declare(parser: Any, options: str) -> Any:
-    """Add options to a parser of `argparse`; yields the name of each value and the role of the file that it names."""
-    group = either = parser
-    for line in re.sub(r"\n +", " ", options.strip()).splitlines():
-        if not line:
-            group = parser
-        elif title := _TITLE.fullmatch(line):
-            group = parser.add_argument_group(*title.groups())
-        elif option := _OPTION.fullmatch(line):
-            alternative, name, value, text, default, required = option.groups()
-            if alternative == "either ":
-                either = group.add_mutually_exclusive_group()
-            settings = _settings(name, value, default, bool(required))
-            role = _role(settings.get("metavar", ""))
-            settings["help"] = text.replace("%", "%%") + _FORMS.get(role, "") + settings.pop("help")
-            (either if alternative else group).add_argument(name, **settings)
-            yield name.lstrip("-").replace("-", "_"), role
-        else:
-            raise ValueError(f"expected an option, its value, two spaces and a text, got {line!r}")
-
-
-def _settings(name: str, value: str | None, default: str | None, is_required: bool) -> dict[str, Any]:
-    """Settings of `argparse` for an option; the help says the default only."""
-    if value is None:
-        return {"action": "store_true", "help": ""}
-    plain = value.removesuffix("...").strip("[]")
-    settings: dict[str, Any] = {"default": default, "help": "" if default is None else " (default: %(default)s)"}
-    if "|" in plain and plain == plain.lower():
-        settings["choices"] = plain.split("|")
-    else:
-        settings |= {"metavar": plain, "type": READERS.get(plain)}
-    if value != plain and name.startswith("-") and not value.startswith("["):
-        settings |= {"action": "append", "default": []}
-    elif value != plain:
-        settings["nargs"] = "?" if value.startswith("[") else "*"
-    return settings | ({"required": True} if is_required else {})
-
-
-def _role(value: str) -> str:
-    if value.endswith(".svg"):
-        return PICTURE
-    if value.endswith(".json"):
-        return MODEL
-    return RESULT if value.endswith((".csv", ".c", ".fmu", ".html", ".sqlite")) else _ROLES.get(value, "")
-
-
-def word_or_number(
-    expected: str, *words: str, number: Callable[[str], float] = int, least: float = -float("inf")
-) -> Callable[[str], Any]:
-    """A reader of one of some words, or of a number that is not below `least`."""
-
-    def read(text: str) -> Any:
-        if text in words:
+    def convert(self, text: Any) -> Any:
+        """The value that a text stands for, or a default as it is."""
+        if not isinstance(text, str) or text in self.words:
             return text
-        try:
-            value = number(text)
-        except ValueError:
-            value = None
-        if value is None or value < least:  # nan is a number here, and refused where it is used
-            raise argparse.ArgumentTypeError(f"expected {expected}, got {text!r}")
+        with suppress(ValueError):
+            if self.read is not None:
+                return self.read(text)
+        near = suggestion(text, self.words)
+        raise click.BadParameter(f"expected {self.expected}, got {text!r}{near and f': {near}'}")
+
+    def complete(self, _context: click.Context, _parameter: click.Parameter, begin: str) -> list[CompletionItem]:
+        """Words that begin like this, and files if there may be other values than words."""
+        words = [CompletionItem(word) for word in (*self.words, *self.offers()) if word.startswith(begin)]
+        return words if self.read is None else [CompletionItem(begin, type="file"), *words]
+
+
+class Parameter(NamedTuple):
+    """A parameter of click, with its value, its help, and the title of the group that shows it."""
+
+    click: click.Parameter
+    value: Value
+    help: str
+    title: str
+
+
+def parameters(function: Callable[..., int]) -> Iterator[Parameter]:
+    """Arguments and options of a command, in the order of its docstrings."""
+    yield from _declared(function, documented(function))
+    quiet = inspect.Parameter("quiet", inspect.Parameter.KEYWORD_ONLY, default=False, annotation=bool)
+    yield _parameter(quiet, "Options", "")
+
+
+def call(function: Callable[..., int], values: Mapping[str, Any]) -> int:
+    """Call the function of a command with the values of its options."""
+    arguments = {}
+    for name, hint in typing.get_type_hints(function).items():
+        if dataclasses.is_dataclass(hint):
+            build: Any = hint
+            arguments[name] = build(**{field.name: values[field.name] for field in dataclasses.fields(hint)})
+        elif name != "return":
+            arguments[name] = values[name]
+    return function(**arguments)
+
+
+def sections(subject: Any) -> dict[str, str]:
+    """Sections of a docstring by their titles; what stands before the first is the section without a title."""
+    first, *others = re.split(r"^(.+)\n---+\n", inspect.cleandoc(subject.__doc__ or ""), flags=re.MULTILINE)
+    return {"": first.strip(), **{title: text.strip() for title, text in zip(others[::2], others[1::2], strict=True)}}
+
+
+def documented(subject: Any) -> dict[str, tuple[str, str]]:
+    """Title and help of the parameters in a docstring, and of fields that a dataclass inherits."""
+    found = {}
+    for title, text in sections(subject).items():
+        for line in re.sub(r"\n +", " ", text).splitlines() if title not in ("", "Examples") else ():
+            name, _, help_ = line.partition(" :")
+            found[name] = ("Options" if title == "Parameters" else title, help_.strip())
+    for base in subject.__bases__ if isinstance(subject, type) else ():
+        found |= {name: text for name, text in documented(base).items() if name not in found}
+    return found
+
+
+def _declared(subject: Any, texts: Mapping[str, tuple[str, str]]) -> Iterator[Parameter]:
+    hints, signature = (typing.get_type_hints(subject, include_extras=True), inspect.signature(subject))
+    for name in texts if isinstance(subject, type) else signature.parameters:
+        own, hint = signature.parameters[name], hints[name]
+        if dataclasses.is_dataclass(hint):
+            yield from _declared(hint, documented(hint))
+        else:
+            yield _parameter(own.replace(annotation=hint), *texts.get(name, ("Options", "")))
+
+
+def _parameter(own: inspect.Parameter, title: str, text: str) -> Parameter:
+    hint, is_multiple = _of_one(own.annotation)
+    value, is_argument = _value(hint), own.kind is not inspect.Parameter.KEYWORD_ONLY
+    text = (text or value.help or _HELP.get(own.name, "")) + _FORMS.get(value.role, "")
+    settings: dict[str, Any] = {"type": value.convert, "shell_complete": value.complete, "metavar": value.name}
+    settings["required"] = own.default is own.empty
+    if own.default not in (own.empty, None, ()):
+        settings |= {"default": own.default, "show_default": not is_argument}
+    if is_argument:
+        form = value.name if settings["required"] else f"[{value.name}]{'...' * is_multiple}"
+        settings |= {"metavar": form, "nargs": -1 if is_multiple else 1}
+        return Parameter(click.Argument([own.name], **settings), value, text, "Arguments")
+    if hint is bool:
+        settings = {"is_flag": True}
+    elif value.bare is not None:
+        settings |= {"is_flag": False, "flag_value": value.bare, "metavar": f"[{value.name}]"}
+    option = click.Option([flag(own.name), own.name], help=text, multiple=is_multiple, **settings)
+    return Parameter(option, value, text, title)
+
+
+def flag(name: str) -> str:
+    """The option for an argument, such as ``--sample-time``."""
+    return f"--{name.rstrip('_').replace('_', '-')}"
+
+
+def _of_one(hint: Any) -> tuple[Any, bool]:
+    """A type without None, that of each item of a tuple, and whether there may be several."""
+    if typing.get_origin(hint) in (typing.Union, types.UnionType):
+        (hint,) = (each for each in typing.get_args(hint) if each is not types.NoneType)
+    return (typing.get_args(hint)[0], True) if typing.get_origin(hint) is tuple else (hint, False)
+
+
+def _value(hint: Any) -> Value:
+    if typing.get_origin(hint) is Annotated:
+        value: Value = hint.__metadata__[0]
+        return value
+    return one_of(dict.fromkeys(typing.get_args(hint), "")) if typing.get_origin(hint) is Literal else _PLAIN[hint]
+
+
+def one_of(words: Mapping[str, str]) -> Value:
+    """Values that are one of some words, with what each stands for."""
+    text = "; ".join(f"{word}: {meaning}" for word, meaning in words.items())
+    return Value(f"[{'|'.join(words)}]", None, ", ".join(words), words=(*words,), help=text)
+
+
+def at_least(least: int) -> Callable[[str], Any]:
+    """A reader of whole numbers that are not below a least one."""
+
+    def read(text: str) -> int:
+        if (value := int(text)) < least:
+            raise ValueError(text)
         return value
 
     return read
 
 
-def numbers(form: str, number: Callable[[str], float] = float) -> Callable[[str], Any]:
-    """A reader of numbers with the signs between them that a form has, such as ``LOW,HIGH`` or ``NAME=LOW:HIGH``."""
-    names, equals, values = form.rpartition("=")
-    separator = ":" if ":" in values else ","
+def matched(pattern: str, *readers: Callable[[str], Any]) -> Callable[[str], Any]:
+    """A reader of texts of a pattern, each group of which has its own reader."""
 
-    def read(text: str) -> Any:
-        name, _, rest = text.partition("=") if equals else ("", "", text)
-        try:
-            parts = tuple(map(number, rest.split(separator)))
-        except ValueError:
-            parts = ()
-        if len(parts) != len(values.split(separator)):
-            raise argparse.ArgumentTypeError(f"expected {form} with numbers, got {text!r}")
-        content = parts[0] if len(parts) == 1 else parts
-        return (name, content) if names else content
+    def read(text: str) -> tuple[Any, ...]:
+        match = re.fullmatch(pattern, text, re.DOTALL)
+        if match is None:
+            raise ValueError(text)
+        return tuple(each(part) for each, part in zip(readers, match.groups(), strict=True))
 
     return read
 
@@ -155,109 +214,105 @@ def positive(option: str, value: float) -> float:
     return value
 
 
+def exclusive(**values: Any) -> None:
+    """ValueError if more than one of some options is used."""
+    used = [flag(name) for name, value in values.items() if value not in (None, False)]
+    if len(used) > 1:
+        raise ValueError(f"{' and '.join(used)} exclude each other: leave one of them out")
+
+
 def column(text: str) -> str | int:
     """A column by its name, or by its number from 0."""
     return int(text) if text.isascii() and text.isdigit() else text
 
 
-def unit(text: str) -> tuple[str, str]:
-    """Signal and unit, as in ``u=V``."""
-    signal, equals, label = text.partition("=")
-    if not equals or signal not in ("t", "u", "y"):
-        raise argparse.ArgumentTypeError(f"expected t=, u= or y= and a unit, got {text!r}")
-    return signal, label
+Place = tuple[float, str]
+"""A place in a record: the number of a sample from 0 if there is no unit, else a time and its unit."""
 
 
-class Place(NamedTuple):
-    """A place in a record: the number of a sample from 0 if there is no unit, else a time."""
-
-    value: float
-    unit: str
-
-
-def place(text: str) -> Place:
+def _place(text: str) -> Place:
     """A place in a record, such as ``100`` or ``2.5s``."""
-    number, unit = re.fullmatch(r"(.*?)([a-z]*)", text, re.DOTALL).groups()  # type: ignore[union-attr]
-    try:
-        if unit in _TIMES:
-            return Place(float(number), unit)
-        if not unit and int(number) >= 0:
-            return Place(int(number), "")
-    except ValueError:
-        pass
-    raise argparse.ArgumentTypeError(
-        f"expected the number of a sample from 0, or a time with its unit such as 2.5s or 300ms, got {text!r}"
-    )
+    number, unit = matched(r"(.*?)((?:[mun]?s)?)", str, str)(text)
+    return (float(number) if unit else at_least(0)(number)), unit
 
 
-_TIMES = ("s", "ms", "us", "ns")
-
-
-def named(form: str, read: Callable[[str], Any]) -> Callable[[str], tuple[str, Any]]:
-    """A reader of a name and a value of some other reader, in a form such as ``NAME=COLUMN``."""
-
-    def read_both(text: str) -> tuple[str, Any]:
-        name, equals, value = text.partition("=")
-        try:
-            return name, read(value if equals and name else "")
-        except ValueError:
-            raise argparse.ArgumentTypeError(f"expected {form}, got {text!r}") from None
-
-    return read_both
-
-
-def _some_column(text: str) -> str | int:
-    if not text:
-        raise ValueError("no column")
-    return column(text)
-
-
-def sensor(text: str) -> tuple[str, str | int]:
-    """A signal of a structure and its column, of the same name unless another one is given."""
+def _sensor(text: str) -> tuple[str, str | int]:
     name, equals, key = text.partition("=")
     if not name or (equals and not key):
-        raise argparse.ArgumentTypeError(f"expected SENSOR=COLUMN, or the name of both, got {text!r}")
+        raise ValueError(text)
     return name, column(key) if equals else name
 
 
-def _channel_and_degree(text: str) -> tuple[str, int]:
-    channel, _, degree = text.rpartition(":")
-    if not channel:
-        raise ValueError("no channel")
-    return channel, int(degree)
-
-
-def library(text: str) -> str | list[str]:
-    """The name of a library, or its terms."""
+def _terms(text: str) -> str | list[str]:
     names = [name.strip() for name in text.split(",")]
     return names if len(names) > 1 or "'" in text else text
 
 
-def platforms(text: str) -> tuple[str, ...]:
-    """Names of platforms with commas between them, or the word none for no platform."""
-    return () if text == "none" else tuple(name.strip() for name in text.split(","))
+def file(name: str, role: str = RESULT, help_: str = "") -> Value:
+    """Values that name a file."""
+    return Value(name, role=role, help=help_)
 
 
-REAL = ("STEP", "TIME", "RMS", "PERCENT", "BOUND", "HERTZ", "HEIGHT", "VALUE", "SHARE", "LENGTH")
-READERS: dict[str, Callable[[str], Any]] = {
-    **dict.fromkeys(("N", "NUMBER", "DEGREE"), word_or_number("a whole number")),
-    **dict.fromkeys(REAL, word_or_number("a number without a unit", number=float)),
-    **{form: numbers(form) for form in ("LOW,HIGH", "FREQUENCY,DAMPING", "NAME=VALUE", "NAME=LOW:HIGH")},
-    "PLACE": place,
-    "COUNT": word_or_number("a number from 1 on", least=1),
-    "SENSOR=COLUMN": sensor,
-    "T,B,L,R": numbers("T,B,L,R", int),
-    "PLATFORMS": platforms,
-    "COLUMN": column,
-    "CHANNEL=COLUMN": named("CHANNEL=COLUMN", _some_column),
-    "NAME=CHANNEL:DEGREE": named("NAME=CHANNEL:DEGREE, such as gain=T:1", _channel_and_degree),
-    "SIGNAL=UNIT": unit,
-    "NAME|TERMS": library,
-    "QUANTUM": word_or_number("a number or detect", "detect", number=float),
-    "CYCLES": word_or_number("a number of cycles, at least 1; the table needs the file before --cycles", least=1),
-    "loo|cycles|K": word_or_number("loo, cycles or a number of blocks", "loo", "cycles", least=0),
-    "loo|K": word_or_number("loo or a number of blocks from 2 on", "loo", least=2),
-    "x|y|DEGREES": word_or_number("x, y or an angle in degrees", "x", "y", number=float),
-    "first|running|NUMBER": word_or_number("first, running or the number of a frame", "first", "running", least=0),
+_PLAIN = {
+    str: Value("TEXT"),
+    bool: Value(""),
+    int: Value("N", int, "a whole number"),
+    float: Value("NUMBER", float, "a number without a unit"),
 }
-"""Readers of values by their names; other values are texts."""
+_CYCLES = "a number of cycles, at least 1; the table needs the file before --cycles"
+_MODEL = f"model file as identify writes it, - for the standard input, or {OWN}"
+_RECORD = "text with one sample a line, NPZ, NPY, MAT or HDF5; or - for the standard input"
+_bounds, _degree = matched("(.*):(.*)", float, float), matched("(.+):(.*)", str, int)
+_PLACE = "the number of a sample from 0, or a time with its unit such as 2.5s or 300ms"
+
+Column = Annotated[str | int, Value("COLUMN", column)]
+Count = Annotated[int, Value("COUNT", at_least(1), "a number from 1 on")]
+Pair = Annotated[tuple[float, float], Value("LOW,HIGH", matched("(.*),(.*)", float, float), "LOW,HIGH with numbers")]
+Mode = Annotated[
+    tuple[float, float],
+    Value("FREQUENCY,DAMPING", matched("(.*),(.*)", float, float), "FREQUENCY,DAMPING with numbers"),
+]
+Region = Annotated[
+    tuple[int, int, int, int],
+    Value("T,B,L,R", matched("(.*),(.*),(.*),(.*)", int, int, int, int), "T,B,L,R with numbers"),
+]
+Fixed = Annotated[
+    tuple[str, float], Value("NAME=VALUE", matched("([^=]+)=(.*)", str, float), "NAME=VALUE with numbers")
+]
+Range = Annotated[
+    tuple[str, tuple[float, float]],
+    Value("NAME=LOW:HIGH", matched("([^=]+)=(.*)", str, _bounds), "NAME=LOW:HIGH with numbers"),
+]
+PlaceIn = Annotated[Place, Value("PLACE", _place, _PLACE)]
+Unit = Annotated[tuple[str, str], Value("SIGNAL=UNIT", matched("([tuy])=(.*)", str, str), "t=, u= or y= and a unit")]
+Channel = Annotated[
+    tuple[str, str | int], Value("CHANNEL=COLUMN", matched("([^=]+)=(.+)", str, column), "CHANNEL=COLUMN")
+]
+Depends = Annotated[
+    tuple[str, tuple[str, int]],
+    Value("NAME=CHANNEL:DEGREE", matched("([^=]+)=(.*)", str, _degree), "NAME=CHANNEL:DEGREE, such as gain=T:1"),
+]
+Sensor = Annotated[tuple[str, str | int], Value("SENSOR=COLUMN", _sensor, "SENSOR=COLUMN, or the name of both")]
+Quantum = Annotated[float | str, Value("QUANTUM", float, "a number or detect", words=("detect",))]
+Cycles = Annotated[int, Value("CYCLES", lambda text: 0 if text == "all" else at_least(1)(text), _CYCLES, bare="all")]
+Folds = Annotated[
+    str | int, Value("loo|cycles|K", at_least(0), "loo, cycles or a number of blocks", words=("loo", "cycles"))
+]
+Blocks = Annotated[str | int, Value("loo|K", at_least(2), "loo or a number of blocks from 2 on", words=("loo",))]
+Terms = Annotated[str | list[str], Value("NAME|TERMS", _terms)]
+Angle = Annotated[
+    float | Literal["x", "y"], Value("x|y|DEGREES", float, "x, y or an angle in degrees", words=("x", "y"))
+]
+Frame = Annotated[
+    int | Literal["first", "running"],
+    Value("first|running|N", at_least(0), "first, running or the number of a frame", words=("first", "running")),
+]
+RecordIn = Annotated[str, file("FILE", INPUT, _RECORD)]
+ModelIn = Annotated[str, file("MODEL", INPUT, _MODEL)]
+Result = Annotated[str, file("FILE")]
+Copy = Annotated[str, file("FILE", PRINTED)]
+Picture = Annotated[str, file("PICTURE.svg", PICTURE)]
+Table = Annotated[str, file("TABLE.csv", TABLE)]
+ModelOut = Annotated[str, file("MODEL.json", MODEL)]
+Page = Annotated[str, file("PAGE.html")]
+Source = Annotated[str, file("MODEL.c")]

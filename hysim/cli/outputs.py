@@ -1,25 +1,22 @@
 """Writing of results: whole files, and text on the standard output."""
 
-import argparse
 import contextlib
 import json
 import math
 import os
 import sys
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from operator import attrgetter
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
+import click
+
+import hysim as hs
 from hysim._atomic import write_all
-from hysim._frozen import items
 from hysim.cli.options import INPUT, MODEL, PICTURE, PRINTED, TABLE
 from hysim.cli.records import STANDARD
-from hysim.cli.shell.words import in_shell_words
-
-if TYPE_CHECKING:
-    from hysim._frozen import FloatArray
-    from hysim.plot import Figure
-    from hysim.simulation import Simulation
+from hysim.cli.words import in_shell_words
 
 Files = Mapping[str | None, Callable[[], Any]]
 """Functions of the contents of files, which are texts, bytes or figures, by the paths; None stands for no file."""
@@ -28,23 +25,19 @@ _ENDINGS = (".svg", ".png", ".pdf")
 _LOOPS_IN_A_ROW = 3
 
 
-def check(options: argparse.Namespace) -> None:
+def check(files: Sequence[tuple[str, str]], *, prints: bool) -> None:
     """Refuse results of a command that cannot be written, before anything is computed.
 
     A ValueError is raised if a folder does not exist or may not be written to, the ending of a picture or a table is
     unknown, two results would go to one place, such as the standard output, or a result would overwrite an input.
+    `files` are paths and their roles, and `prints` whether a document is printed.
     """
-    values = [(vars(options)[name], role) for name, role in options.roles.items() if role]
-    lists = [(value if isinstance(value, list) else [value], role) for value, role in values if value is not None]
-    files = [(path, role) for paths, role in lists for path in paths]
     results = [(path, role) for path, role in files if role != INPUT]
     for path, role in results:
         if path != STANDARD:
             _check_path(path, role)
     streams = [role for path, role in results if path == STANDARD]
-    if "json" in options and options.json and PRINTED not in streams:
-        streams.append(PRINTED)
-    if len(streams) > 1:
+    if len(streams) + (prints and PRINTED not in streams) > 1:
         raise ValueError("two results would go to the standard output: write one of them to a file, or leave it out")
     if len({os.path.realpath(path) for path, _ in results}) < len(results):
         raise ValueError(f"two results would go to one file, {results[0][0]}")
@@ -72,11 +65,11 @@ def keep(inputs: Iterable[str | None], results: Iterable[str | None]) -> None:
     targets = {path: os.stat(path) for path in results if path not in (None, STANDARD) and os.path.isfile(path)}
     for source in inputs:
         for path, target in targets.items():
-            if source is not None and any(os.path.samestat(target, each) for each in _files(source)):
+            if source is not None and any(os.path.samestat(target, each) for each in _behind(source)):
                 raise ValueError(f"{path} is an input of this command, and would be overwritten: give another file")
 
 
-def _files(source: str) -> Iterator[os.stat_result]:
+def _behind(source: str) -> Iterator[os.stat_result]:
     """Files behind an input: itself, the files of a folder, or the file that the standard input is read from."""
     paths = [os.path.join(source, name) for name in os.listdir(source)] if os.path.isdir(source) else [source]
     for path in paths:
@@ -85,10 +78,7 @@ def _files(source: str) -> Iterator[os.stat_result]:
 
 
 def write(
-    options: argparse.Namespace,
-    files: Files,
-    text: Callable[[], str] | None = None,
-    document: Callable[[], Mapping[str, Any]] | None = None,
+    files: Files, text: Callable[[], str] | None = None, document: Callable[[], Mapping[str, Any]] | None = None
 ) -> None:
     """Write a content to each path that is not None, all of the files or none, and print the result.
 
@@ -96,27 +86,30 @@ def write(
     """
     contents = {path: _encoded(path, content()) for path, content in files.items() if path is not None}
     if text is not None and STANDARD not in contents:
-        contents[STANDARD] = printed(options, text, document).encode()
+        contents[STANDARD] = printed(text, document).encode()
     write_all({path: content for path, content in contents.items() if path != STANDARD})
     if STANDARD in contents:
         print(contents[STANDARD].decode(), end="", flush=True)
 
 
-def _encoded(path: str, content: "str | bytes | Figure") -> bytes:
+def _encoded(path: str, content: Any) -> bytes:
     if isinstance(content, str | bytes):
         return content.encode() if isinstance(content, str) else content
-    from hysim import plot
-
-    return plot.to_bytes(content, "svg" if path == STANDARD else Path(path).suffix[1:].lower(), name="picture")
+    return hs.plot.to_bytes(content, "svg" if path == STANDARD else Path(path).suffix[1:].lower(), name="picture")
 
 
-def printed(
-    options: argparse.Namespace, text: Callable[[], str], document: Callable[[], Mapping[str, Any]] | None
-) -> str:
+def printed(text: Callable[[], str], document: Callable[[], Mapping[str, Any]] | None) -> str:
     """The result as a text in the words of the shell, or with ``--json`` as a document if there is one."""
-    if document is not None and options.json:
+    context = click.get_current_context()
+    if document is not None and context.params["json"]:
         return to_json(document())
-    return in_shell_words(text(), options.flags).rstrip("\n") + "\n"
+    return in_shell_words(text(), flags(context.command)).rstrip("\n") + "\n"
+
+
+def flags(command: click.Command) -> dict[str, str]:
+    """The options of a command by the names of their values."""
+    options = [each for each in command.params if isinstance(each, click.Option)]
+    return {(each.name or "").rstrip("_"): each.opts[0] for each in options}
 
 
 def to_json(document: Mapping[str, Any]) -> str:
@@ -134,15 +127,17 @@ def _jsonable(value: Any) -> Any:
 
 def scalars(result: Any) -> dict[str, Any]:
     """The fields of a result that are numbers, words or truth values, by name."""
+    from hysim._frozen import items
+
     return {name: value for name, value in items(result).items() if isinstance(value, (str, int, float))}
 
 
 def fields_of(result: Any, names: Iterable[str]) -> dict[str, Any]:
-    """Some fields of a result, or values of options, by name."""
-    return {name: vars(result)[name] for name in names}
+    """Some fields of a result by name."""
+    return {name: attrgetter(name)(result) for name in names}
 
 
-def table(path: str, columns: Mapping[str, "FloatArray"], units: Mapping[str, str]) -> bytes:
+def table(path: str, columns: Mapping[str, Any], units: Mapping[str, str]) -> bytes:
     """Columns in the format of their path's ending; the standard output gets comma-separated text.
 
     A ValueError is raised if the ending is unknown, or its format needs an extra.
@@ -153,34 +148,29 @@ def table(path: str, columns: Mapping[str, "FloatArray"], units: Mapping[str, st
     return packed(columns, "output.csv" if path == STANDARD else path, notes)
 
 
-def drawn(draw: "Callable[[Figure], object]", width: float = 6.0, height: float = 4.0) -> "Figure":
+def drawn(draw: Callable[[Any], object], width: float = 6.0, height: float = 4.0) -> Any:
     """A figure in the house style, which a function has drawn on."""
-    from hysim import plot
-
-    with plot.house_style():
-        canvas = plot.figure(width, height)
+    with hs.plot.house_style():
+        canvas = hs.plot.figure(width, height)
         draw(canvas)
     return canvas
 
 
-def loop(*results: Any) -> "Figure":
+def loop(*results: Any) -> Any:
     """Picture of loops over each other: of records, simulations, and models and fits on the record before them."""
-    from hysim import plot
-
-    return drawn(lambda canvas: plot.loop(*results, ax=canvas.add_subplot()))
+    return drawn(lambda canvas: hs.plot.loop(*results, ax=canvas.add_subplot()))
 
 
-def picture_of(run: "Simulation") -> "Figure":
+def picture_of(run: "hs.Simulation") -> Any:
     """Picture of a simulation: the loops of a structure's elements, or the loop of output against input."""
-    from hysim import plot
     from hysim.simulation import has_elements
 
     if not has_elements(run):
         return loop(run)
     n = run.signals["drift"].shape[1]
-    rows = math.ceil(n / _LOOPS_IN_A_ROW)
+    columns, rows = min(n, _LOOPS_IN_A_ROW), math.ceil(n / _LOOPS_IN_A_ROW)
     return drawn(
-        lambda canvas: plot.element_loops(run, plot.panels(canvas, n, columns=min(n, _LOOPS_IN_A_ROW), sharex=False)),
-        width=3.0 * min(n, _LOOPS_IN_A_ROW) + 1.0,
+        lambda canvas: hs.plot.element_loops(run, hs.plot.panels(canvas, n, columns=columns, sharex=False)),
+        width=3.0 * columns + 1.0,
         height=3.0 * rows,
     )

@@ -1,162 +1,164 @@
 """Options by which every command reads a record from a file."""
 
-import argparse
 import io
 import os
 import sys
-from collections.abc import Callable
-from typing import Any
+from collections.abc import Callable, Mapping
+from contextlib import nullcontext
+from dataclasses import dataclass, replace
+from typing import Any, Literal
 
-from hysim._frozen import FloatArray
-from hysim.cli.options import positive
-from hysim.cli.shell.ranges import cut
-from hysim.records import Record
+import hysim as hs
+from hysim._prefixes import power_of_ten
+from hysim.cli import options
 
 STANDARD = "-"
 """Stands for the standard input or output."""
 
-DETECT = "detect"
-"""Stands for the resolution that the outputs show."""
-
 _DELIMITERS = {"tab": "\t", "semicolon": ";", "comma": ",", "blank": " "}
-
-FILE = "file FILE  text with one sample a line, NPZ, NPY, MAT or HDF5; or - for the standard input"
-FILES = f"{FILE}\nothers FILE...  further records with the same columns, such as those of other rates"
-_INPUT = "--u COLUMN  input: name of its column, or its number from 0 (default: u)"
-_OUTPUT = "--y COLUMN  output: name or number of its column (default: y)"
-OF_A_TEXT = f"""--delimiter SIGN  sign between cells of a text, or {", ".join(_DELIMITERS)} (default: detected)
---decimal .|,  sign before the decimals of a text (default: detected)
---thousands SIGN  sign between thousands of a text (default: none, but where a number can mean nothing else)
---skip N  number of lines at the top of a text that are neither samples nor names of columns
---encoding NAME  encoding of a text, such as latin-1 (default: UTF-8, -16 or -32)"""
-"""Options for a file of text."""
-
-_OTHERS = f"""
-either --t COLUMN  time: name or number of its column (default: t, if there is one)
-or --no-t  read no time from the file
---sample-time STEP  time between two samples of a file without time [unit of t]; with --t, the record is interpolated
-    linearly to even times with this step
---on-missing error|drop  samples without a value [default: error]
-{OF_A_TEXT}
---resolution QUANTUM  resolution of the output's sensor [unit of y]; or detect: the step of which all outputs are
-    multiples
---unit SIGNAL=UNIT...  label of the unit of t, u or y, as in u=V; no value is converted
---from PLACE  first sample to use: its number from 0, or its time with a unit, as in 2.5s
---to PLACE  first sample behind those to use, likewise
---every COUNT  use each N-th of these samples only: a turn between two of them is lost
-"""
-WEIGHTS = (
-    "--weights COLUMN  weight of each sample in the sum of squares, 0 to leave it out: name or number of its column"
-)
-_SECOND = """--y-file FILE_OF_Y  file of the output, if the first holds the input only; if both have a time, the input
-    is interpolated linearly at the times of the output"""
-OPTIONS_WITHOUT_FILE = f"record:\n{_INPUT}\n{_OUTPUT}\n{_SECOND}{_OTHERS}"
-"""Options for a record whose file is named by an option of the command."""
-
-OPTIONS = f"{FILE}\n\n{OPTIONS_WITHOUT_FILE}"
-OPTIONS_WITH_WEIGHTS = f"""{OPTIONS.rstrip()}
---weights COLUMN  weight of each sample in the sum of squares, 0 to leave it out: name or number of its column
---channel CHANNEL=COLUMN...  further quantity, such as a temperature, and its column: T=temp (default: those of a file
-    that hysim has saved)
-"""
-OPTIONS_OF_AN_INPUT = f"{FILE}\n\nrecord:\n{_INPUT}{_OTHERS}"
-"""Options for a file that needs no column of the output."""
+_ROUNDING = 1e-9  # of the record's time: 0.3 s is found among times that were added up
+_OF_NODES, _OF_ELEMENTS = (("displacement", "velocity", "acceleration"), ("drift", "force"))
 
 
-def read(options: argparse.Namespace, file: str | None = None, *, uncut: bool = False) -> Record:
-    """The record that the options describe, or that of another `file`; without an output column, y is u.
+@dataclass(kw_only=True)
+class TextOptions:
+    """Options for a file of text.
+
+    text
+    ----
+    delimiter : sign between cells of a text, or tab, semicolon, comma, blank (default: detected)
+    decimal : sign before the decimals of a text (default: detected)
+    thousands : sign between thousands of a text (default: none, but where a number can mean nothing else)
+    skip : number of lines at the top of a text that are neither samples nor names of columns
+    encoding : encoding of a text, such as latin-1 (default: UTF-8, -16 or -32)
+    """
+
+    delimiter: str | None = None
+    decimal: Literal[".", ","] | None = None
+    thousands: str | None = None
+    skip: int = 0
+    encoding: str | None = None
+
+    def for_load(self) -> dict[str, Any]:
+        """The options of texts, as `hysim.load` takes them."""
+        others = {name: vars(self)[name] for name in ("decimal", "thousands", "skip", "encoding")}
+        return {"delimiter": _DELIMITERS.get(self.delimiter or "", self.delimiter), **others}
+
+
+@dataclass(kw_only=True)
+class InputOptions(TextOptions):
+    """Options for a file that needs no column of the output.
+
+    record
+    ------
+    u : input: name of its column, or its number from 0 (default: u)
+    t : time: name or number of its column (default: t, if there is one)
+    no_t : read no time from the file
+    sample_time : time between two samples of a file without time [unit of t]; with --t, the record is interpolated
+        linearly to even times with this step
+    on_missing : samples without a value
+    resolution : resolution of the output's sensor [unit of y]; or detect: the step of which all outputs are multiples
+    unit : label of the unit of t, u or y, as in u=V; no value is converted
+    from_ : first sample to use: its number from 0, or its time with a unit, as in 2.5s
+    to : first sample behind those to use, likewise
+    every : use each N-th of these samples only: a turn between two of them is lost
+    """
+
+    u: options.Column | None = None
+    t: options.Column | None = None
+    no_t: bool = False
+    sample_time: float | None = None
+    on_missing: Literal["error", "drop"] = "error"
+    resolution: options.Quantum | None = None
+    unit: tuple[options.Unit, ...] = ()
+    from_: options.PlaceIn | None = None
+    to: options.PlaceIn | None = None
+    every: options.Count | None = None
+
+    def __post_init__(self) -> None:
+        options.exclusive(t=self.t, no_t=self.no_t)
+
+
+@dataclass(kw_only=True)
+class RecordOptions(InputOptions):
+    """Options for a record.
+
+    record
+    ------
+    u : input: name of its column, or its number from 0 (default: u)
+    y : output: name or number of its column (default: y)
+    y_file : file of the output, if the first holds the input only; if both have a time, the input is interpolated
+        linearly at the times of the output
+    """
+
+    y: options.Column | None = None
+    y_file: options.RecordIn | None = None
+
+
+@dataclass(kw_only=True)
+class WeighedOptions(RecordOptions):
+    """Options for a record with further columns.
+
+    record
+    ------
+    weights : weight of each sample in the sum of squares, 0 to leave it out: name or number of its column
+    channel : further quantity, such as a temperature, and its column: T=temp (default: those of a file that hysim has
+        saved)
+    sensor : what a sensor on a structure measured, by the names of hysim simulate, and its column: drift_0, or
+        acceleration_2=roof (default: the structure's own output, in the column --y)
+    """
+
+    weights: options.Column | None = None
+    channel: tuple[options.Channel, ...] = ()
+    sensor: tuple[options.Sensor, ...] = ()
+
+
+def read(settings: InputOptions, path: str, *, uncut: bool = False) -> "hs.Record":
+    """The record that the settings describe in a file; without an output column, y is u.
 
     With `uncut` all samples are used, whatever `--from`, `--to` and `--every` say.
     """
-    path = options.file if file is None else file
-    y = options.y if "y" in options else None
-    return _read(options, path, source_of(path), y, options.resolution, uncut=uncut)
+    return _read(settings, path, source_of(path), uncut=uncut)
 
 
-def read_input(options: argparse.Namespace, *, of_the_ground: bool) -> Record:
-    """The input that the options describe, as a record with y = u.
+def read_input(settings: InputOptions, path: str, *, of_the_ground: bool) -> "hs.Record":
+    """The input that the settings describe, as a record with y = u.
 
     A ground motion in m/s^2 is read from an AT2 file, and with `of_the_ground` from a file that has no column u where
     none is named.
     """
     from hysim.files import column_names, is_at2
 
-    source = _repeatable(options.file)
-    if is_at2(source(), options.encoding):
-        if options.u is not None or options.t is not None or options.no_t:
-            raise ValueError(f"{options.file} is an AT2 file, which has no columns: leave out --u, --t and --no-t")
-        return cut(_ground_motion(options, source), options)
-    if of_the_ground and options.u is None and not options.no_t:
+    source = _repeatable(path)
+    if is_at2(source(), settings.encoding):
+        if settings.u is not None or settings.t is not None or settings.no_t:
+            raise ValueError(f"{path} is an AT2 file, which has no columns: leave out --u, --t and --no-t")
+        return cut(_ground_motion(settings, source), settings)
+    if of_the_ground and settings.u is None and not settings.no_t:
         try:
-            names = column_names(source(), **text_options(options))
+            names = column_names(source(), **settings.for_load())
         except ValueError:
             names = ()  # a list, or a fault that is named where the file is read
         if "u" not in names:
-            return cut(_ground_motion(options, source), options)
-    if options.u is None:
-        options.u = _only_column(options, source(), "u")
-    return _read(options, options.file, source(), None, options.resolution)
+            return cut(_ground_motion(settings, source), settings)
+    if settings.u is None:
+        settings.u = _only_column(settings, source(), "u")
+    return _read(settings, path, source())
 
 
-def _ground_motion(options: argparse.Namespace, source: Callable[[], Any]) -> Record:
-    """A ground motion; a step is that of a list without times, or new even steps for one with times."""
-    from hysim.files import load_ground_motion
-
-    arguments = {"t": options.t, "units": dict(options.unit).get("u"), **text_options(options)}
-    del arguments["thousands"]
-    if options.sample_time is None:
-        return _of_the_ground(*load_ground_motion(source(), **arguments))
-    step = positive("--sample-time", options.sample_time)
-    try:
-        motion = load_ground_motion(source(), **arguments)
-    except ValueError:
-        return _of_the_ground(*load_ground_motion(source(), sample_time=step, **arguments))
-    return _of_the_ground(*motion).resample(step)
-
-
-def _of_the_ground(t: FloatArray, acceleration: FloatArray) -> Record:
-    return Record(t=t, u=acceleration, y=acceleration, units={"t": "s", "u": "m/s^2"})
-
-
-def text_options(options: argparse.Namespace) -> dict[str, Any]:
-    """The options of `OF_A_TEXT`, as `hysim.load` takes them."""
-    delimiter = _DELIMITERS.get(options.delimiter, options.delimiter)
-    others = {name: vars(options)[name] for name in ("decimal", "thousands", "encoding")}
-    return {"delimiter": delimiter, "skip": options.skip or 0, **others}
-
-
-def _repeatable(path: str) -> Callable[[], Any]:
-    """A function that returns the file, or all that a stream holds, from its begin each time."""
-    if path != STANDARD and (os.path.isfile(path) or not os.path.exists(path)):
-        return lambda: path
-    if path == STANDARD:
-        content = source_of(path).read()
-    else:  # a pipe
-        with open(path, "rb") as pipe:
-            content = pipe.read()
-    content = content.encode() if isinstance(content, str) else content
-
-    def begin() -> Any:
-        stream: Any = io.BytesIO(content)
-        stream.name = "<stdin>" if path == STANDARD else path
-        return stream
-
-    return begin
-
-
-def read_with_weights(options: argparse.Namespace) -> tuple[Record, FloatArray | None]:
-    """The record that the options describe, and the column of weights that they name.
+def read_with_weights(settings: WeighedOptions, path: str) -> "tuple[hs.Record, Any]":
+    """The record that the settings describe, and the column of weights that they name.
 
     Columns of sensors are channels of the record, the first of them the output unless another one is named.
     """
-    for name, column in options.sensor:
-        options.channel = [*options.channel, (name, column)]
-        options.y = column if options.y is None else options.y
-    if options.weights is None:
-        return read(options), None
-    source = _repeatable(options.file)
-    record = _read(options, options.file, source(), options.y, options.resolution)
-    return record, _read(options, options.file, source(), options.weights, None).y
+    if settings.sensor and settings.y is None:
+        settings.y = settings.sensor[0][1]
+    settings.channel += settings.sensor
+    if settings.weights is None:
+        return read(settings, path), None
+    source = _repeatable(path)
+    weights = _read(replace(settings, y=settings.weights, resolution=None), path, source()).y
+    return _read(settings, path, source()), weights
 
 
 def source_of(path: str) -> Any:
@@ -166,62 +168,142 @@ def source_of(path: str) -> Any:
     return sys.stdin.buffer if isinstance(sys.stdin, io.TextIOWrapper) else sys.stdin
 
 
-def _read(
-    options: argparse.Namespace, path: str, source: Any, y: str | None, resolution: Any, *, uncut: bool = False
-) -> Record:
-    from dataclasses import replace
+def cut(record: "hs.Record", settings: InputOptions) -> "hs.Record":
+    """The part of the record that the settings name; a ValueError if fewer than two samples are in it."""
+    used = {"--from": settings.from_, "--to": settings.to, "--every": settings.every}
+    names = [name for name, value in used.items() if value is not None]
+    if not names:
+        return record
+    part = slice(_sample(record, settings.from_, "--from"), _sample(record, settings.to, "--to"), settings.every)
+    n = len(range(*part.indices(len(record))))
+    if n < 2:
+        t, unit = record.t, record.units.get("t", "")
+        extent = "" if t is None else f" between {t[0]:g} and {t[-1]:g} {unit}".rstrip()
+        raise ValueError(
+            f"{n} of {len(record)} samples{extent} remain by {' and '.join(names)}: a record needs at least 2"
+        )
+    return record[part]
 
+
+def _sample(record: "hs.Record", place: options.Place | None, option: str) -> int | None:
+    """The number of the first sample at or after a place."""
     import numpy as np
 
-    u = options.u if "y" in options or options.u is not None else "u"
-    if "y_file" in options and options.y_file is not None:
-        record = _from_two_files(options, path, source, y, resolution)
+    if place is None:
+        return None
+    value, unit = place
+    if not unit:
+        return int(value)
+    if record.t is None:
+        raise ValueError(f"{option} {value:g}{unit} needs a time: name its column by --t, or give a number")
+    seconds: Any = 10.0 ** power_of_ten(unit, record.units.get("t", "s"))
+    tolerance = _ROUNDING * float(record.t[-1] - record.t[0])
+    return int(np.searchsorted(record.t, value * seconds - tolerance))
+
+
+def of_structure(structure: Any, record: "hs.Record", columns: Mapping[str, Any]) -> "hs.StructureRecord":
+    """The record of a structure, with the channels of these names as its sensors.
+
+    A ValueError is raised if the model is no structure, a name is none of its signals, or the record has no time.
+    """
+    import numpy as np
+
+    if not isinstance(structure, hs.Structure):
+        name = structure.__name__ if isinstance(structure, type) else type(structure).__name__
+        raise ValueError(f"--sensor is for structures in a file, got a {name}: name its output by --y")
+    if record.t is None:
+        raise ValueError("a structure needs the times of its record: name their column by --t, or use --sample-time")
+    sizes = dict.fromkeys(_OF_NODES, structure.n_nodes) | dict.fromkeys(_OF_ELEMENTS, len(structure.elements))
+    names = {  # masses are counted from 1
+        signal: [f"{signal}_{k + (signal in _OF_NODES)}" for k in range(size)] for signal, size in sizes.items()
+    }
+    signals: dict[str, Any] = {}
+    for name in columns:
+        signal = name.rpartition("_")[0]
+        if name not in names.get(signal, ()):
+            known = ", ".join(f"{each[0]} to {each[-1]}" for each in names.values())
+            raise ValueError(f"the structure has no signal {name!r}: its signals are {known}")
+        values = signals.setdefault(signal, np.full((len(record), sizes[signal]), np.nan))
+        values[:, names[signal].index(name)] = record.channel(name)
+    return hs.StructureRecord(t=record.t, u=record.u, name=record.name, **signals)
+
+
+def _ground_motion(settings: InputOptions, source: Callable[[], Any]) -> "hs.Record":
+    """A ground motion; a step is that of a list without times, or new even steps for one with times."""
+    arguments = {"t": settings.t, "units": dict(settings.unit).get("u"), **settings.for_load()}
+    del arguments["thousands"]
+    step = None if settings.sample_time is None else options.positive("--sample-time", settings.sample_time)
+    has_times = True
+    try:
+        t, acceleration = hs.load_ground_motion(source(), **arguments)
+    except ValueError:
+        if step is None:
+            raise
+        has_times = False
+        t, acceleration = hs.load_ground_motion(source(), sample_time=step, **arguments)
+    motion = hs.Record(t=t, u=acceleration, y=acceleration, units={"t": "s", "u": "m/s^2"})
+    return motion.resample(step) if step is not None and has_times else motion
+
+
+def _repeatable(path: str) -> Callable[[], Any]:
+    """A function that returns the file, or all that a stream holds, from its begin each time."""
+    if path != STANDARD and (os.path.isfile(path) or not os.path.exists(path)):
+        return lambda: path
+    with nullcontext(source_of(path)) if path == STANDARD else open(path, "rb") as stream:  # else a pipe
+        content = stream.read()
+
+    def begin() -> Any:
+        copy: Any = io.BytesIO(content.encode() if isinstance(content, str) else content)
+        copy.name = "<stdin>" if path == STANDARD else path
+        return copy
+
+    return begin
+
+
+def _read(settings: InputOptions, path: str, source: Any, *, uncut: bool = False) -> "hs.Record":
+    import numpy as np
+
+    u = "u" if settings.u is None else settings.u
+    step = None if settings.sample_time is None else options.positive("--sample-time", settings.sample_time)
+    if isinstance(settings, RecordOptions) and settings.y_file is not None:
+        record = _from_two_files(settings, path, source, settings.y_file)
+    elif isinstance(settings, RecordOptions):
+        if u == ("y" if settings.y is None else settings.y):
+            raise ValueError(f"the input and the output are both the column {u}: name them by --u and --y")
+        record = _loaded(settings, path, source, settings.u, settings.y)
     else:
-        names = ("u" if u is None else u, "y" if y is None else y)
-        if "y" in options and names[0] == names[1]:
-            raise ValueError(f"the input and the output are both the column {names[0]}: name them by --u and --y")
-        record = _loaded(options, path, source, u, y if "y" in options else u, resolution)
-    step = None if options.sample_time is None else positive("--sample-time", options.sample_time)
+        record = _loaded(settings, path, source, u, u)
     if step is not None and record.t is None:
         record, step = replace(record, t=step * np.arange(float(len(record)))), None
-    record = record if uncut else cut(record, options)
+    record = record if uncut else cut(record, settings)
     return record if step is None else record.resample(step)
 
 
-def _loaded(options: argparse.Namespace, path: str, source: Any, u: Any, y: Any, resolution: Any) -> Record:
-    from hysim.files import load
-
-    record: Record = load(
-        source,
-        u=u,
-        y=y,
-        t=False if options.no_t else options.t,
-        units=dict(options.unit),
-        name="record" if path == STANDARD else None,
-        on_missing=options.on_missing,
-        resolution=resolution,
-        channels=dict(options.channel) or None if "channel" in options else None,
-        **text_options(options),
-    )
+def _loaded(settings: InputOptions, path: str, source: Any, u: Any, y: Any, **changed: Any) -> "hs.Record":
+    channels = dict(settings.channel) if isinstance(settings, WeighedOptions) else {}
+    arguments = {
+        "t": False if settings.no_t else settings.t, "units": dict(settings.unit), "on_missing": settings.on_missing,
+        "name": "record" if path == STANDARD else None, "channels": channels or None,
+        "resolution": settings.resolution, **settings.for_load(), **changed,
+    }  # fmt: skip
+    record: hs.Record = hs.load(source, u=u, y=y, **arguments)
     return record
 
 
-def _from_two_files(options: argparse.Namespace, path: str, source: Any, y: Any, resolution: Any) -> Record:
+def _from_two_files(settings: RecordOptions, path: str, source: Any, y_file: str) -> "hs.Record":
     """The record of an input in one file and an output in another; a file's only column need not be named."""
-    from hysim.files import join_records
-
-    first, second = _repeatable(path) if path == STANDARD else lambda: source, _repeatable(options.y_file)
-    u = _only_column(options, first(), "u") if options.u is None else options.u
-    y = _only_column(options, second(), "y") if y is None else y
-    drive = _loaded(options, path, first(), u, u, None)
-    return join_records(drive, _loaded(options, options.y_file, second(), y, y, resolution))
+    first, second = (_repeatable(path) if path == STANDARD else lambda: source, _repeatable(y_file))
+    u = _only_column(settings, first(), "u") if settings.u is None else settings.u
+    y = _only_column(settings, second(), "y") if settings.y is None else settings.y
+    drive = _loaded(settings, path, first(), u, u, resolution=None)
+    return hs.join_records(drive, _loaded(settings, y_file, second(), y, y))
 
 
-def _only_column(options: argparse.Namespace, source: Any, name: str) -> str:
+def _only_column(settings: InputOptions, source: Any, name: str) -> str:
     """This name, or that of the only column beside the time; a ValueError if there are several others."""
     from hysim.files import column_names
 
-    others = [each for each in column_names(source, **text_options(options)) if each not in ("t", options.t)]
+    others = [each for each in column_names(source, **settings.for_load()) if each not in ("t", settings.t)]
     if name in others or not others:
         return name
     if len(others) > 1:

@@ -1,50 +1,116 @@
-"""`hysim sweep`: a study in a file, over all cores or a cluster, which can be resumed."""
+"""`hysim sweep`: a study in a file, over all cores or a cluster, which can be resumed.
 
-import argparse
-from collections.abc import Iterator
-from contextlib import contextmanager
-from pathlib import Path
-from typing import TYPE_CHECKING, Any
-
-from hysim._versions import optional
-from hysim.cli import outputs, studies
-from hysim.cli.options import JSON, Command
-from hysim.cli.records import STANDARD
-
-if TYPE_CHECKING:
-    from hysim.plot import Figure
-    from hysim.sweeps import Sweep
-
-_STUDY = """
-
-  seed = 1
-  [response]
-  law = "law.json"
-  record = "loop.csv"
-  [sample]
-  method = "latin_hypercube"
-  n = 1000
-  distributions.beta = [0.0, 0.1]
+A study is a TOML file: a task or a law on a record, its parameters, and the seed; docs/studies.md has the format. A
+study with a task is code: its module or file is executed. A study with a response is data only.
 """
 
+import functools
+import importlib.util
+import math
+import pkgutil
+import sys
+import tomllib
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Annotated, Any, Literal, NamedTuple
+
+import hysim as hs
+from hysim._versions import optional
+from hysim.cli import models, options, outputs
+from hysim.cli.records import STANDARD
+
 SUCCESS, SOME_FAILED = 0, 1
+_SPACES = ("grid", "list", "sample")
 
 
-def run(options: argparse.Namespace) -> int:
-    """Compute or show, write the table that is asked for, and print the summary."""
-    from hysim.sweeps import load_sweep
+def sweep(
+    study: Annotated[str, options.file("STUDY.toml", options.INPUT)] | None = None,
+    *,
+    out: Annotated[str, options.file("RESULTS.sqlite")] | None = None,
+    resume: bool = False,
+    on_change: Literal["error", "keep", "restart"] = "error",
+    processes: bool = False,
+    dask: str | None = None,
+    workers: int | None = None,
+    show: Annotated[str, options.file("DATABASE", options.INPUT)] | None = None,
+    csv: options.Result | None = None,
+    plot: options.Picture | None = None,
+    of: str | None = None,
+    json: bool = False,
+) -> int:
+    """Compute a study over many parameters, or continue one.
 
-    if options.out == STANDARD:
+    Compute a task for many sets of parameters, as a TOML file says, and keep every finished row in a database.
+
+    An interrupted study continues with --resume. Exit code 1: some tasks failed. A study of the error of a law on a
+    record, beside both files:
+
+      seed = 1
+      [response]
+      law = "law.json"
+      record = "loop.csv"
+      [sample]
+      method = "latin_hypercube"
+      n = 1000
+      distributions.beta = [0.0, 0.1]
+
+    Parameters
+    ----------
+    study : description of the study; see the page on studies
+    out : database of the rows
+    resume : continue with the rows that are in the database
+    on_change : with --resume, if the rows come from another study than this one
+    processes : processes instead of threads
+    dask : a dask cluster: address of its scheduler, or scheduler file
+    workers : number of threads or processes (default: one for each core)
+    show : compute nothing: print what is in a database
+    csv : write the rows; - writes them to the standard output
+    plot : draw every row as a line over its parameters
+    of : output whose size colours the lines (default: the first)
+
+    Examples
+    --------
+    hysim sweep study.toml --out rows.sqlite --csv rows.csv --plot rows.svg
+    hysim sweep study.toml --out rows.sqlite --resume
+    hysim sweep --show rows.sqlite
+    """
+    options.exclusive(processes=processes, dask=dask)
+    if out == STANDARD:
         raise ValueError("the rows are kept in a database: give --out a file")
-    if options.show is not None and (options.study or options.out):
-        raise ValueError("--show takes a database and computes nothing: leave the study and --out out")
-    result = _computed(options) if options.show is None else load_sweep(options.show)
-    files: outputs.Files = {options.csv: result.to_csv, options.plot: lambda: _picture(result, options.of)}
-    outputs.write(options, files, result.summary, lambda: _document(result))
-    return SOME_FAILED if result.errors and options.show is None else SUCCESS
+    if show is not None:
+        if study or out:
+            raise ValueError("--show takes a database and computes nothing: leave the study and --out out")
+        result = hs.load_sweep(show)
+    else:
+        if not study:
+            raise ValueError("give a study, such as study.toml, and --out RESULTS.sqlite, or --show RESULTS.sqlite")
+        if not out:
+            raise ValueError(f"the rows are kept in a database: give --out {Path(study).stem}.sqlite")
+        if Path(out).exists() and not resume:
+            raise ValueError(f"{out} exists: continue it with --resume, or give another --out")
+        task, space, seed, files = read(study)
+        outputs.keep(files, [out, csv, plot])
+        with _executor(dask, processes) as executor:
+            result = hs.sweep(
+                task, space, executor=executor, store=out, seed=seed, workers=workers, on_change=on_change
+            )
+    pictures: outputs.Files = {csv: result.to_csv, plot: lambda: _picture(result, of)}
+    outputs.write(pictures, result.summary, lambda: _document(result))
+    return SOME_FAILED if result.errors and show is None else SUCCESS
 
 
-def _document(result: "Sweep") -> dict[str, Any]:
+@contextmanager
+def _executor(dask: str | None, processes: bool) -> Iterator[Any]:
+    if not dask:
+        yield "processes" if processes else "threads"
+        return
+    client_class = optional("distributed", "--dask", "dask", ValueError).Client
+    with client_class(scheduler_file=dask) if Path(dask).is_file() else client_class(dask) as client:
+        yield client
+
+
+def _document(result: "hs.Sweep") -> dict[str, Any]:
     import numpy as np
 
     finite = {name: values[np.isfinite(values)] for name, values in result.outputs.items()}
@@ -62,66 +128,125 @@ def _document(result: "Sweep") -> dict[str, Any]:
     }
 
 
-def _picture(result: "Sweep", output: str | None) -> "Figure":
-    from hysim import plot
-
+def _picture(result: "hs.Sweep", output: str | None) -> Any:
     name = output or next(iter(result.outputs), None)
     if name is None or name not in result.outputs:
         raise ValueError(f"no output {name!r} to draw: there are {', '.join(result.outputs) or 'none'}")
-    return outputs.drawn(lambda canvas: plot.parallel_coordinates(result, name, ax=canvas.add_subplot()))
+    return outputs.drawn(lambda canvas: hs.plot.parallel_coordinates(result, name, ax=canvas.add_subplot()))
 
 
-def _computed(options: argparse.Namespace) -> Any:
-    from hysim.sweeps import sweep
+class Study(NamedTuple):
+    """Arguments of `sweep`, and the files that were read for them."""
 
-    if not options.study:
-        raise ValueError("give a study, such as study.toml, and --out RESULTS.sqlite, or --show RESULTS.sqlite")
-    if not options.out:
-        raise ValueError(f"the rows are kept in a database: give --out {Path(options.study).stem}.sqlite")
-    if Path(options.out).exists() and not options.resume:
-        raise ValueError(f"{options.out} exists: continue it with --resume, or give another --out")
-    task, space, seed, files = studies.read(options.study)
-    outputs.keep(files, [options.out, options.csv, options.plot])
-    with _executor(options) as executor:
-        how = outputs.fields_of(options, ("workers", "on_change"))
-        return sweep(task, space, executor=executor, store=options.out, seed=seed, **how)
+    task: Callable[..., Any]
+    space: Any
+    seed: int
+    files: tuple[str, ...]
 
 
-@contextmanager
-def _executor(options: argparse.Namespace) -> Iterator[Any]:
-    if not options.dask:
-        yield "processes" if options.processes else "threads"
-        return
-    client_class = optional("distributed", "--dask", "dask", ValueError).Client
-    is_file = Path(options.dask).is_file()
-    with client_class(scheduler_file=options.dask) if is_file else client_class(options.dask) as client:
-        yield client
+def read(path: str) -> Study:
+    """The study in a file; a ValueError that names the file if it is no study, an OSError if it cannot be read."""
+    try:
+        document = tomllib.loads(Path(path).read_text(encoding="utf-8"))
+        _check(document, {"seed", "task", "response", *_SPACES}, "a study")
+        source, space = _one_of(document, ("task", "response")), _one_of(document, _SPACES)
+        folder, content = Path(path).resolve().parent, document[source]
+        task = _function(content, folder) if source == "task" else _response(content, folder)
+        names = [content.rpartition(":")[0]] if source == "task" else [content["law"], content["record"]]
+        files = tuple(str(folder / name) for name in names)
+        return Study(task, _space(space, document[space]), document.get("seed", 0), files)
+    except (ValueError, TypeError, KeyError, AttributeError, ImportError) as error:
+        message = f"{error} is missing" if isinstance(error, KeyError) else str(error)
+        raise ValueError(f"{path}: {message}") from error
 
 
-COMMAND = Command(
-    "sweep",
-    "compute a study over many parameters, or continue one",
-    "Compute a task for many sets of parameters, as a TOML file says, and keep every finished row in a database. An "
-    "interrupted study continues with --resume. Exit code 1: some tasks failed. A study of the error of a law on a "
-    "record, beside both files:" + _STUDY,
-    f"""
-study [STUDY.toml]  description of the study; see the page on studies
---out RESULTS.sqlite  database of the rows
---resume  continue with the rows that are in the database
---on-change error|keep|restart  with --resume, if the rows come from another study than this one [default: error]
-either --processes  processes instead of threads
-or --dask ADDRESS  a dask cluster: address of its scheduler, or scheduler file
---workers N  number of threads or processes (default: one for each core)
---show DATABASE  compute nothing: print what is in a database
---csv TABLE.csv  write the rows; - writes them to the standard output
---plot LINES.svg  draw every row as a line over its parameters
---of OUTPUT  output whose size colours the lines (default: the first)
-{JSON}
-""",
-    run,
-    """
-hysim sweep study.toml --out rows.sqlite --csv rows.csv --plot rows.svg
-hysim sweep study.toml --out rows.sqlite --resume
-hysim sweep --show rows.sqlite
-""",
-)
+class FileTask:
+    """A function in a file, which is loaded again in the process where it is unpickled."""
+
+    def __init__(self, path: str, name: str) -> None:
+        self.path, self.name = path, name
+        function = vars(_module(path)).get(name)
+        if not callable(function):
+            raise ValueError(f"{path} has no function {name!r}")
+        self.function: Callable[..., Any] = function
+        functools.update_wrapper(self, function)  # with its attribute `batch`, if it has one
+
+    def __call__(self, *arguments: Any, **named: Any) -> Any:
+        return self.function(*arguments, **named)
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return FileTask, (self.path, self.name)
+
+
+def _module(path: str) -> Any:
+    name = f"hysim_study_{Path(path).stem}"
+    spec = importlib.util.spec_from_file_location(name, path)
+    if spec is None or spec.loader is None:
+        raise ValueError(f"{path} is no Python file")
+    module = importlib.util.module_from_spec(spec)
+    sys.modules[name] = module
+    spec.loader.exec_module(module)
+    return module
+
+
+def _function(text: str, folder: Path) -> Any:
+    place, _, name = text.rpartition(":")
+    if not place or not name:
+        raise ValueError(f'task must be "module:function" or "file.py:function", got {text!r}')
+    return FileTask(str(folder / place), name) if place.endswith(".py") else models.resolved(text)
+
+
+def _response(table: Mapping[str, Any], folder: Path) -> Any:
+    _check(table, {"law", "record", "u", "y", "measure"}, "[response]")
+    name = table["law"]
+    is_file = name.endswith(".json") or (folder / name).is_file()
+    if not is_file and models.is_import_path(name):
+        raise ValueError(f"law takes a family or a file, got {name!r}: a law of your own is code, which a task can use")
+    law = hs.load_model(folder / name) if is_file else models.family(name)
+    if table["record"] == "table1":
+        record = hs.datasets.table1()
+    else:
+        record = hs.load(folder / table["record"], u=table.get("u"), y=table.get("y"))
+    measure = table.get("measure", "rmse")
+    return hs.response_task(law, record.u, record.y if measure in ("rmse", "sse") else None, measure)
+
+
+def _space(kind: str, content: Any) -> Any:
+    if kind == "grid":
+        return {name: _values(values) for name, values in content.items()}
+    if kind == "list":
+        return content
+    _check(content, {"n", "method", "seed", "distributions"}, "[sample]")
+    distributions = {name: _distribution(value) for name, value in content["distributions"].items()}
+    return hs.Sample(**{**content, "distributions": distributions})
+
+
+def _values(values: Any) -> Any:
+    if not isinstance(values, Mapping):
+        return values
+    import numpy as np
+
+    _check(values, {"from", "to", "number"}, "values of a parameter")
+    first, last = float(values["from"]), float(values["to"])
+    if not math.isfinite(last - first):
+        raise ValueError(f"values go from one finite number to another, got {first:g} to {last:g}")
+    return np.linspace(first, last, values["number"])
+
+
+def _distribution(value: Any) -> Any:
+    if not isinstance(value, Mapping):
+        return tuple(value)
+    arguments = dict(value)
+    return pkgutil.resolve_name(f"scipy.stats:{arguments.pop('name')}")(**arguments)
+
+
+def _check(table: Mapping[str, Any], names: set[str], title: str) -> None:
+    if unknown := table.keys() - names:
+        raise ValueError(f"{title} has no {', '.join(sorted(unknown))}: there are {', '.join(sorted(names))}")
+
+
+def _one_of(document: Mapping[str, Any], names: tuple[str, ...]) -> str:
+    present = [name for name in names if name in document]
+    if len(present) != 1:
+        raise ValueError(f"give one of {', '.join(names)}, got {', '.join(present) or 'none'}")
+    return present[0]

@@ -1,0 +1,368 @@
+"""`hysim identify`, `posterior`, `compare` and `discover`: from records in files to models."""
+
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, Literal
+
+import hysim as hs
+from hysim.cli import models, options, outputs, records
+from hysim.errors import Interrupted
+
+SUCCESS, NOT_CONVERGED, NO_MODEL = 0, 1, 1
+
+_FOLDER = ("parameters.csv", "samples.csv", "corner.svg", "posterior.json")
+_IDENTIFIED = (
+    "estimates", "stderr", "intervals", "interval_method", "free_names", "n_parameters", "noise", "sigma",
+    "fit_percent", "rmse", "cv_rmse", "fpe", "aic", "bic", "whiteness", "seed", "success", "message",
+    "warnings", "unsafe",
+)  # fmt: skip
+
+
+def identify(
+    file: options.RecordIn,
+    others: tuple[options.RecordIn, ...] = (),
+    *,
+    settings: records.WeighedOptions,
+    fit: models.FitOptions,
+    bounds: tuple[options.Range, ...] = (),
+    depends: tuple[options.Depends, ...] = (),
+    intervals: Literal["linear", "profile", "bootstrap"] = "linear",
+    cross_validate: options.Folds | None = None,
+    max_evaluations: int | None = None,
+    admissible: Literal["yes", "no"] | None = None,
+    out: options.ModelOut | None = None,
+    plot: options.Picture | None = None,
+    json: bool = False,
+) -> int:
+    """Identify a model on a file of your own.
+
+    Identify a model's parameters by its error in free run, and print them with their standard errors.
+
+    Exit code 1: the search did not converge, or the law is unsafe on smaller cycles.
+
+    Parameters
+    ----------
+    others : further records with the same columns, such as those of other rates
+    bounds : bounds of a parameter: beta=0:2 [unit of the parameter]
+    depends : parameter that is a polynomial in a channel: gain=T:1
+    intervals : method of the 95 % intervals
+    cross_validate : leave out one sample at a time, one cycle, or one of K blocks
+    max_evaluations : most parameter sets that the search simulates; a fit that ends by it is partial
+    admissible : whether the law must be safe on smaller cycles, whatever its fit (default: where noise and creep allow
+        the loss of fit)
+    out : write the model; - writes it to the standard output
+    plot : draw the record and the model
+
+    Examples
+    --------
+    hysim identify loop.csv --model polynomial-bouc-wen --out law.json --plot fit.svg
+    hysim identify loop.csv --u voltage --y displacement --model bouc-wen --fix n=1
+    hysim identify drive.csv --y-file sensor.csv --model prandtl-ishlinskii --plays 8
+    hysim identify test.csv --model oscillator --excitation base
+    hysim identify quake.csv --model frame.json --free damping --sensor acceleration_2
+    """
+    from hysim.models.storage import to_json
+
+    subject = models.to_identify(fit)
+    if others and (settings.weights is not None or settings.sensor or settings.y_file is not None):
+        raise ValueError("--weights, --sensor and --y-file are for one file: leave out the others, or use Python")
+    record, weights = records.read_with_weights(settings, file)
+    further = [records.read(settings, path) for path in others]
+    sensors = dict(settings.sensor)
+    measured: Any = records.of_structure(subject, record, sensors) if sensors else record
+    result = hs.identify(
+        subject,
+        [measured, *further] if further else measured,
+        bounds=dict(bounds),
+        depends=dict(depends) or None,
+        weights=weights,
+        intervals=intervals,
+        cross_validate=cross_validate,
+        max_evaluations=max_evaluations,
+        admissible=None if admissible is None else admissible == "yes",
+        **fit.for_identify(),
+    )
+
+    def picture() -> Any:
+        if sensors:  # the record of one sensor is not the output of the structure
+            return outputs.picture_of(hs.simulate(result, record.t, record.u))
+        return outputs.loop(record, result)
+
+    files: outputs.Files = {out: lambda: to_json(result, units=record.units), plot: picture}
+    family = {"family": type(result.model).__name__}
+    outputs.write(files, result.summary, lambda: family | outputs.fields_of(result, _IDENTIFIED))
+    return SUCCESS if result.success else NOT_CONVERGED
+
+
+def posterior(
+    file: options.RecordIn,
+    others: tuple[options.RecordIn, ...] = (),
+    *,
+    settings: records.RecordOptions,
+    fit: models.FitOptions,
+    prior: tuple[options.Range, ...] = (),
+    samples: options.Count = 10000,
+    out: str | None = None,
+    json: bool = False,
+) -> int:
+    """Draw the distribution of a model's parameters given a file.
+
+    Identify a model, draw its parameters from their posterior distribution, and print medians and intervals at 95 %.
+
+    It needs the extra bayes. Exit code 1: the search did not converge, or the draws are too few to use.
+
+    Parameters
+    ----------
+    others : further records with the same columns, such as those of other rates
+    prior : flat prior of a parameter, or of sigma: n=1:3 (default: the box of the search) [unit of the parameter]
+    samples : effective draws of each parameter
+    out : folder to write into: parameters.csv, samples.csv, corner.svg and posterior.json
+
+    Examples
+    --------
+    hysim posterior loop.csv --model bouc-wen --out posterior
+    hysim posterior loop.csv --model play --resolution detect --noise quantised --samples 1000
+    hysim posterior loop.csv --model bouc-wen --fix n=1 --prior sigma=0.01:0.1 --json
+    """
+    from hysim._printing import csv_text
+
+    subject = models.to_identify(fit)
+    measured: Any = [records.read(settings, path) for path in (file, *others)]
+    measured = measured if others else measured[0]
+    if out is not None:
+        outputs.keep([file, *others, fit.model], [str(Path(out, name)) for name in _FOLDER])
+        Path(out).mkdir(parents=True, exist_ok=True)
+    result = hs.identify(subject, measured, **fit.for_identify())
+    draws = hs.sample_posterior(
+        result, measured, initial=fit.initial, noise=fit.noise, priors=dict(prior), samples=samples, seed=fit.seed
+    )
+    rows = _rows(draws)
+    conditions = outputs.fields_of(draws, ("noise", "resolution", "priors", "n_evaluations", "seed", "warnings"))
+    document = {"family": type(draws.model).__name__, "parameters": rows, **conditions}
+    contents: dict[str, Callable[[], Any]] = {
+        "parameters.csv": lambda: csv_text([rows[0], *(row.values() for row in rows)]),
+        "samples.csv": draws.to_csv,
+        "corner.svg": lambda: _corner(draws),
+        "posterior.json": lambda: outputs.to_json(document),
+    }
+    files: outputs.Files = {} if out is None else {str(Path(out, name)): contents[name] for name in _FOLDER}
+    outputs.write(files, draws.summary, lambda: document)
+    return NOT_CONVERGED if draws.warnings or not result.success else SUCCESS
+
+
+def _rows(posterior: "hs.Posterior") -> list[dict[str, Any]]:
+    """Each parameter with its median, interval at 95 % and diagnostics."""
+    columns: dict[str, Any] = {
+        "median": posterior.median,
+        "lower": {name: low for name, (low, _) in posterior.interval().items()},
+        "upper": {name: high for name, (_, high) in posterior.interval().items()},
+        "mean": {name: float(draws.mean()) for name, draws in posterior.samples.items()},
+        "standard_deviation": {name: float(draws.std(ddof=1)) for name, draws in posterior.samples.items()},
+        "effective_samples": posterior.effective_samples,
+        "rhat": posterior.rhat,
+    }
+    return [{"name": name, **{key: column[name] for key, column in columns.items()}} for name in posterior.samples]
+
+
+def _corner(posterior: "hs.Posterior") -> Any:
+    n = len(posterior.names)
+    side = max(1.25 * n, 4.0)  # inches, of a panel 1.25
+    return outputs.drawn(lambda canvas: hs.plot.corner(posterior, axes=canvas.subplots(n, n)), side, side)
+
+
+def compare(
+    file: options.RecordIn,
+    *,
+    settings: records.RecordOptions,
+    model: tuple[models.ToCompare, ...] = (),
+    cross_validate: options.Folds | None = None,
+    test: options.RecordIn | None = None,
+    test_cycles: int | None = None,
+    max_evaluations: int | None = None,
+    seed: int = 0,
+    csv: options.Result | None = None,
+    markdown: options.Result | None = None,
+    latex: options.Result | None = None,
+    out: options.ModelOut | None = None,
+    plot: options.Picture | None = None,
+    json: bool = False,
+) -> int:
+    """Compare models on a file of your own.
+
+    Identify models on a record, all by the same protocol, and print them side by side.
+
+    Beside them stands what the record cannot decide.
+
+    Parameters
+    ----------
+    model : name of a family, such as bouc-wen; MODEL.json; or module:name of your own, which executes ./module.py or an
+        installed module; once or more (default: all families)
+    cross_validate : leave out one sample at a time, one cycle, or one of K blocks (default: loo up to 200 samples, then
+        10)
+    test : another record with the same columns, for the test only
+    test_cycles : keep the last N cycles for the test
+    max_evaluations : most parameter sets that the search of each model simulates; a fit that ends by it is partial
+    csv : write the table; - writes it to the standard output, so too with the next two options
+    markdown : write the table in Markdown
+    latex : write the table in LaTeX
+    out : write the model that predicts best, as identify does
+    plot : draw the best models
+
+    Examples
+    --------
+    hysim compare loop.csv
+    hysim compare loop.csv --model bouc-wen --model preisach --model law.json --test-cycles 1
+    hysim compare loop.csv --csv table.csv --plot loops.svg --out best.json
+    """
+    options.exclusive(test=test, test_cycles=test_cycles)
+    record = records.read(settings, file)
+    kept: Any = test_cycles if test is None else records.read(settings, test, uncut=True)
+    subjects: dict[str, Any] = {}
+    for name in model:
+        subjects |= _subjects(name)
+    try:
+        table = hs.compare(
+            subjects or None, record, cross_validate=cross_validate or "auto", test=kept, seed=seed,
+            max_evaluations=max_evaluations,
+        )  # fmt: skip
+    except Interrupted as interrupt:
+        if not json:
+            print(interrupt.finished.to_text())
+        raise
+    files: outputs.Files = {
+        out: lambda: _best(table),
+        csv: lambda: table.to_csv(),
+        markdown: lambda: table.to_markdown() + "\n",
+        latex: lambda: table.to_latex() + "\n",
+        plot: lambda: _picture(table),
+    }
+    outputs.write(files, lambda: table.to_text(), lambda: _document(table))
+    return SUCCESS
+
+
+def _subjects(name: str) -> dict[str, Any]:
+    """Subjects of the comparison for a family's name, a file or an import path."""
+    from hysim.models.model import candidates_named
+
+    model = models.model_or_family(name)
+    if name.endswith(".json") or models.is_import_path(name):
+        return {models.name_of(name): model}
+    try:
+        of_family = candidates_named(model.__name__)
+    except ValueError:
+        raise ValueError(f"the model {name} cannot be compared without further arguments: give a .json file") from None
+    return of_family if len(of_family) > 1 else dict.fromkeys([name], *of_family.values())
+
+
+def _best(table: "hs.Comparison") -> str:
+    """The model that predicts best; if no errors of prediction are known, the one with the smallest rmse."""
+    from hysim.models.storage import to_json
+
+    ranked = table.ranked() or table.ranked("rmse")
+    if not ranked:
+        raise ValueError(f"no model could be compared: {'; '.join(table.failed.values())}")
+    return to_json(ranked[0].model, units=table.record.units)
+
+
+def _document(table: "hs.Comparison") -> dict[str, Any]:
+    fields = ("rmse_ratio", "typical_ratio", "probability", "diverged")
+    contrasts = {each.name: outputs.fields_of(each, fields) for each in table.contrasts}
+    rows = [outputs.scalars(row) | contrasts.get(row.name, dict.fromkeys(fields)) for row in table.rows]
+    verdict = outputs.fields_of(table, ("winner", "undecided", "verdict", "warnings"))
+    return {"record": table.record.name, "units": table.record.units, **verdict, "rows": rows, "failed": table.failed}
+
+
+def _picture(table: "hs.Comparison") -> Any:
+    rows = min(4, len(table.rows))
+    return outputs.drawn(
+        lambda canvas: hs.plot.comparison(table, axes=hs.plot.panels(canvas, 3 * rows, columns=3)), 9.0, 2.2 * rows
+    )
+
+
+PLANT, WITHOUT_PLANT = (("mass", "damping", "stiffness"), ("library", "cross_validate", "initial"))
+
+
+def discover(
+    file: options.RecordIn,
+    *,
+    settings: records.RecordOptions,
+    route: Literal["auto", "memory", "output", "oscillator"] = "auto",
+    library: options.Terms | None = None,
+    degree: int | None = None,
+    symmetry: Literal["odd", "even"] | None = None,
+    mass: float | None = None,
+    damping: float | None = None,
+    stiffness: float | None = None,
+    cross_validate: options.Blocks | None = None,
+    initial: Literal["auto", "free", "rest"] | None = None,
+    seed: int = 0,
+    out: options.ModelOut | None = None,
+    plot: options.Picture | None = None,
+    json: bool = False,
+) -> int:
+    """Find the law of the memory in a file of your own.
+
+    Find the law of a memory by sparse regression (PySINDy) and free runs, and print it with its verdict.
+
+    The verdict is hysteresis, a linear lag, or that records of one rate cannot decide.
+
+    Parameters
+    ----------
+    route : meaning of the output: the memory, a feedthrough and a memory, or the displacement of an oscillator; auto
+        tries the first two
+    library : bouc-wen, duhem, or terms with commas between them: "u',|u'| z,u' |z|"
+    degree : largest degree of the library's monomials; 2 by default, of an oscillator's 3
+    symmetry : symmetry of the response; only odd for an oscillator
+    mass : mass of an oscillator, if it is known [units of u s^2/y]
+    damping : damping of an oscillator, if it is known [units of u s/y]
+    stiffness : stiffness of an oscillator, if it is known [units of u/y]
+    cross_validate : repeat the whole search without one sample at a time, or one of K blocks; not for an oscillator
+    initial : whether the memory begins at a value of its own or at zero; by default the BIC decides
+    out : write the model; - writes it to the standard output
+    plot : draw the record and the law
+
+    Examples
+    --------
+    hysim discover loop.csv --plot law.svg
+    hysim discover test.csv --route oscillator --mass 2.5
+    """
+    from hysim.models.storage import to_json
+
+    values = {
+        "mass": mass, "damping": damping, "stiffness": stiffness, "library": library,
+        "cross_validate": cross_validate, "initial": initial, "degree": degree, "symmetry": symmetry,
+    }  # fmt: skip
+    used: dict[str, Any] = {name: value for name, value in values.items() if value is not None}
+    is_oscillator = _is_oscillator(route, used)
+    record = records.read(settings, file)
+    if is_oscillator:
+        result: Any = hs.discover_oscillator(record, seed=seed, **used)
+    else:
+        result = hs.discover(record, seed=seed, route=route, **used)
+    model = result.model
+    files: dict[str | None, Any] = {
+        out: lambda: to_json(model, units=record.units),
+        plot: lambda: outputs.loop(record, model),
+    }
+    if model is None:
+        files = {path: lambda: "" for path in files if path == records.STANDARD}
+    outputs.write(files, result.to_json if json else result.summary)
+    unwritten = [name for name, path in (("--out", out), ("--plot", plot)) if path and model is None]
+    if unwritten:
+        print(f"hysim: {' and '.join(unwritten)} not written: {result.warnings[0]}", file=sys.stderr)
+    return NO_MODEL if unwritten else SUCCESS
+
+
+def _is_oscillator(route: str, used: dict[str, Any]) -> bool:
+    """Whether the record is an oscillator's; options that are not used by it are refused."""
+    is_oscillator = route == "oscillator" or (route == "auto" and any(name in used for name in PLANT))
+    for name in WITHOUT_PLANT if is_oscillator else PLANT:
+        if name in used:
+            user = "an oscillator" if is_oscillator else f"--route {route}"
+            raise ValueError(f"--{name.replace('_', '-')} is not used by {user}: leave it out")
+    if is_oscillator and used.get("symmetry") == "even":
+        raise ValueError("--symmetry even is not used by an oscillator: leave it out, or use --symmetry odd")
+    if "degree" in used and isinstance(used.get("library"), list):
+        raise ValueError("--degree is not used with a library of names: leave it out")
+    return is_oscillator

@@ -1,0 +1,215 @@
+"""`hysim example`, `explore`, `reproduce` and `completion`: what helps to learn and to set up."""
+
+import os
+import tempfile
+from collections import Counter
+from collections.abc import Callable, Iterator, Sequence
+from pathlib import Path
+from typing import Annotated, Any, Literal, NamedTuple
+
+import click
+from click.shell_completion import BashComplete, FishComplete, ZshComplete
+
+import hysim as hs
+from hysim.cli import options, outputs
+from hysim.cli.records import STANDARD
+
+SUCCESS, NOT_CONVERGED = 0, 1
+_SEED = 1
+
+
+class Device(NamedTuple):
+    """A device whose record is written: what it is, the record, and commands to try on the file."""
+
+    what: str
+    record: "Callable[[], hs.Record]"
+    tries: tuple[str, ...]
+
+
+def _damper() -> "hs.Record":
+    """Cycles of growing amplitude on a steel damper, whose load cell has noise."""
+    import numpy as np
+
+    phase = np.linspace(0.0, 2.0 * np.pi, 120, endpoint=False)
+    u = np.concatenate([*(amplitude * np.sin(phase) for amplitude in (2.0, 4.0, 6.0, 8.0, 10.0, 10.0)), [0.0]])
+    law = hs.BoucWen(A=1.0, beta=0.35, gamma=0.15, n=1.5, feedthrough=1.2, gain=18.0)
+    noise = 0.1 * np.random.default_rng(_SEED).standard_normal(u.size)
+    t = 0.1 * np.arange(float(u.size))
+    units = {"t": "s", "u": "mm", "y": "kN"}
+    return hs.Record(t=t, u=u, y=law.response(u) + noise, units=units, name="steel damper, simulated")
+
+
+def _magnet() -> "hs.Record":
+    """First-order reversal curves of relays with two bells of thresholds."""
+    import numpy as np
+
+    def density(up: Any, down: Any) -> Any:
+        return np.asarray(np.exp(-((up + down) ** 2) / 800.0 - ((up - down - 80.0) ** 2) / 1800.0))
+
+    law = hs.Preisach.from_density(np.linspace(-100.0, 100.0, 41), density)
+    u = hs.signals.reversal_curves(-100.0, 100.0, curves=20, samples_per_step=2)
+    y = law.response(u)
+    return hs.Record(u=u, y=1.5 * y / np.abs(y).max(), units={"u": "kA/m", "y": "T"}, name="magnet, simulated")
+
+
+DEVICES = {
+    "piezo": Device(
+        "voltages and displacements measured on a piezo stack",
+        lambda: hs.datasets.table1(dwell=1.0),
+        ("metrics {}", "identify {} --model polynomial-bouc-wen --plot fit.svg"),
+    ),
+    "damper": Device(
+        "simulated test of a steel damper, displacements and forces in cycles of growing amplitude",
+        _damper,
+        ("metrics {} --cycles", "identify {} --model bouc-wen --plot fit.svg"),
+    ),
+    "magnet": Device(
+        "simulated first-order reversal curves of a magnet, fields and flux densities",
+        _magnet,
+        ("plot {} --kind minor-loops --out loops.svg", "plot {} --kind forc --out forc.svg"),
+    ),
+}
+"""Devices that `--device` takes."""
+
+
+Kind = Annotated[str, options.one_of({name: device.what for name, device in DEVICES.items()})]
+_SCRIPTS = {"bash": BashComplete, "zsh": ZshComplete, "fish": FishComplete}
+
+
+def example(path: options.Table | None = None, *, device: Kind = "piezo") -> int:
+    """Write a file to try the other commands on.
+
+    Write a record as a file like one of your own.
+
+    The piezo's 52 samples were measured for a paper of 2016, which prints no times: one second a sample is an
+    assumption. The other devices are simulated.
+
+    Parameters
+    ----------
+    path : file to write (default: the device's name with the ending .csv)
+
+    Examples
+    --------
+    hysim example
+    hysim example damper.csv --device damper
+    hysim example curves.mat --device magnet
+    """
+    import numpy as np
+
+    from hysim.files import Notes, packed
+
+    out = f"{device}.csv" if path is None else path
+    if out != STANDARD and os.path.exists(out):
+        raise ValueError(f"{out} is there already: give another name, as in hysim example mine.csv")
+    what, make, tries = DEVICES[device]
+    record = make()
+    columns = {} if record.t is None else {"t": np.asarray(record.t)}
+    columns |= {"u": record.u, "y": record.y}
+    notes = Notes(record.units, record.resolution, record.name)
+    content = packed(columns, "example.csv" if out == STANDARD else out, notes)
+    names = ", ".join(f"{name} [{record.units[name]}]" for name in columns)
+    lines = [
+        f"{out}: {len(record)} samples of {names}: {what}. Try:",
+        *(f"  hysim {line.format(out)}" for line in tries),
+    ]
+    outputs.write({out: lambda: content}, lambda: "\n".join(lines))
+    return SUCCESS
+
+
+def explore(*, out: options.Page | None = None, no_browser: bool = False) -> int:
+    """Play with the families of laws in a browser.
+
+    Open a page with a choice of families and devices, whose loops follow sliders. It works offline.
+
+    Parameters
+    ----------
+    out : write the page to this file (default: a temporary one)
+    no_browser : write it, and open no browser
+
+    Examples
+    --------
+    hysim explore
+    hysim explore --no-browser --out explorer.html
+    """
+    import webbrowser
+
+    from hysim.export import explorer
+
+    page = explorer(Path(tempfile.mkdtemp(prefix="hysim-"), "explorer.html") if out is None else Path(out))
+    print(page)
+    if not no_browser:
+        webbrowser.open(page.resolve().as_uri())
+    return SUCCESS
+
+
+def reproduce(*, out: str = "reproduction", quick: bool = False, page: bool = False, json: bool = False) -> int:
+    """Rebuild the paper's results and write a report.
+
+    Identify, discover and compare models on the 52 voltage-displacement points of the paper.
+
+    The folder holds report.html, summary.json, figures and tables.
+
+    Parameters
+    ----------
+    out : folder to write into
+    quick : skip the cross-validation
+    page : also write table1.html, a page for a browser: the identified Bouc-Wen law with sliders over the 52 points
+    json : print summary.json instead of the short table
+
+    Examples
+    --------
+    hysim reproduce --quick
+    hysim reproduce --out report --page
+    """
+    from hysim import paper
+
+    result = paper.reproduce(out, quick=quick, page=page)
+    study = result.findings.study
+    if json:
+        print((result.folder / "summary.json").read_text(encoding="utf-8"), end="")
+    else:
+        print(*_lines(study), *_verdicts(result.findings.claims), f"report: {result.folder / 'report.html'}", sep="\n")
+    return SUCCESS if all(fit.success for fit in study.fits.values()) else NOT_CONVERGED
+
+
+def _lines(study: Any) -> Iterator[str]:
+    comparison, loop = study.comparison, study.comparison.loop
+    yield (
+        f"Table 1: {len(comparison.record)} points, stroke {loop.stroke:.3f} um; the loop is {loop.max_width:.3f} um "
+        f"wide at {loop.max_width_at:g} V, {loop.mean_width:.4f} um on average, area {loop.area:.2f} um V"
+    )
+    yield comparison.to_text()
+    for name, fit in study.fits.items():
+        for region, best in fit.regions.items():
+            yield f"{name}: the best {region} law fits {best.fit_percent:.2f} %"
+    yield f"sindy: {study.discovery.equation}  ({study.discovery.verdict})"
+
+
+def _verdicts(claims: Sequence[Any]) -> Iterator[str]:
+    """The number of claims with each verdict, and the verdicts on the two headline figures."""
+    counts = Counter(claim.verdict for claim in claims)
+    yield f"{len(claims)} claims: " + ", ".join(f"{number} {verdict}" for verdict, number in counts.most_common())
+    for claim in claims:
+        if claim.id.startswith(("hysteresis-90", "vibration-97")):
+            yield f"{claim.id}: {claim.recomputed:.1f} % where the paper says {claim.printed:g} %, {claim.verdict}"
+
+
+def completion(shell: Literal["bash", "zsh", "fish"]) -> int:
+    """Write a script by which a shell completes commands and options.
+
+    Write a script for a shell to the standard output.
+
+    For the running shell: source <(hysim completion bash), or hysim completion fish | source; for all: write it to a
+    file where the shell looks for such scripts.
+
+    Parameters
+    ----------
+    shell : shell
+
+    Examples
+    --------
+    hysim completion bash
+    hysim completion fish
+    """
+    print(_SCRIPTS[shell](click.get_current_context().find_root().command, {}, "hysim", "_HYSIM_COMPLETE").source())
+    return SUCCESS

@@ -1,0 +1,201 @@
+"""`hysim simulate`, `page`, `c` and `fmu`: what is done with a model in a file."""
+
+from pathlib import Path
+from typing import Annotated, Any, Literal, Protocol, runtime_checkable
+
+import hysim as hs
+from hysim._atomic import write_all
+from hysim.cli import models, options, outputs, records
+
+
+@runtime_checkable
+class _Shaken(Protocol):
+    """A plant that a force or its base moves."""
+
+    excitation: str
+
+
+def simulate(
+    model: options.ModelIn,
+    file: options.RecordIn,
+    *,
+    settings: records.InputOptions,
+    out: options.Table | None = None,
+    plot: options.Picture | None = None,
+    json: bool = False,
+) -> int:
+    """Drive a model with the input in a file of your own.
+
+    Simulate a model in free run, and write its signals as columns.
+
+    The columns are t if there is a time, u, y, the memory z of a law and further signals of a plant, those of a
+    structure as drift_0, drift_1, ... for its elements and displacement_1, ... for its nodes. An AT2 file of PEER is
+    read as the acceleration of the ground in m/s^2; so is, for a plant that its base moves, a file without a column u;
+    --unit u=g says the unit if it states none.
+
+    Parameters
+    ----------
+    out : the columns (default: the standard output)
+    plot : draw the loop; of a structure, the loops of its elements
+    json : print the columns as JSON, beside a file if --out is used
+
+    Examples
+    --------
+    hysim simulate law.json drive.csv --out response.csv
+    hysim simulate frame.json quake.at2 --out response.csv --plot loops.svg
+    hysim simulate law.json loop.csv | hysim plot - --out loop.svg
+    """
+    from hysim.simulation import columns_of
+
+    _one_standard_input(model, file)
+    if file.endswith(".json") and model.endswith((".csv", ".tsv", ".txt", ".npz", ".mat", ".h5")):
+        raise ValueError(f"the model stands before the record: hysim simulate {file} {model}")
+    law, units = models.read(model)
+    of_the_ground = isinstance(law, _Shaken) and law.excitation == "base"
+    record = records.read_input(settings, file, of_the_ground=of_the_ground)
+    units |= dict(settings.unit) | {signal: unit for signal, unit in record.units.items() if signal != "y"}
+    simulation = models.simulated(law, record, units)
+    columns, named = simulation.columns, [item for item in simulation.signals.items() if item[0] in units]
+    labels = {column: units[name] for name, values in named for column in columns_of(name, values)}
+
+    def document() -> dict[str, Any]:
+        values = {name: column.tolist() for name, column in columns.items()}
+        return {"units": {name: labels[name] for name in columns if name in labels}, "columns": values}
+
+    files: dict[str | None, Any] = {plot: lambda: outputs.picture_of(simulation)}
+    if out is not None or not json:
+        path = out or records.STANDARD
+        files[path] = lambda: outputs.table(path, columns, labels)
+    outputs.write(files, (lambda: "") if json else None, document)
+    return 0
+
+
+def page(
+    model: options.ModelIn,
+    *,
+    out: options.Page,
+    data: options.RecordIn | None = None,
+    between: options.Pair | None = None,
+    title: str | None = None,
+    settings: records.RecordOptions,
+) -> int:
+    """Write a law with sliders as a page for a browser.
+
+    Write a page on which the loop of a law follows sliders, one HTML file that works offline.
+
+    With --data the measured points are part of it.
+
+    Parameters
+    ----------
+    out : the page
+    data : record to show and to compare with: text with one sample a line, NPZ, NPY, MAT or HDF5
+    between : lowest and highest input at the start [unit of u]
+    title : heading of the page
+
+    Examples
+    --------
+    hysim page law.json --out law.html
+    hysim page law.json --data loop.csv --out law.html
+    """
+    _one_standard_input(model, data)
+    law, units = models.read(model)
+    record = None if data is None else records.read(settings, data)
+    units |= ({} if record is None else dict(record.units)) | dict(settings.unit)
+    hs.to_page(law, out, record, between=between, units=units, title=title)
+    return 0
+
+
+def _one_standard_input(model: str, record: str | None) -> None:
+    if model == record == records.STANDARD:
+        raise ValueError("the standard input holds the model or the record, not both")
+
+
+def c(
+    model: options.ModelIn,
+    *,
+    out: options.Source,
+    inverse: bool = False,
+    sample_time: float | None = None,
+    u0: float = 0.0,
+) -> int:
+    """Write a model, or its inverse, as C99 for the device that it runs on.
+
+    Write a law, a sum, a cascade or a plant as C99 with math.h alone.
+
+    The files are MODEL.h, MODEL.c, and MODEL_main.c, a program that reads inputs, one in each line, and prints outputs.
+    A controller that is tuned on the model is written by hysim control --c.
+
+    Parameters
+    ----------
+    out : the source; the other files stand beside it
+    inverse : the inverse of the law: the input that gives a wanted output
+    sample_time : time between two samples of a plant, or of a law that depends on time [s]
+    u0 : input at rest, at which an inverse starts [unit of u]
+
+    Examples
+    --------
+    hysim c law.json --out law.c
+    hysim c law.json --inverse --out inverse.c
+    """
+    path = Path(out)
+    if path.suffix != ".c":
+        raise ValueError(f"--out is a C source, and its header stands beside it: call the file .c, got {out}")
+    paths = {end: str(path.with_name(path.stem + end)) for end in (".h", ".c", "_main.c")}
+    outputs.keep([model], paths.values())
+    law, _ = models.read(model)
+    step = None if sample_time is None else options.positive("--sample-time", sample_time)
+    code = hs.to_c(hs.InverseFeedforward(law=law) if inverse else law, step, name=path.stem, u0=u0)
+    texts = {".h": code.header, ".c": code.source, "_main.c": code.main}
+    write_all({paths[end]: text for end, text in texts.items()})
+    print(f"wrote {', '.join(paths.values())}; a program that reads one input in each line is compiled by")
+    print(f"  cc -std=c99 -O2 -ffp-contract=off {paths['.c']} {paths['_main.c']} -lm -o {path.with_suffix('')}")
+    return 0
+
+
+Platform = Literal["linux", "windows", "mac"]
+
+
+def _platforms(text: str) -> tuple[str, ...]:
+    return () if text == "none" else tuple(name.strip() for name in text.split(","))
+
+
+def fmu(
+    model: options.ModelIn,
+    *,
+    out: Annotated[str, options.file("MODEL.fmu")],
+    version: Literal["2.0", "3.0"] = "2.0",
+    sample_time: float | None = None,
+    name: str | None = None,
+    unit: tuple[options.Unit, ...] = (),
+    u0: float = 0.0,
+    y0: float = 0.0,
+    platforms: Annotated[tuple[Platform, ...], options.Value("PLATFORMS", _platforms)] | None = None,
+) -> int:
+    """Write a model as a functional mock-up unit for Simulink, Modelica and other tools.
+
+    Write a model as a functional mock-up unit (FMU) for co-simulation.
+
+    It holds its description, its C sources, and shared libraries. The output is one communication step late.
+
+    Parameters
+    ----------
+    out : the file to write
+    version : version of FMI
+    sample_time : time between two samples of a plant or a controller [s]
+    name : name of the model, a name in C (default: that of its class)
+    unit : unit of u or y, such as u=V (default: those in the model's file)
+    u0 : input at which a law rests before the simulation, command at which a controller starts [unit of u]
+    y0 : displacement at which a controller starts [unit of y]
+    platforms : linux, windows, mac, with commas between them, for which it holds a shared library, or none (default:
+        this machine, if it has a C compiler)
+
+    Examples
+    --------
+    hysim fmu law.json --out law.fmu
+    hysim fmu actuator.json --sample-time 1e-4 --version 3.0 --out actuator.fmu
+    """
+    law, units = models.read(model)
+    step = None if sample_time is None else options.positive("--sample-time", sample_time)
+    units |= dict(unit)
+    hs.to_fmu(law, out, version, step, name=name, units=units, platforms=platforms, u0=u0, y0=y0)
+    return 0
