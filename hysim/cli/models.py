@@ -50,10 +50,6 @@ actuator: the model actuator, from records of several rates
 """
 """The choice of a family and the options of its structure."""
 
-_SHORT = {
-    "zhu-wang": "ZhuWangBoucWen", "baber-noori": "BoucWenBaberNoori", "lugre": "LuGre",
-    "oscillator": "BoucWenOscillator",
-}  # fmt: skip
 _PLANTS = ("oscillator", "actuator")
 _STRUCTURAL = (
     "plays", "relay_intervals", "one_signed", "degree", "poles", "zeros", "sample", "hold", "oversampling", "period",
@@ -75,19 +71,19 @@ class _Structured(Protocol):
 
 def names() -> list[str]:
     """Names of all families that can be compared without further arguments; loads every family."""
-    from hysim.models.candidates import candidates
+    from hysim.models.candidates import candidates, short_names
 
-    short = {family: name for name, family in _SHORT.items()}
+    short = {family: name for name, family in short_names().items()}
     families = dict.fromkeys(name.split()[0] for name in candidates() if name.split()[0] in hysim.__all__)
     return [short.get(name, _hyphenated(name)) for name in families]
 
 
 def names_to_identify() -> list[str]:
     """Names of all models that `hysim identify` takes: those to compare, further laws and plants."""
-    from hysim.models.candidates import is_identifiable
+    from hysim.models.candidates import is_identifiable, short_names
     from hysim.models.model import every_family
 
-    short = {family: name for name, family in _SHORT.items()}
+    short = {family: name for name, family in short_names().items()}
     laws = [
         short.get(name, _hyphenated(name))
         for name, law in every_family().items()
@@ -100,7 +96,7 @@ def family(name: str) -> Any:
     """The family with a name such as ``bouc-wen``; a ValueError, which lists the names, if there is none."""
     from hysim.models.model import FAMILIES
 
-    public = _public()
+    public = _public(name)
     law = resolved(f"hysim:{public[name]}") if name in public else None
     if law is None or FAMILIES.get(public[name]) is not law:
         known = names_to_identify()
@@ -111,9 +107,14 @@ def family(name: str) -> Any:
     return law
 
 
-def _public() -> dict[str, str]:
-    """Names of classes by their names on the command line."""
-    return {_hyphenated(each): each for each in hysim.__all__ if each[0].isupper()} | _SHORT
+def _public(name: str) -> dict[str, str]:
+    """Names of classes by their names on the command line; with the short ones where `name` is no other."""
+    public = {_hyphenated(each): each for each in hysim.__all__ if each[0].isupper()}
+    if name in public:
+        return public
+    from hysim.models.candidates import short_names  # which loads every family
+
+    return public | short_names()
 
 
 def _hyphenated(name: str) -> str:
@@ -236,7 +237,7 @@ def read(path: str) -> tuple[Any, dict[str, str]]:
             raise ValueError(f"{path} needs values for its parameters: give an instance ({error})") from None
     if path == STANDARD:
         return from_json(sys.stdin.read(), "the standard input")
-    if path in _public() and not Path(path).exists():
+    if not Path(path).exists() and path in _public(path):
         raise ValueError(f"{path} is a family without numbers: write a model of it by hysim identify --out {path}.json")
     return from_json(Path(path).read_bytes(), path)
 

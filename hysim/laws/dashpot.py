@@ -5,7 +5,7 @@ from typing import Self
 from hysim._frozen import FloatArray, check_not_negative
 from hysim.kernels import stepping
 from hysim.laws._rate_part import RatePart
-from hysim.models.model import family
+from hysim.models.model import Example, family
 
 
 @family
@@ -29,6 +29,7 @@ class Dashpot(RatePart):
 
     c: float = 1.0
 
+    example = Example({"c": 2.0})
     step = staticmethod(stepping.dashpot)
 
     @staticmethod

@@ -12,7 +12,7 @@ from hysim.kernels import inverses, stepping
 from hysim.laws._smoothing import equal_inputs, smoothing_spline
 from hysim.models.composable import Composable
 from hysim.models.law import Law
-from hysim.models.model import family
+from hysim.models.model import Example, family
 from hysim.models.parameters import Parameter, space_of
 from hysim.models.protocols import UNLIMITED, CompiledLaw, DirectFit, Limits
 from hysim.models.search_space import Freedom, SearchSpace
@@ -38,9 +38,10 @@ class Line(Law):
     offset: float = 0.0
     slope: float = 0.0
 
+    example = Example({"offset": 1.0, "slope": 2.0})
     step = staticmethod(stepping.line)
     initial: ClassVar[tuple[str, ...]] = ()
-    searched = (Parameter("offset", affine=True), Parameter("slope", affine=True))
+    searched = (Parameter("offset", unit="y", affine=True), Parameter("slope", unit="y/u", affine=True))
     memory = None  # type: ignore[assignment]  # a line remembers nothing
 
     @property
@@ -83,6 +84,8 @@ class SingleValued(Composable):
 
     u: FloatArray
     y: FloatArray
+
+    example = Example({"u": (0.0, 1.0), "y": (0.0, 2.0)}, (-10.0, 10.0))
 
     def __post_init__(self) -> None:
         if self.u.ndim != 1 or self.u.shape != self.y.shape or not self.u.size:

@@ -7,14 +7,18 @@ method ``candidates()`` what is tried instead; one that makes no sense without b
 """
 
 import importlib
-from typing import Any
+from typing import Any, Protocol, runtime_checkable
 
 from hysim._names import MODULE_OF, meant, plain
 from hysim.models.model import FAMILIES, ROOMS, every_family
 from hysim.models.protocols import Direct, Identifiable, Offering
 
-SHORT = {"zhuwang": "ZhuWangBoucWen", "babernoori": "BoucWenBaberNoori"}
-"""Families by the plain forms of their short names."""
+
+@runtime_checkable
+class _Short(Protocol):
+    """A family with a short name."""
+
+    short: str
 
 
 def candidates() -> dict[str, Any]:
@@ -45,13 +49,26 @@ def family_named(name: str) -> Any:
     'BoucWen'
     """
     public = [each for each, module in MODULE_OF.items() if module.startswith(ROOMS)]
-    known = {plain(each): each for each in (*FAMILIES, *public)} | SHORT
+    known = {plain(each): each for each in (*FAMILIES, *public)}
+    if plain(name) not in known:
+        known |= {plain(short): each for short, each in short_names().items()}
     if (family := known.get(plain(name))) is not None:
         if family in public:
             importlib.import_module(MODULE_OF[family])  # enters it into the families
         if family in FAMILIES:
             return FAMILIES[family]
     raise ValueError(f"there is no family {name!r}{meant(name, every_family())}")
+
+
+def short_names() -> dict[str, str]:
+    """Short names of families to their names; loads every family.
+
+    Examples
+    --------
+    >>> short_names()["zhu-wang"]
+    'ZhuWangBoucWen'
+    """
+    return {each.short: name for name, each in every_family().items() if isinstance(each, _Short) and each.short}
 
 
 def candidates_named(name: str) -> dict[str, Any]:

@@ -112,6 +112,7 @@ class BoucWenOscillator:
     initial_state: tuple[float, ...] = ()
 
     dynamic: ClassVar[bool] = True
+    short = "oscillator"
 
     def __post_init__(self) -> None:
         if self.mass <= 0.0:

@@ -7,7 +7,7 @@ u is the input, z the memory, y the output; time has no part in it.
 """
 
 from abc import abstractmethod
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from functools import cached_property
 from typing import ClassVar, Self
 
@@ -34,6 +34,7 @@ class MemoryLaw(Law):
     """
 
     polynomial: ClassVar[str] = "input_coefficients"
+    units: ClassVar[Mapping[str, str]] = {"n": "1", "offset": "y"}
 
     A: float
     beta: float

@@ -16,7 +16,7 @@ from hysim.laws.differential.boucwen import BoucWen
 from hysim.laws.differential.polynomial_boucwen import PolynomialBoucWen
 from hysim.models.holding import Holding
 from hysim.models.law import Packed, Stepping
-from hysim.models.model import family
+from hysim.models.model import Example, family
 from hysim.models.search_space import ALL_FREE, Freedom, Parameters, SearchSpace
 from hysim.models.stages import Stage, Subset
 from hysim.models.tables import Tables
@@ -128,6 +128,17 @@ class BoucWenBaberNoori(MemoryLaw):
     z0: float = 0.0
     input_coefficients: tuple[float, ...] = (0.0,)
 
+    short = "baber-noori"
+    example = Example(
+        {
+            "beta": 0.5, "gamma": 0.3, "delta_nu": 0.03, "delta_eta": 0.03, "zeta_s": 0.8, "q": 0.1, "p": 1.0,
+            "psi": 0.3, "lambda_": 0.3,
+        },
+        (-4.0, 4.0),
+        title="Baber-Noori: wear and pinching",
+        group="Devices",
+        units={"u": "mm", "y": "kN"},
+    )  # fmt: skip
     contains = Subset(
         BoucWen,
         neutral={"delta_a": 0.0, "delta_nu": 0.0, "delta_eta": 0.0, "zeta_s": 0.0, "input_coefficients": 0.0},

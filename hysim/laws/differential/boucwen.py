@@ -4,7 +4,7 @@ from typing import ClassVar, Self
 
 from hysim.laws.differential import _boucwen_conversions as conversions
 from hysim.laws.differential._boucwen_law import BoucWenLaw
-from hysim.models.model import family
+from hysim.models.model import Example, family
 
 
 @family
@@ -47,6 +47,8 @@ class BoucWen(BoucWenLaw):
     [0.0, 0.632121, -0.745354, 0.714823]
     """
 
+    units: ClassVar = {"n": "1", "feedthrough": "y/u", "offset": "y"}
+    example = Example({"beta": 0.6, "gamma": 0.2, "feedthrough": 0.1}, (-2.0, 2.0), title="Bouc-Wen")
     polynomial: ClassVar[str] = "feedthrough"
 
     A: float = 1.0

@@ -22,7 +22,7 @@ from hysim.laws.differential.terms import (
     terms_of,
 )
 from hysim.models.law import Law, Packed, State
-from hysim.models.model import family
+from hysim.models.model import Example, family
 from hysim.models.protocols import CompiledLaw
 from hysim.models.search_space import ALL_FREE, Freedom, Parameters, SearchSpace
 from hysim.models.tables import Tables
@@ -93,6 +93,8 @@ class Duhem(Law):
     offset: float = 0.0
     y0: float = 0.0
 
+    units: ClassVar = {"feedthrough": "y/u", "offset": "y", "y0": "y"}
+    example = Example({"p": ((1.0, -0.5),), "q": ((0.3, -0.2),)}, (-2.0, 2.0), title="Duhem")
     step = staticmethod(kernels.step)
     start = staticmethod(kernels.start)
     initial: ClassVar[tuple[str, ...]] = ("y0",)

@@ -10,7 +10,7 @@ from hysim.laws.differential import _boucwen_facts
 from hysim.laws.differential._memory_law import MemoryLaw
 from hysim.laws.differential.boucwen import BoucWen
 from hysim.models.law import Packed, Stepping
-from hysim.models.model import family
+from hysim.models.model import Example, family
 from hysim.models.search_space import Freedom
 from hysim.models.stages import Subset
 from hysim.models.tables import Tables
@@ -73,6 +73,7 @@ class GeneralizedBoucWen(MemoryLaw):
     z0: float = 0.0
     input_coefficients: tuple[float, ...] = (0.0,)
 
+    example = Example({"beta": 0.5, "gamma": 0.2, "b2": 0.1, "b4": 0.1}, (-2.0, 2.0), title="Generalised Bouc-Wen")
     contains = Subset(
         BoucWen,
         neutral={**dict.fromkeys(_SECTORS, 0.0), "input_coefficients": 0.0},

@@ -4,7 +4,7 @@ from typing import ClassVar
 
 from hysim.kernels.friction import backlash as kernels
 from hysim.laws.friction.rated_law import RatedLaw, check_signs
-from hysim.models.model import family
+from hysim.models.model import Example, family
 from hysim.models.parameters import Parameter
 from hysim.models.tables import Tables
 
@@ -60,6 +60,12 @@ class ElasticBacklash(RatedLaw):
     center: float = 0.0
     offset: float = 0.0
 
+    example = Example(
+        {"stiffness": 2.0, "damping": 0.05, "half_gap": 0.4},
+        title="Backlash of an elastic shaft",
+        units={"u": "rad", "y": "N m"},
+        kind="sine",
+    )
     step = staticmethod(kernels.step)
     rated_step = staticmethod(kernels.rated_step)
     initial: ClassVar[tuple[str, ...]] = ()

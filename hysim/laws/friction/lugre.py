@@ -9,7 +9,7 @@ import numpy.typing as npt
 from hysim._frozen import FloatArray
 from hysim.kernels.friction import lugre as kernels
 from hysim.laws.friction.rated_law import RatedLaw, check_signs, curve
-from hysim.models.model import family
+from hysim.models.model import Example, family
 from hysim.models.parameters import Parameter
 from hysim.models.tables import Tables
 
@@ -85,6 +85,15 @@ class LuGre(RatedLaw):
     offset: float = 0.0
     z0: float = 0.0
 
+    short = "lugre"
+    example = Example(
+        {
+            "sigma0": 20.0, "sigma1": 0.1, "sigma2": 0.02, "coulomb": 1.0, "breakaway": 1.5, "stribeck_velocity": 2.0,
+        },
+        title="Friction: LuGre",
+        units={"u": "mm", "y": "N"},
+        kind="sine",
+    )  # fmt: skip
     step = staticmethod(kernels.step)
     rated_step = staticmethod(kernels.rated_step)
     searched = (

@@ -9,7 +9,7 @@ import numpy.typing as npt
 from hysim._frozen import FloatArray
 from hysim.kernels.friction import stribeck as kernels
 from hysim.laws.friction.rated_law import RatedLaw, check_signs
-from hysim.models.model import family
+from hysim.models.model import Example, family
 from hysim.models.parameters import Parameter
 from hysim.models.tables import Tables
 
@@ -66,6 +66,12 @@ class StribeckFriction(RatedLaw):
     viscous: float = 0.0
     offset: float = 0.0
 
+    example = Example(
+        {"coulomb": 1.0, "breakaway": 1.5, "breakaway_velocity": 1.0, "viscous": 0.05},
+        title="Friction: Stribeck",
+        units={"u": "mm", "y": "N"},
+        kind="sine",
+    )
     step = staticmethod(kernels.step)
     rated_step = staticmethod(kernels.rated_step)
     initial: ClassVar[tuple[str, ...]] = ()

@@ -6,6 +6,7 @@ is demagnetised where the input is zero.
 """
 
 from abc import abstractmethod
+from collections.abc import Mapping
 from dataclasses import replace
 from typing import ClassVar
 
@@ -35,13 +36,14 @@ class BranchLaw(Law):
     offset: float
     z0: float
 
+    units: ClassVar[Mapping[str, str]] = {"squareness": "1", "z0": "1"}
     states: ClassVar[tuple[str, ...]] = ("rest", "periodic", "free")
     searched: ClassVar[tuple[Parameter, ...]] = (
-        Parameter("saturation", affine=True),
+        Parameter("saturation", unit="y", affine=True),
         Parameter("coercivity", 1e-3, 3.0, unit="h", log=True),
         Parameter("squareness", 1e-3, 0.999, physical=(True, True)),
-        Parameter("feedthrough", affine=True),
-        Parameter("offset", affine=True),
+        Parameter("feedthrough", unit="y/u", affine=True),
+        Parameter("offset", unit="y", affine=True),
         Parameter("z0", -1.0, 1.0, physical=(True, True)),
     )
     starts = tuple(

@@ -1,6 +1,6 @@
 """Chan's law of magnetic cores, which LTspice has."""
 
-from typing import Self
+from typing import ClassVar, Self
 
 import numpy as np
 
@@ -8,7 +8,7 @@ from hysim._frozen import check_not_negative, check_positive
 from hysim.kernels.magnetics import chan as kernels
 from hysim.laws.magnetic._branches import VACUUM, BranchLaw
 from hysim.models.law import Packed
-from hysim.models.model import family
+from hysim.models.model import Example, family
 from hysim.models.parameters import Parameter, declared_space
 from hysim.models.search_space import ALL_FREE, Freedom, SearchSpace
 from hysim.models.tables import Tables
@@ -88,6 +88,8 @@ class Chan(BranchLaw):
     offset: float = 0.0
     z0: float = 0.0
 
+    units: ClassVar = {**BranchLaw.units, "offset": "y", "gap": "u/y"}
+    example = Example({"coercivity": 0.4, "squareness": 0.5}, (-2.0, 2.0), title="Magnetic core: Chan")
     step = staticmethod(kernels.step)
     states = ("rest", "free")
     searched = tuple(each for each in BranchLaw.searched if each.name != "offset")

@@ -20,7 +20,7 @@ from hysim.laws.magnetic import _jiles_atherton_search as search
 from hysim.laws.magnetic._jiles_atherton_conversions import MU0
 from hysim.models.inverse_search import first_input
 from hysim.models.law import Law, Packed, State
-from hysim.models.model import family
+from hysim.models.model import Example, family
 from hysim.models.parameters import Parameter
 from hysim.models.protocols import UNLIMITED, CompiledLaw, Limits
 from hysim.models.search_space import ALL_FREE, Freedom, Parameters, SearchSpace
@@ -110,7 +110,20 @@ class JilesAtherton(Law):
     offset: float = 0.0
     z0: float = 0.0
 
-    searched = tuple(Parameter(name, affine=True) for name in ("gain", "feedthrough", "offset"))
+    units: ClassVar = {
+        **dict.fromkeys(("Ms", "a", "k", "z0"), "u"),
+        **dict.fromkeys(("alpha", "c", "anisotropy", "reversible_feedback"), "1"),
+    }
+    example = Example(
+        {"Ms": 1.0, "a": 0.3, "alpha": 0.1, "k": 0.4, "gain": 1.0, "feedthrough": 0.0},
+        (-2.0, 2.0),
+        title="Magnetic core: Jiles-Atherton",
+    )
+    searched = (
+        Parameter("gain", unit="y/u", affine=True),
+        Parameter("feedthrough", unit="y/u", affine=True),
+        Parameter("offset", unit="y", affine=True),
+    )
     step = staticmethod(kernels.step)
     resume = staticmethod(kernels.resume)
     exact_strokes: ClassVar[bool] = True

@@ -8,7 +8,7 @@ import numpy as np
 from hysim.kernels.magnetics import tellinen as kernels
 from hysim.laws.magnetic._branches import VACUUM, BranchLaw
 from hysim.models.law import Packed
-from hysim.models.model import family
+from hysim.models.model import Example, family
 from hysim.models.tables import Tables
 
 
@@ -64,6 +64,7 @@ class Tellinen(BranchLaw):
     offset: float = 0.0
     z0: float = 0.0
 
+    example = Example({"coercivity": 0.4, "squareness": 0.7}, (-2.0, 2.0), title="Magnetic core: Tellinen")
     step = staticmethod(kernels.step)
 
     @classmethod

@@ -13,6 +13,7 @@ extremes; see `hysim.kernels.preisach`.
 """
 
 import math
+from collections.abc import Mapping
 from typing import Any, ClassVar
 
 import numpy as np
@@ -34,6 +35,7 @@ class RelayLaw(ByStructure, Law):
     """A bank of weighted relays; a law says whether they are spread over their intervals, and adds its fields."""
 
     spread: ClassVar[bool]
+    units: ClassVar[Mapping[str, str]] = {"levels": "u", "weights": "y", "offset": "y", "z0": "u"}
     levels: tuple[float, ...]
     weights: tuple[float, ...]
     offset: float

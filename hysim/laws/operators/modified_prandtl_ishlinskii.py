@@ -8,6 +8,7 @@ either side. Where these sums have one sign it has an inverse of its own kind, e
 
 import math
 from dataclasses import replace
+from typing import ClassVar
 
 import numpy as np
 import numpy.typing as npt
@@ -18,7 +19,7 @@ from hysim.laws.operators._play_sums import ExtendedPlays, check_dead_zones, dea
 from hysim.laws.operators.prandtl_ishlinskii import PrandtlIshlinskii, wrong_sum
 from hysim.models.inverse_search import searched_inverse
 from hysim.models.law import Packed, State
-from hysim.models.model import family
+from hysim.models.model import Example, family
 from hysim.models.protocols import UNLIMITED, CompiledLaw, Limits
 from hysim.models.tables import Tables
 
@@ -73,6 +74,15 @@ class ModifiedPrandtlIshlinskii(ExtendedPlays):
     dead_zone_weights: tuple[float, ...] = (1.0,)
     offset: float = 0.0
     z0: tuple[float, ...] = (0.0,)
+
+    units: ClassVar = {"thresholds": "u", "offset": "y", "z0": "u"}
+    example = Example(
+        {
+            "thresholds": (0.0, 0.1, 0.2, 0.35, 0.5, 0.7), "weights": (0.4, 0.3, 0.2, 0.2, 0.1, 0.1),
+            "dead_zones": (-0.4, 0.0, 0.4), "dead_zone_weights": (0.3, 1.0, -0.3),
+        },
+        title="Prandtl-Ishlinskii: dead zones",
+    )  # fmt: skip
 
     @classmethod
     def check(cls, tables: Tables) -> None:

@@ -33,7 +33,7 @@ from hysim.laws.operators._reversal_curves import curves_of, everett_between, le
 from hysim.laws.operators._smooth_density import smooth, supported
 from hysim.laws.operators.prandtl_ishlinskii import PrandtlIshlinskii
 from hysim.models.law import State
-from hysim.models.model import family
+from hysim.models.model import Example, family
 from hysim.models.protocols import UNLIMITED, CompiledLaw, Limits
 from hysim.records import Record, several
 
@@ -43,6 +43,30 @@ Density = Callable[[FloatArray, FloatArray], npt.ArrayLike]
 _POINTS = 8  # of Gauss's rule on an interval
 
 _ROOM = 1000  # extremes that the inverse keeps in a loop
+
+
+def _relay_weights(grid: FloatArray, density: Density) -> tuple[float, ...]:
+    """A density integrated over each pair of intervals between the levels."""
+    rows, columns = np.tril_indices(max(grid.size - 1, 0))
+    nodes, share = np.polynomial.legendre.leggauss(_POINTS)
+    p, q = (1.0 + nodes) / 2.0, (1.0 + nodes[:, np.newaxis]) / 2.0
+    length = np.diff(grid)
+    diagonal = (rows == columns)[:, np.newaxis, np.newaxis]
+    reach = np.where(diagonal, p, 1.0)  # of b on the way up to a
+    a = grid[rows][:, np.newaxis, np.newaxis] + length[rows][:, np.newaxis, np.newaxis] * p
+    b = grid[columns][:, np.newaxis, np.newaxis] + length[columns][:, np.newaxis, np.newaxis] * reach * q
+    area = (length[rows] * length[columns] / 4.0)[:, np.newaxis, np.newaxis] * np.outer(share, share) * reach
+    heights = np.asarray(density(np.broadcast_to(a, b.shape), b), dtype=float)
+    return tuple(np.sum(area * heights, axis=(1, 2)).tolist())
+
+
+def _two_bells(up: FloatArray, down: FloatArray) -> FloatArray:
+    """Weight of relays: two bells, about the diagonal and about the line where both thresholds are opposite."""
+    width, middle = up - down, 0.5 * (up + down)
+    return np.exp(-4.0 * middle**2) * np.exp(-((width - 0.5) ** 2) / 0.2) / math.sqrt(math.pi)
+
+
+_GRID = read_only(np.linspace(-1.0, 1.0, 11))
 
 
 @family
@@ -74,6 +98,10 @@ class PreisachRelays(RelayLaw):
     [-2.5, -0.5, 2.5, 2.5, 0.5, -2.5]
     """
 
+    example = Example(
+        {"levels": (-1.0, -0.5, 0.0, 0.5, 1.0), "weights": (0.1, 0.1, 0.3, 0.2, 0.3, 0.1, 0.1, 0.2, 0.1, 0.1)},
+        title="Preisach relays",
+    )
     spread: ClassVar[bool] = False
 
     levels: tuple[float, ...] = ()
@@ -123,6 +151,7 @@ class Preisach(RelayLaw):
     """
 
     spread: ClassVar[bool] = True
+    example = Example({"levels": tuple(_GRID.tolist()), "weights": _relay_weights(_GRID, _two_bells)}, title="Preisach")
 
     levels: tuple[float, ...] = ()
     weights: tuple[float, ...] = ()
@@ -157,17 +186,7 @@ class Preisach(RelayLaw):
         [1.5, 3.0, 1.5]
         """
         grid = read_only(levels, "levels", ndim=1)
-        rows, columns = np.tril_indices(max(grid.size - 1, 0))
-        nodes, share = np.polynomial.legendre.leggauss(_POINTS)
-        p, q = (1.0 + nodes) / 2.0, (1.0 + nodes[:, np.newaxis]) / 2.0
-        length = np.diff(grid)
-        diagonal = (rows == columns)[:, np.newaxis, np.newaxis]
-        reach = np.where(diagonal, p, 1.0)  # of b on the way up to a
-        a = grid[rows][:, np.newaxis, np.newaxis] + length[rows][:, np.newaxis, np.newaxis] * p
-        b = grid[columns][:, np.newaxis, np.newaxis] + length[columns][:, np.newaxis, np.newaxis] * reach * q
-        area = (length[rows] * length[columns] / 4.0)[:, np.newaxis, np.newaxis] * np.outer(share, share) * reach
-        weights = np.sum(area * np.asarray(density(np.broadcast_to(a, b.shape), b), dtype=float), axis=(1, 2))
-        return cls(levels=tuple(grid), weights=tuple(weights), offset=offset)
+        return cls(levels=tuple(grid), weights=_relay_weights(grid, density), offset=offset)
 
     @classmethod
     def from_plays(cls, levels: npt.ArrayLike, law: PrandtlIshlinskii) -> Self:

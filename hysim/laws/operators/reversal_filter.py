@@ -14,7 +14,7 @@ import numpy as np
 
 from hysim.kernels import clamps as kernels
 from hysim.models.law import Law, Packed
-from hysim.models.model import family
+from hysim.models.model import Example, family
 from hysim.models.tables import Tables
 
 
@@ -46,6 +46,8 @@ class ReversalFilter(Law):
 
     threshold: float = 0.0
 
+    units: ClassVar = {"threshold": "u"}
+    example = Example({"threshold": 0.3}, title="Filter of small reversals")
     step = staticmethod(kernels.extreme)
     start = staticmethod(kernels.start_extreme)
     initial: ClassVar[tuple[str, ...]] = ()
