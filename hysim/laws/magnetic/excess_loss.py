@@ -7,7 +7,7 @@ import numpy as np
 
 from hysim._frozen import FloatArray, check_not_negative
 from hysim.kernels.magnetics import losses
-from hysim.laws._rate_part import RatePart
+from hysim.laws.dashpot import RatePart
 from hysim.models.model import Example, family
 
 _BERTOTTI = 0.1356
@@ -38,6 +38,7 @@ class ExcessLoss(RatePart):
     c: float = 1.0
 
     example = Example({"c": 2.0})
+    power = 0.5
     step = staticmethod(losses.excess)
 
     @staticmethod
