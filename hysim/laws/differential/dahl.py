@@ -3,7 +3,7 @@
 import numpy as np
 
 from hysim._frozen import FloatArray
-from hysim.laws.differential._equivalent_boucwen import EquivalentBoucWen
+from hysim.laws.differential.boucwen import EquivalentBoucWen
 from hysim.models.model import Example, family
 from hysim.models.parameters import Parameter
 from hysim.models.tables import Tables

@@ -6,7 +6,7 @@ import numpy as np
 
 from hysim._frozen import check_not_negative, check_positive
 from hysim.kernels.magnetics import chan as kernels
-from hysim.laws.magnetic._branches import VACUUM, BranchLaw
+from hysim.laws.magnetic.tellinen import VACUUM, BranchLaw
 from hysim.models.law import Packed
 from hysim.models.model import Example, family
 from hysim.models.parameters import Parameter, declared_space
