@@ -46,7 +46,7 @@ seen their manuals.
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any, ClassVar, Self
+from typing import ClassVar, Self
 
 import numpy as np
 import numpy.typing as npt
@@ -66,7 +66,6 @@ from hysim.records import Record
 MU0 = 4e-7 * math.pi
 """Magnetic constant [T m / A], to its nine digits."""
 
-Scalars = dict[str, float]
 _BOX = {
     "Ms": (np.log(0.9), np.log(30.0)),
     "a": (np.log(1e-4), np.log(30.0)),
@@ -101,59 +100,13 @@ _SCREENED = 1024
 _POSITIVE = ("Ms", "a", "k")
 
 
-def from_total(Ms: float, a: float, alpha: float, k: float, c: float) -> Scalars:
-    """Numbers from those of a law whose irreversible rate is (M_an - M) / k."""
-    if not c < 1.0:
-        raise ValueError(f"c must be below 1, got {c:g}")
-    return {"Ms": Ms, "a": a, "alpha": alpha, "k": k / (1.0 - c), "c": c}
-
-
-def to_total(law: Any) -> Scalars:
-    """The way back."""
-    _isotropic(law, "this spelling")
-    return {"Ms": law.Ms, "a": law.a, "alpha": law.alpha, "k": law.k * (1.0 - law.c), "c": law.c}
-
-
-def from_circuit(MS: float, A: float, K: float, C: float) -> Scalars:
-    """Numbers from those of the circuit simulators' law without alpha."""
-    if not C >= 0.0:
-        raise ValueError(f"C must not be negative, got {C:g}")
-    return {"Ms": MS, "a": A, "alpha": 0.0, "k": (1.0 + C) * K, "c": C / (1.0 + C)}
-
-
-def to_circuit(law: Any) -> Scalars:
-    """The way back."""
-    _isotropic(law, "the circuit simulators' law")
-    if law.alpha != 0.0:
-        raise ValueError(f"the circuit simulators' law has no coupling, got alpha = {law.alpha:g}")
-    if law.c == 1.0:
-        raise ValueError("the circuit simulators' law needs c below 1")
-    return {"MS": law.Ms, "A": law.a, "K": law.k * (1.0 - law.c), "C": law.c / (1.0 - law.c)}
-
-
-def from_jamodel(a: float, k: float, c: float, Ms: float, alpha: float, Kan: float, psi: float) -> Scalars:
-    """Numbers from those of JAmodel's bulk model (ModelType 2)."""
-    if not Ms * a > 0.0:
-        raise ValueError(f"Ms and a must be positive, got {Ms:g} and {a:g}")
-    anisotropy = Kan * math.cos(2.0 * psi) / (MU0 * Ms * a)
-    return {"Ms": Ms, "a": a, "alpha": alpha, "k": k, "c": c, "anisotropy": anisotropy}
-
-
-def to_jamodel(law: Any) -> Scalars:
-    """The member with the easy axis along the field, or across it."""
-    _whole_feedback(law, "JAmodel")
-    Kan = law.anisotropy * MU0 * law.Ms * law.a
-    axis = {"Kan": abs(Kan), "psi": 0.0 if Kan >= 0.0 else 0.5 * math.pi}
-    return {"a": law.a, "k": law.k, "c": law.c, "Ms": law.Ms, "alpha": law.alpha, **axis}
-
-
-def _isotropic(law: Any, whose: str) -> None:
-    _whole_feedback(law, whose)
+def _check_isotropic(law: "JilesAtherton", whose: str) -> None:
+    _check_feedback(law, whose)
     if law.anisotropy != 0.0:
         raise ValueError(f"{whose} is isotropic, got anisotropy = {law.anisotropy:g}")
 
 
-def _whole_feedback(law: Any, whose: str) -> None:
+def _check_feedback(law: "JilesAtherton", whose: str) -> None:
     if law.reversible_feedback != 1.0:
         raise ValueError(f"{whose} has He = H + alpha M, got reversible_feedback = {law.reversible_feedback:g}")
     if law.z0 != 0.0:
@@ -458,12 +411,14 @@ class JilesAtherton(Law):
         >>> hs.JilesAtherton.from_total(Ms=1.6e6, a=1100.0, alpha=1.6e-3, k=320.0, c=0.2).k
         400.0
         """
-        numbers: Any = from_total(Ms, a, alpha, k, c)
-        return cls(**numbers)
+        if not c < 1.0:
+            raise ValueError(f"c must be below 1, got {c:g}")
+        return cls(Ms=Ms, a=a, alpha=alpha, k=k / (1.0 - c), c=c)
 
     def to_total(self) -> dict[str, float]:
         """The arguments of `from_total`; ValueError if the law is anisotropic, has another He, or begins magnetised."""
-        return to_total(self)
+        _check_isotropic(self, "this spelling")
+        return {"Ms": self.Ms, "a": self.a, "alpha": self.alpha, "k": self.k * (1.0 - self.c), "c": self.c}
 
     @classmethod
     def from_circuit(cls, *, MS: float, A: float, K: float, C: float) -> Self:
@@ -479,12 +434,18 @@ class JilesAtherton(Law):
         >>> law.k, law.c
         (25.0, 0.2)
         """
-        numbers: Any = from_circuit(MS, A, K, C)
-        return cls(**numbers)
+        if not C >= 0.0:
+            raise ValueError(f"C must not be negative, got {C:g}")
+        return cls(Ms=MS, a=A, alpha=0.0, k=(1.0 + C) * K, c=C / (1.0 + C))
 
     def to_circuit(self) -> dict[str, float]:
         """The arguments of `from_circuit`; ValueError also if the law has a coupling, or c = 1."""
-        return to_circuit(self)
+        _check_isotropic(self, "the circuit simulators' law")
+        if self.alpha != 0.0:
+            raise ValueError(f"the circuit simulators' law has no coupling, got alpha = {self.alpha:g}")
+        if self.c == 1.0:
+            raise ValueError("the circuit simulators' law needs c below 1")
+        return {"MS": self.Ms, "A": self.a, "K": self.k * (1.0 - self.c), "C": self.c / (1.0 - self.c)}
 
     @classmethod
     def from_jamodel(
@@ -498,12 +459,17 @@ class JilesAtherton(Law):
         >>> round(hs.JilesAtherton.from_jamodel(a=50.0, k=20.0, c=0.2, Ms=1e6, alpha=1e-5, Kan=100.0).anisotropy, 6)
         1.591549
         """
-        numbers: Any = from_jamodel(a, k, c, Ms, alpha, Kan, psi)
-        return cls(**numbers)
+        if not Ms * a > 0.0:
+            raise ValueError(f"Ms and a must be positive, got {Ms:g} and {a:g}")
+        anisotropy = Kan * math.cos(2.0 * psi) / (MU0 * Ms * a)
+        return cls(Ms=Ms, a=a, alpha=alpha, k=k, c=c, anisotropy=anisotropy)
 
     def to_jamodel(self) -> dict[str, float]:
         """The arguments of `from_jamodel`, with psi = 0 or pi / 2."""
-        return to_jamodel(self)
+        _check_feedback(self, "JAmodel")
+        Kan = self.anisotropy * MU0 * self.Ms * self.a
+        axis = {"Kan": abs(Kan), "psi": 0.0 if Kan >= 0.0 else 0.5 * math.pi}
+        return {"a": self.a, "k": self.k, "c": self.c, "Ms": self.Ms, "alpha": self.alpha, **axis}
 
     def magnetisation(self, u: npt.ArrayLike) -> FloatArray:
         """Magnetisation M at the samples of the field `u`, shape (n_samples,) [A/m]; errors as of `response`."""
