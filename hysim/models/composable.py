@@ -74,6 +74,8 @@ class Composable:
 class Placed(Composable):
     """Base class of laws: where the initial memory holds, and where the law was identified.
 
+    A family lists fields whose numbers must be `positive`, or `not_negative`.
+
     Parameters
     ----------
     u0 : float, optional
@@ -85,6 +87,8 @@ class Placed(Composable):
     """
 
     u0: float | None = field(default=None, metadata=LAST)
+    positive: ClassVar[tuple[str, ...]] = ()
+    not_negative: ClassVar[tuple[str, ...]] = ()
     # Any, so that type checkers take BoucWen(**parameters) with a dict of floats
     u_range: Any = field(default=None, compare=False, metadata={**LAST, "kind": tuple[float, ...] | None})
 

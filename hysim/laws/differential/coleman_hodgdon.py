@@ -52,6 +52,7 @@ class ColemanHodgdon(EquivalentBoucWen):
     offset: float = 0.0
     z0: float = 0.0
 
+    positive = ("alpha",)
     example = Example({}, (-2.0, 2.0), title="Coleman-Hodgdon: magnet")
     searched = (
         Parameter("alpha", 1e-2, 1e3, unit="1/u", log=True),
@@ -60,12 +61,6 @@ class ColemanHodgdon(EquivalentBoucWen):
     )
     starts = tuple({"alpha": 1.0 / length} for length in (0.03, 0.1, 0.3, 1.0))
     screened = 64
-
-    @classmethod
-    def check(cls, tables: Tables) -> None:
-        """Refuse a rate that is not positive."""
-        if not (tables["alpha"] > 0.0).all():
-            raise ValueError(f"alpha must be positive, got {tables['alpha'].min()}")
 
     @classmethod
     def equivalent(cls, tables: Tables) -> dict[str, FloatArray]:

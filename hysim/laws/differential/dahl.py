@@ -48,6 +48,7 @@ class Dahl(EquivalentBoucWen):
     offset: float = 0.0
     z0: float = 0.0
 
+    positive = ("stiffness", "coulomb")
     example = Example({"stiffness": 1.0, "coulomb": 0.8}, (-2.0, 2.0), title="Dahl")
     searched = (
         Parameter("stiffness", 1e-4, 1e5, unit="y/u", log=True),
@@ -57,13 +58,6 @@ class Dahl(EquivalentBoucWen):
     )
     starts = tuple({"stiffness": force / length, "coulomb": force} for length, force in _STARTS)
     screened = 512
-
-    @classmethod
-    def check(cls, tables: Tables) -> None:
-        """Refuse a stiffness or a Coulomb force that is not positive."""
-        for name in ("stiffness", "coulomb"):
-            if not (tables[name] > 0.0).all():
-                raise ValueError(f"{name} must be positive, got {tables[name].min()}")
 
     @classmethod
     def equivalent(cls, tables: Tables) -> dict[str, FloatArray]:

@@ -89,6 +89,7 @@ class Chan(BranchLaw):
     z0: float = 0.0
 
     units: ClassVar = {**BranchLaw.units, "offset": "y", "gap": "u/y"}
+    not_negative = ("gap",)
     example = Example({"coercivity": 0.4, "squareness": 0.5}, (-2.0, 2.0), title="Magnetic core: Chan")
     step = staticmethod(kernels.step)
     states = ("rest", "free")
@@ -98,8 +99,6 @@ class Chan(BranchLaw):
     def check(cls, tables: Tables) -> None:
         """Refuse what is no pair of branches, no place between them, or no gap."""
         super().check(tables)
-        if (tables["gap"] < 0.0).any():
-            raise ValueError(f"gap must not be negative, got {tables['gap'].min()}")
         for name in ("saturation", "feedthrough"):
             if ((tables["gap"] > 0.0) & (tables[name] < 0.0)).any():
                 raise ValueError(f"{name} must not be negative beside a gap, got {tables[name].min()}")

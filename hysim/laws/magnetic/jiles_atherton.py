@@ -97,7 +97,6 @@ _LEAST = 1e-12  # of 1 - alpha Ms m0 / a
 _TURN = 12.0  # twice the stability at which alpha Ms s / a is 1
 _SMALLEST = 1e-3  # of the width: a for a coupling that is given, and nearly as large
 _SCREENED = 1024
-_POSITIVE = ("Ms", "a", "k")
 
 
 def _check_isotropic(law: "JilesAtherton", whose: str) -> None:
@@ -361,6 +360,7 @@ class JilesAtherton(Law):
         **dict.fromkeys(("Ms", "a", "k", "z0"), "u"),
         **dict.fromkeys(("alpha", "c", "anisotropy", "reversible_feedback"), "1"),
     }
+    positive = ("Ms", "a", "k")
     example = Example(
         {"Ms": 1.0, "a": 0.3, "alpha": 0.1, "k": 0.4, "gain": 1.0, "feedthrough": 0.0},
         (-2.0, 2.0),
@@ -378,9 +378,7 @@ class JilesAtherton(Law):
     @classmethod
     def check(cls, tables: Tables) -> None:
         """Refuse constants of no material, and a reversible magnetisation that is not unique."""
-        for name in _POSITIVE:
-            if not (tables[name] > 0.0).all():
-                raise ValueError(f"{name} must be positive, got {tables[name].min()}")
+        super().check(tables)
         for name in ("c", "reversible_feedback"):
             if not ((tables[name] >= 0.0) & (tables[name] <= 1.0)).all():
                 raise ValueError(f"{name} must be between 0 and 1, got {tables[name].ravel().tolist()[0]}")

@@ -41,6 +41,7 @@ class BranchLaw(Law):
     offset: float
     z0: float
 
+    positive = ("coercivity",)
     units: ClassVar[Mapping[str, str]] = {"squareness": "1", "z0": "1"}
     states: ClassVar[tuple[str, ...]] = ("rest", "periodic", "free")
     searched: ClassVar[tuple[Parameter, ...]] = (
@@ -61,8 +62,7 @@ class BranchLaw(Law):
     @classmethod
     def check(cls, tables: Tables) -> None:
         """Refuse a coercivity that is not positive, a squareness that is none, and a place beyond a branch."""
-        if not (tables["coercivity"] > 0.0).all():
-            raise ValueError(f"coercivity must be positive, got {tables['coercivity'].min()}")
+        super().check(tables)
         squareness = tables["squareness"].ravel()
         wrong = squareness[~((squareness > 0.0) & (squareness < 1.0))]
         if wrong.size:

@@ -68,6 +68,7 @@ class EnergyPlays(ByStructure, Bank):
     """
 
     units: ClassVar = {"thresholds": "u", "weights": "y", "field": "u", "feedthrough": "y/u", "offset": "y", "z0": "u"}
+    positive = ("field",)
     example = Example(
         {"thresholds": (0.0, 0.2, 0.5), "weights": (0.2, 0.6, 0.4), "field": 0.15},
         (-2.0, 2.0),
@@ -84,13 +85,6 @@ class EnergyPlays(ByStructure, Bank):
     z0: tuple[float, ...] = (0.0,)
 
     step = staticmethod(kernels.step)
-
-    @classmethod
-    def check(cls, tables: Tables) -> None:
-        """Refuse elements that are no cells, and a field that is not positive."""
-        super().check(tables)
-        if not (tables["field"] > 0.0).all():
-            raise ValueError(f"field must be positive, got {tables['field'].min()}")
 
     @classmethod
     def pack(cls, tables: Tables) -> Packed:

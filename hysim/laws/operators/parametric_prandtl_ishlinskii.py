@@ -100,6 +100,7 @@ class ParametricPrandtlIshlinskii(Law):
     z0: tuple[float, ...] = (0.0, 0.0)
 
     units: ClassVar = {"exponent": "1", "reach": "u", "plays": "1"}
+    positive = ("decay",)
     example = Example(
         {"exponent": -0.3, "decay": 0.4, "weight": 0.5, "reach": 2.0, "plays": 20.0},
         title="Prandtl-Ishlinskii: density",
@@ -121,8 +122,7 @@ class ParametricPrandtlIshlinskii(Law):
         """Refuse what is no density or no number of plays."""
         if not (tables["exponent"] > -1.0).all():
             raise ValueError(f"exponent must be above -1, got {tables['exponent'].min()}")
-        if not (tables["decay"] > 0.0).all():
-            raise ValueError(f"decay must be positive, got {tables['decay'].min()}")
+        super().check(tables)
         idle = (tables["weight"] == 0.0) & (tables["weight_slope"] == 0.0)
         if not ((tables["reach"] > 0.0) | (idle & (tables["reach"] == 0.0))).all():
             raise ValueError(f"reach must be positive beside a weight, got {tables['reach'].min()}")
