@@ -12,7 +12,7 @@ from typing import Any
 
 import hysim
 from hysim.models.law import Law
-from hysim.models.model import every_family, is_identifiable
+from hysim.models.model import is_identifiable
 from hysim.models.protocols import Invertible, StepwiseInvertible
 
 GROUPS = {
@@ -129,19 +129,18 @@ def _members(module: ModuleType) -> Iterable[str]:
 def families() -> str:
     """Every law of the registry, and what hysim can do with it, as a table."""
     lines = ["| family | law | identified | inverse |", "|---|---|---|---|"]
-    for name, family in every_family().items():
-        if family.__module__.startswith("hysim.laws"):
-            summary = (
-                f"{inspect.getdoc(family)}".split("\n\n")[0]
-                .replace("\n", " ")
-                .replace("``", "`")
-                .replace("|", r"\|")
-            )
-            inverse = _inverse(family)
-            identified = "yes" if is_identifiable(family) else ""
-            lines.append(
-                f"| [{name}](reference/hysim.{name}.rst) | {summary} | {identified} | {inverse} |"
-            )
+    for name, family in hysim.families().items():
+        summary = (
+            f"{inspect.getdoc(family)}".split("\n\n")[0]
+            .replace("\n", " ")
+            .replace("``", "`")
+            .replace("|", r"\|")
+        )
+        inverse = _inverse(family)
+        identified = "yes" if is_identifiable(family) else ""
+        lines.append(
+            f"| [{name}](reference/hysim.{name}.rst) | {summary} | {identified} | {inverse} |"
+        )
     return "\n".join(lines)
 
 

@@ -1,11 +1,9 @@
 """The gallery: a loop of every family of laws, and the pages' figures of every plant and of every picture.
 
-Nothing is listed here. The families are those of the registry, each as its docstring's example makes it, or as the
-explorer shows it; the figures of the others are what the first block of a page that calls them has drawn.
+Nothing is listed here. The families are those of the registry, each as its `example` has it; the figures of the others
+are what the first block of a page that calls them has drawn.
 """
 
-import ast
-import doctest
 import inspect
 import re
 from collections.abc import Iterable
@@ -26,21 +24,11 @@ HERE = Path(__file__).parent
 LOOP_FOLDER = "gallery_figures"  # beside this file, not kept
 EXPLORER = "explorer.html"  # beside the built pages, of which it needs nothing
 
-_AMPLITUDES = np.geomspace(1e-6, 1e3, 19)
 _PERIOD = 1.0  # s, where a law asks for a sample time
 _PART = re.compile(
     r"^```python\n(.*?)^```|!\[[^\]]*\]\((figures/[\w-]+\.(?:svg|gif))\)",
     re.MULTILINE | re.DOTALL,
 )
-
-
-def families() -> dict[str, type]:
-    """The laws of the registry, by their names."""
-    return {
-        name: each
-        for name, each in every_family().items()
-        if each.__module__.startswith("hysim.laws")
-    }
 
 
 def plants() -> dict[str, type]:
@@ -67,25 +55,27 @@ def pictures() -> dict[str, Any]:
 def draw_families(folder: Path) -> None:
     """Draw a loop of every family, a file for each."""
     folder.mkdir(exist_ok=True)
-    for name in families():
-        law, between, units = example_of(name)
-        u, y = loop(law, between)
+    for name, family in hs.families().items():
+        example = family.example
+        u, y = loop(family(**example.fields), example.between)
         with hs.plot.house_style():
             canvas = hs.plot.figure(3.2, 2.4)
-            hs.plot.loop(hs.Simulation(u=u, y=y, units=units), ax=canvas.add_subplot())
+            hs.plot.loop(
+                hs.Simulation(u=u, y=y, units=example.units), ax=canvas.add_subplot()
+            )
         hs.plot.save_svg(canvas, folder / f"{name}.svg")
 
 
 def family_cards() -> str:
     """A card for each family, under the headings of the reference: its loop, its name and what it is."""
-    headings = {name: heading_of(each) for name, each in families().items()}
+    headings = {name: heading_of(each) for name, each in hs.families().items()}
     order = dict.fromkeys([*GROUPS, *headings.values()])
     groups = [heading for heading in order if heading in headings.values()]
     return "\n\n".join(
         f"**{group}**\n\n"
         + _cards(
             (f"{LOOP_FOLDER}/{name}.svg", f"hysim.{name}", name, each, _sliders(name))
-            for name, each in families().items()
+            for name, each in hs.families().items()
             if headings[name] == group
         )
         for group in groups
@@ -172,47 +162,14 @@ def figures_by_code() -> list[tuple[str, str]]:
     return figures
 
 
-def example_of(name: str) -> tuple[Any, tuple[float, float] | None, dict[str, str]]:
-    """A law of a family, the input between which it shows its loop, if that is known, and units."""
-    for each in presets().values():
-        if type(each.model).__name__ == name:
-            return each.model, each.between, dict(each.units)
-    return _example(name), None, {}
-
-
-def _example(name: str) -> Any:
-    """What the example of a docstring makes by the constructor of its family."""
-    docstring = f"{inspect.getdoc(getattr(hs, name))}"
-    examples = doctest.DocTestParser().get_examples(docstring)
-    tree = ast.parse("".join(each.source for each in examples))
-    for node in ast.walk(tree):
-        if isinstance(node, ast.Call) and ast.unparse(node.func) == f"hs.{name}":
-            return eval(ast.unparse(node), {"hs": hs, "np": np})
-    raise LookupError(f"no example of {name} calls hs.{name}")
-
-
 def loop(
-    law: Any, between: tuple[float, float] | None
+    law: Any, between: tuple[float, float]
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """A fading input, and what a law makes of it."""
-    low, high = between or amplitudes_of(law)
+    low, high = between
     half, mean = 0.5 * (high - low), 0.5 * (low + high)
     u = hs.signals.decaying_sine(half, mean=mean, cycles=4, samples_per_cycle=100)
     return u, _response(law, u)
-
-
-def amplitudes_of(law: Any) -> tuple[float, float]:
-    """The amplitude, of two in each decade, at which the shape of the loop changes most; 1 where it never does."""
-    cycles = np.sin(np.linspace(0.0, 4.0 * np.pi, 201))
-    outputs = np.array([_response(law, amplitude * cycles) for amplitude in _AMPLITUDES])
-    last = outputs[:, 101:]
-    strokes = np.ptp(last, axis=1)
-    moving = np.where(strokes > 0.0, strokes, np.inf)
-    shapes = (last - last.mean(axis=1, keepdims=True)) / moving[:, np.newaxis]
-    changes = np.abs(np.diff(shapes, axis=0)).max(axis=1)
-    changes[strokes[:-1] == 0.0] = 0.0  # the first motion out of a gap has no shape yet
-    best = float(_AMPLITUDES[changes.argmax() + 1]) if changes.max() > 0.01 else 1.0
-    return -best, best
 
 
 def _response(law: Any, u: NDArray[np.float64]) -> NDArray[np.float64]:

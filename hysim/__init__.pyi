@@ -78,6 +78,7 @@ from hysim.metrics import magnetic_metrics as magnetic_metrics
 from hysim.metrics import MagneticMetrics as MagneticMetrics
 from hysim.models.law import Law as Law
 from hysim.models.jacobian import Jacobian as Jacobian
+from hysim.models.model import families as families
 from hysim.models.model import family as family
 from hysim.models.parameters import Parameter as Parameter
 from hysim.laws.differential.boucwen import BoucWen as BoucWen

@@ -18,9 +18,8 @@ from square_dahl import SquareDahl
 import hysim as hs
 from hysim.cli import main
 from hysim.export import _compilers, _fmu
-from hysim.export._field_units import FIELD_UNITS, field_unit
+from hysim.export._fmu import field_unit
 from hysim.export._program import Field, Program
-from hysim.models.model import every_family
 from hysim.models.protocols import needs_time
 
 VERSIONS = ("2.0", "3.0")
@@ -139,11 +138,10 @@ def test_a_controller_with_preview_says_how_far_ahead_its_reference_is(tmp_path)
 
 
 def test_units_of_parameters_are_those_of_fields_that_the_families_have():
-    families = every_family()
-    for name, units in FIELD_UNITS.items():
-        fields = {each.name for each in dataclasses.fields(families[name])}
-        shared = units.keys() - fields
-        assert shared <= {"threshold", "thresholds", "gain", "weights"}, (name, shared)  # of plays, alone or in sums
+    for name, family in hs.families().items():
+        assert family.units.keys() <= {each.name for each in dataclasses.fields(family)}, name
+    assert field_unit(hs.Dahl(), "z0") == "y"
+    assert field_unit(hs.Chan(), "gap") == "u/y"
     assert field_unit(SquareDahl(), "k") == "y/u"
     assert field_unit(SquareDahl(), "offset") == ""
 

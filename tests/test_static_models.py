@@ -78,19 +78,19 @@ def test_a_smooth_curve_without_a_loop_is_found_in_noise():
 
 def test_the_spline_is_that_of_scipy():
     """The same strength and a knot at every group: the penalised problem of make_smoothing_spline."""
-    from hysim.laws import _smoothing
+    from hysim.laws import static
 
     rng = np.random.default_rng(2)
     x = np.sort(rng.uniform(0.0, 1.0, 30))
     x[0], x[-1] = 0.0, 1.0
     y = np.sin(7.0 * x) + 0.1 * rng.standard_normal(30)
-    chosen = _smoothing._STRENGTHS
+    chosen = static._STRENGTHS
     for strength in (1e-5, 1e-3, 1.0):
-        _smoothing._STRENGTHS = np.array([strength])
+        static._STRENGTHS = np.array([strength])
         try:
-            smooth = _smoothing.smoothing_spline(x, y)
+            smooth = static.smoothing_spline(x, y)
         finally:
-            _smoothing._STRENGTHS = chosen
+            static._STRENGTHS = chosen
         reference = interpolate.make_smoothing_spline(x, y, lam=30 * strength)(x)
         # 29 even intervals stand for knots at 30 uneven inputs
         assert smooth.y == pytest.approx(reference, abs=2e-3)

@@ -5,22 +5,16 @@ import os
 import pkgutil
 import re
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Annotated, Any, Literal, Protocol, runtime_checkable
 
 import hysim as hs
-from hysim._names import MODULE_OF, plain
+from hysim._names import MODULE_OF
 from hysim.cli import options
 from hysim.cli.records import STANDARD
 from hysim.cli.words import suggestion
-
-_SHORT = {
-    "ZhuWangBoucWen": "zhu-wang", "BoucWenBaberNoori": "baber-noori", "LuGre": "lugre",
-    "BoucWenOscillator": "oscillator",
-}  # fmt: skip
-"""Short names of families."""
 
 _PLANTS = ("oscillator", "actuator")
 _ARGUMENTS = {"plays": ("plays", "elements"), "relay_intervals": ("intervals",)}
@@ -41,7 +35,7 @@ def names() -> list[str]:
     from hysim.models.model import candidates
 
     families = dict.fromkeys(name.split()[0] for name in candidates() if name.split()[0] in hs.__all__)
-    return [*map(_short, families)]
+    return _short(families)
 
 
 def names_to_identify() -> list[str]:
@@ -49,19 +43,38 @@ def names_to_identify() -> list[str]:
     from hysim.models.model import every_family, is_identifiable
 
     own = {name: law for name, law in every_family().items() if law.__module__.startswith("hysim.laws.")}
-    laws = [_short(name) for name, law in own.items() if is_identifiable(law)]
+    laws = _short(name for name, law in own.items() if is_identifiable(law))
     return [*dict.fromkeys([*names(), *laws, *_PLANTS])]
 
 
 def _offered() -> list[str]:
     """Names of laws and plants for a shell to complete, which are known without loading a family."""
     laws = [name for name, module in MODULE_OF.items() if module.startswith("hysim.laws.") and name[0].isupper()]
-    return [*map(_short, laws), "transfer-function", *_PLANTS]
+    return [*map(_hyphenated, laws), "transfer-function", *_PLANTS]
 
 
-def _short(name: str) -> str:
-    """``bouc-wen`` of ``BoucWen``, and the short name of a family that has one."""
-    return _SHORT.get(name, re.sub(r"(?<=[a-z])(?=[A-Z])", "-", name).lower())
+def _short(families: Iterable[str]) -> list[str]:
+    """The names of families on the command line, short where they have a short one; loads every family."""
+    from hysim.models.model import short_names
+
+    short = {family: name for name, family in short_names().items()}
+    return [short.get(name, _hyphenated(name)) for name in families]
+
+
+def _is_family(name: str) -> bool:
+    """Whether a family has this name, short or not."""
+    from hysim.models.model import family_named
+
+    try:
+        family_named(name)
+    except ValueError:
+        return False
+    return True
+
+
+def _hyphenated(name: str) -> str:
+    """``bouc-wen`` of ``BoucWen``."""
+    return re.sub(r"(?<=[a-z])(?=[A-Z])", "-", name).lower()
 
 
 FORMS = f"name of a family, such as bouc-wen; MODEL.json; or {options.OWN}"
@@ -368,7 +381,7 @@ def read(path: str) -> tuple[Any, dict[str, str]]:
             raise ValueError(f"{path} needs values for its parameters: give an instance ({error})") from None
     if path == STANDARD:
         return from_json(sys.stdin.read(), "the standard input")
-    if plain(path) in map(plain, (*MODULE_OF, *_SHORT.values())) and not Path(path).exists():
+    if not Path(path).exists() and _is_family(path):
         raise ValueError(f"{path} is a family without numbers: write a model of it by hysim identify --out {path}.json")
     return from_json(Path(path).read_bytes(), path)
 

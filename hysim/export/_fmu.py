@@ -22,7 +22,6 @@ from hysim._results import model_of
 from hysim.errors import warn_unsafe
 from hysim.export._c import number, table
 from hysim.export._compilers import TARGETS, Target, compiler, host, shared_library, universal
-from hysim.export._field_units import field_unit
 from hysim.export._fmu_variables import Variable, build_description, description, is_tunable, variables_of
 from hysim.export._packing import packing
 from hysim.export._program import Program, program_of
@@ -208,6 +207,17 @@ def _with_units(program: Program, thing: Any) -> Program:
     if not isinstance(thing, Law):
         return program
     return replace(program, fields=tuple(each._replace(unit=field_unit(thing, each.name)) for each in program.fields))
+
+
+def field_unit(law: Law, name: str) -> str:
+    """The unit of one number of a law, as in ``"y/u"``; empty where it is not known.
+
+    >>> import hysim as hs
+    >>> field_unit(hs.Dahl(), "stiffness")
+    'y/u'
+    """
+    searched = {each.name: each.unit for each in law.searched if each.unit != "1"}
+    return {**searched, **law.units}.get(name.partition("[")[0], "")
 
 
 def _checked(path: Path, version: str, platforms: Sequence[str] | None) -> Path:

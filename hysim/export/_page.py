@@ -26,7 +26,6 @@ from hysim._release import __version__
 from hysim._results import model_of
 from hysim.export._compilers import compressed
 from hysim.export._page_model import Parts, about, heading, node_of, plane_of
-from hysim.laws.operators.prandtl_ishlinskii import PrandtlIshlinskii
 from hysim.records import Record
 
 LARGEST = 300_000
@@ -194,7 +193,7 @@ def _inputs(amplitude: float, middle: float, timed: bool) -> list[dict[str, Any]
     return sliders
 
 
-def _stack(controls: list[dict[str, Any]], law: PrandtlIshlinskii) -> list[dict[str, Any]]:
+def _stack(controls: list[dict[str, Any]], law: Any) -> list[dict[str, Any]]:
     """Sliders for number, largest threshold and weights of the plays behind that of threshold zero, and its weight."""
     places = {name: k for k, name in enumerate(law.scalars)}
     most, weight = len(law.thresholds) - 1, sum(law.weights[1:])

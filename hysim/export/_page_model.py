@@ -21,9 +21,8 @@ from hysim.export._compilers import Kernels, kernels_of, module_of
 from hysim.export._packing import packing
 from hysim.kernels import clamps, play_sums
 from hysim.kernels.magnetics import energy_plays
-from hysim.laws.dashpot import Dashpot
+from hysim.laws.dashpot import RatePart
 from hysim.laws.friction.rated_law import RatedLaw
-from hysim.laws.magnetic.excess_loss import ExcessLoss
 from hysim.laws.operators.rate_dependent_prandtl_ishlinskii import RateDependentPrandtlIshlinskii
 from hysim.laws.static import SingleValued
 from hysim.models.cascade import Cascade
@@ -202,7 +201,7 @@ def node_of(thing: Any, u: FloatArray, parts: Parts, prefix: str = "") -> dict[s
     first = len(parts.values)
     if isinstance(thing, SingleValued):
         return {"knots": [thing.u.tolist(), thing.y.tolist()], "name": "hs.SingleValued", "fields": []}
-    if isinstance(thing, Dashpot | ExcessLoss):
+    if isinstance(thing, RatePart):
         return _of_rate(thing, parts, prefix)
     if isinstance(thing, RatedLaw):
         return _rated(thing, u, parts, prefix)
@@ -323,14 +322,14 @@ def _at_sample_time(law: RateDependentPrandtlIshlinskii, u: FloatArray, parts: P
     return {**node, **names_of, "fields": fields, "per_time": [place]}
 
 
-def _of_rate(part: Dashpot | ExcessLoss, parts: Parts, prefix: str) -> dict[str, Any]:
+def _of_rate(part: RatePart, parts: Parts, prefix: str) -> dict[str, Any]:
     """A part that is a power of the velocity of the input, times a coefficient."""
     first, parts.timed = len(parts.values), True
     parts.values.append(part.c)
     size = 2.0 * abs(part.c) or 1.0
     parts.controls.append(Control("c", part.c, -size, size, (0,)).to_json(first, prefix))
     words = {"name": _name(type(part)), "fields": [["c", first, 1.0]], "output": output_of(type(part))}
-    return {"rate": first, "power": 0.5 if isinstance(part, ExcessLoss) else 1.0, **words}
+    return {"rate": first, "power": part.power, **words}
 
 
 def _rated(law: RatedLaw, u: FloatArray, parts: Parts, prefix: str) -> dict[str, Any]:
@@ -383,8 +382,9 @@ def heading(thing: Any) -> str:
 
 
 def plane_of(node: Mapping[str, Any]) -> dict[str, Any] | None:
-    """Places of the levels and weights of a Preisach law."""
-    if node.get("kind") not in ("Preisach", "PreisachRelays"):
+    """Places of the levels of a law of relays, and of the weights of all pairs of intervals between them."""
+    places = {name: place for name, place, *_ in node.get("fields", ()) if name in ("levels", "weights")}
+    if not all(isinstance(place, list) for place in places.values()) or len(places) < 2:
         return None
-    places = {name: place for name, place, _ in node["fields"]}
-    return {"levels": places["levels"], "weights": places["weights"]}
+    n_intervals = len(places["levels"]) - 1
+    return places if len(places["weights"]) == n_intervals * (n_intervals + 1) // 2 else None

@@ -1,22 +1,221 @@
-"""Yardsticks without memory: a model that does not beat them has learnt nothing about hysteresis."""
+"""Yardsticks without memory: a model that does not beat them has learnt nothing about hysteresis.
+
+Cubic smoothing spline through an output that scatters, its strength chosen by the inputs that are left out.
+
+The curve f minimises, over m groups of samples with equal inputs x_g (scaled to 0 ... 1), n_g samples and mean
+output y_g,
+
+    sum_g n_g / N (y_g - f(x_g))^2 + strength * integral of f''^2 dx.
+
+With f = B c in cubic B-splines on even knots this is (B^T W B + strength P) c = B^T W y, banded. The strength is
+the one that predicts best what is left out: the groups between the first and the last, *in the order of their
+inputs*, are cut into contiguous blocks, and each block is predicted from the others. Loading and unloading lie in
+the same block, so that the spline averages them.
+
+Sources: P. J. Green and B. W. Silverman, Nonparametric Regression and Generalized Linear Models (1994), ch. 2 for the
+spline, section 3.3.4 for its degrees of freedom, the trace of the matrix that takes y to f; T. Hastie, J. R. Stat.
+Soc. B 58 (1996) 379 for fewer knots than groups; D. R. Roberts et al., Ecography 40 (2017) 913 for blocks.
+"""
 
 import math
 from collections.abc import Mapping
-from typing import ClassVar, Self
+from typing import ClassVar, NamedTuple, Self
 
 import numpy as np
 import numpy.typing as npt
 
 from hysim._frozen import FloatArray, read_only
 from hysim.kernels import inverses, stepping
-from hysim.laws._smoothing import equal_inputs, smoothing_spline
 from hysim.models.composable import Composable
 from hysim.models.law import Law
-from hysim.models.model import family
+from hysim.models.model import Example, family
 from hysim.models.parameters import Parameter, space_of
 from hysim.models.protocols import UNLIMITED, CompiledLaw, DirectFit, Limits
 from hysim.models.search_space import Freedom, SearchSpace
 from hysim.records import Record
+
+_EQUAL = 1e-9  # of the span: inputs nearer than this are equal; a sine computed twice differs by 1e-15
+_MOST_GROUPS = 1000  # beyond, inputs of a thousandth of the span make a group: 1e-3 of the span moves no smooth curve
+_MOST_INTERVALS = 100  # between knots; the strength decides the shape long before
+_MOST_BLOCKS = 20
+_GROUPS_IN_BLOCK = 5  # at least, where there are as many: fewer would let a branch see its neighbour
+_STRENGTHS = np.logspace(-9.0, 2.0, 23)  # from a hundred half waves over the span to a straight line
+_ROUNDING = 1e-12  # of the mean squared output: errors below are equal
+
+
+class Smooth(NamedTuple):
+    """A smooth curve.
+
+    Increasing inputs `u` (m,) and outputs `y` (m,) of the curve; its degrees of freedom; and at each sample the
+    standard error of the curve for noise of standard deviation 1, `spread` (n,).
+    """
+
+    u: FloatArray
+    y: FloatArray
+    degrees_of_freedom: float
+    spread: FloatArray
+
+
+def smoothing_spline(u: FloatArray, y: FloatArray) -> Smooth:
+    """The smoothing spline of outputs `y` (n,) at inputs `u` (n,), which take at least two values."""
+    from scipy.linalg import solveh_banded
+
+    place, scaled = _groups(u)
+    counts = np.bincount(place)
+    x, means = np.bincount(place, scaled) / counts, np.bincount(place, y) / counts
+    share = counts / u.size
+    splines = _Splines.on(x.size)
+    rows = splines.at(x)
+    bands, moments = _normal_equations(rows, share, means, np.zeros(x.size, dtype=np.intp), 1, splines.size)
+    gram = _full(bands[0])
+    penalised = bands[0] + _strength(splines, rows, share, means) * splines.penalty
+    inverse = solveh_banded(penalised, np.eye(splines.size), lower=True)
+    coefficients = inverse @ moments[0]
+    low, high = float(u.min()), float(u.max())
+    knots = np.concatenate([[0.0], x, [1.0]])
+    inputs, remaining = np.unique(
+        np.clip(low + (high - low) * knots, low, high), return_index=True
+    )  # in u, where they round
+    return Smooth(
+        u=inputs,
+        y=splines.at(knots[remaining]).combined(coefficients),
+        degrees_of_freedom=float(np.sum(gram * inverse)),
+        spread=np.sqrt(_quadratic_form(bands[0], rows.combined(inverse)) / u.size)[place],
+    )
+
+
+def equal_inputs(u: FloatArray) -> npt.NDArray[np.intp]:
+    """Which group of equal inputs each sample is in, (n,); the groups are numbered by increasing input."""
+    order = np.argsort(u, kind="stable")
+    steps = np.diff(u[order]) > _EQUAL * float(np.ptp(u))
+    place = np.empty(u.size, dtype=np.intp)
+    place[order] = np.concatenate([[0], np.cumsum(steps)])
+    return place
+
+
+def _groups(u: FloatArray) -> tuple[npt.NDArray[np.intp], FloatArray]:
+    """Which group each sample is in, and its scaled input, both (n,)."""
+    scaled = (u - u.min()) / np.ptp(u)
+    place = equal_inputs(scaled)
+    if place.max() >= _MOST_GROUPS:
+        cells = np.minimum(scaled * _MOST_GROUPS, _MOST_GROUPS - 1).astype(np.intp)
+        place = np.unique(cells, return_inverse=True)[1]
+    return place, scaled
+
+
+class _Rows(NamedTuple):
+    """The splines that are not zero at some inputs: the number of the first of them (m,), and the values of four."""
+
+    first: npt.NDArray[np.intp]
+    values: FloatArray
+
+    def combined(self, coefficients: FloatArray) -> FloatArray:
+        """Sums of the splines times `coefficients` (count, ...), shape (m, ...)."""
+        columns = np.moveaxis(coefficients, 0, -1)
+        return np.moveaxis(np.sum([self.values[:, k] * columns[..., self.first + k] for k in range(4)], axis=0), -1, 0)
+
+
+class _Splines(NamedTuple):
+    """Cubic B-splines on even knots over 0 ... 1.
+
+    `penalty` holds the integrals of the products of their second derivatives, by diagonals, (4, size).
+    """
+
+    knots: FloatArray
+    penalty: FloatArray
+
+    @classmethod
+    def on(cls, n_groups: int) -> "_Splines":
+        """The splines for so many groups."""
+        from scipy.interpolate import BSpline
+
+        n = max(1, min(n_groups - 1, _MOST_INTERVALS))
+        breaks = np.linspace(0.0, 1.0, n + 1)
+        knots = np.concatenate([np.zeros(3), breaks, np.ones(3)])
+        middle, half = 0.5 * (breaks[1:] + breaks[:-1]), 0.5 / n
+        points = (middle[:, np.newaxis] + half * np.array([-1.0, 1.0]) / np.sqrt(3.0)).ravel()
+        bends = BSpline(knots, np.eye(n + 3), 3).derivative(2)(points)  # piecewise linear: two points are exact
+        penalty = np.zeros((4, n + 3))
+        for k in range(4):
+            penalty[k, : n + 3 - k] = half * np.sum(bends[:, k:] * bends[:, : n + 3 - k], axis=0)
+        return cls(knots, penalty)
+
+    @property
+    def size(self) -> int:
+        """Number of splines."""
+        return self.knots.size - 4
+
+    def at(self, x: FloatArray) -> _Rows:
+        """The splines at `x` (m,)."""
+        from scipy.interpolate import BSpline
+
+        table = BSpline.design_matrix(x, self.knots, 3)
+        return _Rows(table.indices[::4].astype(np.intp), table.data.reshape(-1, 4))
+
+
+def _strength(splines: _Splines, rows: _Rows, share: FloatArray, y: FloatArray) -> float:
+    """The strength that predicts left-out blocks best; of equal ones the greatest."""
+    block, n_blocks = _blocks(share.size)
+    if not n_blocks:
+        return float(_STRENGTHS[-1])
+    bands, moments = _normal_equations(rows, share, y, block, n_blocks + 1, splines.size)
+    remaining, goals = bands.sum(axis=0) - bands[:-1], moments.sum(axis=0) - moments[:-1]
+    coefficients = _solved(remaining, goals, splines.penalty)
+    inside = np.flatnonzero(block < n_blocks)
+    predicted = np.zeros((inside.size, _STRENGTHS.size))
+    for k in range(4):
+        predicted += rows.values[inside, k, np.newaxis] * coefficients[block[inside], :, rows.first[inside] + k]
+    errors = share[inside] @ (y[inside, np.newaxis] - predicted) ** 2
+    return float(_STRENGTHS[errors <= errors.min() * (1.0 + 1e-9) + _ROUNDING * (share @ y**2)].max())
+
+
+def _blocks(n_groups: int) -> tuple[npt.NDArray[np.intp], int]:
+    """The block that each group is in, contiguous, and their number; the first and the last group are in none."""
+    inner = n_groups - 2
+    n_blocks = min(_MOST_BLOCKS, max(inner // _GROUPS_IN_BLOCK, min(inner, 2)))
+    block = np.full(n_groups, n_blocks)
+    block[1:-1] = np.arange(inner) * n_blocks // max(inner, 1)
+    return block, n_blocks
+
+
+def _normal_equations(
+    rows: _Rows, share: FloatArray, y: FloatArray, block: npt.NDArray[np.intp], n_blocks: int, count: int
+) -> tuple[FloatArray, FloatArray]:
+    """B^T W B by diagonals, (n_blocks, 4, count), and B^T W y, (n_blocks, count), of each block's groups."""
+    bands, moments = np.zeros((n_blocks, 4, count)), np.zeros((n_blocks, count))
+    for a in range(4):
+        weighted = share * rows.values[:, a]
+        place = block * count + rows.first + a
+        moments += np.bincount(place, weighted * y, moments.size).reshape(moments.shape)
+        for b in range(a, 4):
+            products = weighted * rows.values[:, b]
+            bands[:, b - a] += np.bincount(place, products, moments.size).reshape(moments.shape)
+    return bands, moments
+
+
+def _solved(bands: FloatArray, goals: FloatArray, penalty: FloatArray) -> FloatArray:
+    """Coefficients for each block left out and each strength, (n_blocks, n_strengths, count)."""
+    from scipy.linalg import solveh_banded
+
+    systems = bands[:, np.newaxis] + _STRENGTHS[:, np.newaxis, np.newaxis] * penalty
+    right = np.broadcast_to(goals[:, np.newaxis], (len(goals), _STRENGTHS.size, goals.shape[1]))
+    return np.asarray(
+        solveh_banded(np.moveaxis(systems, 2, 0).reshape(4, -1), right.ravel(), lower=True).reshape(right.shape)
+    )
+
+
+def _quadratic_form(bands: FloatArray, z: FloatArray) -> FloatArray:
+    """z^T M z for each row of `z` (m, count), M symmetric with these lower diagonals."""
+    total = z**2 @ bands[0]
+    for k in range(1, 4):
+        total += 2.0 * (z[:, k:] * z[:, :-k]) @ bands[k, :-k]
+    return np.asarray(np.maximum(total, 0.0))
+
+
+def _full(bands: FloatArray) -> FloatArray:
+    """The symmetric matrix with these lower diagonals."""
+    lower = sum((np.diag(bands[k, : bands.shape[1] - k], -k) for k in range(1, 4)), np.diag(bands[0]))
+    return np.asarray(lower + np.tril(lower, -1).T)
 
 
 @family
@@ -38,9 +237,10 @@ class Line(Law):
     offset: float = 0.0
     slope: float = 0.0
 
+    example = Example({"offset": 1.0, "slope": 2.0})
     step = staticmethod(stepping.line)
     initial: ClassVar[tuple[str, ...]] = ()
-    searched = (Parameter("offset", affine=True), Parameter("slope", affine=True))
+    searched = (Parameter("offset", unit="y", affine=True), Parameter("slope", unit="y/u", affine=True))
     memory = None  # type: ignore[assignment]  # a line remembers nothing
 
     @property
@@ -62,7 +262,7 @@ class SingleValued(Composable):
     `hysim.identify` fits a cubic smoothing spline to the mean outputs of equal inputs, and takes its values at the
     record's inputs as the knots (at most about a thousand). The spline's strength is the one that predicts best what
     is left out, in blocks of neighbouring inputs, so that it follows the mean of loading and unloading
-    (`hysim.laws._smoothing`). The number of parameters is that of its degrees of freedom, rounded.
+    The number of parameters is that of its degrees of freedom, rounded.
 
     Parameters
     ----------
@@ -83,6 +283,8 @@ class SingleValued(Composable):
 
     u: FloatArray
     y: FloatArray
+
+    example = Example({"u": (0.0, 1.0), "y": (0.0, 2.0)}, (-10.0, 10.0))
 
     def __post_init__(self) -> None:
         if self.u.ndim != 1 or self.u.shape != self.y.shape or not self.u.size:

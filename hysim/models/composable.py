@@ -1,10 +1,13 @@
 """Sums and cascades by operators: ``law + law``, ``law >> plant``."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
-from typing import Any, NamedTuple, Self
+from types import MappingProxyType
+from typing import Any, ClassVar, NamedTuple, Self
 
 from hysim._frozen import LAST, items, own_items
 from hysim._results import model_of
+from hysim.models.model import Example
 from hysim.models.protocols import Responding
 
 
@@ -28,7 +31,21 @@ class Composable:
     """Base class of what can be a part of a `hysim.Sum` and a stage of a `hysim.Cascade`.
 
     An operand that is a structure, or holds one, makes a structure. A result of a fit stands for its model.
+
+    Attributes
+    ----------
+    example : Example, optional
+        The law that stands for a family of hysim.
+    short : str
+        Another name of the family, which the command line prefers; empty if there is none.
+    units : mapping
+        Units of fields in those of u and y, such as ``"y/u"``, beside those of parameters that are searched; ``"1"``
+        is dimensionless. A number whose unit depends on a choice is not listed.
     """
+
+    example: ClassVar[Example | None] = None
+    short: ClassVar[str] = ""
+    units: ClassVar[Mapping[str, str]] = MappingProxyType({})
 
     def __add__(self, other: "Composable") -> Any:
         """Sum of the outputs; a sum among the operands adds its own parts."""
@@ -51,6 +68,8 @@ class Composable:
 class Placed(Composable):
     """Base class of laws: where the initial memory holds, and where the law was identified.
 
+    A family lists fields whose numbers must be `positive`, or `not_negative`.
+
     Parameters
     ----------
     u0 : float, optional
@@ -62,6 +81,8 @@ class Placed(Composable):
     """
 
     u0: float | None = field(default=None, metadata=LAST)
+    positive: ClassVar[tuple[str, ...]] = ()
+    not_negative: ClassVar[tuple[str, ...]] = ()
     # Any, so that type checkers take BoucWen(**parameters) with a dict of floats
     u_range: Any = field(default=None, compare=False, metadata={**LAST, "kind": tuple[float, ...] | None})
 

@@ -32,7 +32,7 @@ from hysim.models.protocols import UNLIMITED, CompiledLaw, Limits, Startable
 from hysim.models.search_space import ALL_FREE, Freedom, Parameters, SearchSpace
 from hysim.models.stages import Simpler, Stage, Subset
 from hysim.models.steady_cycle import Pass, PassOf, fixed_point
-from hysim.models.tables import Tables, arguments_of, scalars_of, table_of_one, tables_of
+from hysim.models.tables import Tables, arguments_of, check_signs, scalars_of, table_of_one, tables_of
 from hysim.records import Record
 
 if TYPE_CHECKING:
@@ -123,6 +123,7 @@ class Law(Placed, ABC):
     @classmethod
     def check(cls, tables: Tables) -> None:
         """Raise a ValueError where the tables, every field over sets, hold parameters that are no law."""
+        check_signs(tables, cls.positive, cls.not_negative)
 
     @classmethod
     def pack(cls, tables: Tables) -> Packed:

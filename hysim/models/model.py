@@ -10,8 +10,10 @@ one that makes no sense without being told more names nothing.
 """
 
 import importlib
+from collections.abc import Mapping
 from dataclasses import field, fields
-from typing import Any, TypeVar, dataclass_transform
+from types import MappingProxyType
+from typing import Any, NamedTuple, Protocol, TypeVar, dataclass_transform, runtime_checkable
 
 import numpy as np
 
@@ -22,11 +24,35 @@ from hysim.models.protocols import Direct, Identifiable, Offering
 
 T = TypeVar("T")
 
-ROOMS = ("hysim.models.", "hysim.laws.", "hysim.plants.")  # where hysim's own families are
+_LAWS = "hysim.laws."
+ROOMS = ("hysim.models.", _LAWS, "hysim.plants.")  # where hysim's own families are
 
 FAMILIES: dict[str, type] = {}
-SHORT = {"zhuwang": "ZhuWangBoucWen", "babernoori": "BoucWenBaberNoori"}
-"""Families by the plain forms of their short names."""
+
+
+class Example(NamedTuple):
+    """The law that stands for its family in the gallery, on the pages and in tests.
+
+    `fields` are the arguments of its constructor, `between` are the lowest and the highest input. `title` is its name
+    in the explorer, which leaves out a family without one; `group` is the heading there, by default that of the
+    family's folder. `units` are labels of u and y, and `kind` is the input with which its page begins. `stack` replaces
+    the sliders of plays with equal weights and even thresholds by those of their number and reach.
+    """
+
+    fields: Mapping[str, Any]
+    between: tuple[float, float] = (-1.0, 1.0)
+    title: str = ""
+    group: str = ""
+    units: Mapping[str, str] = MappingProxyType({})
+    kind: str = "triangle"
+    stack: bool = False
+
+
+@runtime_checkable
+class _Short(Protocol):
+    """A family with a short name."""
+
+    short: str
 
 
 @dataclass_transform(kw_only_default=True, frozen_default=True, field_specifiers=(field,))
@@ -78,10 +104,38 @@ def _models_in(name: str, value: Any) -> dict[str, Any]:
 
 def every_family() -> dict[str, type]:
     """The registry after every public model of hysim has entered its family."""
-    for module in dict.fromkeys(MODULE_OF.values()):
-        if module.startswith(ROOMS):
-            importlib.import_module(module)
+    _load(ROOMS)
     return FAMILIES
+
+
+def families() -> dict[str, type[Any]]:
+    """The families of hysim's laws by their names, in the order of the public names.
+
+    A family has the law that stands for it, ``family(**family.example.fields)``. Families of your own are not among
+    them.
+
+    Returns
+    -------
+    dict
+        Names to classes.
+
+    Examples
+    --------
+    >>> import hysim as hs
+    >>> list(hs.families())[:2]
+    ['BoucWen', 'PolynomialBoucWen']
+    >>> hs.families()["Dahl"].example.fields
+    {'stiffness': 1.0, 'coulomb': 0.8}
+    """
+    _load((_LAWS,))
+    laws = (name for name, module in MODULE_OF.items() if module.startswith(_LAWS))
+    return {name: FAMILIES[name] for name in laws if name in FAMILIES}
+
+
+def _load(rooms: tuple[str, ...]) -> None:
+    for module in dict.fromkeys(MODULE_OF.values()):
+        if module.startswith(rooms):
+            importlib.import_module(module)  # enters its families
 
 
 def candidates() -> dict[str, Any]:
@@ -112,13 +166,26 @@ def family_named(name: str) -> Any:
     'BoucWen'
     """
     public = [each for each, module in MODULE_OF.items() if module.startswith(ROOMS)]
-    known = {plain(each): each for each in (*FAMILIES, *public)} | SHORT
+    known = {plain(each): each for each in (*FAMILIES, *public)}
+    if plain(name) not in known:
+        known |= {plain(short): each for short, each in short_names().items()}
     if (family := known.get(plain(name))) is not None:
         if family in public:
             importlib.import_module(MODULE_OF[family])  # enters it into the families
         if family in FAMILIES:
             return FAMILIES[family]
     raise ValueError(f"there is no family {name!r}{meant(name, every_family())}")
+
+
+def short_names() -> dict[str, str]:
+    """Short names of families to their names; loads every family.
+
+    Examples
+    --------
+    >>> short_names()["zhu-wang"]
+    'ZhuWangBoucWen'
+    """
+    return {each.short: name for name, each in every_family().items() if isinstance(each, _Short) and each.short}
 
 
 def candidates_named(name: str) -> dict[str, Any]:

@@ -1,7 +1,7 @@
 """The numbers of laws: one name for each, and tables of every field over sets of laws."""
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from typing import Any
 
 import numpy as np
@@ -34,6 +34,16 @@ def arguments_of(scalars: Mapping[str, float]) -> dict[str, Any]:
         number = value if type(value) is float else float(np.asarray(value).item())
         arguments[whole] = (*arguments.get(whole, ()), number) if bracket else number
     return arguments
+
+
+def check_signs(tables: Tables, positive: Iterable[str], not_negative: Iterable[str]) -> None:
+    """A ValueError for the first field of these with a number that is not positive, or negative."""
+    for name in positive:
+        if not (tables[name] > 0.0).all():
+            raise ValueError(f"{name} must be positive, got {tables[name].min()}")
+    for name in not_negative:
+        if not (tables[name] >= 0.0).all():
+            raise ValueError(f"{name} must not be negative, got {tables[name].min()}")
 
 
 def tables_of(

@@ -196,6 +196,7 @@ class BoucWenOscillator:
     initial_state: tuple[float, ...] = ()
 
     dynamic: ClassVar[bool] = True
+    short = "oscillator"
 
     def __post_init__(self) -> None:
         check_positive(mass=self.mass)

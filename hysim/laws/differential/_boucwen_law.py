@@ -7,6 +7,17 @@
 restoring force) and counterclockwise for a negative one (a piezoelectric displacement).
 
 Sources: R. Bouc 1967; Y. K. Wen, J. Eng. Mech. Div. 102 (1976); the classes after Ikhouane and Rodellar 2007.
+
+Bounds of the memory and of the slope of a Bouc-Wen law, whatever its input.
+
+    dz/du = A - |z|^n (gamma + beta sign(z du))
+
+A branch on which w = |z| grows obeys w' = a - c w^n and ends at w = (a/c)^(1/n): with A > 0 the loading
+branch, a = A and c = beta + gamma; with A < 0 the unloading one, a = -A and c = beta - gamma. In the classes I
+to IV of Ikhouane and Rodellar (2007) this bounds the memory, or z0 does where it is larger. With |z| <= B
+the slope lies between its values at z = 0, and at B on both branches:
+
+    A,    A - (beta + gamma) B^n,    A + (beta - gamma) B^n
 """
 
 import math
@@ -18,7 +29,7 @@ from hysim._frozen import FloatArray, read_only
 from hysim.kernels import boucwen as kernels
 from hysim.kernels import stepping
 from hysim.kernels.charts import N_WORK
-from hysim.laws.differential import _boucwen_facts, boucwen_inverse, limit_cycle
+from hysim.laws.differential import boucwen_inverse, limit_cycle
 from hysim.laws.differential._memory_law import MemoryLaw
 from hysim.laws.differential.boucwen_inverse import BoucWenInverse, InverseState
 from hysim.laws.differential.limit_cycle import LimitCycle
@@ -26,6 +37,59 @@ from hysim.models.law import Law, Packed, State, Stepping
 from hysim.models.protocols import UNLIMITED, CompiledLaw, Limits
 from hysim.models.tables import Tables
 from hysim.records import Record
+
+
+def saturation(A: float, beta: float, gamma: float, n: float) -> float:
+    """``|z|`` at the end of a long stroke of the input; inf where it has no limit."""
+    if A == 0.0:
+        return 0.0 if beta + gamma > 0.0 and beta - gamma >= 0.0 else math.inf
+    c = beta + math.copysign(1.0, A) * gamma
+    return _power(abs(A) / c, 1.0 / n) if c > 0.0 else math.inf
+
+
+def memory_bound(A: float, beta: float, gamma: float, n: float, z0: float, stability_class: str) -> float:
+    """Bound of |z| for every input that begins with z0; inf where there is none."""
+    if stability_class == "none":
+        return math.inf
+    if stability_class in ("II", "IV"):
+        unstable = abs(A) / (abs(gamma) - beta)
+        if abs(z0) > _power(unstable, 1.0 / n):
+            return math.inf
+    return max(abs(z0), saturation(A, beta, gamma, n))
+
+
+def memory_slopes(A: float, beta: float, gamma: float, n: float, bound: float) -> tuple[float, float]:
+    """Lowest and highest slope dz/du for |z| <= `bound`."""
+    ends = [A]
+    for c in (beta + gamma, gamma - beta):
+        ends.append(A - c * _power(bound, n) if c != 0.0 else A)
+    return min(ends), max(ends)
+
+
+def polynomial_range(coefficients: FloatArray, low: float, high: float) -> tuple[float, float]:
+    """Lowest and highest value of a polynomial (ascending powers) on an interval that may be infinite."""
+    trimmed = np.trim_zeros(coefficients, "b")
+    if trimmed.size < 2:
+        value = float(trimmed[0]) if trimmed.size else 0.0
+        return value, value
+    turns = np.polynomial.polynomial.polyroots(np.polynomial.polynomial.polyder(trimmed))
+    real = turns[np.abs(turns.imag) <= 1e-8 * np.abs(turns)].real
+    inside = [turn for turn in real.tolist() if low < turn < high]
+    values = [_value(trimmed, point) for point in (low, high, *inside)]
+    return min(values), max(values)
+
+
+def _power(base: float, exponent: float) -> float:
+    """base ** exponent for base >= 0, where Python raises an OverflowError for infinity."""
+    with np.errstate(over="ignore"):
+        return float(np.float64(base) ** exponent)
+
+
+def _value(coefficients: FloatArray, point: float) -> float:
+    if math.isinf(point):
+        degree = coefficients.size - 1
+        return math.copysign(math.inf, coefficients[-1] * (math.copysign(1.0, point) if degree % 2 else 1.0))
+    return float(np.polynomial.polynomial.polyval(point, coefficients))
 
 
 class BoucWenStep(Law):
@@ -103,12 +167,12 @@ class BoucWenLaw(BoucWenStep, MemoryLaw):
     @property
     def saturation(self) -> float:
         """Limit of ``|z|`` on a long stroke of the input, (A / (beta + gamma))^(1/n) for A > 0; inf if it has none."""
-        return _boucwen_facts.saturation(self.A, self.beta, self.gamma, self.n)
+        return saturation(self.A, self.beta, self.gamma, self.n)
 
     @property
     def memory_bound(self) -> float:
         """Bound of ``|z|`` for every input that begins with z0; inf if it has none."""
-        return _boucwen_facts.memory_bound(self.A, self.beta, self.gamma, self.n, self.z0, self.stability_class)
+        return memory_bound(self.A, self.beta, self.gamma, self.n, self.z0, self.stability_class)
 
     def limit_cycle(self, amplitude: float) -> LimitCycle:
         """Steady loop of the memory between the inputs -amplitude and amplitude [unit of u].
@@ -146,9 +210,9 @@ class BoucWenLaw(BoucWenStep, MemoryLaw):
         """
         if not low <= high:
             raise ValueError(f"low must not be above high, got {low} and {high}")
-        memory = _boucwen_facts.memory_slopes(self.A, self.beta, self.gamma, self.n, self.memory_bound)
+        memory = memory_slopes(self.A, self.beta, self.gamma, self.n, self.memory_bound)
         scaled = sorted(self.gain * slope if self.gain else 0.0 for slope in memory)
-        static = _boucwen_facts.polynomial_range(self.input_slope, low, high)
+        static = polynomial_range(self.input_slope, low, high)
         with np.errstate(invalid="ignore"):
             total = np.add(static, scaled)
         lowest, highest = np.where(np.isnan(total), [-np.inf, np.inf], total).tolist()

@@ -7,7 +7,7 @@ u is the input, z the memory, y the output; time has no part in it.
 """
 
 from abc import abstractmethod
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from functools import cached_property
 from typing import ClassVar, Self
 
@@ -34,6 +34,8 @@ class MemoryLaw(Law):
     """
 
     polynomial: ClassVar[str] = "input_coefficients"
+    positive = ("n",)
+    units: ClassVar[Mapping[str, str]] = {"n": "1", "offset": "y"}
 
     A: float
     beta: float
@@ -46,8 +48,7 @@ class MemoryLaw(Law):
     @classmethod
     def check(cls, tables: Tables) -> None:
         """Refuse an exponent that is not positive, and a polynomial without coefficients."""
-        if not (tables["n"] > 0.0).all():
-            raise ValueError(f"n must be positive, got {tables['n'].min()}")
+        super().check(tables)
         if not tables[cls.polynomial].size:
             raise ValueError(f"{cls.polynomial} must hold at least one coefficient")
 

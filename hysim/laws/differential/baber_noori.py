@@ -1,4 +1,8 @@
-"""The Bouc-Wen law of Baber and Noori, which degrades with the energy that it has taken, and pinches."""
+"""The Bouc-Wen law of Baber and Noori, which degrades with the energy that it has taken, and pinches.
+
+The two materials of OpenSees that change with the energy count it as e' = (1 - alpha) ko u' z, ours is e' = u' z, so
+that rates go over by the factor (1 - alpha) ko. Source: OpenSees command manual, uniaxialMaterial BoucWen and BWBN.
+"""
 
 from dataclasses import replace
 from typing import ClassVar, Self
@@ -10,13 +14,13 @@ from hysim._frozen import FloatArray
 from hysim.kernels import baber_noori as kernels
 from hysim.kernels.remainder import ROUNDING
 from hysim.kernels.search.baber_noori import close_step
-from hysim.laws.differential import _boucwen_conversions, _boucwen_search, _power_units, _wear_search
+from hysim.laws.differential import _boucwen_search, _power_units, _wear_search
 from hysim.laws.differential._memory_law import MemoryLaw
 from hysim.laws.differential.boucwen import BoucWen
 from hysim.laws.differential.polynomial_boucwen import PolynomialBoucWen
 from hysim.models.by_structure import Holding
 from hysim.models.law import Packed, Stepping
-from hysim.models.model import family
+from hysim.models.model import Example, family
 from hysim.models.search_space import ALL_FREE, Freedom, Parameters, SearchSpace
 from hysim.models.stages import Stage, Subset
 from hysim.models.tables import Tables
@@ -128,6 +132,17 @@ class BoucWenBaberNoori(MemoryLaw):
     z0: float = 0.0
     input_coefficients: tuple[float, ...] = (0.0,)
 
+    short = "baber-noori"
+    example = Example(
+        {
+            "beta": 0.5, "gamma": 0.3, "delta_nu": 0.03, "delta_eta": 0.03, "zeta_s": 0.8, "q": 0.1, "p": 1.0,
+            "psi": 0.3, "lambda_": 0.3,
+        },
+        (-4.0, 4.0),
+        title="Baber-Noori: wear and pinching",
+        group="Devices",
+        units={"u": "mm", "y": "kN"},
+    )  # fmt: skip
     contains = Subset(
         BoucWen,
         neutral={"delta_a": 0.0, "delta_nu": 0.0, "delta_eta": 0.0, "zeta_s": 0.0, "input_coefficients": 0.0},
@@ -197,8 +212,10 @@ class BoucWenBaberNoori(MemoryLaw):
         >>> law.gain, round(law.delta_nu, 12), round(law.delta_eta, 12)
         (18.0, 0.18, 0.36)
         """
-        rates = {"delta_a": deltaA, "delta_nu": deltaNu, "delta_eta": deltaEta}
-        return cls(**_boucwen_conversions.from_opensees_energy(alpha, ko, n, gamma, beta, Ao, rates))
+        stiffness = (1.0 - alpha) * ko
+        rates = {"delta_a": deltaA * stiffness, "delta_nu": deltaNu * stiffness, "delta_eta": deltaEta * stiffness}
+        memory = {"A": Ao, "beta": beta, "gamma": gamma, "n": n}
+        return cls(**memory, **rates, gain=stiffness, input_coefficients=(alpha * ko,))
 
     def to_opensees(self) -> dict[str, float]:
         """The arguments of `from_opensees`, with Ao = A.
@@ -206,7 +223,10 @@ class BoucWenBaberNoori(MemoryLaw):
         Raises ValueError if the law pinches, has an offset, an initial memory, more than one input coefficient, or no
         stiffness.
         """
-        return _boucwen_conversions.to_opensees_degrading(self)
+        if self.zeta_s != 0.0:
+            raise ValueError(f"the material does not pinch, got zeta_s = {self.zeta_s:g}: see to_opensees_bwbn")
+        rates = {"deltaA": self.delta_a, "deltaNu": self.delta_nu, "deltaEta": self.delta_eta}
+        return {**self._of_material(), **{name: rate / self.gain for name, rate in rates.items()}}
 
     @classmethod
     def from_opensees_bwbn(
@@ -230,9 +250,10 @@ class BoucWenBaberNoori(MemoryLaw):
         The first six parameters are those of `from_opensees`, the others the pinching in the order of the command, with
         ``lambda`` for lamda; p and deltaShi are per unit of their energy.
         """
-        rates = {"p": p, "delta_psi": deltaShi}
-        energy = _boucwen_conversions.from_opensees_energy(alpha, ko, n, gamma, beta, Ao, rates)
-        return cls(**energy, q=q, zeta_s=zetas, psi=Shi, lambda_=lamda)
+        stiffness = (1.0 - alpha) * ko
+        memory = {"A": Ao, "beta": beta, "gamma": gamma, "n": n}
+        pinching = {"q": q, "zeta_s": zetas, "p": p * stiffness, "psi": Shi, "delta_psi": deltaShi * stiffness}
+        return cls(**memory, **pinching, lambda_=lamda, gain=stiffness, input_coefficients=(alpha * ko,))
 
     def to_opensees_bwbn(self) -> dict[str, float]:
         """The arguments of `from_opensees_bwbn`, with Ao = A.
@@ -240,7 +261,27 @@ class BoucWenBaberNoori(MemoryLaw):
         Raises ValueError if the law degrades, has an offset, an initial memory, more than one input coefficient, or no
         stiffness.
         """
-        return _boucwen_conversions.to_opensees_pinching(self)
+        for name in ("delta_a", "delta_nu", "delta_eta"):
+            if (rate := self.scalars[name]) != 0.0:
+                raise ValueError(f"the material does not degrade, got {name} = {rate:g}: see to_opensees")
+        own = {"q": self.q, "zetas": self.zeta_s, "p": self.p / self.gain, "Shi": self.psi, "lamda": self.lambda_}
+        return {**self._of_material(), **own, "deltaShi": self.delta_psi / self.gain}
+
+    def _of_material(self) -> dict[str, float]:
+        """Parameters that both materials of OpenSees have."""
+        if self.offset != 0.0:
+            raise ValueError(f"the material has no offset, got {self.offset:g}: take it off the output")
+        if self.z0 != 0.0:
+            raise ValueError(f"the material begins with z = 0, got z0 = {self.z0:g}")
+        first, *others = self.input_coefficients
+        if any(others):
+            raise ValueError(
+                f"the material has a linear spring only, got input_coefficients = {self.input_coefficients}"
+            )
+        ko = first + self.gain
+        if ko == 0.0 or self.gain == 0.0:
+            raise ValueError(f"the material needs a stiffness and a gain, got {ko:g} and {self.gain:g}")
+        return {"alpha": first / ko, "ko": ko, "n": self.n, "gamma": self.gamma, "beta": self.beta, "Ao": self.A}
 
     @property
     def stepping(self) -> Stepping:

@@ -3,8 +3,8 @@
 import numpy as np
 
 from hysim._frozen import FloatArray
-from hysim.laws.differential._equivalent_boucwen import EquivalentBoucWen
-from hysim.models.model import family
+from hysim.laws.differential.boucwen import EquivalentBoucWen
+from hysim.models.model import Example, family
 from hysim.models.parameters import Parameter
 from hysim.models.tables import Tables
 
@@ -52,18 +52,15 @@ class ColemanHodgdon(EquivalentBoucWen):
     offset: float = 0.0
     z0: float = 0.0
 
+    positive = ("alpha",)
+    example = Example({}, (-2.0, 2.0), title="Coleman-Hodgdon: magnet")
     searched = (
         Parameter("alpha", 1e-2, 1e3, unit="1/u", log=True),
-        *(Parameter(name, affine=True) for name in ("c", "B", "offset", "z0")),
+        *(Parameter(name, unit="y/u", affine=True) for name in ("c", "B")),
+        *(Parameter(name, unit="y", affine=True) for name in ("offset", "z0")),
     )
     starts = tuple({"alpha": 1.0 / length} for length in (0.03, 0.1, 0.3, 1.0))
     screened = 64
-
-    @classmethod
-    def check(cls, tables: Tables) -> None:
-        """Refuse a rate that is not positive."""
-        if not (tables["alpha"] > 0.0).all():
-            raise ValueError(f"alpha must be positive, got {tables['alpha'].min()}")
 
     @classmethod
     def equivalent(cls, tables: Tables) -> dict[str, FloatArray]:

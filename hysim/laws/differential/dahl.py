@@ -3,8 +3,8 @@
 import numpy as np
 
 from hysim._frozen import FloatArray
-from hysim.laws.differential._equivalent_boucwen import EquivalentBoucWen
-from hysim.models.model import family
+from hysim.laws.differential.boucwen import EquivalentBoucWen
+from hysim.models.model import Example, family
 from hysim.models.parameters import Parameter
 from hysim.models.tables import Tables
 
@@ -48,21 +48,16 @@ class Dahl(EquivalentBoucWen):
     offset: float = 0.0
     z0: float = 0.0
 
+    positive = ("stiffness", "coulomb")
+    example = Example({"stiffness": 1.0, "coulomb": 0.8}, (-2.0, 2.0), title="Dahl")
     searched = (
         Parameter("stiffness", 1e-4, 1e5, unit="y/u", log=True),
         Parameter("coulomb", 1e-2, 1e2, unit="y", log=True),
-        Parameter("offset", affine=True),
-        Parameter("z0", affine=True),
+        Parameter("offset", unit="y", affine=True),
+        Parameter("z0", unit="y", affine=True),
     )
     starts = tuple({"stiffness": force / length, "coulomb": force} for length, force in _STARTS)
     screened = 512
-
-    @classmethod
-    def check(cls, tables: Tables) -> None:
-        """Refuse a stiffness or a Coulomb force that is not positive."""
-        for name in ("stiffness", "coulomb"):
-            if not (tables[name] > 0.0).all():
-                raise ValueError(f"{name} must be positive, got {tables[name].min()}")
 
     @classmethod
     def equivalent(cls, tables: Tables) -> dict[str, FloatArray]:

@@ -1,7 +1,26 @@
-"""The polynomial Duhem law: one slope where the input rises, another where it falls."""
+"""The polynomial Duhem law: one slope where the input rises, another where it falls.
+
+Duhem laws of given terms, as `identify` takes them: the search begins at a regression on the record.
+
+Along the measured loop the law's integral is linear in its coefficients c_k of the monomials m_k,
+
+    y(t) - y(0) = sum c_k integral m_k(u, y) r_k,    r_k = du or |du|
+
+and least squares over all samples give them, with the integrals by the trapezoidal rule. Noise in y biases them a
+little, so they are only where the search in free run begins. So do the coefficients of each lower degree; those that
+run closest to the record are the middle of the box.
+
+The box in which a Duhem law is searched: its own structure, around its own coefficients.
+
+A coordinate is a coefficient measured by what its term contributes over the span of the input, in units
+of the stroke; the feedthrough likewise; offset and y0 are measured in strokes. The box reaches 10 to both sides of the
+law's own coefficients, and 1 of its y0. A parameter that the user bounds has these bounds.
+
+A law that has neither |z| nor a feedthrough or an offset is not given one: its polynomials in u and y already hold it.
+"""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import field
+from dataclasses import dataclass, field, replace
 from typing import Any, ClassVar, Self
 
 import numpy as np
@@ -9,27 +28,140 @@ import numpy.typing as npt
 
 from hysim._frozen import FloatArray, check_whole, read_only
 from hysim.kernels import duhem as kernels
-from hysim.laws.differential import _duhem_search
 from hysim.laws.differential.duhem_runs import branches, free_runs, outputs
-from hysim.laws.differential.duhem_structure import DuhemStructure
 from hysim.laws.differential.terms import (
     Polynomials,
     Term,
+    coefficient_units,
     duhem_terms,
     equation,
     latex,
     polynomials,
     terms_of,
 )
+from hysim.models.composable import Composable
 from hysim.models.law import Law, Packed, State
-from hysim.models.model import family
-from hysim.models.protocols import CompiledLaw
+from hysim.models.model import Example, family
+from hysim.models.protocols import CompiledLaw, Identifiable
 from hysim.models.search_space import ALL_FREE, Freedom, Parameters, SearchSpace
 from hysim.models.tables import Tables
 from hysim.records import Record
 
+_REACH = 10.0
+_REACH_LEVEL = 1.0
+_RANK = 1e-6  # singular values of the normalised columns below this are taken as zero
 _BOUND = 1e3
 _OUTPUT = ("feedthrough", "offset", "y0")
+
+
+def search_space(
+    defaults: Mapping[str, float],
+    record: Record,
+    freedom: Freedom,
+) -> SearchSpace:
+    """Declare the box for the terms, feedthrough, offset and y0 in `defaults`."""
+    if np.ptp(record.u) == 0.0:
+        raise ValueError("the input is constant: nothing can be identified from it")
+    terms = {name: Term.parse(name) for name in defaults if name not in _OUTPUT}
+    held = freedom.held(
+        defaults,
+        redundant=() if _has_memory_of_its_own(defaults, terms) else (("feedthrough",), ("offset",)),
+        at_rest=("y0",) if freedom.starts_at_rest() else (),
+    )
+    limits = freedom.limits(defaults, held)
+    names = tuple(name for name in defaults if name not in held)
+    unit = _units(terms, defaults, record)
+    scale = np.array([unit[name] for name in names])
+    start = np.array([defaults[name] for name in names]) / scale
+    reach = np.array([_REACH_LEVEL if name in ("offset", "y0") else _REACH for name in names])
+    lower, upper = start - reach, start + reach
+    for k, name in enumerate(names):
+        if name in limits:
+            lower[k], upper[k] = np.array(limits[name]) / scale[k]
+
+    def parameters(x: FloatArray) -> dict[str, FloatArray]:
+        sets = np.atleast_2d(x) * scale
+        constants = {name: np.full(len(sets), value) for name, value in held.items()}
+        return constants | dict(zip(names, sets.T, strict=True))
+
+    return SearchSpace(
+        coordinates=names,
+        lower=lower,
+        upper=upper,
+        starts=np.clip(start, lower, upper)[np.newaxis],
+        names=names,
+        columns=(),
+        linear=(),
+        held=held,
+        parameters=parameters,
+        state=("y0",),
+    )
+
+
+def _has_memory_of_its_own(defaults: Mapping[str, float], terms: Mapping[str, Term]) -> bool:
+    return any(defaults[name] for name in _OUTPUT[:2]) or any(term.absolute for term in terms.values())
+
+
+def _units(terms: Mapping[str, Term], defaults: Mapping[str, float], record: Record) -> dict[str, float]:
+    stroke = float(np.ptp(record.y)) or 1.0
+    memory = record.y - defaults["offset"] - defaults["feedthrough"] * record.u
+    units = dict(zip(terms, coefficient_units(record.u, memory, terms.values()).tolist(), strict=True))
+    return {**units, "feedthrough": stroke / float(np.ptp(record.u)), "offset": stroke, "y0": stroke}
+
+
+@dataclass(frozen=True, kw_only=True)
+class DuhemStructure(Identifiable, Composable):
+    """The terms of a Duhem law without their coefficients; see `Duhem.structure`. `family` is any law of the family."""
+
+    family: Identifiable
+    terms: tuple[Term, ...]
+
+    def __post_init__(self) -> None:
+        if not self.terms:
+            raise ValueError("terms must name at least one term")
+        if barred := [term.name for term in self.terms if term.absolute]:
+            raise ValueError(f"{barred[0]!r} needs a memory of its own: begin the search from a law, Duhem.from_terms")
+
+    def search_space(self, record: Record, freedom: Freedom = ALL_FREE) -> SearchSpace:
+        """The box of `Duhem.search_space` around the regression on this record."""
+        names = [term.name for term in self.terms]
+        degrees = sorted({term.degree for term in self.terms}, reverse=True)
+        level = {"feedthrough": 0.0, "offset": 0.0, "y0": float(record.y[0]) if len(record) else 0.0}
+        candidates = [{**dict.fromkeys(names, 0.0), **self._regression(record, degree), **level} for degree in degrees]
+        candidates.sort(key=lambda values: self._distance(values, record))
+        space = search_space(candidates[0], record, freedom)
+        unit = {name: values[0] for name, values in space.parameters(np.ones(space.lower.size)).items()}
+        starts = np.array([[values[name] / unit[name] for name in space.coordinates] for values in candidates])
+        return replace(space, starts=np.clip(starts, space.lower, space.upper), screened=0)
+
+    def regressors(self, parameters: Parameters, record: Record) -> FloatArray:
+        """As `Duhem.regressors`."""
+        return self.family.regressors(parameters, record)
+
+    def assemble(self, parameters: Mapping[str, float]) -> Any:
+        """The law with these parameters, one number for each name."""
+        return self.family.assemble(parameters)
+
+    def _distance(self, values: Mapping[str, float], record: Record) -> float:
+        """Sum of squared residuals in free run, inf where the law diverges."""
+        y = self.family.regressors(values, record)[0, :, 0]
+        with np.errstate(over="ignore"):
+            return float(np.sum((record.y - y) ** 2))
+
+    def _regression(self, record: Record, degree: float) -> dict[str, float]:
+        """The coefficients of the terms up to this degree."""
+        terms = [term for term in self.terms if term.degree <= degree]
+        du = np.diff(record.u)
+        columns = []
+        for term in terms:
+            values = record.u**term.i * record.y**term.j
+            way = np.abs(du) if term.rectified else du
+            columns.append(np.concatenate([[0.0], np.cumsum(0.5 * (values[1:] + values[:-1]) * way)]))
+        table = np.column_stack([*columns, np.ones(len(record))])
+        norms = np.linalg.norm(table, axis=0)
+        norms[norms == 0.0] = 1.0
+        solution = np.linalg.lstsq(table / norms, record.y, rcond=_RANK)[0] / norms
+        return {term.name: float(value) for term, value in zip(terms, solution, strict=False)}
 
 
 def _none() -> FloatArray:
@@ -93,6 +225,8 @@ class Duhem(Law):
     offset: float = 0.0
     y0: float = 0.0
 
+    units: ClassVar = {"feedthrough": "y/u", "offset": "y", "y0": "y"}
+    example = Example({"p": ((1.0, -0.5),), "q": ((0.3, -0.2),)}, (-2.0, 2.0), title="Duhem")
     step = staticmethod(kernels.step)
     start = staticmethod(kernels.start)
     initial: ClassVar[tuple[str, ...]] = ("y0",)
@@ -264,7 +398,7 @@ class Duhem(Law):
         return f"{super().divergence(sample, u, y)}: {self.equation}"
 
     def search_space(self, record: Record, freedom: Freedom = ALL_FREE) -> SearchSpace:
-        return _duhem_search.search_space(self.scalars, record, freedom)
+        return search_space(self.scalars, record, freedom)
 
     def regressors(self, parameters: Parameters, record: Record) -> FloatArray:
         """The output itself, shape (n_sets, n_samples, 1): it is affine in none of the parameters."""

@@ -6,11 +6,11 @@ import numpy as np
 
 from hysim._frozen import FloatArray
 from hysim.kernels import generalized as kernels
-from hysim.laws.differential import _boucwen_facts
+from hysim.laws.differential import _boucwen_law as facts
 from hysim.laws.differential._memory_law import MemoryLaw
 from hysim.laws.differential.boucwen import BoucWen
 from hysim.models.law import Packed, Stepping
-from hysim.models.model import family
+from hysim.models.model import Example, family
 from hysim.models.search_space import Freedom
 from hysim.models.stages import Subset
 from hysim.models.tables import Tables
@@ -73,6 +73,7 @@ class GeneralizedBoucWen(MemoryLaw):
     z0: float = 0.0
     input_coefficients: tuple[float, ...] = (0.0,)
 
+    example = Example({"beta": 0.5, "gamma": 0.2, "b2": 0.1, "b4": 0.1}, (-2.0, 2.0), title="Generalised Bouc-Wen")
     contains = Subset(
         BoucWen,
         neutral={**dict.fromkeys(_SECTORS, 0.0), "input_coefficients": 0.0},
@@ -110,12 +111,12 @@ class GeneralizedBoucWen(MemoryLaw):
         loading, unloading = ([gamma + side * beta for _, beta, gamma, _ in laws] for side in (1.0, -1.0))
         if not (self.A > 0.0 and min(loading) > 0.0):
             return super().known_slopes
-        bound = max(abs(self.z0), _boucwen_facts.saturation(self.A, 0.0, min(loading), self.n))
-        lows, highs = zip(*(_boucwen_facts.memory_slopes(A, b, g, n, bound) for A, b, g, n in laws), strict=True)
+        bound = max(abs(self.z0), facts.saturation(self.A, 0.0, min(loading), self.n))
+        lows, highs = zip(*(facts.memory_slopes(A, b, g, n, bound) for A, b, g, n in laws), strict=True)
         if self.A - max(unloading) * bound**self.n < 0.0:  # the memory may grow where the input turns back
             return super().known_slopes
         memory = sorted((self.gain * min(lows), self.gain * max(highs)))
-        static = _boucwen_facts.polynomial_range(self.input_slope, -np.inf, np.inf)
+        static = facts.polynomial_range(self.input_slope, -np.inf, np.inf)
         return static[0] + memory[0], static[1] + memory[1]
 
     def alike(self, record: Record, freedom: Freedom) -> tuple[tuple[str, ...], ...]:

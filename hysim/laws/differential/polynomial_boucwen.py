@@ -2,7 +2,7 @@
 
 from hysim.laws.differential._boucwen_law import BoucWenLaw
 from hysim.laws.differential.boucwen import BoucWen
-from hysim.models.model import family
+from hysim.models.model import Example, family
 from hysim.models.stages import Subset
 
 
@@ -42,4 +42,11 @@ class PolynomialBoucWen(BoucWenLaw):
     z0: float = 0.0
     input_coefficients: tuple[float, ...] = (0.0, 0.0)
 
+    example = Example(
+        {"A": 1.0, "beta": 0.05, "gamma": -0.03, "gain": -0.012, "input_coefficients": (0.03, 4e-5)},
+        (0.0, 100.0),
+        title="Piezo actuator",
+        group="Devices",
+        units={"u": "V", "y": "um"},
+    )
     contains = Subset(BoucWen, neutral={"input_coefficients": 0.0}, names={"feedthrough": "input_coefficients[0]"})

@@ -17,7 +17,7 @@ from hysim.laws.differential import _power_units
 from hysim.laws.differential._memory_law import MemoryLaw
 from hysim.laws.differential.boucwen import BoucWen
 from hysim.models.law import Packed, Stepping
-from hysim.models.model import family
+from hysim.models.model import Example, family
 from hysim.models.stages import Subset
 from hysim.models.tables import Tables
 
@@ -70,6 +70,8 @@ class ZhuWangBoucWen(MemoryLaw):
     z0: float = 0.0
     input_coefficients: tuple[float, ...] = (0.0,)
 
+    short = "zhu-wang"
+    example = Example({"beta": 0.5, "gamma": 0.2, "delta": 0.15}, (-2.0, 2.0), title="Zhu-Wang: asymmetric")
     samples_a_thread = 2_000
     screened = 1024  # a step costs twenty times that of the Bouc-Wen law
     contains = Subset(

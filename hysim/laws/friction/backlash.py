@@ -3,8 +3,8 @@
 from typing import ClassVar
 
 from hysim.kernels.friction import backlash as kernels
-from hysim.laws.friction.rated_law import RatedLaw, check_signs
-from hysim.models.model import family
+from hysim.laws.friction.rated_law import RatedLaw
+from hysim.models.model import Example, family
 from hysim.models.parameters import Parameter
 from hysim.models.tables import Tables
 
@@ -60,6 +60,14 @@ class ElasticBacklash(RatedLaw):
     center: float = 0.0
     offset: float = 0.0
 
+    positive = ("stiffness",)
+    not_negative = ("damping", "half_gap")
+    example = Example(
+        {"stiffness": 2.0, "damping": 0.05, "half_gap": 0.4},
+        title="Backlash of an elastic shaft",
+        units={"u": "rad", "y": "N m"},
+        kind="sine",
+    )
     step = staticmethod(kernels.step)
     rated_step = staticmethod(kernels.rated_step)
     initial: ClassVar[tuple[str, ...]] = ()
@@ -77,11 +85,6 @@ class ElasticBacklash(RatedLaw):
         for center in (-0.5, 0.0, 0.5)
     )
     screened = 512
-
-    @classmethod
-    def check(cls, tables: Tables) -> None:
-        """Refuse a stiffness that is not positive, a negative damping or gap."""
-        check_signs(tables, positive=("stiffness",), not_negative=("damping", "half_gap"))
 
     @classmethod
     def further(cls, tables: Tables) -> int:

@@ -8,10 +8,9 @@ import numpy.typing as npt
 
 from hysim._frozen import FloatArray
 from hysim.kernels.friction import lugre as kernels
-from hysim.laws.friction.rated_law import RatedLaw, check_signs, curve
-from hysim.models.model import family
+from hysim.laws.friction.rated_law import RatedLaw, curve
+from hysim.models.model import Example, family
 from hysim.models.parameters import Parameter
-from hysim.models.tables import Tables
 
 
 @family
@@ -85,6 +84,17 @@ class LuGre(RatedLaw):
     offset: float = 0.0
     z0: float = 0.0
 
+    short = "lugre"
+    positive = ("sigma0", "coulomb", "breakaway", "stribeck_velocity", "stribeck_exponent")
+    not_negative = ("damping_velocity",)
+    example = Example(
+        {
+            "sigma0": 20.0, "sigma1": 0.1, "sigma2": 0.02, "coulomb": 1.0, "breakaway": 1.5, "stribeck_velocity": 2.0,
+        },
+        title="Friction: LuGre",
+        units={"u": "mm", "y": "N"},
+        kind="sine",
+    )  # fmt: skip
     step = staticmethod(kernels.step)
     rated_step = staticmethod(kernels.rated_step)
     searched = (
@@ -104,12 +114,6 @@ class LuGre(RatedLaw):
         for velocity in (0.01, 0.1)
     )
     screened = 512
-
-    @classmethod
-    def check(cls, tables: Tables) -> None:
-        """Refuse stiffness, friction or Stribeck's numbers that are not positive."""
-        positive = ("sigma0", "coulomb", "breakaway", "stribeck_velocity", "stribeck_exponent")
-        check_signs(tables, positive=positive, not_negative=("damping_velocity",))
 
     @property
     def viscosity(self) -> float:

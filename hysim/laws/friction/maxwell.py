@@ -7,8 +7,8 @@ import numpy.typing as npt
 
 from hysim._frozen import FloatArray
 from hysim.kernels.friction import maxwell as kernels
-from hysim.laws.friction.rated_law import RatedLaw, check_signs, curve
-from hysim.models.model import family
+from hysim.laws.friction.rated_law import RatedLaw, curve
+from hysim.models.model import Example, family
 from hysim.models.parameters import Parameter
 from hysim.models.tables import Tables
 
@@ -83,6 +83,18 @@ class GeneralizedMaxwellSlip(RatedLaw):
     offset: float = 0.0
     z0: tuple[float, ...] = (0.0,)
 
+    positive = (
+        "stiffness", "weights", "coulomb", "breakaway", "stribeck_velocity", "stribeck_exponent", "attraction",
+    )  # fmt: skip
+    example = Example(
+        {
+            "stiffness": (20.0, 10.0, 5.0), "weights": (0.4, 0.3, 0.3), "stribeck_velocity": 2.0, "attraction": 50.0,
+            "viscous": 0.02,
+        },
+        title="Friction: Maxwell slip with a lag",
+        units={"u": "mm", "y": "N"},
+        kind="sine",
+    )  # fmt: skip
     step = staticmethod(kernels.step)
     rated_step = staticmethod(kernels.rated_step)
     searched = (
@@ -112,12 +124,6 @@ class GeneralizedMaxwellSlip(RatedLaw):
         if len(self.z0) != n:
             raise ValueError(f"z0 must hold one number for each of {n} elements, got {len(self.z0)}")
         super().__post_init__()
-
-    @classmethod
-    def check(cls, tables: Tables) -> None:
-        """Refuse numbers that are not positive."""
-        positive = ("stiffness", "weights", "coulomb", "breakaway", "stribeck_velocity", "stribeck_exponent")
-        check_signs(tables, positive=(*positive, "attraction"))
 
     @classmethod
     def further(cls, tables: Tables) -> int:

@@ -23,7 +23,7 @@ from hysim.models.law import Law, State
 from hysim.models.parameters import Parameter, declared_space, rate_spans
 from hysim.models.protocols import CompiledLaw, Identifiable, Startable, needed_time, positive_time
 from hysim.models.search_space import ALL_FREE, Freedom, Parameters, SearchSpace
-from hysim.models.tables import Tables, arguments_of, scalars_of
+from hysim.models.tables import Tables, arguments_of, check_signs, scalars_of
 from hysim.records import Record
 
 if TYPE_CHECKING:
@@ -61,6 +61,7 @@ class RatedLaw(Identifiable, Placed, ABC):
     @classmethod
     def check(cls, tables: Tables) -> None:
         """Raise a ValueError where the tables, every field over sets, hold parameters that are no law."""
+        check_signs(tables, cls.positive, cls.not_negative)
 
     @classmethod
     def further(cls, tables: Tables) -> int:
@@ -248,16 +249,6 @@ def _kind_at_sample_time(family: type[RatedLaw]) -> type[Law]:
         "searched": family.searched,
     }
     return checked(type(f"{family.__name__}AtSampleTime", (AtSampleTime,), body))
-
-
-def check_signs(tables: Tables, *, positive: tuple[str, ...], not_negative: tuple[str, ...] = ()) -> None:
-    """A ValueError for the first field of these with a number that is not positive, or negative."""
-    for name in positive:
-        if not (tables[name] > 0.0).all():
-            raise ValueError(f"{name} must be positive, got {tables[name].min():g}")
-    for name in not_negative:
-        if not (tables[name] >= 0.0).all():
-            raise ValueError(f"{name} must not be negative, got {tables[name].min():g}")
 
 
 def curve(speed: npt.ArrayLike, coulomb: float, breakaway: float, velocity: float, exponent: float) -> FloatArray:

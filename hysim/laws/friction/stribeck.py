@@ -8,10 +8,9 @@ import numpy.typing as npt
 
 from hysim._frozen import FloatArray
 from hysim.kernels.friction import stribeck as kernels
-from hysim.laws.friction.rated_law import RatedLaw, check_signs
-from hysim.models.model import family
+from hysim.laws.friction.rated_law import RatedLaw
+from hysim.models.model import Example, family
 from hysim.models.parameters import Parameter
-from hysim.models.tables import Tables
 
 
 @family
@@ -66,6 +65,13 @@ class StribeckFriction(RatedLaw):
     viscous: float = 0.0
     offset: float = 0.0
 
+    positive = ("breakaway_velocity",)
+    example = Example(
+        {"coulomb": 1.0, "breakaway": 1.5, "breakaway_velocity": 1.0, "viscous": 0.05},
+        title="Friction: Stribeck",
+        units={"u": "mm", "y": "N"},
+        kind="sine",
+    )
     step = staticmethod(kernels.step)
     rated_step = staticmethod(kernels.rated_step)
     initial: ClassVar[tuple[str, ...]] = ()
@@ -78,11 +84,6 @@ class StribeckFriction(RatedLaw):
     )
     starts: ClassVar = tuple({"breakaway_velocity": velocity} for velocity in (0.001, 0.01, 0.1))
     memory = None  # type: ignore[assignment]  # it remembers nothing
-
-    @classmethod
-    def check(cls, tables: Tables) -> None:
-        """Refuse a breakaway velocity that is not positive."""
-        check_signs(tables, positive=("breakaway_velocity",))
 
     @property
     def viscosity(self) -> float:

@@ -1,14 +1,14 @@
 """Chan's law of magnetic cores, which LTspice has."""
 
-from typing import Self
+from typing import ClassVar, Self
 
 import numpy as np
 
 from hysim._frozen import check_not_negative, check_positive
 from hysim.kernels.magnetics import chan as kernels
-from hysim.laws.magnetic._branches import VACUUM, BranchLaw
+from hysim.laws.magnetic.tellinen import VACUUM, BranchLaw
 from hysim.models.law import Packed
-from hysim.models.model import family
+from hysim.models.model import Example, family
 from hysim.models.parameters import Parameter, declared_space
 from hysim.models.search_space import ALL_FREE, Freedom, SearchSpace
 from hysim.models.tables import Tables
@@ -88,6 +88,9 @@ class Chan(BranchLaw):
     offset: float = 0.0
     z0: float = 0.0
 
+    units: ClassVar = {**BranchLaw.units, "offset": "y", "gap": "u/y"}
+    not_negative = ("gap",)
+    example = Example({"coercivity": 0.4, "squareness": 0.5}, (-2.0, 2.0), title="Magnetic core: Chan")
     step = staticmethod(kernels.step)
     states = ("rest", "free")
     searched = tuple(each for each in BranchLaw.searched if each.name != "offset")
@@ -96,8 +99,6 @@ class Chan(BranchLaw):
     def check(cls, tables: Tables) -> None:
         """Refuse what is no pair of branches, no place between them, or no gap."""
         super().check(tables)
-        if (tables["gap"] < 0.0).any():
-            raise ValueError(f"gap must not be negative, got {tables['gap'].min()}")
         for name in ("saturation", "feedthrough"):
             if ((tables["gap"] > 0.0) & (tables[name] < 0.0)).any():
                 raise ValueError(f"{name} must not be negative beside a gap, got {tables[name].min()}")

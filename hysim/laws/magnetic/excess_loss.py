@@ -7,8 +7,8 @@ import numpy as np
 
 from hysim._frozen import FloatArray, check_not_negative
 from hysim.kernels.magnetics import losses
-from hysim.laws._rate_part import RatePart
-from hysim.models.model import family
+from hysim.laws.dashpot import RatePart
+from hysim.models.model import Example, family
 
 _BERTOTTI = 0.1356
 """Bertotti's dimensionless coefficient of eddy current damping by one magnetic object, 4 / pi^3 sum 1 / (2 k + 1)^3."""
@@ -37,6 +37,8 @@ class ExcessLoss(RatePart):
 
     c: float = 1.0
 
+    example = Example({"c": 2.0})
+    power = 0.5
     step = staticmethod(losses.excess)
 
     @staticmethod

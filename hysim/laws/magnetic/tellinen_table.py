@@ -1,6 +1,6 @@
 """Tellinen's law between two tabulated branches."""
 
-from typing import Any, Self
+from typing import Any, ClassVar, Self
 
 import numpy as np
 
@@ -8,7 +8,7 @@ from hysim._frozen import check_whole
 from hysim.kernels.magnetics import tellinen_table as kernels
 from hysim.metrics import loop_metrics
 from hysim.models.law import Law, Packed
-from hysim.models.model import family
+from hysim.models.model import Example, family
 from hysim.models.parameters import Parameter
 from hysim.models.tables import Tables
 from hysim.records import Record
@@ -63,10 +63,19 @@ class TellinenTable(Law):
     offset: float = 0.0
     z0: float = 0.0
 
+    units: ClassVar = {"inputs": "u", "lower": "y", "upper": "y", "z0": "1"}
+    example = Example(
+        {
+            "inputs": (-2.0, -1.0, 0.0, 1.0, 2.0), "lower": (-1.0, -0.9, -0.5, 0.6, 1.0),
+            "upper": (-1.0, -0.6, 0.5, 0.9, 1.0),
+        },
+        (-2.0, 2.0),
+        title="Magnetic core: Tellinen's branches from a table",
+    )  # fmt: skip
     step = staticmethod(kernels.step)
     searched = (
-        Parameter("feedthrough", affine=True),
-        Parameter("offset", affine=True),
+        Parameter("feedthrough", unit="y/u", affine=True),
+        Parameter("offset", unit="y", affine=True),
         Parameter("z0", -1.0, 1.0, physical=(True, True)),
     )
 

@@ -49,6 +49,7 @@ class Bank(Law):
     @classmethod
     def check(cls, tables: Tables) -> None:
         """Refuse elements that are no plays or stops of this law."""
+        super().check(tables)
         check_elements(cls, *(tables[name] for name in (cls.thresholds_name, cls.weights_name, "z0")))
 
     @property

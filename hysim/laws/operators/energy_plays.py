@@ -12,7 +12,7 @@ from hysim.laws.operators._clamp_search import Axis, ClampStructure, Pushing
 from hysim.laws.operators._clamps import Bank
 from hysim.models.by_structure import ByStructure
 from hysim.models.law import Packed
-from hysim.models.model import family
+from hysim.models.model import Example, family
 from hysim.models.parameters import spans
 from hysim.models.search_space import Parameters
 from hysim.models.tables import Tables
@@ -67,6 +67,14 @@ class EnergyPlays(ByStructure, Bank):
     [0.0, 1.3624, 0.7299, -1.3624]
     """
 
+    units: ClassVar = {"thresholds": "u", "weights": "y", "field": "u", "feedthrough": "y/u", "offset": "y", "z0": "u"}
+    positive = ("field",)
+    example = Example(
+        {"thresholds": (0.0, 0.2, 0.5), "weights": (0.2, 0.6, 0.4), "field": 0.15},
+        (-2.0, 2.0),
+        title="Magnetic core: energy-based plays",
+        group="Magnetic cores",
+    )
     ordered: ClassVar[bool] = True
 
     thresholds: tuple[float, ...] = ()
@@ -77,13 +85,6 @@ class EnergyPlays(ByStructure, Bank):
     z0: tuple[float, ...] = (0.0,)
 
     step = staticmethod(kernels.step)
-
-    @classmethod
-    def check(cls, tables: Tables) -> None:
-        """Refuse elements that are no cells, and a field that is not positive."""
-        super().check(tables)
-        if not (tables["field"] > 0.0).all():
-            raise ValueError(f"field must be positive, got {tables['field'].min()}")
 
     @classmethod
     def pack(cls, tables: Tables) -> Packed:

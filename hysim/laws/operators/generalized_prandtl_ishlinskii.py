@@ -12,7 +12,7 @@ from hysim.laws.operators._clamp_search import Axis, ClampStructure, Pushing
 from hysim.laws.operators._play_sums import IDENTITY, ExtendedPlays, kernel_rows, positions_of
 from hysim.laws.operators.prandtl_ishlinskii import PrandtlIshlinskii
 from hysim.models.law import Packed
-from hysim.models.model import family
+from hysim.models.model import Example, family
 from hysim.models.parameters import spans
 from hysim.models.search_space import Parameters
 from hysim.models.tables import Tables
@@ -77,6 +77,16 @@ class GeneralizedPrandtlIshlinskii(ExtendedPlays):
     right: tuple[float, ...] = ()
     offset: float = 0.0
     z0: tuple[float, ...] = (0.0,)
+
+    units: ClassVar = {"offset": "y"}
+    example = Example(
+        {
+            "thresholds": (0.0, 0.1, 0.2, 0.35, 0.5, 0.7), "weights": (0.4, 0.3, 0.2, 0.2, 0.1, 0.1),
+            "left": (1.2, 1.4, 0.0, 0.0, 0.1),
+        },
+        (-2.0, 2.0),
+        title="Prandtl-Ishlinskii: envelopes",
+    )  # fmt: skip
 
     @classmethod
     def check(cls, tables: Tables) -> None:

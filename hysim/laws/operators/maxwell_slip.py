@@ -10,7 +10,7 @@ from hysim.laws.operators._clamp_search import ClampStructure
 from hysim.laws.operators._clamps import ClampLaw
 from hysim.laws.operators.prandtl_ishlinskii import PrandtlIshlinskii
 from hysim.models.by_structure import ByStructure
-from hysim.models.model import family
+from hysim.models.model import Example, family
 
 
 @family
@@ -59,6 +59,8 @@ class MaxwellSlip(ByStructure, ClampLaw):
     [0.0, 1.5, 3.0, 0.0, -3.0]
     """
 
+    units: ClassVar = {"stiffness": "y/u", "slips": "u", "feedthrough": "y/u", "offset": "y", "z0": "u"}
+    example = Example({"stiffness": (1.0, 1.0, 1.0), "slips": (0.2, 0.5, 0.9)}, (-1.5, 1.5), title="Maxwell slip")
     thresholds_name: ClassVar[str] = "slips"
     weights_name: ClassVar[str] = "stiffness"
     stops: ClassVar[bool] = True

@@ -10,7 +10,7 @@ positions of the plays are the same for every density.
 """
 
 from dataclasses import replace
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 import numpy.typing as npt
@@ -18,7 +18,7 @@ import numpy.typing as npt
 from hysim._frozen import FloatArray
 from hysim.kernels import clamps as kernels
 from hysim.models.law import Law, Packed
-from hysim.models.model import family
+from hysim.models.model import Example, family
 from hysim.models.parameters import Parameter, declared_space, spans
 from hysim.models.search_space import ALL_FREE, Freedom, Parameters, SearchSpace
 from hysim.models.tables import Tables
@@ -99,11 +99,20 @@ class ParametricPrandtlIshlinskii(Law):
     plays: float = 40.0
     z0: tuple[float, ...] = (0.0, 0.0)
 
+    units: ClassVar = {"exponent": "1", "reach": "u", "plays": "1"}
+    positive = ("decay",)
+    example = Example(
+        {"exponent": -0.3, "decay": 0.4, "weight": 0.5, "reach": 2.0, "plays": 20.0},
+        title="Prandtl-Ishlinskii: density",
+    )
     step = staticmethod(kernels.bent_step)
     searched = (
         Parameter("exponent", -0.95, 4.0, physical=(True, False)),
         Parameter("decay", 3e-3, 1e2, unit="h", log=True),
-        *(Parameter(name, affine=True) for name in ("weight", "weight_slope", "offset", "input_coefficients")),
+        Parameter("weight", unit="y/u", affine=True),
+        Parameter("weight_slope", affine=True),
+        Parameter("offset", unit="y", affine=True),
+        Parameter("input_coefficients", affine=True),
         Parameter("z0", -2.0, 2.0, unit="h", from_first=True),
     )
     screened = 64
@@ -113,8 +122,7 @@ class ParametricPrandtlIshlinskii(Law):
         """Refuse what is no density or no number of plays."""
         if not (tables["exponent"] > -1.0).all():
             raise ValueError(f"exponent must be above -1, got {tables['exponent'].min()}")
-        if not (tables["decay"] > 0.0).all():
-            raise ValueError(f"decay must be positive, got {tables['decay'].min()}")
+        super().check(tables)
         idle = (tables["weight"] == 0.0) & (tables["weight_slope"] == 0.0)
         if not ((tables["reach"] > 0.0) | (idle & (tables["reach"] == 0.0))).all():
             raise ValueError(f"reach must be positive beside a weight, got {tables['reach'].min()}")

@@ -10,7 +10,7 @@ import numpy as np
 
 from hysim._frozen import FloatArray
 from hysim.laws.operators._clamps import ClampLaw
-from hysim.models.model import family
+from hysim.models.model import Example, family
 from hysim.models.parameters import Parameter
 from hysim.models.search_space import Parameters
 
@@ -27,8 +27,8 @@ class _Element(ClampLaw):
     searched = (
         Parameter("threshold", 1e-3, 1.5, unit="h", physical=(True, False)),
         Parameter("z0", -1.0, 1.0, unit="h", from_first=True),
-        Parameter("gain", affine=True),
-        Parameter("offset", affine=True),
+        Parameter("gain", unit="y/u", affine=True),
+        Parameter("offset", unit="y", affine=True),
     )
     starts = tuple({"threshold": share, "z0": 0.0} for share in (0.1, 0.3, 0.6))
     screened = 256
@@ -75,6 +75,8 @@ class Play(_Element):
     offset: float = 0.0
     z0: float = 0.0
 
+    example = Example({"threshold": 0.25}, title="Play")
+
 
 @family
 class Stop(_Element):
@@ -105,6 +107,7 @@ class Stop(_Element):
     [0.0, 0.5, 0.0, -0.5]
     """
 
+    example = Example({"threshold": 0.4}, title="Stop")
     stops: ClassVar[bool] = True
     threshold: float = 1.0
     gain: float = 1.0

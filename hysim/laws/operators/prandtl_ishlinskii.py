@@ -24,7 +24,7 @@ from hysim.laws.operators._clamp_search import ClampStructure
 from hysim.laws.operators._clamps import ClampLaw
 from hysim.models.by_structure import ByStructure
 from hysim.models.law import State
-from hysim.models.model import family
+from hysim.models.model import Example, family
 from hysim.models.protocols import UNLIMITED, CompiledLaw, Limits
 
 _CONSISTENT = 1e-9  # of the largest threshold: what rounding may add to the distance of two plays
@@ -70,6 +70,16 @@ class PrandtlIshlinskii(ByStructure, ClampLaw):
     """
 
     ordered: ClassVar[bool] = True
+    units: ClassVar = {"thresholds": "u", "weights": "y/u", "offset": "y", "z0": "u"}
+    example = Example(
+        {
+            "thresholds": tuple(1.2 * k / 6 for k in range(21)),  # those behind the sixth are for the page, which adds
+            "weights": (0.3, *[1.0 / 6.0] * 6, *[0.0] * 14),  # plays
+        },
+        (-2.0, 2.0),
+        title="Prandtl-Ishlinskii",
+        stack=True,
+    )
 
     thresholds: tuple[float, ...] = ()
     weights: tuple[float, ...] = ()

@@ -28,7 +28,7 @@ from hysim.models.batch import Reduction
 from hysim.models.by_structure import ByStructure
 from hysim.models.composable import Placed
 from hysim.models.law import Packed, State
-from hysim.models.model import family
+from hysim.models.model import Example, family
 from hysim.models.parameters import spans
 from hysim.models.protocols import UNLIMITED, CompiledLaw, Limits, Startable, needed_time
 from hysim.models.search_space import Parameters
@@ -136,6 +136,12 @@ class RateDependentPrandtlIshlinskii(ByStructure, Placed):
     offset: float = 0.0
     z0: tuple[float, ...] = (0.0,)
 
+    example = Example(
+        {
+            "thresholds": (0.0, 0.1, 0.2, 0.35, 0.5, 0.7), "weights": (0.4, 0.3, 0.2, 0.2, 0.1, 0.1), "beta": 0.005,
+        },
+        title="Prandtl-Ishlinskii: with the rate",
+    )  # fmt: skip
     dynamic: ClassVar[bool] = True
     thresholds_name: ClassVar[str] = "thresholds"
     weights_name: ClassVar[str] = "weights"

@@ -14,7 +14,7 @@ import numpy as np
 
 from hysim.kernels import clamps as kernels
 from hysim.models.law import Law, Packed
-from hysim.models.model import family
+from hysim.models.model import Example, family
 from hysim.models.tables import Tables
 
 
@@ -46,17 +46,14 @@ class ReversalFilter(Law):
 
     threshold: float = 0.0
 
+    units: ClassVar = {"threshold": "u"}
+    not_negative = ("threshold",)
+    example = Example({"threshold": 0.3}, title="Filter of small reversals")
     step = staticmethod(kernels.extreme)
     start = staticmethod(kernels.start_extreme)
     initial: ClassVar[tuple[str, ...]] = ()
     filters_input: ClassVar[bool] = True
     memory = inverse_response = None  # type: ignore[assignment]  # it says nothing that its output does not
-
-    @classmethod
-    def check(cls, tables: Tables) -> None:
-        """Refuse a negative threshold."""
-        if (tables["threshold"] < 0.0).any():
-            raise ValueError(f"threshold must not be negative, got {tables['threshold'].min():g}")
 
     @classmethod
     def pack(cls, tables: Tables) -> Packed:

@@ -1,0 +1,121 @@
+"""The name of a family of laws stands in its own file and in few others, and its example makes a law."""
+
+import ast
+import re
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import hysim as hs
+from hysim.models.model import every_family, short_names
+
+PACKAGE = Path(hs.__file__).parent
+
+ALLOWED: dict[tuple[str, ...], tuple[str, ...]] = {
+    # A law is built on a simpler one, contains it, or is converted to it.
+    ("laws/",): ("BoucWen", "PolynomialBoucWen", "PrandtlIshlinskii", "Duhem"),
+    # What these parts are about: the paper's laws, the benchmark's, the rig's, and those that discovery returns.
+    ("paper/",): ("BoucWen", "PolynomialBoucWen", "Line", "SingleValued"),
+    ("benchmarks.py", "discovery/_oscillator_models.py", "discovery/_structures.py"): ("BoucWen",),
+    ("discovery/_laws.py",): ("BoucWen", "Duhem"),
+    ("rig/_rig.py",): ("PolynomialBoucWen",),
+    # A discovered law is compared with the best sum of plays and the best curve.
+    ("discovery/_yardsticks.py",): ("PrandtlIshlinskii", "SingleValued"),
+    # A mass on a Bouc-Wen spring.
+    ("plants/oscillator.py",): ("BoucWen", "PolynomialBoucWen"),
+    ("plants/oscillator_structure.py",): ("BoucWen",),
+    # A chain or an element without hysteresis has a line in its place, and a viscous part is moved exactly.
+    ("control/_feedforward.py", "control/_open_loop.py", "plants/chain.py", "plants/whole/input_sum.py"): ("Line",),
+    ("plants/structures/element.py",): ("Dashpot", "Line"),
+    # The filter of small reversals is what a fit of a noisy input has in front of any law.
+    ("identification/_assumptions.py", "identification/_measured.py"): ("ReversalFilter",),
+    # The diagram of reversal curves is that of a density of relays.
+    ("plot/_maps.py",): ("Preisach", "PreisachRelays"),
+    # A page computes a curve of knots, which has no step, and plays that widen with the speed, in the browser.
+    ("export/_page_model.py",): ("RateDependentPrandtlIshlinskii", "SingleValued"),
+    # Devices are sums of laws, or laws with the numbers of a material.
+    ("export/_page_presets.py",): ("BoucWen", "Dahl", "Dashpot", "ExcessLoss", "JilesAtherton", "Line", "MaxwellSlip"),
+    # Messages and examples name a law that a user may take.
+    ("cli/",): ("BoucWen", "Preisach", "PrandtlIshlinskii"),
+    ("control/_adaptive.py", "control/_feedforward.py", "design/", "plants/actuator.py"): ("BoucWen",),
+    ("tracking/_track.py",): ("BoucWen",),
+    ("plants/whole/actuator_structure.py",): ("BoucWen", "Line"),
+    ("identification/_admissible.py", "discovery/_judgement.py"): ("PrandtlIshlinskii", "Preisach"),
+}  # fmt: skip
+"""Files and folders that may name families beside a family's own file, and which."""
+
+
+def names_in(text: str) -> set[str]:
+    """Families that a string names: by its whole, as ``hs.Name``, or by a word with capitals inside."""
+    words = {word for word in re.findall(r"\w+", text) if re.search("[a-z][A-Z]", word)}
+    return {text, *words, *re.findall(r"\bhs\.(\w+)", text)}
+
+
+@cache
+def named(path: Path) -> set[str]:
+    """Names that a file imports from the laws, takes from the front door, or has in a string that is no docstring."""
+    tree = ast.parse(path.read_text())
+    with_docstrings = (ast.Module, ast.ClassDef, ast.FunctionDef)
+    texts = {
+        id(node.body[0].value)
+        for node in ast.walk(tree)
+        if isinstance(node, with_docstrings) and ast.get_docstring(node)
+    }
+    texts |= {id(node.value) for node in ast.walk(tree) if isinstance(node, ast.Expr)}  # docstrings of constants
+    found: set[str] = set()
+    for node in ast.walk(tree):
+        if isinstance(node, ast.ImportFrom) and f"{node.module}.".startswith("hysim.laws."):
+            found |= {alias.name for alias in node.names}
+        elif isinstance(node, ast.Attribute) and isinstance(node.value, ast.Name) and node.value.id in ("hs", "hysim"):
+            found.add(node.attr)
+        elif isinstance(node, ast.Constant) and isinstance(node.value, str) and id(node) not in texts:
+            found |= names_in(node.value)
+    return found
+
+
+FILES = {str(path.relative_to(PACKAGE)): path for path in sorted(PACKAGE.rglob("*.py"))}
+
+
+def allowed(file: str) -> set[str]:
+    return {name for places, names in ALLOWED.items() if file.startswith(places) for name in names}
+
+
+@pytest.mark.parametrize("name", hs.families())
+def test_the_name_of_a_family_stands_in_its_own_file_only(name):
+    own = f"{hs.families()[name].__module__.removeprefix('hysim.').replace('.', '/')}.py"
+    others = [file for file, path in FILES.items() if file != own and name in named(path) - allowed(file)]
+    assert not others, f"{name} is named in {others}: ask for what the family is or has, not for its name"
+
+
+def test_no_place_may_name_a_family_that_it_does_not_name():
+    for places, names in ALLOWED.items():
+        used = {name for file, path in FILES.items() if file.startswith(places) for name in named(path)}
+        assert set(names) <= used, (places, set(names) - used)
+
+
+@pytest.mark.parametrize("name", hs.families())
+def test_every_family_has_an_example_in_its_own_class(name):
+    family = hs.families()[name]
+    assert family.__name__ == name
+    assert family.example is vars(family)["example"]
+    law, (low, high) = family(**family.example.fields), family.example.between
+    assert low < high
+    assert np.isfinite([low, high]).all()
+    assert hs.families()[name](**family.example.fields) == law
+
+
+def test_the_families_are_the_laws_of_the_registry_in_the_order_of_the_public_names():
+    laws = {name for name, each in every_family().items() if each.__module__.startswith("hysim.laws.")}
+    assert set(hs.families()) == laws
+    assert list(hs.families()) == [name for name in hs.__all__ if name in laws]
+
+
+def test_short_names_are_each_that_of_one_family():
+    assert short_names() == {
+        "zhu-wang": "ZhuWangBoucWen",
+        "baber-noori": "BoucWenBaberNoori",
+        "lugre": "LuGre",
+        "oscillator": "BoucWenOscillator",
+    }
