@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from hysim._frozen import FloatArray, read_only
+from hysim._basics.frozen import FloatArray, read_only
 
 Channels = Mapping[str, Any]
 """Names to a number, or to an array of shape (n,)."""

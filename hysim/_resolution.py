@@ -17,7 +17,7 @@ import math
 
 import numpy as np
 
-from hysim._frozen import FloatArray
+from hysim._basics.frozen import FloatArray
 
 MOST_LEVELS = 65_536
 """Most steps in the span of the values: finer ones are not searched."""

@@ -24,7 +24,7 @@ from dataclasses import replace
 import numpy as np
 import numpy.typing as npt
 
-from hysim._frozen import FloatArray, read_only
+from hysim._basics.frozen import FloatArray, read_only
 from hysim.laws.differential.boucwen import BoucWen
 from hysim.plants.equation_of_motion import decimated, interpolated
 from hysim.plants.oscillator import BoucWenOscillator

@@ -10,7 +10,7 @@ from importlib.resources import files
 
 import numpy as np
 
-from hysim._frozen import FloatArray
+from hysim._basics.frozen import FloatArray
 from hysim.records import Record
 
 __all__ = ["PIXEL", "SQUARE_WAVE_FREQUENCY", "table1", "table2"]

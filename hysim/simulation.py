@@ -7,10 +7,10 @@ from typing import Any, Protocol, runtime_checkable
 import numpy as np
 import numpy.typing as npt
 
-from hysim._frozen import FloatArray, frozen, vectors
-from hysim._printing import extent, printed, summary_text
-from hysim._progress import Reports, along, reports
-from hysim._results import Result, model_of
+from hysim._basics.frozen import FloatArray, frozen, vectors
+from hysim._basics.printing import extent, printed, summary_text
+from hysim._basics.progress import Reports, along, reports
+from hysim._basics.results import Result, model_of
 from hysim.interop import dataset, frame
 from hysim.models.dependent import on_record
 from hysim.models.protocols import Remembering, Responding, needs_time

@@ -114,7 +114,7 @@ def pyplot_keeps_no_figure():
 @pytest.fixture(autouse=True)
 def no_call_is_long_enough_to_report(monkeypatch):
     """A slow machine would write progress where a test expects nothing on the standard error."""
-    monkeypatch.setattr("hysim._progress._SILENT", float("inf"))
+    monkeypatch.setattr("hysim._basics.progress._SILENT", float("inf"))
 
 
 def once_for_all_processes(tmp_path_factory, name, compute):

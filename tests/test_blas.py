@@ -10,8 +10,8 @@ import pytest
 from threadpoolctl import threadpool_info, threadpool_limits
 
 import hysim as hs
-from hysim._blas import one_blas_thread
-from hysim._parallel import processes
+from hysim._basics.blas import one_blas_thread
+from hysim._basics.parallel import processes
 
 U = hs.signals.triangle(-1.0, 1.0, cycles=2, samples_per_cycle=40)
 RECORD = hs.Record(u=U, y=hs.Play(threshold=0.3).response(U))

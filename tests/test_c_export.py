@@ -12,7 +12,7 @@ import pytest
 from test_inverse_of_every_law import LAWS
 
 import hysim as hs
-from hysim._frozen import read_only
+from hysim._basics.frozen import read_only
 from hysim.cli import main
 from hysim.kernels.controllers import replay
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import hysim as hs
-from hysim._frozen import checked
+from hysim._basics.frozen import checked
 from hysim.kernels.stepping import drive
 from hysim.models.inverse_search import searched_inverse
 

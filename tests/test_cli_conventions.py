@@ -16,7 +16,7 @@ import numpy as np
 import pytest
 
 import hysim as hs
-from hysim._atomic import write_all
+from hysim._basics.atomic import write_all
 from hysim.cli import COMMANDS, Command, designs, main, models, options, outputs
 from hysim.cli.look import KINDS
 

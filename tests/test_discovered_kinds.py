@@ -118,7 +118,7 @@ def test_every_kind_goes_through_the_command_line(name, kinds, tmp_path, monkeyp
         tmp_path / "r.csv", np.column_stack(columns), delimiter=",", header="u,y,t"[: 2 * len(columns) - 1], comments=""
     )
     verb = "discover_oscillator" if isinstance(found, hs.OscillatorDiscovery) else "discover"
-    monkeypatch.setattr(f"hysim.discovery.{verb}", lambda record, **options: found)
+    monkeypatch.setattr(f"hysim.{verb}", lambda record, **options: found)
     command = ["discover", str(tmp_path / "r.csv"), *["--route", "oscillator"] * (verb == "discover_oscillator")]
     assert main([*command, "--json"]) == 0
     assert json.loads(capsys.readouterr().out)["discovery"]["fields"]["equation"] == found.equation

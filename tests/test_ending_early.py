@@ -12,9 +12,10 @@ from types import SimpleNamespace
 
 import pytest
 
-from hysim import _atomic, _parallel
-from hysim._atomic import write_all
-from hysim._parallel import in_chunks, map_on_threads, processes, second_process, threads
+from hysim._basics import atomic as _atomic
+from hysim._basics import parallel as _parallel
+from hysim._basics.atomic import write_all
+from hysim._basics.parallel import in_chunks, map_on_threads, processes, second_process, threads
 from hysim.cli import main
 from hysim.cli.signals import Ended
 

@@ -18,30 +18,30 @@ ALLOWED: dict[tuple[str, ...], tuple[str, ...]] = {
     ("laws/",): ("BoucWen", "PolynomialBoucWen", "PrandtlIshlinskii", "Duhem"),
     # What these parts are about: the paper's laws, the benchmark's, the rig's, and those that discovery returns.
     ("paper/",): ("BoucWen", "PolynomialBoucWen", "Line", "SingleValued"),
-    ("benchmarks.py", "discovery/_oscillator_models.py", "discovery/_structures.py"): ("BoucWen",),
-    ("discovery/_laws.py",): ("BoucWen", "Duhem"),
+    ("benchmarks.py", "discovery/_oscillator_response.py", "discovery/_refinement.py"): ("BoucWen",),
+    ("discovery/_result.py",): ("BoucWen", "Duhem"),
     ("rig/_rig.py",): ("PolynomialBoucWen",),
     # A discovered law is compared with the best sum of plays and the best curve.
-    ("discovery/_yardsticks.py",): ("PrandtlIshlinskii", "SingleValued"),
+    ("discovery/_competitors.py",): ("PrandtlIshlinskii", "SingleValued"),
     # A mass on a Bouc-Wen spring.
     ("plants/oscillator.py",): ("BoucWen", "PolynomialBoucWen"),
     ("plants/oscillator_structure.py",): ("BoucWen",),
     # A chain or an element without hysteresis has a line in its place, and a viscous part is moved exactly.
-    ("control/_feedforward.py", "control/_open_loop.py", "plants/chain.py", "plants/whole/input_sum.py"): ("Line",),
-    ("plants/structures/element.py",): ("Dashpot", "Line"),
+    ("control/_tracking.py", "control/_open_loop.py", "plants/chain.py", "plants/multi_input_actuator.py"): ("Line",),
+    ("plants/structures/parts.py",): ("Dashpot", "Line"),
     # The filter of small reversals is what a fit of a noisy input has in front of any law.
     ("identification/_assumptions.py", "identification/_measured.py"): ("ReversalFilter",),
     # The diagram of reversal curves is that of a density of relays.
-    ("plot/_maps.py",): ("Preisach", "PreisachRelays"),
+    ("plot/_sweeps.py",): ("Preisach", "PreisachRelays"),
     # A page computes a curve of knots, which has no step, and plays that widen with the speed, in the browser.
     ("export/_page_model.py",): ("RateDependentPrandtlIshlinskii", "SingleValued"),
     # Devices are sums of laws, or laws with the numbers of a material.
     ("export/_page_presets.py",): ("BoucWen", "Dahl", "Dashpot", "ExcessLoss", "JilesAtherton", "Line", "MaxwellSlip"),
     # Messages and examples name a law that a user may take.
     ("cli/",): ("BoucWen", "Preisach", "PrandtlIshlinskii"),
-    ("control/_adaptive.py", "control/_feedforward.py", "design/", "plants/actuator.py"): ("BoucWen",),
+    ("control/_adaptive.py", "control/_tracking.py", "design/", "plants/actuator.py"): ("BoucWen",),
     ("tracking/_track.py",): ("BoucWen",),
-    ("plants/whole/actuator_structure.py",): ("BoucWen", "Line"),
+    ("plants/actuator_structure.py",): ("BoucWen", "Line"),
     ("identification/_admissible.py", "discovery/_judgement.py"): ("PrandtlIshlinskii", "Preisach"),
 }  # fmt: skip
 """Files and folders that may name families beside a family's own file, and which."""

@@ -624,7 +624,7 @@ def test_a_unit_is_written_from_the_command_line(run):
         (("pid.json", "--out", "pid.fmu"), "sample"),
         (("loop.csv", "--out", "law.fmu"), "does not hold a model"),
         (("none.json", "--out", "law.fmu"), "No such file"),
-        (("law.json",), "required: --out"),
+        (("law.json",), "Missing option '--out'"),
     ],
 )
 def test_what_makes_no_unit_is_refused_in_one_line(run, tmp_path, arguments, message):

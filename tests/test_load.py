@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import hysim as hs
-from hysim._printing import csv_text
+from hysim._basics.printing import csv_text
 from hysim.files import FileColumn, _delimited
 
 LOOP = "time [s],voltage [V],displacement (um),note\n0,0,0.0,up\n1,5,0.079,\n2,10,0.152,top\n"

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import hysim as hs
-from hysim import _parallel
+from hysim._basics import parallel as _parallel
 from hysim.models.protocols import Remembering
 
 U = np.concatenate([np.linspace(0.0, 1.0, 9), np.linspace(0.9, -0.8, 11), np.linspace(-0.7, 0.6, 12)])

@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 import hysim as hs
-from hysim import _versions
-from hysim._printing import LETTERS, LINES, summary_text, wrapped
+from hysim._basics import versions as _versions
+from hysim._basics.printing import LETTERS, LINES, summary_text, wrapped
 
 UNITS = {"t": "s", "u": "V", "y": "um"}
 U = hs.signals.triangle(0.0, 100.0, cycles=2, samples_per_cycle=40)
@@ -125,7 +125,7 @@ def test_what_is_long_is_cut_within_its_lines(name):
 def test_a_result_that_cannot_draw_itself_says_what_draws_it():
     import re
 
-    from hysim import _printing
+    from hysim._basics import printing as _printing
 
     for name, calls in _printing._PICTURES.items():
         for function in re.findall(r"hs\.plot\.(\w+)\(", calls):

@@ -11,7 +11,7 @@ import pytest
 import sweep_tasks
 
 import hysim as hs
-from hysim import _progress
+from hysim._basics import progress as _progress
 from hysim.cli import main
 from hysim.paper import reproduce
 
@@ -144,7 +144,7 @@ def test_a_sweep_says_at_its_start_that_its_table_will_need_pandas(stream, at_on
 
 
 def test_a_simulation_reports_its_samples(monkeypatch):
-    monkeypatch.setattr("hysim._parallel._STRETCH", 2)
+    monkeypatch.setattr("hysim._basics.parallel._STRETCH", 2)
     calls = []
     hs.simulate(hs.Play(), None, [0.0, 1.0, 2.0, 1.0, 0.0], progress=lambda *at: calls.append(at))
     assert calls[:3] == [(2, 5), (4, 5), (5, 5)]

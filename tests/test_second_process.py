@@ -6,8 +6,8 @@ import sys
 import numpy as np
 import pytest
 
-from hysim import _parallel
-from hysim._parallel import second_process
+from hysim._basics import parallel as _parallel
+from hysim._basics.parallel import second_process
 
 FORKS = sys.platform.startswith("linux")
 

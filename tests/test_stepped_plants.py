@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import hysim as hs
-from hysim._frozen import checked
+from hysim._basics.frozen import checked
 from hysim.export import program_of
 from hysim.models.compiled_step import startable
 from hysim.models.protocols import needs_time

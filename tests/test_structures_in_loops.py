@@ -9,7 +9,7 @@ from frame_laws import bouc_wen
 from scipy.linalg import expm
 
 import hysim as hs
-from hysim.kernels.structures.path import follow
+from hysim.kernels.structure_path import follow
 
 pytestmark = pytest.mark.skipif(
     os.environ.get("NUMBA_DISABLE_JIT", "0") != "0",

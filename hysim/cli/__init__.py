@@ -15,7 +15,7 @@ import click
 from click.shell_completion import shell_complete
 
 from hysim import __version__
-from hysim._progress import silent
+from hysim._basics.progress import silent
 from hysim.cli import options, outputs, signals
 from hysim.cli.words import OTHER_NAMES, in_shell_words, suggestion
 from hysim.errors import SimulationError

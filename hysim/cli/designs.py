@@ -14,9 +14,9 @@ import numpy as np
 from scipy.optimize import brentq
 
 import hysim as hs
-from hysim._frozen import FloatArray
-from hysim._prefixes import label
-from hysim._printing import extent, folded, quantity
+from hysim._basics.frozen import FloatArray
+from hysim._basics.prefixes import label
+from hysim._basics.printing import extent, folded, quantity
 from hysim.cli import models, outputs
 from hysim.cli.models import DesignOptions
 from hysim.cli.options import Pair, positive

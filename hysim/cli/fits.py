@@ -125,7 +125,7 @@ def posterior(
     hysim posterior loop.csv --model play --resolution detect --noise quantised --samples 1000
     hysim posterior loop.csv --model bouc-wen --fix n=1 --prior sigma=0.01:0.1 --json
     """
-    from hysim._printing import csv_text
+    from hysim._basics.printing import csv_text
 
     subject = models.to_identify(fit)
     measured: Any = [records.read(settings, path) for path in (file, *others)]

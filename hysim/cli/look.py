@@ -103,7 +103,7 @@ def metrics(
 
 
 def _lines(loop: "hs.LoopMetrics", units: Mapping[str, str]) -> Iterator[str]:
-    from hysim._printing import folded, quantity
+    from hysim._basics.printing import folded, quantity
 
     u, y = (units.get(signal, "") for signal in ("u", "y"))
     product, ratio = (f"{y} {u}", f"{y}/{u}") if u and y else ("", "")

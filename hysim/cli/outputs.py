@@ -13,7 +13,7 @@ from typing import Any
 import click
 
 import hysim as hs
-from hysim._atomic import write_all
+from hysim._basics.atomic import write_all
 from hysim.cli.options import INPUT, MODEL, PICTURE, PRINTED, TABLE
 from hysim.cli.records import STANDARD
 from hysim.cli.words import in_shell_words
@@ -127,7 +127,7 @@ def _jsonable(value: Any) -> Any:
 
 def scalars(result: Any) -> dict[str, Any]:
     """The fields of a result that are numbers, words or truth values, by name."""
-    from hysim._frozen import items
+    from hysim._basics.frozen import items
 
     return {name: value for name, value in items(result).items() if isinstance(value, (str, int, float))}
 

@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 from typing import Any, Literal
 
 import hysim as hs
-from hysim._prefixes import power_of_ten
+from hysim._basics.prefixes import power_of_ten
 from hysim.cli import options
 
 STANDARD = "-"

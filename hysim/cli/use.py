@@ -4,7 +4,7 @@ from pathlib import Path
 from typing import Annotated, Any, Literal, Protocol, runtime_checkable
 
 import hysim as hs
-from hysim._atomic import write_all
+from hysim._basics.atomic import write_all
 from hysim.cli import models, options, outputs, records
 
 

@@ -13,12 +13,12 @@ from typing import Any, NamedTuple, Protocol, runtime_checkable
 import numpy as np
 
 from hysim import metrics
-from hysim._cycles import TOLERANCE
-from hysim._excursions import measured_cycles
-from hysim._frozen import FloatArray
-from hysim._parallel import map_on_threads
-from hysim._progress import Reports, announced_by, reports
-from hysim._results import Result, model_of
+from hysim._basics.frozen import FloatArray
+from hysim._basics.parallel import map_on_threads
+from hysim._basics.progress import Reports, announced_by, reports
+from hysim._basics.results import Result, model_of
+from hysim._turns.excursions import measured_cycles
+from hysim._turns.turning import TOLERANCE
 from hysim.comparison._result import Comparison, ComparisonRow
 from hysim.errors import Interrupted, SimulationError
 from hysim.identification import Identification, identify

@@ -9,9 +9,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from hysim._frozen import FloatArray, check_choice, frozen, items
+from hysim._basics.frozen import FloatArray, check_choice, frozen, items
+from hysim._basics.printing import aligned, bic_in_words, csv_text, folded, listed, printed, summary_text
 from hysim._names import among
-from hysim._printing import aligned, bic_in_words, csv_text, folded, listed, printed, summary_text
 from hysim.comparison._verdict import Contrast, contrasts
 from hysim.identification.forms import CONSTANT, SWAPPED
 from hysim.interop import frame, heading

@@ -35,7 +35,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from hysim._frozen import FloatArray, frozen
+from hysim._basics.frozen import FloatArray, frozen
 
 LEVEL = 0.05
 """Two models differ significantly if the probability is below this."""

@@ -1,6 +1,6 @@
 """Feed-forward by the inverse of a law whose numbers drift.
 
-Its equations stand in `hysim.kernels.adaptation.inverse`.
+Its equations stand in `hysim.kernels.adaptive_inverse`.
 """
 
 import functools
@@ -9,10 +9,10 @@ from typing import Any
 
 import numpy as np
 
-from hysim._frozen import FloatArray, read_only
+from hysim._basics.frozen import FloatArray, read_only
 from hysim.control._controller import WithoutFeedback, check_limits
 from hysim.kernels import stepping
-from hysim.kernels.adaptation.inverse import adaptive
+from hysim.kernels.adaptive_inverse import adaptive
 from hysim.models.compiled_step import compiled_step
 from hysim.models.inverse_search import searched_inverse
 from hysim.models.law import Law

@@ -12,8 +12,8 @@ import numpy as np
 import numpy.typing as npt
 
 from hysim import signals
-from hysim._frozen import FloatArray, frozen, read_only
-from hysim._printing import extent, printed, quantity, summary_text
+from hysim._basics.frozen import FloatArray, frozen, read_only
+from hysim._basics.printing import extent, printed, quantity, summary_text
 from hysim.control._controller import Controller, preview
 from hysim.control._loop import ClosedLoop, RestingPlant, around_actuator, as_actuator, sampled
 from hysim.control._open_loop import secant_gain, without_memory

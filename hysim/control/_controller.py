@@ -16,7 +16,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy.linalg import block_diag
 
-from hysim._frozen import FloatArray, check_not_negative, read_only, vectors
+from hysim._basics.frozen import FloatArray, check_not_negative, read_only, vectors
 from hysim.kernels import controllers as kernels
 from hysim.models.model import family
 from hysim.models.protocols import CompiledController, positive_time

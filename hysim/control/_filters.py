@@ -38,7 +38,7 @@ from typing import Self
 import numpy as np
 import numpy.typing as npt
 
-from hysim._frozen import FloatArray, check_count, check_not_negative, check_positive
+from hysim._basics.frozen import FloatArray, check_count, check_not_negative, check_positive
 from hysim.control._controller import Feedback
 from hysim.models.model import family
 from hysim.plants.sampled import sampled, vibration_stage

@@ -8,10 +8,10 @@ from typing import Any, TypeGuard
 import numpy as np
 import numpy.typing as npt
 
-from hysim._frozen import FloatArray, frozen, read_only, vectors
-from hysim._printing import extent, printed, quantity, summary_text
-from hysim._progress import Progress, Reports, reports
-from hysim._results import model_of
+from hysim._basics.frozen import FloatArray, frozen, read_only, vectors
+from hysim._basics.printing import extent, printed, quantity, summary_text
+from hysim._basics.progress import Progress, Reports, reports
+from hysim._basics.results import model_of
 from hysim.control._controller import Controller, begun, held_samples, limits_of, preview
 from hysim.errors import SimulationError, warn_beyond, warn_limited
 from hysim.models.model import in_brief

@@ -10,7 +10,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from hysim._frozen import FloatArray
+from hysim._basics.frozen import FloatArray
 from hysim.laws.static import Line
 from hysim.plants.actuator import Actuator
 

@@ -45,7 +45,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from hysim._frozen import FloatArray, check_positive
+from hysim._basics.frozen import FloatArray, check_positive
 from hysim.control._controller import Controller, Feedback, SampledController, limits_of
 from hysim.control._loop import RestingPlant, as_actuator
 from hysim.control._open_loop import secant_gain, slopes

@@ -16,8 +16,8 @@ from typing import Any
 
 import numpy as np
 
-from hysim._frozen import FloatArray
-from hysim._results import model_of
+from hysim._basics.frozen import FloatArray
+from hysim._basics.results import model_of
 from hysim.control._controller import PID
 from hysim.control._loop import as_actuator, is_controller
 from hysim.control._tracking import InverseFeedforward, TrackingController

@@ -18,7 +18,7 @@ from typing import Any, NamedTuple, Self
 import numpy as np
 import numpy.typing as npt
 
-from hysim._frozen import FloatArray, read_only
+from hysim._basics.frozen import FloatArray, read_only
 from hysim.control._controller import PID, Feedback, SampledController, WithoutFeedback, check_limits
 from hysim.control._filters import DampingLoop, ModeInverse, Notch, Shaper
 from hysim.kernels import tracking as kernels

@@ -26,8 +26,8 @@ import numpy as np
 import numpy.typing as npt
 from scipy.optimize import minimize
 
-from hysim._frozen import FloatArray, check_choice, check_positive, frozen
-from hysim._printing import printed, summary_text
+from hysim._basics.frozen import FloatArray, check_choice, check_positive, frozen
+from hysim._basics.printing import printed, summary_text
 from hysim.control._controller import PID, SampledController, limits_of
 from hysim.control._loop import RestingPlant, as_actuator, sampled
 from hysim.control._open_loop import secant_gain, slopes

@@ -7,9 +7,9 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from hysim._frozen import FloatArray, check_positive, frozen, read_only
-from hysim._printing import printed, summary_text
-from hysim._results import model_of
+from hysim._basics.frozen import FloatArray, check_positive, frozen, read_only
+from hysim._basics.printing import printed, summary_text
+from hysim._basics.results import model_of
 from hysim.design import _inputs as shapes
 from hysim.design._inputs import InputLimits
 from hysim.design._subjects import Criterion, LawAlone, Subject, merit, sizes_of, spreads, whole_actuator

@@ -8,7 +8,7 @@ import math
 
 import numpy as np
 
-from hysim._frozen import FloatArray, check_positive, checked
+from hysim._basics.frozen import FloatArray, check_positive, checked
 
 
 @checked

@@ -10,7 +10,7 @@ from typing import Any, Literal
 
 import numpy as np
 
-from hysim._frozen import FloatArray
+from hysim._basics.frozen import FloatArray
 from hysim._names import among
 from hysim.design._inputs import InputLimits, usual
 from hysim.identification.likelihood import Expected, density

@@ -31,8 +31,8 @@ from scipy.interpolate import BSpline
 from scipy.linalg import block_diag
 
 from hysim import metrics
-from hysim._cycles import TOLERANCE
-from hysim._frozen import FloatArray, checked
+from hysim._basics.frozen import FloatArray, checked
+from hysim._turns.turning import TOLERANCE
 from hysim.errors import SimulationError
 from hysim.identification import identify
 from hysim.laws.operators.prandtl_ishlinskii import PrandtlIshlinskii

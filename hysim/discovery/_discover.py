@@ -16,9 +16,9 @@ from typing import Any
 import numpy as np
 
 from hysim import metrics
-from hysim._blas import one_blas_thread
-from hysim._frozen import FloatArray, check_choice
-from hysim._progress import Progress, Reports, reports
+from hysim._basics.blas import one_blas_thread
+from hysim._basics.frozen import FloatArray, check_choice
+from hysim._basics.progress import Progress, Reports, reports
 from hysim.discovery._judgement import HYSTERESIS, LAG, NO_STRUCTURE, Competitors, Judgement, competitors, doubts, judge
 from hysim.discovery._refinement import DIVERGED, AnyExponent, Candidate, FreeRun, Samples, Work
 from hysim.discovery._result import Discovery, coefficients, law_from

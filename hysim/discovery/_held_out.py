@@ -20,8 +20,8 @@ import numpy as np
 import numpy.typing as npt
 from scipy import special
 
-from hysim._cycles import TOLERANCE, complete_cycles
-from hysim._frozen import FloatArray
+from hysim._basics.frozen import FloatArray
+from hysim._turns.turning import TOLERANCE, complete_cycles
 from hysim.discovery._competitors import FLOOR, Rival, curve, means, plays, relaxations, trend
 from hysim.errors import SimulationError
 from hysim.identification import folds as blocks

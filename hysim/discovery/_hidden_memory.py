@@ -22,7 +22,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy.interpolate import CubicSpline
 
-from hysim._frozen import FloatArray
+from hysim._basics.frozen import FloatArray
 from hysim.discovery._slopes import independent, sparse_path
 from hysim.identification.marquardt import Schedule, SumOfSquares, descend
 from hysim.kernels import memory_terms as kernels

@@ -20,8 +20,8 @@ from typing import NamedTuple
 import numpy as np
 
 from hysim import metrics
-from hysim._frozen import FloatArray, check_positive
-from hysim._progress import Progress, Reports, reports
+from hysim._basics.frozen import FloatArray, check_positive
+from hysim._basics.progress import Progress, Reports, reports
 from hysim.discovery._hidden_memory import PLANT, HiddenMemory, Regressed, TermRegression
 from hysim.discovery._judgement import NO_STRUCTURE
 from hysim.discovery._oscillator_response import (

@@ -23,8 +23,8 @@ import numpy as np
 import numpy.typing as npt
 
 from hysim import metrics
-from hysim._frozen import FloatArray
-from hysim._parallel import in_chunks
+from hysim._basics.frozen import FloatArray
+from hysim._basics.parallel import in_chunks
 from hysim.discovery._hidden_memory import (
     BLOCKS,
     FLOOR,

@@ -25,7 +25,7 @@ from typing import Generic, NamedTuple, Self, TypeVar
 import numpy as np
 import numpy.typing as npt
 
-from hysim._frozen import FloatArray
+from hysim._basics.frozen import FloatArray
 from hysim.discovery._slopes import Regression
 from hysim.identification.marquardt import Schedule, SumOfSquares, descend, differences
 from hysim.laws.differential.boucwen import BoucWen

@@ -16,8 +16,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from hysim._frozen import FloatArray, frozen
-from hysim._printing import printed, summary_text, wrapped
+from hysim._basics.frozen import FloatArray, frozen
+from hysim._basics.printing import printed, summary_text, wrapped
 from hysim.discovery._judgement import Judgement
 from hysim.discovery._refinement import AnyExponent, Candidate, Structure, Terms
 from hysim.identification.forms import Stored

@@ -38,7 +38,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from hysim._frozen import FloatArray
+from hysim._basics.frozen import FloatArray
 from hysim.discovery._refinement import Candidate, FreeRun, Terms, bic_of, cost_of
 from hysim.discovery._slopes import Regression
 from hysim.laws.differential.terms import Term, bouc_wen_exponent

@@ -8,11 +8,11 @@ from typing import Any
 
 import numpy as np
 
-from hysim._atomic import write_text
-from hysim._frozen import FloatArray, frozen
-from hysim._printing import printed, summary_text
+from hysim._basics.atomic import write_text
+from hysim._basics.frozen import FloatArray, frozen
+from hysim._basics.printing import printed, summary_text
+from hysim._basics.results import model_of
 from hysim._release import __version__
-from hysim._results import model_of
 from hysim.errors import warn_unsafe
 from hysim.export import _c
 from hysim.export._program import Program, program_of, start_of

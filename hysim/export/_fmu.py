@@ -15,10 +15,10 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any, Literal, NamedTuple
 
-from hysim._atomic import write_all
-from hysim._frozen import check_choice
+from hysim._basics.atomic import write_all
+from hysim._basics.frozen import check_choice
+from hysim._basics.results import model_of
 from hysim._release import __version__
-from hysim._results import model_of
 from hysim.errors import warn_unsafe
 from hysim.export._c import number, table
 from hysim.export._compilers import TARGETS, Target, compiler, host, shared_library, universal

@@ -7,7 +7,7 @@ from typing import NamedTuple
 from xml.etree import ElementTree
 from xml.etree.ElementTree import Element
 
-from hysim._prefixes import prefixed
+from hysim._basics.prefixes import prefixed
 from hysim._release import __version__
 from hysim.export._program import Program
 

@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from hysim._frozen import FloatArray
+from hysim._basics.frozen import FloatArray
 from hysim.export._symbols import HELPERS, OPERATIONS, Number, Symbol, Tape, UntraceableError, helper, in_javascript
 from hysim.models.law import Law
 

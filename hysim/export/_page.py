@@ -17,13 +17,13 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from hysim._atomic import write_text
-from hysim._cycles import TOLERANCE, Samples
-from hysim._excursions import measured_cycles
-from hysim._frozen import FloatArray, items
-from hysim._prefixes import label, printed
+from hysim._basics.atomic import write_text
+from hysim._basics.frozen import FloatArray, items
+from hysim._basics.prefixes import label, printed
+from hysim._basics.results import model_of
 from hysim._release import __version__
-from hysim._results import model_of
+from hysim._turns.excursions import measured_cycles
+from hysim._turns.turning import TOLERANCE, Samples
 from hysim.export._compilers import compressed
 from hysim.export._page_model import Parts, about, heading, node_of, plane_of
 from hysim.records import Record

@@ -14,13 +14,12 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from hysim._frozen import FloatArray
+from hysim._basics.frozen import FloatArray
 from hysim.errors import SimulationError
 from hysim.export._c import plain
 from hysim.export._compilers import Kernels, kernels_of, module_of
 from hysim.export._packing import packing
-from hysim.kernels import clamps, play_sums
-from hysim.kernels.magnetics import energy_plays
+from hysim.kernels import clamps, energy_plays, play_sums
 from hysim.laws.dashpot import RatePart
 from hysim.laws.friction.rated_law import RatedLaw
 from hysim.laws.operators.rate_dependent_prandtl_ishlinskii import RateDependentPrandtlIshlinskii

@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import Any
 
 import hysim as hs
-from hysim._atomic import write_text
+from hysim._basics.atomic import write_text
 from hysim.benchmarks import noel_schoukens_plant
 from hysim.export._page import Shown, checked_path, page_text
 from hysim.models.model import families

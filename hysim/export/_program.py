@@ -17,7 +17,7 @@ from dataclasses import dataclass, field, replace
 from types import MappingProxyType
 from typing import Any, NamedTuple
 
-from hysim._frozen import FloatArray, frozen, read_only
+from hysim._basics.frozen import FloatArray, frozen, read_only
 from hysim.control import Controller, InverseFeedforward, RestingPlant, TrackingController, begun, preview
 from hysim.export import _c
 from hysim.export._body import Body

@@ -27,7 +27,7 @@ from typing import IO, Any, BinaryIO
 import numpy as np
 import numpy.typing as npt
 
-from hysim._frozen import FloatArray
+from hysim._basics.frozen import FloatArray
 from hysim.files._table import Column, Notes, damaged, listed, notes_in, number_of, require, shown
 
 MOST_BYTES = 2_000_000_000

@@ -26,8 +26,8 @@ from typing import BinaryIO, NamedTuple
 
 import numpy as np
 
-from hysim._frozen import FloatArray
-from hysim._printing import text_in_cell
+from hysim._basics.frozen import FloatArray
+from hysim._basics.printing import text_in_cell
 from hysim.files._table import COMMENTS, Column, Notes, column_of, json_value, notes_in, require, shown
 from hysim.interop import heading
 

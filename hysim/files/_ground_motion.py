@@ -12,8 +12,8 @@ from typing import Any, Literal, NamedTuple
 
 import numpy as np
 
-from hysim._frozen import FloatArray
-from hysim._prefixes import power_of_ten
+from hysim._basics.frozen import FloatArray
+from hysim._basics.prefixes import power_of_ten
 from hysim.files._delimited import Text, delimited
 from hysim.files._load import Source, opened, options_of_a_text, table_of
 from hysim.files._number_lists import (

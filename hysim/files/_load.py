@@ -16,8 +16,8 @@ from typing import Any, BinaryIO, Literal, NamedTuple, Protocol, TextIO, TypedDi
 import numpy as np
 import numpy.typing as npt
 
-from hysim._frozen import FloatArray, check_choice
-from hysim._progress import Progress, Reports, reports
+from hysim._basics.frozen import FloatArray, check_choice
+from hysim._basics.progress import Progress, Reports, reports
 from hysim._resolution import output_quantum
 from hysim.files._arrays import NUMBERS, Arrays, mat, npy, npz
 from hysim.files._delimited import DECIMALS, THOUSANDS, Delimited, Text, delimited

@@ -20,7 +20,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from hysim._frozen import FloatArray
+from hysim._basics.frozen import FloatArray
 from hysim.files._table import COMMENTS, require, shown
 
 TOP = 60

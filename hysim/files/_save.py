@@ -11,11 +11,11 @@ from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
 
-from hysim._atomic import write_all
+from hysim._basics.atomic import write_all
+from hysim._basics.frozen import FloatArray
+from hysim._basics.printing import csv_text
+from hysim._basics.versions import optional
 from hysim._channels import along
-from hysim._frozen import FloatArray
-from hysim._printing import csv_text
-from hysim._versions import optional
 from hysim.files._arrays import NOTES, UNITS
 from hysim.files._table import Notes
 from hysim.records import Record, as_record

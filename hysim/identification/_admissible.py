@@ -30,7 +30,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from hysim._frozen import FloatArray
+from hysim._basics.frozen import FloatArray
 from hysim.errors import SimulationError
 from hysim.identification._result import Candidate
 from hysim.identification._search import optima, polish, spread

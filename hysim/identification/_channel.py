@@ -11,10 +11,10 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from hysim._basics.frozen import FloatArray, frozen
+from hysim._basics.printing import printed, quantity, summary_text
+from hysim._basics.results import model_of
 from hysim._channels import value_in
-from hysim._frozen import FloatArray, frozen
-from hysim._printing import printed, quantity, summary_text
-from hysim._results import model_of
 from hysim.identification._identify import identify
 from hysim.identification._result import Identification
 from hysim.identification.forms import Stored

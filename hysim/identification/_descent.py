@@ -18,7 +18,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from hysim._frozen import FloatArray
+from hysim._basics.frozen import FloatArray
 from hysim.identification._noise import Noise
 from hysim.identification._problem import Problem
 from hysim.identification.marquardt import Evaluated, Flags, Sets, Trial, bounded_steps, descend

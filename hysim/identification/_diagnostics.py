@@ -10,9 +10,9 @@ import numpy as np
 import numpy.typing as npt
 
 from hysim import metrics
-from hysim._cycles import TOLERANCE
-from hysim._frozen import FloatArray
-from hysim._input_noise import noise_level
+from hysim._basics.frozen import FloatArray
+from hysim._turns.input_noise import noise_level
+from hysim._turns.turning import TOLERANCE
 from hysim.errors import SimulationError
 from hysim.identification._descent import Descent
 from hysim.identification._noise import Gaussian, Noise

@@ -13,11 +13,11 @@ import numpy as np
 import numpy.typing as npt
 
 from hysim import metrics
-from hysim._blas import one_blas_thread
-from hysim._frozen import FloatArray, check_choice, check_count, read_only
-from hysim._parallel import at_most
-from hysim._progress import Progress, Reports, reports
-from hysim._results import model_of
+from hysim._basics.blas import one_blas_thread
+from hysim._basics.frozen import FloatArray, check_choice, check_count, read_only
+from hysim._basics.parallel import at_most
+from hysim._basics.progress import Progress, Reports, reports
+from hysim._basics.results import model_of
 from hysim.identification._admissible import choose, danger, excursion, implausible
 from hysim.identification._assumptions import Treated, decided, in_units_of_noise, quiet_rmse, treated
 from hysim.identification._diagnostics import fit_measures, left_out, left_out_errors, rate_noise_warning, rms_of_known

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from hysim import metrics
-from hysim._frozen import FloatArray
+from hysim._basics.frozen import FloatArray
 from hysim.errors import SimulationError
 from hysim.identification._assumptions import Treated
 from hysim.identification._result import Candidate, Identification

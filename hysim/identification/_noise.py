@@ -22,7 +22,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from hysim._frozen import FloatArray, check_choice
+from hysim._basics.frozen import FloatArray, check_choice
 
 _FREEDOM = 4.0  # of Student's t: a compromise between efficiency on normal noise and indifference to outliers
 _FINEST = 0.1  # smallest sigma of rounded data, in quanta: with less noise intervals are on the safe side

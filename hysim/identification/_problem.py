@@ -17,10 +17,10 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from hysim._basics.frozen import FloatArray
 from hysim._channels import taken
-from hysim._frozen import FloatArray
 from hysim._names import meant
-from hysim._repeats import repeated_cycle
+from hysim._turns.repeats import repeated_cycle
 from hysim.identification.marquardt import Settled, least_squares, triangle
 from hysim.models.protocols import Forgetting, Identifiable, Staged, placed
 from hysim.models.search_space import STATES, STATES_IN_WORDS, Freedom, Parameters, SearchSpace

@@ -11,7 +11,7 @@ there. Other optima inside the interval count too.
 import numpy as np
 import numpy.typing as npt
 
-from hysim._frozen import FloatArray, frozen
+from hysim._basics.frozen import FloatArray, frozen
 from hysim.identification._descent import Constraint, Descent
 
 _ENOUGH = 0.01  # of sqrt(D) at the end of an interval

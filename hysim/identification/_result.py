@@ -6,8 +6,8 @@ from typing import Any
 
 import numpy as np
 
-from hysim._frozen import FloatArray, frozen
-from hysim._printing import bic_in_words, folded, printed, summary_text, wrapped
+from hysim._basics.frozen import FloatArray, frozen
+from hysim._basics.printing import bic_in_words, folded, printed, summary_text, wrapped
 from hysim.identification._profile import Profile
 from hysim.identification.forms import Stored
 from hysim.interop import frame

@@ -11,9 +11,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from hysim._frozen import FloatArray
-from hysim._printing import listed
-from hysim._progress import Progress
+from hysim._basics.frozen import FloatArray
+from hysim._basics.printing import listed
+from hysim._basics.progress import Progress
 from hysim.identification._descent import Descent, Reached
 from hysim.identification._noise import Gaussian
 from hysim.identification._problem import Problem

@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from hysim import metrics
-from hysim._frozen import FloatArray
+from hysim._basics.frozen import FloatArray
 from hysim.identification._assumptions import Treated
 from hysim.identification._descent import Descent
 from hysim.identification._diagnostics import bootstrap, fit_measures, loop_widths, width_stderr

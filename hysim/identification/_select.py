@@ -4,9 +4,9 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
-from hysim._frozen import check_choice, frozen
-from hysim._printing import aligned, printed, summary_text
-from hysim._progress import Reports, announced_by, reports
+from hysim._basics.frozen import check_choice, frozen
+from hysim._basics.printing import aligned, printed, summary_text
+from hysim._basics.progress import Reports, announced_by, reports
 from hysim.identification._identify import identify
 from hysim.identification._result import Identification
 from hysim.identification.sharing import sharing

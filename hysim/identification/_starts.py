@@ -28,8 +28,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from hysim._basics.frozen import FloatArray
 from hysim._channels import steady
-from hysim._frozen import FloatArray
 from hysim.errors import SimulationError
 from hysim.identification._assumptions import decided
 from hysim.identification._problem import Problem, Setting

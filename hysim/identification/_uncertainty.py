@@ -18,7 +18,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from hysim._frozen import FloatArray
+from hysim._basics.frozen import FloatArray
 from hysim.errors import SimulationError
 from hysim.identification._descent import named_slopes
 from hysim.identification._problem import Problem

@@ -10,7 +10,7 @@ from typing import Any, Self
 
 import numpy as np
 
-from hysim._frozen import FloatArray
+from hysim._basics.frozen import FloatArray
 from hysim.identification._descent import named_slopes
 from hysim.identification._measured import without_filter
 from hysim.identification._noise import Noise, density

@@ -17,7 +17,7 @@ from typing import NamedTuple, Protocol
 import numpy as np
 import numpy.typing as npt
 
-from hysim._frozen import FloatArray
+from hysim._basics.frozen import FloatArray
 
 _RANK = 1e-11  # singular values of the normalised columns below this are taken as zero
 _MANY = 8  # columns from which on a triangle costs clearly less

@@ -15,8 +15,8 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from hysim._frozen import FloatArray
-from hysim._parallel import awaited
+from hysim._basics.frozen import FloatArray
+from hysim._basics.parallel import awaited
 from hysim.identification._problem import Problem
 
 T = TypeVar("T")

@@ -14,7 +14,7 @@ from dataclasses import replace
 import numpy as np
 
 from hysim import metrics
-from hysim._frozen import FloatArray
+from hysim._basics.frozen import FloatArray
 from hysim.errors import SimulationError
 from hysim.identification._problem import Setting, problems
 from hysim.identification._search import brief_cost

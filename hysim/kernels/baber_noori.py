@@ -23,7 +23,7 @@ A law that neither wears off nor pinches takes the exact step of `hysim.kernels.
 
 import math
 
-from hysim._frozen import FloatArray
+from hysim._basics.frozen import FloatArray
 from hysim.kernels import boucwen
 from hysim.kernels._compile import inner, kernel
 from hysim.kernels.baber_noori_series import (

@@ -8,7 +8,7 @@ all its terms underflow; there it is left out, and a step ends before the bell c
 
 import math
 
-from hysim._frozen import FloatArray
+from hysim._basics.frozen import FloatArray
 from hysim.kernels._compile import inner, kernel, pasted
 from hysim.kernels.remainder import FARTHEST, N_TERMS, ROUNDING, fraction
 

@@ -11,7 +11,7 @@ import math
 import numpy as np
 from numba import float64, int64, types, void
 
-from hysim._frozen import FloatArray
+from hysim._basics.frozen import FloatArray
 from hysim.kernels._compile import inlined, signed_kernel
 from hysim.kernels.stepping import START, STEP, Start, Step, drive
 

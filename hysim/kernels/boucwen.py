@@ -21,7 +21,7 @@ import math
 
 import numpy as np
 
-from hysim._frozen import FloatArray
+from hysim._basics.frozen import FloatArray
 from hysim.kernels._compile import borrowed, inlined, inner, kernel
 from hysim.kernels.charts import N_WORK, in_chart, power_flow, prepare_exponent
 from hysim.kernels.elementary import (

@@ -20,7 +20,7 @@ forms, and numba leaves out the charts of other exponents, which take most of th
 
 import math
 
-from hysim._frozen import FloatArray
+from hysim._basics.frozen import FloatArray
 from hysim.kernels import boucwen
 from hysim.kernels._compile import borrowed, inner, kernel, pasted
 from hysim.kernels.elementary import power

@@ -25,7 +25,7 @@ made before.
 
 import math
 
-from hysim._frozen import FloatArray
+from hysim._basics.frozen import FloatArray
 from hysim.kernels._compile import inlined, inner
 from hysim.kernels.elementary import N_TERMS, sum8, sum16
 

@@ -20,7 +20,7 @@ depends on the input, beside a polynomial of it (`bent_step`):
 
 import numpy as np
 
-from hysim._frozen import FloatArray
+from hysim._basics.frozen import FloatArray
 from hysim.kernels._compile import inlined, kernel, signed_kernel
 from hysim.kernels.stepping import START, STEP
 

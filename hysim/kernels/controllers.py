@@ -22,7 +22,7 @@ from collections.abc import Callable
 
 from numba import float64, int64, types
 
-from hysim._frozen import FloatArray
+from hysim._basics.frozen import FloatArray
 from hysim.kernels._compile import borrowed, signed_kernel
 from hysim.kernels.stepping import CONSTANTS, VECTOR
 

@@ -32,7 +32,7 @@ import math
 
 import numpy as np
 
-from hysim._frozen import FloatArray
+from hysim._basics.frozen import FloatArray
 from hysim.kernels._compile import inner, kernel
 from hysim.kernels.remainder import N_TERMS, ROUNDING, fraction
 

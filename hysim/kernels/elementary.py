@@ -23,7 +23,7 @@ from fractions import Fraction
 
 from numba import float64, int64, types
 
-from hysim._frozen import FloatArray, read_only
+from hysim._basics.frozen import FloatArray, read_only
 from hysim.kernels._compile import inlined, inner, signed_inlined
 
 N_TERMS = 16

@@ -15,7 +15,7 @@ both laws are the same is not cut: a Bouc-Wen law in this form gives the bits of
 
 import math
 
-from hysim._frozen import FloatArray
+from hysim._basics.frozen import FloatArray
 from hysim.kernels import boucwen
 from hysim.kernels._compile import inner, kernel, pasted
 from hysim.kernels.charts import N_WORK

@@ -18,7 +18,7 @@ from collections.abc import Callable
 
 from numba import float64, types
 
-from hysim._frozen import FloatArray
+from hysim._basics.frozen import FloatArray
 from hysim.kernels import clamps
 from hysim.kernels._compile import borrowed, by_address, inlined, inner, kernel, signed_closure
 from hysim.kernels.stepping import CONSTANTS, STEP, VECTOR, Step

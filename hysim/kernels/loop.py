@@ -57,7 +57,7 @@ import numpy as np
 import numpy.typing as npt
 from numba import float64, int64, types, void
 
-from hysim._frozen import FloatArray
+from hysim._basics.frozen import FloatArray
 from hysim.kernels._compile import borrowed, by_address, closure, inlined, signed_closure, signed_kernel
 from hysim.kernels.controllers import CONTROLLER, LARGEST, ControllerStep, guarded
 from hysim.kernels.stepping import CONSTANTS, START, STEP, VECTOR, Start, Step

@@ -5,7 +5,7 @@ import math
 import numpy as np
 from numba import int64, void
 
-from hysim._frozen import FloatArray
+from hysim._basics.frozen import FloatArray
 from hysim.kernels._compile import signed_kernel
 from hysim.kernels.batches import ROWS, TABLE, begin
 from hysim.kernels.stepping import CONSTANTS, STEP, VECTOR, Step, drive

@@ -13,7 +13,7 @@ numbers are refined elsewhere.
 
 import math
 
-from hysim._frozen import FloatArray
+from hysim._basics.frozen import FloatArray
 from hysim.kernels._compile import inner, kernel
 
 LARGEST = 1e150

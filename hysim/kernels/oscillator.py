@@ -28,7 +28,7 @@ import math
 
 import numpy as np
 
-from hysim._frozen import FloatArray
+from hysim._basics.frozen import FloatArray
 from hysim.kernels._compile import inlined, inner, kernel
 from hysim.kernels.boucwen import advance, polynomial
 from hysim.kernels.elementary import linear_flow, power

@@ -16,7 +16,7 @@ import math
 
 from numba import float64, types, void
 
-from hysim._frozen import FloatArray
+from hysim._basics.frozen import FloatArray
 from hysim.kernels._compile import borrowed, inlined, inner, kernel, signed_kernel
 from hysim.kernels.inverses import N_LIMITS, N_PLACE, within_limits
 from hysim.kernels.stepping import CONSTANTS, STEP, VECTOR

@@ -18,7 +18,7 @@ import math
 
 import numpy as np
 
-from hysim._frozen import FloatArray
+from hysim._basics.frozen import FloatArray
 from hysim.kernels._compile import borrowed, inner, kernel
 from hysim.kernels.inverses import N_LIMITS, N_PLACE, within_limits
 

@@ -16,7 +16,7 @@ from collections.abc import Callable
 
 from numba import float64, int64, types, void
 
-from hysim._frozen import FloatArray
+from hysim._basics.frozen import FloatArray
 from hysim.kernels._compile import Addressed as Addressed
 from hysim.kernels._compile import borrowed as borrowed
 from hysim.kernels._compile import by_address as by_address

@@ -28,7 +28,7 @@ from collections.abc import Callable
 
 from numba import float64
 
-from hysim._frozen import FloatArray
+from hysim._basics.frozen import FloatArray
 from hysim.kernels._compile import borrowed, by_address, inlined, kernel, signed_closure
 from hysim.kernels.controllers import CONTROLLER, ControllerStep, pid
 from hysim.kernels.loop import advance, output

@@ -25,7 +25,7 @@ A law that diverges is returned as `inf`; one so stiff that it needs more than M
 
 import math
 
-from hysim._frozen import FloatArray, read_only
+from hysim._basics.frozen import FloatArray, read_only
 from hysim.kernels import boucwen
 from hysim.kernels._compile import kernel
 from hysim.kernels.duhem import MAX_STEPS, newton

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from hysim._frozen import FloatArray, checked, read_only
+from hysim._basics.frozen import FloatArray, checked, read_only
 from hysim.models.batch import Reduction
 from hysim.models.compiled_step import compiled_start, compiled_step
 from hysim.models.law import Law, Packed, rows_by_step

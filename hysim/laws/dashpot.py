@@ -7,7 +7,7 @@ from typing import Any, ClassVar, Self
 import numpy as np
 import numpy.typing as npt
 
-from hysim._frozen import FloatArray, check_not_negative, items, read_only
+from hysim._basics.frozen import FloatArray, check_not_negative, items, read_only
 from hysim.kernels import stepping
 from hysim.laws.static import linear_space
 from hysim.models.batch import Batch, Reduction, Sets

@@ -24,7 +24,7 @@ from typing import ClassVar, NamedTuple, Self
 import numpy as np
 import numpy.typing as npt
 
-from hysim._frozen import FloatArray, read_only
+from hysim._basics.frozen import FloatArray, read_only
 from hysim.kernels import inverses, stepping
 from hysim.models.composable import Composable
 from hysim.models.law import Law

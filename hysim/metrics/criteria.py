@@ -14,7 +14,7 @@ import math
 import numpy as np
 import numpy.typing as npt
 
-from hysim._frozen import FloatArray, read_only, vectors
+from hysim._basics.frozen import FloatArray, read_only, vectors
 
 
 def information(mean_square: float, n_samples: int, n_parameters: int, *, floor: float = 0.0) -> float:

@@ -14,9 +14,9 @@ from typing import Literal, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from hysim._frozen import FloatArray, read_only
+from hysim._basics.frozen import FloatArray, read_only
+from hysim._basics.parallel import in_chunks
 from hysim._names import meant
-from hysim._parallel import in_chunks
 from hysim.metrics.rows import LoopRows
 
 Reduction = Literal["sse", "max_width", "area", "final"]

@@ -5,7 +5,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
-from hysim._frozen import FloatArray
+from hysim._basics.frozen import FloatArray
 from hysim.models.protocols import Forgetting, Identifiable, LongerPast, Staged, Undecided, Variant
 from hysim.models.search_space import ALL_FREE, Freedom, Parameters, SearchSpace
 from hysim.models.stages import Simpler, Stage

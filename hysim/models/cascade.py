@@ -16,7 +16,7 @@ from typing import Any, ClassVar
 import numpy as np
 import numpy.typing as npt
 
-from hysim._frozen import FloatArray, checked, read_only
+from hysim._basics.frozen import FloatArray, checked, read_only
 from hysim.kernels.stepping import one_behind_the_other
 from hysim.models.compiled_step import startable
 from hysim.models.composable import Composable

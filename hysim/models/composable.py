@@ -5,8 +5,8 @@ from dataclasses import dataclass, field, replace
 from types import MappingProxyType
 from typing import Any, ClassVar, NamedTuple, Self
 
-from hysim._frozen import LAST, items, own_items
-from hysim._results import model_of
+from hysim._basics.frozen import LAST, items, own_items
+from hysim._basics.results import model_of
 from hysim.models.model import Example
 from hysim.models.protocols import Responding
 

@@ -12,8 +12,8 @@ from typing import Any, Protocol, runtime_checkable
 import numpy as np
 import numpy.typing as npt
 
+from hysim._basics.frozen import FloatArray, read_only
 from hysim._channels import Channels, checked_channels, steady, taken, value_in
-from hysim._frozen import FloatArray, read_only
 from hysim.models.dependent_structure import DependentStructure
 from hysim.models.model import family
 from hysim.models.parts import response_of

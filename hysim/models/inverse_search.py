@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from hysim._frozen import FloatArray, read_only
-from hysim._parallel import in_pieces
+from hysim._basics.frozen import FloatArray, read_only
+from hysim._basics.parallel import in_pieces
 from hysim.errors import SimulationError
 from hysim.kernels import inverses as kernels
 from hysim.kernels.stepping import drive

@@ -16,7 +16,7 @@ from typing import Any
 
 import numpy as np
 
-from hysim._frozen import FloatArray, frozen, read_only
+from hysim._basics.frozen import FloatArray, frozen, read_only
 
 _SHARE = 0.1  # of a number: the first step that is tried; of a zero, 1
 _FALL = 8.0  # by which steps become shorter

@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from hysim._frozen import FloatArray
+from hysim._basics.frozen import FloatArray
 from hysim._names import among
 from hysim.models.parts import own
 from hysim.models.protocols import Undecided, Variant

@@ -17,9 +17,9 @@ from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple, Self
 import numpy as np
 import numpy.typing as npt
 
-from hysim._cycles import TOLERANCE
-from hysim._frozen import FloatArray, items, last_names, read_only
-from hysim._parallel import in_pieces
+from hysim._basics.frozen import FloatArray, items, last_names, read_only
+from hysim._basics.parallel import in_pieces
+from hysim._turns.turning import TOLERANCE
 from hysim.errors import SimulationError, warn_beyond
 from hysim.kernels import stepping
 from hysim.kernels.stepping import Start, Step, drive

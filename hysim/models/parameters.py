@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from hysim._frozen import FloatArray
+from hysim._basics.frozen import FloatArray
 from hysim.models.search_space import Freedom, SearchSpace
 from hysim.models.tables import scalars_of
 from hysim.records import Record

@@ -7,7 +7,7 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from hysim._frozen import FloatArray, read_only
+from hysim._basics.frozen import FloatArray, read_only
 from hysim.kernels.stepping import Start, Step, complete, self_starting, started_both
 from hysim.models.protocols import CompiledLaw, OfFamily, Responding, Startable, Steppable, needed_time, needs_time
 

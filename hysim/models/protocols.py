@@ -10,7 +10,7 @@ from typing import Any, ClassVar, NamedTuple, Protocol, Self, TypeGuard, runtime
 
 import numpy as np
 
-from hysim._frozen import FloatArray
+from hysim._basics.frozen import FloatArray
 from hysim.models.search_space import ALL_FREE, Freedom, Parameters, SearchSpace
 from hysim.models.stages import Simpler, Stage
 from hysim.records import Record
@@ -119,7 +119,7 @@ class Rated(Protocol):
     """A law that depends on the rate of its input, as an element of a structure takes it."""
 
     def rated(self) -> Startable:
-        """The step for strokes of known durations and rates, without a dashpot; see `hysim.kernels.friction.rates`."""
+        """The step for strokes of known durations and rates, without a dashpot; see `hysim.kernels.friction_rates`."""
 
     @property
     def viscosity(self) -> float:

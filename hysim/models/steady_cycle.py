@@ -14,7 +14,7 @@ from collections.abc import Callable
 import numpy as np
 import numpy.typing as npt
 
-from hysim._frozen import FloatArray
+from hysim._basics.frozen import FloatArray
 
 Pass = Callable[[FloatArray], FloatArray]
 """Memory (n_sets, n_memory) after a pass, from that before it; nan where it diverges."""

@@ -13,11 +13,11 @@ from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
 
-from hysim._atomic import write_text
-from hysim._frozen import given_items, last_names
+from hysim._basics.atomic import write_text
+from hysim._basics.frozen import given_items, last_names
+from hysim._basics.results import model_of
 from hysim._names import MODULE_OF
 from hysim._release import __version__
-from hysim._results import model_of
 from hysim.models.model import FAMILIES, every_family
 
 _DEEPEST = 100  # lists and mappings in each other: a chain of chains takes three for a model

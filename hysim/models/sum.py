@@ -14,7 +14,7 @@ from typing import Any, ClassVar
 import numpy as np
 import numpy.typing as npt
 
-from hysim._frozen import FloatArray, checked, items, read_only
+from hysim._basics.frozen import FloatArray, checked, items, read_only
 from hysim.errors import warn_beyond
 from hysim.kernels.stepping import side_by_side
 from hysim.models.by_structure import ByStructure

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from hysim._frozen import FloatArray, read_only
+from hysim._basics.frozen import FloatArray, read_only
 from hysim._names import among
 from hysim.models.search_space import Parameters
 

@@ -21,9 +21,9 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from hysim._basics.frozen import FloatArray, read_only
+from hysim._basics.parallel import in_chunks
 from hysim._channels import label
-from hysim._frozen import FloatArray, read_only
-from hysim._parallel import in_chunks
 from hysim.errors import SimulationError
 from hysim.kernels import stepping
 from hysim.models.compiled_step import compiled_start, compiled_step
@@ -228,7 +228,7 @@ def paths(law: Law, parameters: Parameters, u: FloatArray) -> FloatArray:
     A number has the shape (n_sets, n_samples), (n_sets,) or (). Raises ValueError if the law's state holds what depends
     on a number that varies.
     """
-    from hysim.kernels.channels.varying import drive_varying  # compiled where it is needed
+    from hysim.kernels.varying import drive_varying  # compiled where it is needed
 
     if law.u0 is not None:
         again = {k: np.insert(v, 0, v[:, 0], axis=1) if np.ndim(v) == 2 else v for k, v in parameters.items()}

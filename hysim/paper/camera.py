@@ -23,7 +23,7 @@ from typing import Any
 import numpy as np
 
 from hysim import signals
-from hysim._frozen import FloatArray, frozen
+from hysim._basics.frozen import FloatArray, frozen
 from hysim.control import PID, RestingPlant, as_actuator, open_loop
 from hysim.datasets import PIXEL
 from hysim.metrics import VibrationReduction, loop_metrics, reduction_percent, rmse, vibration_reduction

@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from hysim._frozen import FloatArray, frozen
+from hysim._basics.frozen import FloatArray, frozen
 from hysim.control import to_control
 from hysim.metrics import LoopMetrics, fit_percent, fpe, loop_metrics
 from hysim.paper import equations, printed

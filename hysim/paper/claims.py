@@ -21,7 +21,7 @@ from functools import cache
 from importlib.resources import files
 from typing import Any, Literal, NamedTuple, get_args
 
-from hysim._frozen import frozen
+from hysim._basics.frozen import frozen
 from hysim.datasets import table1, table2
 from hysim.paper import printed
 from hysim.paper.claim_values import FUNCTIONS, Evidence, Loop, Value

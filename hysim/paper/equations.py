@@ -32,7 +32,7 @@ from typing import Any
 
 import numpy as np
 
-from hysim._frozen import FloatArray, checked, frozen
+from hysim._basics.frozen import FloatArray, checked, frozen
 from hysim.control import to_control
 from hysim.metrics import fit_percent
 from hysim.paper import printed

@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from hysim import plot
-from hysim._frozen import FloatArray
+from hysim._basics.frozen import FloatArray
 from hysim.comparison import Comparison
 from hysim.datasets import PIXEL
 from hysim.discovery import Discovery

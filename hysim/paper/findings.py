@@ -2,8 +2,8 @@
 
 from collections.abc import Mapping
 
-from hysim._frozen import frozen
-from hysim._parallel import awaited, second_process
+from hysim._basics.frozen import frozen
+from hysim._basics.parallel import awaited, second_process
 from hysim.paper.camera import CameraLoop, hysteresis_cameras, period_rows, vibration_cameras
 from hysim.paper.claims import Claim, claims, evidence
 from hysim.paper.equations import Approximation, Characteristics, approximations, printed_characteristics

@@ -17,7 +17,7 @@ from typing import Any, Generic, NamedTuple, TypeVar
 
 import numpy as np
 
-from hysim._frozen import frozen
+from hysim._basics.frozen import frozen
 from hysim.control import (
     PID,
     HysteresisAssessment,

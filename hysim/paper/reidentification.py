@@ -19,7 +19,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy.optimize import minimize_scalar
 
-from hysim._frozen import FloatArray, frozen, read_only
+from hysim._basics.frozen import FloatArray, frozen, read_only
 from hysim.control import to_control
 from hysim.datasets import SQUARE_WAVE_FREQUENCY, table1, table2
 from hysim.identification import Identification, identify

@@ -13,12 +13,12 @@ from typing import Any, Literal
 
 import numpy as np
 
-from hysim._atomic import write_all
-from hysim._blas import one_blas_thread
-from hysim._frozen import frozen
-from hysim._parallel import awaited, second_process
-from hysim._printing import csv_text
-from hysim._progress import reports
+from hysim._basics.atomic import write_all
+from hysim._basics.blas import one_blas_thread
+from hysim._basics.frozen import frozen
+from hysim._basics.parallel import awaited, second_process
+from hysim._basics.printing import csv_text
+from hysim._basics.progress import reports
 from hysim.datasets import table2
 from hysim.export import Shown, page_text
 from hysim.paper import figures

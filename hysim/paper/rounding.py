@@ -21,7 +21,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from hysim._frozen import FloatArray, frozen
+from hysim._basics.frozen import FloatArray, frozen
 
 Number = str | float
 """A printed number as text, or an exact one."""

@@ -23,7 +23,7 @@ import numpy.typing as npt
 from scipy.optimize import differential_evolution, minimize
 
 from hysim import signals
-from hysim._frozen import FloatArray, frozen
+from hysim._basics.frozen import FloatArray, frozen
 from hysim.control import PID, LinearLoop, RestingPlant, as_actuator, later, secant_gain, slopes
 from hysim.datasets import PIXEL
 from hysim.metrics import step_metrics

@@ -24,7 +24,7 @@ import numpy as np
 from scipy.linalg import expm
 from scipy.optimize import brentq
 
-from hysim._frozen import FloatArray, frozen
+from hysim._basics.frozen import FloatArray, frozen
 
 _SETTLED = 0.02
 _PER_TIME_CONSTANT = 5

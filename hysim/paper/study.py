@@ -17,7 +17,7 @@ from typing import Any
 
 import numpy as np
 
-from hysim._frozen import FloatArray, frozen
+from hysim._basics.frozen import FloatArray, frozen
 from hysim.comparison import Comparison, compare
 from hysim.datasets import table1
 from hysim.discovery import Discovery, discover

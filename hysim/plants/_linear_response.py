@@ -9,8 +9,8 @@ from typing import NamedTuple, Self
 import numpy as np
 import numpy.typing as npt
 
-from hysim._frozen import FloatArray, read_only
-from hysim._parallel import in_chunks
+from hysim._basics.frozen import FloatArray, read_only
+from hysim._basics.parallel import in_chunks
 from hysim.kernels import linear as kernels
 from hysim.kernels.stepping import complete
 from hysim.models.protocols import Startable

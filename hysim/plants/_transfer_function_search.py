@@ -40,7 +40,7 @@ import numpy as np
 from numpy.polynomial import chebyshev
 
 from hysim import metrics
-from hysim._frozen import FloatArray
+from hysim._basics.frozen import FloatArray
 from hysim.models.search_space import ALL_FREE, Freedom, Parameters, SearchSpace
 from hysim.plants._linear_response import LinearPlants, affine_columns
 from hysim.records import Record

@@ -7,8 +7,8 @@ from typing import Any, Protocol, runtime_checkable
 import numpy as np
 import numpy.typing as npt
 
-from hysim._frozen import FloatArray, items, read_only
-from hysim._results import model_of
+from hysim._basics.frozen import FloatArray, items, read_only
+from hysim._basics.results import model_of
 from hysim.errors import SimulationError, warn_unsafe
 from hysim.models.cascade import Cascade
 from hysim.models.model import family

@@ -18,9 +18,9 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from hysim._frozen import FloatArray
-from hysim._parallel import in_chunks
-from hysim.kernels.actuators import columns as kernels
+from hysim._basics.frozen import FloatArray
+from hysim._basics.parallel import in_chunks
+from hysim.kernels import actuator_columns as kernels
 from hysim.models.search_space import Parameters, SearchSpace
 from hysim.plants.amplifier import Amplifier
 from hysim.plants.chain import Chain, Stages

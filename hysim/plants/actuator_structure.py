@@ -22,7 +22,7 @@ from typing import Any
 
 import numpy as np
 
-from hysim._frozen import FloatArray, checked
+from hysim._basics.frozen import FloatArray, checked
 from hysim.models.joint_space import columns_beside, declared, together
 from hysim.models.parts import own
 from hysim.models.protocols import Doubt, Identifiable

@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from hysim._frozen import FloatArray, check_not_negative, check_positive, read_only
+from hysim._basics.frozen import FloatArray, check_not_negative, check_positive, read_only
 from hysim.models.model import family
 
 

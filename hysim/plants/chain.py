@@ -11,8 +11,8 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from hysim._frozen import FloatArray, check_count, read_only
-from hysim._progress import Progress
+from hysim._basics.frozen import FloatArray, check_count, read_only
+from hysim._basics.progress import Progress
 from hysim.kernels import controllers
 from hysim.kernels import loop as kernels
 from hysim.laws.static import Line

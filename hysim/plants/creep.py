@@ -9,7 +9,7 @@ import math
 import numpy as np
 import numpy.typing as npt
 
-from hysim._frozen import FloatArray, check_count, check_positive
+from hysim._basics.frozen import FloatArray, check_count, check_positive
 from hysim.models.model import family
 from hysim.plants.state_space import StateSpace
 

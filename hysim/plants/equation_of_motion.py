@@ -20,7 +20,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy.signal import cont2discrete, firwin, lfilter, upfirdn
 
-from hysim._frozen import FloatArray
+from hysim._basics.frozen import FloatArray
 
 METHODS = ("split", "runge-kutta", "newmark", "strang")
 """Ways to step an oscillator."""

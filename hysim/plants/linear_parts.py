@@ -26,7 +26,7 @@ from typing import Any
 
 import numpy as np
 
-from hysim._frozen import FloatArray, read_only
+from hysim._basics.frozen import FloatArray, read_only
 from hysim.models.parameters import Coordinate, space_of
 from hysim.models.search_space import Freedom, Parameters, SearchSpace
 from hysim.plants.amplifier import Amplifier

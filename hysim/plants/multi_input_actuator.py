@@ -17,8 +17,8 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from hysim._basics.frozen import FloatArray, read_only
 from hysim._channels import Channels, checked_channels, value_in
-from hysim._frozen import FloatArray, read_only
 from hysim.laws.static import Line
 from hysim.models.dependent import AlongRecord
 from hysim.models.joint_space import columns_beside, declared, together, without_repetition

@@ -37,7 +37,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy.linalg import expm
 
-from hysim._frozen import FloatArray, check_choice, check_positive, check_whole, items, read_only, whole_substeps
+from hysim._basics.frozen import FloatArray, check_choice, check_positive, check_whole, items, read_only, whole_substeps
 from hysim.errors import SimulationError
 from hysim.kernels import oscillator as kernels
 from hysim.kernels.boucwen import prepare

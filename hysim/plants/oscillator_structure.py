@@ -22,8 +22,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from hysim._frozen import FloatArray, check_choice, check_whole, checked, items, read_only
-from hysim._parallel import in_chunks
+from hysim._basics.frozen import FloatArray, check_choice, check_whole, checked, items, read_only
+from hysim._basics.parallel import in_chunks
 from hysim.errors import SimulationError
 from hysim.kernels import boucwen as kernels
 from hysim.laws.differential import _boucwen_search

@@ -16,7 +16,7 @@ from typing import NamedTuple, Self
 import numpy as np
 from scipy.linalg import matrix_balance
 
-from hysim._frozen import FloatArray, read_only
+from hysim._basics.frozen import FloatArray, read_only
 from hysim.plants._linear_response import scaled_companion, transitions
 from hysim.plants.creep import Creep
 from hysim.plants.state_space import Modes, StateSpace, resting_states

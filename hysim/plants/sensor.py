@@ -3,7 +3,7 @@
 import numpy as np
 import numpy.typing as npt
 
-from hysim._frozen import FloatArray, check_not_negative, check_whole, read_only
+from hysim._basics.frozen import FloatArray, check_not_negative, check_whole, read_only
 from hysim.models.model import family
 
 

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from hysim._frozen import FloatArray, check_not_negative, check_positive
+from hysim._basics.frozen import FloatArray, check_not_negative, check_positive
 from hysim.models.model import family
 from hysim.plants.transfer_function import TransferFunction
 

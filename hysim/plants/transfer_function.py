@@ -16,7 +16,7 @@ from typing import ClassVar
 import numpy as np
 import numpy.typing as npt
 
-from hysim._frozen import FloatArray, check_not_negative, checked, read_only
+from hysim._basics.frozen import FloatArray, check_not_negative, checked, read_only
 from hysim.errors import SimulationError
 from hysim.models.composable import Composable
 from hysim.models.model import family

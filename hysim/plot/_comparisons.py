@@ -11,8 +11,8 @@ from matplotlib.patches import Polygon
 from numpy.typing import NDArray
 
 from hysim import metrics
-from hysim._frozen import FloatArray
-from hysim._prefixes import in_unit, label, printed
+from hysim._basics.frozen import FloatArray
+from hysim._basics.prefixes import in_unit, label, printed
 from hysim.comparison import Comparison, ComparisonRow
 from hysim.identification import Identification
 from hysim.plot._style import GUIDE, MANY, MEASURED, POINTS, AxesArray, grid_of, joined, line, one, scattered, several

@@ -13,8 +13,8 @@ from typing import Any
 import matplotlib
 from matplotlib.figure import Figure
 
-from hysim._atomic import write_text
-from hysim._frozen import check_choice
+from hysim._basics.atomic import write_text
+from hysim._basics.frozen import check_choice
 from hysim.plot._style import house_style
 
 _DOTS = 200  # per inch

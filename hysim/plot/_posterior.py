@@ -5,8 +5,8 @@ from collections.abc import Sequence
 import numpy as np
 from matplotlib.axes import Axes
 
-from hysim._frozen import FloatArray
-from hysim._prefixes import label
+from hysim._basics.frozen import FloatArray
+from hysim._basics.prefixes import label
 from hysim.plot._style import GUIDE, MEASURED, POINTS, AxesArray, line, one, scattered, several
 from hysim.posterior import Evidence, Posterior, Prediction
 from hysim.records import Record

@@ -6,9 +6,9 @@ from typing import Any, Protocol, runtime_checkable
 import numpy as np
 from matplotlib.axes import Axes
 
-from hysim._frozen import FloatArray
-from hysim._prefixes import in_unit, label
-from hysim._results import model_of
+from hysim._basics.frozen import FloatArray
+from hysim._basics.prefixes import in_unit, label
+from hysim._basics.results import model_of
 from hysim.control import ClosedLoop
 from hysim.models.protocols import Responding
 from hysim.plot._style import MANY, MEASURED, POINTS, AxesArray, joined, line, one, several, upright

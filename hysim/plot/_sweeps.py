@@ -11,9 +11,9 @@ from matplotlib.colors import Normalize
 from matplotlib.patches import Polygon
 from matplotlib.ticker import MaxNLocator
 
-from hysim._cycles import TOLERANCE, turns
-from hysim._frozen import FloatArray
-from hysim._prefixes import in_unit, label
+from hysim._basics.frozen import FloatArray
+from hysim._basics.prefixes import in_unit, label
+from hysim._turns.turning import TOLERANCE, turns
 from hysim.laws.operators.preisach import Preisach, PreisachRelays
 from hysim.plot._style import DIVERGING, GUIDE, MEASURED, POINTS, AxesArray, line, one, several
 from hysim.records import Record

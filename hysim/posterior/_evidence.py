@@ -7,10 +7,10 @@ from typing import Any
 
 import numpy as np
 
-from hysim._blas import one_blas_thread
-from hysim._frozen import check_choice, check_count, frozen
-from hysim._printing import aligned, listed, printed, summary_text
-from hysim._progress import Reports, reports
+from hysim._basics.blas import one_blas_thread
+from hysim._basics.frozen import check_choice, check_count, frozen
+from hysim._basics.printing import aligned, listed, printed, summary_text
+from hysim._basics.progress import Reports, reports
 from hysim.identification import Identification, identify
 from hysim.posterior._log_evidence import LogEvidence, bridge_evidence, nested_evidence
 from hysim.posterior._priors import given

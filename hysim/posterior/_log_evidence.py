@@ -23,8 +23,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from hysim._frozen import FloatArray
-from hysim._versions import optional
+from hysim._basics.frozen import FloatArray
+from hysim._basics.versions import optional
 from hysim.posterior._sampler import Chains, effective_samples, split_rhat
 from hysim.posterior._target import Target
 

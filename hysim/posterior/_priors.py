@@ -17,7 +17,7 @@ from typing import Any
 
 import numpy as np
 
-from hysim._frozen import FloatArray
+from hysim._basics.frozen import FloatArray
 from hysim.identification.likelihood import Problem
 
 REACH = 3.0

@@ -29,7 +29,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from scipy.special import log_ndtr, ndtr, ndtri, ndtri_exp
 
-from hysim._frozen import FloatArray
+from hysim._basics.frozen import FloatArray
 from hysim.errors import SimulationError
 from hysim.identification.likelihood import Noise, Problem
 from hysim.posterior._priors import SIGMA, Given, Linear, Searched, linear, of_sigma, searched

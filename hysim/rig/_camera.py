@@ -27,7 +27,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy import fft, special
 
-from hysim._frozen import FloatArray, checked, read_only
+from hysim._basics.frozen import FloatArray, checked, read_only
 from hysim.datasets import PIXEL
 
 Counts = npt.NDArray[np.uint8] | npt.NDArray[np.uint16]

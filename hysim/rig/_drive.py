@@ -5,7 +5,7 @@ import operator
 import numpy as np
 
 from hysim import signals
-from hysim._frozen import FloatArray, checked
+from hysim._basics.frozen import FloatArray, checked
 from hysim.rig._camera import Camera
 
 SQUARE_WAVES = {"slow": 0.1, "fast": 1.01626}

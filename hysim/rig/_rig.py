@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
-from hysim._frozen import FloatArray, checked, frozen
-from hysim._progress import Reports
+from hysim._basics.frozen import FloatArray, checked, frozen
+from hysim._basics.progress import Reports
 from hysim.laws.differential.polynomial_boucwen import PolynomialBoucWen
 from hysim.plants.actuator import Actuator
 from hysim.plants.amplifier import Amplifier

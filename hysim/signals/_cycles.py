@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 
-from hysim._frozen import FloatArray
+from hysim._basics.frozen import FloatArray
 from hysim.signals._parts import checked_count, checked_span, unit_sine
 
 

@@ -5,7 +5,7 @@ from typing import Literal
 
 import numpy as np
 
-from hysim._frozen import FloatArray, check_choice, check_not_negative, check_positive
+from hysim._basics.frozen import FloatArray, check_choice, check_not_negative, check_positive
 
 ENVELOPES = ("saragoni-hart", "jennings", "none")
 

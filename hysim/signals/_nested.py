@@ -6,7 +6,7 @@ from collections.abc import Sequence
 import numpy as np
 import numpy.typing as npt
 
-from hysim._frozen import FloatArray, read_only
+from hysim._basics.frozen import FloatArray, read_only
 from hysim.signals._parts import checked_count, checked_span, unit_sine
 
 _MOST_SAMPLES = 100_000_000  # of lines between extremes: 0.8 GB

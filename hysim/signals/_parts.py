@@ -5,7 +5,7 @@ import operator
 
 import numpy as np
 
-from hysim._frozen import FloatArray
+from hysim._basics.frozen import FloatArray
 
 
 def unit_sine(n: int) -> FloatArray:

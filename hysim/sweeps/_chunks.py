@@ -23,9 +23,9 @@ from typing import Any, NamedTuple, Protocol, runtime_checkable
 import numpy as np
 import numpy.typing as npt
 
-from hysim._frozen import FloatArray
-from hysim._parallel import at_most
-from hysim._progress import silent
+from hysim._basics.frozen import FloatArray
+from hysim._basics.parallel import at_most
+from hysim._basics.progress import silent
 from hysim.sweeps._space import OWN_NAMES, Column
 
 Task = Callable[..., Any]

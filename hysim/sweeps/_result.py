@@ -18,10 +18,10 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from hysim._frozen import FloatArray, frozen
+from hysim._basics.frozen import FloatArray, frozen
+from hysim._basics.printing import csv_text, printed, summary_text
+from hysim._basics.versions import optional
 from hysim._names import among
-from hysim._printing import csv_text, printed, summary_text
-from hysim._versions import optional
 from hysim.sweeps._chunks import Table, seeds
 from hysim.sweeps._space import Column
 from hysim.sweeps._store import opened

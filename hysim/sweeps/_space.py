@@ -7,7 +7,7 @@ from typing import Any, Literal, NamedTuple, Protocol, runtime_checkable
 import numpy as np
 import numpy.typing as npt
 
-from hysim._frozen import FloatArray, check_choice, check_count, frozen
+from hysim._basics.frozen import FloatArray, check_choice, check_count, frozen
 
 Column = npt.NDArray[Any]
 """Values of one parameter, shape (n_tasks,): float64, int64, bool or strings."""

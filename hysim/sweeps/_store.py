@@ -38,8 +38,8 @@ from zlib import error as CompressionError  # noqa: N812
 import numpy as np
 import numpy.typing as npt
 
-from hysim._atomic import replacing
-from hysim._frozen import FloatArray
+from hysim._basics.atomic import replacing
+from hysim._basics.frozen import FloatArray
 from hysim.sweeps._chunks import Group, Layout, Outcome
 from hysim.sweeps._space import Column, Space
 

@@ -7,8 +7,8 @@ from typing import Any, Literal, Protocol, get_args, runtime_checkable
 import numpy as np
 import numpy.typing as npt
 
-from hysim._frozen import FloatArray, check_choice, checked, given_items, read_only, vectors
-from hysim._results import model_of
+from hysim._basics.frozen import FloatArray, check_choice, checked, given_items, read_only, vectors
+from hysim._basics.results import model_of
 from hysim.plants.structures.ensemble import REDUCTIONS
 from hysim.plants.structures.structure import Structure
 

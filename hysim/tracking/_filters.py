@@ -19,8 +19,8 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from hysim._frozen import FloatArray, read_only
-from hysim.kernels.adaptation.copies import step_each
+from hysim._basics.frozen import FloatArray, read_only
+from hysim.kernels.copies import step_each
 from hysim.kernels.stepping import START, STEP, by_address
 from hysim.models.compiled_step import compiled_start, compiled_step
 from hysim.models.law import Law

@@ -13,9 +13,9 @@ from typing import Any, Literal
 import numpy as np
 import numpy.typing as npt
 
-from hysim._frozen import FloatArray, check_choice, frozen
-from hysim._printing import printed, summary_text
-from hysim._results import model_of
+from hysim._basics.frozen import FloatArray, check_choice, frozen
+from hysim._basics.printing import printed, summary_text
+from hysim._basics.results import model_of
 from hysim.models.law import Law
 from hysim.records import Record
 from hysim.tracking._filters import Coordinates, Copies, Filtered, Walk, coordinates_of, particles, sigma_points

@@ -19,8 +19,8 @@ from typing import Any, Literal
 import numpy as np
 import numpy.typing as npt
 
-from hysim._frozen import FloatArray
-from hysim._progress import Reports, reports
+from hysim._basics.frozen import FloatArray
+from hysim._basics.progress import Reports, reports
 from hysim.vision._frames import Picture, grey_pictures, read_frames
 from hysim.vision._locate import LOST, Location, locate
 from hysim.vision._result import Displacement

@@ -13,8 +13,8 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from hysim._frozen import frozen
-from hysim._versions import optional
+from hysim._basics.frozen import frozen
+from hysim._basics.versions import optional
 
 Picture = npt.NDArray[np.float32]
 

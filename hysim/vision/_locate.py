@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from hysim._frozen import FloatArray
+from hysim._basics.frozen import FloatArray
 from hysim.vision._template import Picture, Reference, Spectrum, Template, cut, without_plane
 
 _ROUNDS = 8

@@ -28,7 +28,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy import fft, ndimage
 
-from hysim._frozen import FloatArray
+from hysim._basics.frozen import FloatArray
 
 Picture = npt.NDArray[np.float32]
 Spectrum = npt.NDArray[np.complex64]

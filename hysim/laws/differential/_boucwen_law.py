@@ -25,7 +25,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from hysim._frozen import FloatArray, read_only
+from hysim._basics.frozen import FloatArray, read_only
 from hysim.kernels import boucwen as kernels
 from hysim.kernels import stepping
 from hysim.kernels.charts import N_WORK

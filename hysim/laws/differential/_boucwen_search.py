@@ -25,7 +25,7 @@ from typing import Protocol
 
 import numpy as np
 
-from hysim._frozen import FloatArray
+from hysim._basics.frozen import FloatArray
 from hysim.models.search_space import Freedom, SearchSpace
 from hysim.records import Record
 

@@ -14,7 +14,7 @@ from typing import ClassVar, Self
 import numpy as np
 import numpy.typing as npt
 
-from hysim._frozen import FloatArray
+from hysim._basics.frozen import FloatArray
 from hysim.laws.differential import _boucwen_search, boucwen_inverse
 from hysim.models.law import Law, State, of_sets
 from hysim.models.protocols import CompiledLaw

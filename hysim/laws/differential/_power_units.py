@@ -22,7 +22,7 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from hysim._frozen import FloatArray
+from hysim._basics.frozen import FloatArray
 from hysim.models.tables import Tables
 
 _NEGLIGIBLE = 300.0  # in powers of two: a term that is smaller than another one by this factor gives no units

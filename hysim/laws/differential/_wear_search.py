@@ -23,7 +23,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from hysim._frozen import FloatArray
+from hysim._basics.frozen import FloatArray
 from hysim.laws.differential import _boucwen_search as plain
 from hysim.models.search_space import Freedom, SearchSpace
 from hysim.records import Record

@@ -10,10 +10,10 @@ from typing import ClassVar, Self
 import numpy as np
 import numpy.typing as npt
 
-from hysim._frozen import FloatArray
+from hysim._basics.frozen import FloatArray
 from hysim.kernels import baber_noori as kernels
+from hysim.kernels.baber_noori_search import close_step
 from hysim.kernels.remainder import ROUNDING
-from hysim.kernels.search.baber_noori import close_step
 from hysim.laws.differential import _boucwen_search, _power_units, _wear_search
 from hysim.laws.differential._memory_law import MemoryLaw
 from hysim.laws.differential.boucwen import BoucWen

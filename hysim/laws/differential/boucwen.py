@@ -37,7 +37,7 @@ from typing import ClassVar, Self
 import numpy as np
 import numpy.typing as npt
 
-from hysim._frozen import FloatArray
+from hysim._basics.frozen import FloatArray
 from hysim.kernels import boucwen as kernels
 from hysim.kernels import stepping
 from hysim.laws.differential._boucwen_law import BoucWenLaw, BoucWenStep

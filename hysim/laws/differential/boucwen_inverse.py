@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from hysim._frozen import FloatArray, frozen, read_only
+from hysim._basics.frozen import FloatArray, frozen, read_only
 from hysim.errors import SimulationError
 from hysim.kernels import boucwen
 from hysim.kernels import boucwen_inverse as kernels

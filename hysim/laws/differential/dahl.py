@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from hysim._frozen import FloatArray
+from hysim._basics.frozen import FloatArray
 from hysim.laws.differential.boucwen import EquivalentBoucWen
 from hysim.models.model import Example, family
 from hysim.models.parameters import Parameter

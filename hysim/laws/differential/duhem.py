@@ -26,7 +26,7 @@ from typing import Any, ClassVar, Self
 import numpy as np
 import numpy.typing as npt
 
-from hysim._frozen import FloatArray, check_whole, read_only
+from hysim._basics.frozen import FloatArray, check_whole, read_only
 from hysim.kernels import duhem as kernels
 from hysim.laws.differential.duhem_runs import branches, free_runs, outputs
 from hysim.laws.differential.terms import (

@@ -9,8 +9,8 @@ from collections.abc import Sequence
 import numpy as np
 import numpy.typing as npt
 
-from hysim._frozen import FloatArray, read_only
-from hysim._parallel import in_chunks
+from hysim._basics.frozen import FloatArray, read_only
+from hysim._basics.parallel import in_chunks
 from hysim.kernels import duhem as kernels
 from hysim.laws.differential.terms import Polynomials, Term, polynomials
 

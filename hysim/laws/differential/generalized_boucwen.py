@@ -4,7 +4,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from hysim._frozen import FloatArray
+from hysim._basics.frozen import FloatArray
 from hysim.kernels import generalized as kernels
 from hysim.laws.differential import _boucwen_law as facts
 from hysim.laws.differential._memory_law import MemoryLaw

@@ -27,7 +27,7 @@ import math
 import numpy as np
 from scipy.optimize import brentq
 
-from hysim._frozen import FloatArray, frozen, read_only
+from hysim._basics.frozen import FloatArray, frozen, read_only
 from hysim.errors import SimulationError
 from hysim.kernels import boucwen as kernels
 

@@ -10,9 +10,9 @@ from typing import ClassVar
 
 import numpy as np
 
-from hysim._frozen import FloatArray
+from hysim._basics.frozen import FloatArray
 from hysim.kernels import zhu_wang as kernels
-from hysim.kernels.search import zhu_wang as search_kernels
+from hysim.kernels import zhu_wang_search as search_kernels
 from hysim.laws.differential import _power_units
 from hysim.laws.differential._memory_law import MemoryLaw
 from hysim.laws.differential.boucwen import BoucWen

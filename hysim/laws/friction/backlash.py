@@ -2,7 +2,7 @@
 
 from typing import ClassVar
 
-from hysim.kernels.friction import backlash as kernels
+from hysim.kernels import backlash as kernels
 from hysim.laws.friction.rated_law import RatedLaw
 from hysim.models.model import Example, family
 from hysim.models.parameters import Parameter

@@ -5,8 +5,8 @@ from typing import ClassVar
 import numpy as np
 import numpy.typing as npt
 
-from hysim._frozen import FloatArray
-from hysim.kernels.friction import maxwell as kernels
+from hysim._basics.frozen import FloatArray
+from hysim.kernels import maxwell as kernels
 from hysim.laws.friction.rated_law import RatedLaw, curve
 from hysim.models.model import Example, family
 from hysim.models.parameters import Parameter

@@ -1,7 +1,7 @@
 """The abstract law of a force that depends on the rate of its input.
 
 A family declares its fields and two steps: one for a sample time, along whose samples the input moves evenly, and one
-for the strokes of a structure's element; see `hysim.kernels.friction.rates`. At one sample time it is a `hysim.Law`
+for the strokes of a structure's element; see `hysim.kernels.friction_rates`. At one sample time it is a `hysim.Law`
 with one field more, from which all else is derived.
 """
 
@@ -14,9 +14,9 @@ from typing import TYPE_CHECKING, Any, ClassVar, Self, cast
 import numpy as np
 import numpy.typing as npt
 
-from hysim._frozen import FloatArray, checked, items, last_names, read_only
+from hysim._basics.frozen import FloatArray, checked, items, last_names, read_only
 from hysim.kernels import stepping
-from hysim.kernels.friction.rates import N_RATED
+from hysim.kernels.friction_rates import N_RATED
 from hysim.models.batch import Reduction
 from hysim.models.composable import Placed
 from hysim.models.law import Law, State
@@ -42,7 +42,7 @@ class RatedLaw(Identifiable, Placed, ABC):
         ``step(parameters, state, u) -> y`` after an even stroke of one sample, the first parameter; the others are the
         fields but for the initial memory, in their order. The state is the last input and the memory.
     rated_step : kernel
-        Likewise, the stroke being described in the state; see `hysim.kernels.friction.rates`.
+        Likewise, the stroke being described in the state; see `hysim.kernels.friction_rates`.
     initial, searched, starts, screened
         As of `hysim.Law`; parameters may have the units ``"v"``, the highest speed of the record, and ``"r"``, the
         speed of an output that follows the input.

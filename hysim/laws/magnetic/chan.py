@@ -4,8 +4,8 @@ from typing import ClassVar, Self
 
 import numpy as np
 
-from hysim._frozen import check_not_negative, check_positive
-from hysim.kernels.magnetics import chan as kernels
+from hysim._basics.frozen import check_not_negative, check_positive
+from hysim.kernels import chan as kernels
 from hysim.laws.magnetic.tellinen import VACUUM, BranchLaw
 from hysim.models.law import Packed
 from hysim.models.model import Example, family
@@ -105,7 +105,7 @@ class Chan(BranchLaw):
 
     @classmethod
     def pack(cls, tables: Tables) -> Packed:
-        """Parameters as `hysim.kernels.magnetics.chan` has them, and the memory (u, z, excess, turn, h)."""
+        """Parameters as `hysim.kernels.chan` has them, and the memory (u, z, excess, turn, h)."""
         head = [tables[name] for name in ("offset", "saturation", "feedthrough", "gap", "coercivity")]
         knee = tables["coercivity"] * (1.0 / tables["squareness"] - 1.0)
         return Packed(np.concatenate([*head, knee], axis=1), cls.initial_memory(tables, further=3))

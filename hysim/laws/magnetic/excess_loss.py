@@ -5,8 +5,8 @@ from typing import Self
 
 import numpy as np
 
-from hysim._frozen import FloatArray, check_not_negative
-from hysim.kernels.magnetics import losses
+from hysim._basics.frozen import FloatArray, check_not_negative
+from hysim.kernels import core_losses as losses
 from hysim.laws.dashpot import RatePart
 from hysim.models.model import Example, family
 

@@ -51,9 +51,9 @@ from typing import ClassVar, Self
 import numpy as np
 import numpy.typing as npt
 
-from hysim._frozen import FloatArray, read_only
-from hysim.kernels.magnetics import jiles_atherton as kernels
-from hysim.kernels.magnetics import jiles_atherton_inverse as inverse
+from hysim._basics.frozen import FloatArray, read_only
+from hysim.kernels import jiles_atherton as kernels
+from hysim.kernels import jiles_atherton_inverse as inverse
 from hysim.models.inverse_search import first_input
 from hysim.models.law import Law, Packed, State
 from hysim.models.model import Example, family
@@ -392,7 +392,7 @@ class JilesAtherton(Law):
 
     @classmethod
     def pack(cls, tables: Tables) -> Packed:
-        """Parameters as `hysim.kernels.magnetics.jiles_atherton.step` takes them; memory (u, M_irr, He / a, rest)."""
+        """Parameters as `hysim.kernels.jiles_atherton.step` takes them; memory (u, M_irr, He / a, rest)."""
         a, Ms = tables["a"], tables["Ms"]
         scaled = [a, Ms, tables["alpha"] * Ms / a, tables["k"] / a]
         others = ("c", "reversible_feedback", "anisotropy", "gain", "feedthrough", "offset")

@@ -15,7 +15,7 @@ from typing import ClassVar, Self
 
 import numpy as np
 
-from hysim.kernels.magnetics import tellinen as kernels
+from hysim.kernels import tellinen as kernels
 from hysim.models.law import Law, Packed
 from hysim.models.model import Example, family
 from hysim.models.parameters import Parameter
@@ -158,7 +158,7 @@ class Tellinen(BranchLaw):
 
     @classmethod
     def pack(cls, tables: Tables) -> Packed:
-        """Parameters as `hysim.kernels.magnetics.tellinen` has them, and the memory (u, z)."""
+        """Parameters as `hysim.kernels.tellinen` has them, and the memory (u, z)."""
         s, coercivity = tables["squareness"], tables["coercivity"]
         scale = coercivity / (0.5 * (np.log1p(s) - np.log1p(-s)))
         rates = [(1.0 - s) * (1.0 - s) / (2.0 * s), (1.0 + s) * (1.0 + s) / (2.0 * s)]

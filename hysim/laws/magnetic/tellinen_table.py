@@ -4,8 +4,8 @@ from typing import Any, ClassVar, Self
 
 import numpy as np
 
-from hysim._frozen import check_whole
-from hysim.kernels.magnetics import tellinen_table as kernels
+from hysim._basics.frozen import check_whole
+from hysim.kernels import tellinen_table as kernels
 from hysim.metrics import loop_metrics
 from hysim.models.law import Law, Packed
 from hysim.models.model import Example, family

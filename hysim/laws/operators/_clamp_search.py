@@ -29,7 +29,7 @@ from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 
-from hysim._frozen import FloatArray, check_whole, checked
+from hysim._basics.frozen import FloatArray, check_whole, checked
 from hysim.laws.operators._clamps import check_elements, positions
 from hysim.models.composable import Composable
 from hysim.models.parameters import Coordinate, space_of, spans

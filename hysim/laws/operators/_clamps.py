@@ -15,7 +15,7 @@ from typing import Any, ClassVar
 import numpy as np
 import numpy.typing as npt
 
-from hysim._frozen import FloatArray, items, read_only
+from hysim._basics.frozen import FloatArray, items, read_only
 from hysim.kernels import clamps as kernels
 from hysim.laws.differential.limit_cycle import LimitCycle
 from hysim.models.law import Law, Packed

@@ -7,7 +7,7 @@ from typing import ClassVar
 import numpy as np
 import numpy.typing as npt
 
-from hysim._frozen import FloatArray, read_only
+from hysim._basics.frozen import FloatArray, read_only
 from hysim.kernels import play_sums as kernels
 from hysim.laws.operators._clamps import Bank
 from hysim.laws.operators.prandtl_ishlinskii import PrandtlIshlinskii

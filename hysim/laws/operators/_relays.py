@@ -34,8 +34,8 @@ from typing import Any, ClassVar
 import numpy as np
 import numpy.typing as npt
 
-from hysim._frozen import FloatArray, check_whole, checked, read_only
-from hysim._parallel import in_pieces
+from hysim._basics.frozen import FloatArray, check_whole, checked, read_only
+from hysim._basics.parallel import in_pieces
 from hysim.kernels import preisach as kernels
 from hysim.laws.operators._clamp_search import TURN, runs_clockwise, variants_of_sign
 from hysim.models.by_structure import ByStructure

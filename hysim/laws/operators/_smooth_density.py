@@ -27,8 +27,8 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from hysim._cycles import TOLERANCE
-from hysim._frozen import FloatArray
+from hysim._basics.frozen import FloatArray
+from hysim._turns.turning import TOLERANCE
 from hysim.records import Record
 
 STRENGTHS = np.logspace(-10.0, 4.0, 43)

@@ -6,8 +6,8 @@ from typing import Any, ClassVar
 import numpy as np
 import numpy.typing as npt
 
-from hysim._frozen import FloatArray, checked, read_only
-from hysim.kernels.magnetics import energy_plays as kernels
+from hysim._basics.frozen import FloatArray, checked, read_only
+from hysim.kernels import energy_plays as kernels
 from hysim.laws.operators._clamp_search import Axis, ClampStructure, Pushing
 from hysim.laws.operators._clamps import Bank
 from hysim.models.by_structure import ByStructure

@@ -7,7 +7,7 @@ from typing import Any, ClassVar
 import numpy as np
 import numpy.typing as npt
 
-from hysim._frozen import FloatArray, checked, read_only
+from hysim._basics.frozen import FloatArray, checked, read_only
 from hysim.laws.operators._clamp_search import Axis, ClampStructure, Pushing
 from hysim.laws.operators._play_sums import IDENTITY, ExtendedPlays, kernel_rows, positions_of
 from hysim.laws.operators.prandtl_ishlinskii import PrandtlIshlinskii

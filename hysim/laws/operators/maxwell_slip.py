@@ -5,7 +5,7 @@ from typing import ClassVar, Self
 import numpy as np
 import numpy.typing as npt
 
-from hysim._frozen import read_only
+from hysim._basics.frozen import read_only
 from hysim.laws.operators._clamp_search import ClampStructure
 from hysim.laws.operators._clamps import ClampLaw
 from hysim.laws.operators.prandtl_ishlinskii import PrandtlIshlinskii

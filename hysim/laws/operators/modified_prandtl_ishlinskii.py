@@ -25,7 +25,7 @@ from typing import Any, ClassVar
 import numpy as np
 import numpy.typing as npt
 
-from hysim._frozen import FloatArray, check_whole, checked, read_only
+from hysim._basics.frozen import FloatArray, check_whole, checked, read_only
 from hysim.laws.operators._clamp_search import ClampStructure
 from hysim.laws.operators._play_sums import ExtendedPlays, check_dead_zones, dead_zone, kernel_rows
 from hysim.laws.operators.prandtl_ishlinskii import PrandtlIshlinskii, wrong_sum

@@ -8,7 +8,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from hysim._frozen import FloatArray
+from hysim._basics.frozen import FloatArray
 from hysim.laws.operators._clamps import ClampLaw
 from hysim.models.model import Example, family
 from hysim.models.parameters import Parameter

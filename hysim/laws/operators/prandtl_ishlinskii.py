@@ -18,7 +18,7 @@ from typing import ClassVar
 import numpy as np
 import numpy.typing as npt
 
-from hysim._frozen import FloatArray, read_only
+from hysim._basics.frozen import FloatArray, read_only
 from hysim.kernels import inverses
 from hysim.laws.operators._clamp_search import ClampStructure
 from hysim.laws.operators._clamps import ClampLaw

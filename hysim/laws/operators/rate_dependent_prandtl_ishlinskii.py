@@ -19,7 +19,7 @@ from typing import Any, ClassVar
 import numpy as np
 import numpy.typing as npt
 
-from hysim._frozen import FloatArray, checked, read_only
+from hysim._basics.frozen import FloatArray, checked, read_only
 from hysim.kernels import play_sums as kernels
 from hysim.laws.operators._clamp_search import Axis, ClampStructure, Pushing
 from hysim.laws.operators._play_sums import ExtendedPlays, kernel_rows, positions_of

@@ -8,14 +8,14 @@ import numpy as np
 import numpy.typing as npt
 from scipy.linalg import eigh
 
-from hysim._frozen import FloatArray, read_only, whole_substeps
+from hysim._basics.frozen import FloatArray, read_only, whole_substeps
 from hysim.kernels.stepping import START
-from hysim.kernels.structures.ensembles import fill_slopes, fill_structure, start_motion
-from hysim.kernels.structures.flows import N_POWERS
-from hysim.kernels.structures.layout import Elements, Flows, Motion, Plant, Room, Steps, Tracks, make_room
-from hysim.kernels.structures.path import follow
-from hysim.kernels.structures.pointers import FOLLOW, addresses
-from hysim.kernels.structures.sweeps import LEAST_DRIFT
+from hysim.kernels.structure_ensembles import fill_slopes, fill_structure, start_motion
+from hysim.kernels.structure_flows import N_POWERS
+from hysim.kernels.structure_layout import Elements, Flows, Motion, Plant, Room, Steps, Tracks, make_room
+from hysim.kernels.structure_path import follow
+from hysim.kernels.structure_pointers import FOLLOW, addresses
+from hysim.kernels.structure_sweeps import LEAST_DRIFT
 from hysim.models.compiled_step import startable
 from hysim.models.protocols import Rated, Startable, Stretched
 from hysim.plants.structures.parts import OF_ELEMENTS, OF_NODES, ModalDamping, Rayleigh, dissipates, parted
@@ -151,7 +151,7 @@ def linear_parts(matrices: Matrices) -> tuple[FloatArray, FloatArray, FloatArray
 
 
 def follow_address() -> Any:
-    """The address of `hysim.kernels.structures.path.follow`, which is compiled where it has not been yet."""
+    """The address of `hysim.kernels.structure_path.follow`, which is compiled where it has not been yet."""
     (address,) = addresses([follow], FOLLOW)
     return address
 

@@ -6,10 +6,10 @@ from typing import Any, Literal, NamedTuple, get_args
 import numpy as np
 import numpy.typing as npt
 
-from hysim._frozen import FloatArray, check_choice, read_only
-from hysim._parallel import in_chunks
-from hysim.kernels.structures.ensembles import Results, Sets, follow_each
-from hysim.kernels.structures.layout import Plant, Steps
+from hysim._basics.frozen import FloatArray, check_choice, read_only
+from hysim._basics.parallel import in_chunks
+from hysim.kernels.structure_ensembles import Results, Sets, follow_each
+from hysim.kernels.structure_layout import Plant, Steps
 from hysim.models.compiled_step import compiled_start, compiled_step
 from hysim.models.law import Law
 from hysim.models.parts import own

@@ -10,15 +10,15 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from hysim._frozen import FloatArray, read_only
-from hysim._parallel import in_pieces
-from hysim._progress import Progress
+from hysim._basics.frozen import FloatArray, read_only
+from hysim._basics.parallel import in_pieces
+from hysim._basics.progress import Progress
 from hysim.errors import SimulationError
 from hysim.kernels.controllers import CONTROLLER
-from hysim.kernels.structures.layout import Elements, Flows, Motion, Plant, Steps, Tracks
-from hysim.kernels.structures.loop import close
-from hysim.kernels.structures.path import follow
-from hysim.kernels.structures.pointers import addresses
+from hysim.kernels.structure_layout import Elements, Flows, Motion, Plant, Steps, Tracks
+from hysim.kernels.structure_loop import close
+from hysim.kernels.structure_path import follow
+from hysim.kernels.structure_pointers import addresses
 from hysim.models.protocols import CompiledController, needed_time, positive_time
 from hysim.plants.structures import assembly
 from hysim.plants.structures.assembly import AssembledStructure

@@ -17,7 +17,7 @@ from typing import Any, NamedTuple, Self
 
 import numpy as np
 
-from hysim._frozen import FloatArray, check_not_negative, check_positive, check_whole, read_only
+from hysim._basics.frozen import FloatArray, check_not_negative, check_positive, check_whole, read_only
 from hysim.errors import SimulationError
 from hysim.laws.dashpot import Dashpot
 from hysim.laws.static import Line

@@ -24,9 +24,9 @@ from typing import Any
 
 import numpy as np
 
-from hysim._frozen import FloatArray, checked, frozen, read_only
-from hysim._parallel import in_chunks
-from hysim._printing import printed, summary_text
+from hysim._basics.frozen import FloatArray, checked, frozen, read_only
+from hysim._basics.parallel import in_chunks
+from hysim._basics.printing import printed, summary_text
 from hysim.errors import SimulationError
 from hysim.models.parameters import Coordinate, free_coordinate, space_of
 from hysim.models.protocols import Identifiable

@@ -4,7 +4,7 @@
                                                          =  r u(t)      under a force u
 
 x are the displacements relative to the ground; b is the direction of an element, f its law for the drift b . x, and r
-the influence. The input is linear between the samples. How it is integrated: `hysim.kernels.structures.path`.
+the influence. The input is linear between the samples. How it is integrated: `hysim.kernels.structure_path`.
 
 Pushed slowly, under displacement control, it has
 
@@ -24,8 +24,8 @@ import numpy as np
 import numpy.typing as npt
 from scipy.linalg import LinAlgError, cholesky
 
-from hysim._frozen import FloatArray, check_choice, check_whole, frozen, read_only
-from hysim._printing import extent, printed, summary_text
+from hysim._basics.frozen import FloatArray, check_choice, check_whole, frozen, read_only
+from hysim._basics.printing import extent, printed, summary_text
 from hysim.errors import SimulationError
 from hysim.models.model import family
 from hysim.plants.structures.assembly import AssembledStructure, Laws

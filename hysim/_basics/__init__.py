@@ -1,0 +1,1 @@
+"""Tools that know nothing of hysteresis: frozen arrays, files in one piece, printing, progress, threads."""

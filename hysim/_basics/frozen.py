@@ -1,0 +1,345 @@
+"""Frozen values: dataclasses that are compared, hashed, copied and pickled by what they hold.
+
+`frozen` makes keyword-only dataclasses whose arrays are read-only float64, also after unpickling and
+copying. `checked` is the stricter form for specifications (models, records): every number must be finite.
+"""
+
+import dataclasses
+import functools
+import inspect
+import math
+import sys
+import typing
+from collections.abc import Callable, Iterable, Mapping
+from types import MappingProxyType
+from typing import Any, TypeVar, dataclass_transform
+
+import numpy as np
+import numpy.typing as npt
+
+from hysim._basics.results import model_of
+from hysim._names import among, meant
+
+FloatArray = npt.NDArray[np.float64]
+LAST = {"last": True}  # metadata of a field of a base class that stands behind those of its families
+T = TypeVar("T")
+
+_MOST_SUBSTEPS = 1e9
+_TOO_LARGE = f"a number beyond {sys.float_info.max:.2g}"
+
+
+@dataclass_transform(kw_only_default=True, frozen_default=True)
+def frozen(cls: type[T]) -> type[T]:
+    """Make `cls` a frozen keyword-only dataclass with read-only arrays and equality by value."""
+    return _freeze(cls, finite=False)
+
+
+@dataclass_transform(kw_only_default=True, frozen_default=True)
+def checked(cls: type[T]) -> type[T]:
+    """Make `cls` frozen, and refuse numbers that are not finite."""
+    return _freeze(cls, finite=True)
+
+
+def check_positive(**numbers: float | None) -> None:
+    """A ValueError for the first number by name that is not positive; None is no number."""
+    for name, value in numbers.items():
+        if value is not None and not value > 0.0:
+            raise ValueError(f"{name} must be positive, got {value}")
+
+
+def check_not_negative(**numbers: float | None) -> None:
+    """A ValueError for the first number by name that is negative; None is no number."""
+    for name, value in numbers.items():
+        if value is not None and not value >= 0.0:
+            raise ValueError(f"{name} must not be negative, got {value}")
+
+
+def read_only(
+    values: npt.ArrayLike, name: str = "values", *, ndim: int | None = None, finite: bool = True
+) -> FloatArray:
+    """Return a read-only contiguous float64 copy of `values`.
+
+    A TypeError is raised unless they are real numbers, a ValueError if an element is masked, the number of axes is not
+    `ndim`, or (with `finite`) an element is not finite.
+    """
+    array = _as_float_array(values, name)
+    if ndim is not None and array.ndim != ndim:
+        raise ValueError(
+            wrong_axes(name, array) if ndim == 1 else f"{name} must have {ndim} axes, got shape {array.shape}"
+        )
+    if finite and not np.isfinite(array).all():
+        place = tuple(int(i) for i in np.argwhere(~np.isfinite(array))[0])
+        index = place[0] if len(place) == 1 else place
+        raise ValueError(f"{name} must be finite, got {array[place]} at index {index}")
+    array.setflags(write=False)
+    return array
+
+
+def wrong_axes(name: str, array: npt.NDArray[Any]) -> str:
+    """Message for an array in place of a vector, with what to do where it has rows and columns."""
+    mend = "np.ravel makes it flat" if 1 in array.shape else f"take one column, {name}[:, 0]"
+    return f"{name} must have 1 axis, got shape {array.shape}{f': {mend}' if array.ndim == 2 else ''}"
+
+
+def vectors(**values: npt.ArrayLike) -> list[FloatArray]:
+    """Return read-only copies of vectors of equal lengths; other errors are those of `read_only`."""
+    arrays = {name: read_only(each, name, ndim=1) for name, each in values.items()}
+    first, *others = arrays
+    for name in others:
+        if arrays[name].size != arrays[first].size:
+            sizes = f"{arrays[first].size} and {arrays[name].size}"
+            raise ValueError(f"{first} and {name} must have equal lengths, got {sizes}")
+    return [*arrays.values()]
+
+
+def check_choice(name: str, value: object, choices: Iterable[object]) -> None:
+    """Raise a ValueError if the argument of this name is not one of the choices."""
+    if value not in (known := tuple(choices)):
+        raise ValueError(f"{name} must be one of {', '.join(map(str, known))}, got {value!r}{meant(value, known)}")
+
+
+def check_count(name: str, value: object) -> None:
+    """Raise a ValueError if the argument of this name is not an integer of at least 1."""
+    if isinstance(value, bool) or not isinstance(value, int) or value < 1:
+        raise ValueError(f"{name} must be an integer of at least 1, got {value!r}")
+
+
+def _as_float_array(values: npt.ArrayLike, name: str) -> FloatArray:
+    if _is_masked(values):
+        raise ValueError(f"{name} must have no masked element: leave these samples out, or fill them with filled()")
+    try:
+        array = np.asarray(values)
+        kind = array.dtype.kind
+        numbers = np.array(array, dtype=np.float64, order="C") if kind not in "cmM" else None
+    except OverflowError:
+        raise ValueError(f"{name} must be finite, got {_TOO_LARGE}") from None
+    except (TypeError, ValueError, RecursionError) as error:
+        raise TypeError(f"{name} must be numbers, got {type(values).__name__}: {error}") from None
+    if kind == "c":
+        raise TypeError(f"{name} must be real numbers, got complex ones")
+    if numbers is None:  # NumPy would convert dates to counts of their unit
+        raise TypeError(f"{name} must be numbers, got dates or times: give seconds from the first one")
+    return numbers
+
+
+def _is_masked(values: Any) -> bool:
+    """Whether an element is masked: NumPy would take the number under the mask, or make nan with a warning."""
+    if isinstance(values, (list, tuple)):
+        return any(isinstance(each, np.ma.MaskedArray) and np.ma.is_masked(each) for each in values)
+    return bool(np.ma.is_masked(values))
+
+
+def _freeze(cls: type[T], *, finite: bool) -> type[T]:
+    check = getattr(cls, "__post_init__", None)  # a class may have none, or inherit it
+    prepare = getattr(cls, "_prepare", None)  # for arguments that say more than their numbers
+
+    def coerce_then_check(self: Any) -> None:
+        if prepare is not None:
+            prepare(self)
+        for name, coerce in _coercions(type(self), finite).items():  # type: ignore[arg-type]
+            object.__setattr__(self, name, coerce(vars(self)[name], name))
+        if check is not None:
+            check(self)
+
+    cls.__post_init__ = coerce_then_check  # type: ignore[attr-defined]
+    cls.__eq__ = _equal  # type: ignore[method-assign]
+    cls.__hash__ = _hash  # type: ignore[method-assign]
+    cls.__reduce__ = _reduce  # type: ignore[method-assign]
+    made = dataclasses.dataclass(frozen=True, kw_only=True, eq=False)(cls)
+    if _field_names(made)[2]:  # type: ignore[arg-type]
+        made.__repr__ = _repr_without_none  # type: ignore[method-assign]
+        made.__doc__ = _with_last(made.__doc__ or "")
+        _, *arguments = inspect.signature(made.__init__).parameters.values()
+        arguments.sort(key=lambda each: each.name in _field_names(made)[2])  # type: ignore[arg-type]
+        made.__signature__ = inspect.Signature(arguments)  # type: ignore[attr-defined]
+    return _with_advice(made)
+
+
+_PARAMETERS = "\n    Parameters\n    ----------\n"
+_PLACE = """    u0 : float, optional
+        Input at which the initial memory holds [unit of u], from which the law first moves to an input's first sample;
+        by default that sample itself.
+    u_range : (float, float), optional
+        Lowest and highest input of the record that the law was identified on [unit of u].
+"""
+
+
+def _with_last(text: str) -> str:
+    """A docstring whose section of parameters ends with those that are `LAST`."""
+    before, heading, rest = text.partition(_PARAMETERS)
+    if not heading or _PLACE in text:
+        return text
+    own, blank, others = rest.partition("\n\n    ")
+    return before + heading + own.rstrip() + "\n" + (_PLACE.rstrip("\n") if blank else _PLACE) + blank + others
+
+
+def _repr_without_none(self: Any) -> str:
+    return f"{type(self).__qualname__}({', '.join(f'{name}={value!r}' for name, value in given_items(self).items())})"
+
+
+def _with_advice(cls: type[T]) -> type[T]:
+    """Let the constructor name its parameters, and the one that may have been meant, where one is unknown."""
+    generated: Any = cls.__init__
+
+    @functools.wraps(generated)
+    def construct(self: Any, *arguments: Any, **values: Any) -> None:
+        try:
+            generated(self, *arguments, **values)
+        except TypeError:
+            fields = dataclasses.fields(cls)  # type: ignore[arg-type]
+            known, by_place = [*_field_names(cls)[0]], sum(not field.kw_only for field in fields)  # type: ignore[arg-type]
+            unknown = next((name for name in values if name not in known), None)
+            if unknown is None and len(arguments) <= by_place:
+                raise
+            most = f"at most {by_place} positional argument" if by_place else "no positional argument"
+            what = f"takes {most}" if unknown is None else f"has no parameter {unknown!r}"
+            raise TypeError(f"{cls.__name__} {what}; by name it takes {among(unknown, known)}") from None
+
+    cls.__init__ = construct  # type: ignore[method-assign]
+    return cls
+
+
+@functools.cache
+def _coercions(cls: Any, finite: bool) -> dict[str, Callable[[Any, str], Any]]:
+    rules: dict[Any, Callable[[Any, str], Any]] = {
+        float: functools.partial(_as_float, finite=finite),
+        tuple[float, ...]: functools.partial(_as_float_tuple, finite=finite),
+        tuple[float, ...] | None: lambda value, name: (
+            None if value is None else _as_float_tuple(value, name, finite=finite)
+        ),
+        FloatArray: functools.partial(read_only, finite=finite),
+        FloatArray | None: lambda value, name: None if value is None else read_only(value, name, finite=finite),
+        float | None: lambda value, name: None if value is None else _as_float(value, name, finite=finite),
+    }
+    hints = typing.get_type_hints(cls)
+    kinds = {field.name: field.metadata.get("kind", hints[field.name]) for field in dataclasses.fields(cls)}
+    coercions = {name: rules.get(kind) for name, kind in kinds.items()}
+    mapping = _as_named_parts if finite else _as_mapping
+    coercions |= {name: mapping for name in coercions if typing.get_origin(hints[name]) is Mapping}
+    if finite:  # the parts of a specification are models, and no results of fits
+        coercions = {name: _as_parts if coerce is None else coerce for name, coerce in coercions.items()}
+    return {name: coerce for name, coerce in coercions.items() if coerce is not None}
+
+
+def _as_float(value: Any, name: str, *, finite: bool) -> float:
+    if type(value) is float and math.isfinite(value):  # nearly every one; the checks take most of the time of a law
+        return value
+    if isinstance(value, (str, bytes, bool, list, tuple, Mapping)) or np.ndim(value) != 0:
+        raise TypeError(f"{name} must be a number, got {value!r}")
+    if np.ma.is_masked(value):
+        raise ValueError(f"{name} must be a number, got a masked one")
+    try:
+        number = float(value)
+    except OverflowError:
+        raise ValueError(f"{name} must be finite, got {_TOO_LARGE}") from None
+    except (TypeError, ValueError):
+        raise TypeError(f"{name} must be a number, got {value!r}") from None
+    if finite and not math.isfinite(number):
+        raise ValueError(f"{name} must be finite, got {number}")
+    return number
+
+
+def _as_float_tuple(values: Any, name: str, *, finite: bool) -> tuple[float, ...]:
+    several = isinstance(values, (list, tuple)) or np.ndim(values) != 0
+    return tuple(read_only(values if several else [values], name, ndim=1, finite=finite).tolist())
+
+
+def _as_mapping(values: Mapping[Any, Any], name: str) -> Mapping[Any, Any]:
+    if not isinstance(values, Mapping):
+        raise TypeError(f"{name} must be a mapping, got {type(values).__name__}")
+    return MappingProxyType(dict(values))
+
+
+def _as_parts(value: Any, name: str) -> Any:
+    return type(value)(map(model_of, value)) if type(value) in (list, tuple) else model_of(value)
+
+
+def _as_named_parts(values: Mapping[str, Any], name: str) -> Mapping[str, Any]:
+    return MappingProxyType({key: model_of(each) for key, each in _as_mapping(values, name).items()})
+
+
+def check_whole(value: Any, name: str, *, least: int = 1) -> None:
+    """Refuse what is no whole number from `least` up: TypeError if it is no int, ValueError if it is too small."""
+    if isinstance(value, bool) or not isinstance(value, int):
+        raise TypeError(f"{name} must be a whole number, got {value!r}")
+    if value < least:
+        raise ValueError(f"{name} must {f'be at least {least}' if least else 'not be negative'}, got {value}")
+
+
+def whole_substeps(count: float) -> int:
+    """Sub-steps of a sample, at least one; ValueError for more than a computer takes in a reasonable time."""
+    if not count < _MOST_SUBSTEPS:
+        raise ValueError(
+            f"a sample would take {count:.3g} sub-steps: it is too long for the stiffness and damping over the mass"
+        )
+    return max(1, math.ceil(count))
+
+
+def items(value: Any) -> dict[str, Any]:
+    """Fields of a frozen value by name."""
+    values = vars(value)
+    return {name: values[name] for name in _field_names(type(value))[0]}  # type: ignore[arg-type]
+
+
+def own_items(value: Any) -> dict[str, Any]:
+    """Fields of a frozen value by name, without those that are `LAST`."""
+    return {name: item for name, item in items(value).items() if name not in last_names(type(value))}
+
+
+def given_items(value: Any) -> dict[str, Any]:
+    """Fields of a frozen value by name, without those that are `LAST` and None."""
+    last = last_names(type(value))
+    return {name: item for name, item in items(value).items() if item is not None or name not in last}
+
+
+def last_names(cls: Any) -> tuple[str, ...]:
+    """Names of the fields that are `LAST`."""
+    return _field_names(cls)[2]
+
+
+@functools.cache
+def _field_names(cls: Any) -> tuple[tuple[str, ...], ...]:
+    """Names of all fields, of those that count in comparisons, and of those that are `LAST`."""
+    fields = sorted(dataclasses.fields(cls), key=lambda field: "last" in field.metadata)
+    return (
+        tuple(field.name for field in fields),
+        tuple(field.name for field in fields if field.compare),
+        tuple(field.name for field in fields if "last" in field.metadata),
+    )
+
+
+def _compared(value: Any) -> tuple[Any, ...]:
+    values = vars(value)
+    return tuple(values[name] for name in _field_names(type(value))[1])  # type: ignore[arg-type]
+
+
+def _key(value: Any) -> Any:
+    if type(value) is float:  # nearly every one
+        return "nan" if math.isnan(value) else value
+    if isinstance(value, np.ndarray):
+        return value.shape, (value + 0.0 if value.dtype.kind == "f" else value).tobytes()
+    if isinstance(value, (tuple, list)):
+        return tuple(_key(item) for item in value)
+    if isinstance(value, Mapping):
+        return tuple((name, _key(item)) for name, item in sorted(value.items()))
+    return "nan" if isinstance(value, float) and math.isnan(value) else value
+
+
+def _equal(self: Any, other: object) -> Any:
+    if type(self) is not type(other):
+        return NotImplemented
+    pairs = zip(_compared(self), _compared(other), strict=True)
+    return all(one is another or _key(one) == _key(another) for one, another in pairs)
+
+
+def _hash(self: Any) -> int:
+    return hash((type(self), _key(_compared(self))))
+
+
+def _reduce(self: Any) -> tuple[Any, ...]:
+    plain = {name: dict(item) if isinstance(item, MappingProxyType) else item for name, item in items(self).items()}
+    return _rebuild, (type(self), plain)
+
+
+def _rebuild(cls: type, items: dict[str, Any]) -> Any:
+    return cls(**items)

@@ -1,0 +1,338 @@
+"""Work divided between threads, and work in other processes.
+
+Kernels release the interpreter lock, so that a pool of threads keeps all cores busy. The division of the work does not
+change a result: every item is computed by itself. Searches in Python hold the lock; they run in a second process.
+
+An interrupt ends all of it: a kernel is called for a fraction of a second at a time, an exception is raised in threads
+that still work, and processes are terminated. A process also ends with its parent, in whatever way that ends.
+"""
+
+import contextlib
+import ctypes
+import itertools
+import multiprocessing
+import multiprocessing.connection
+import os
+import queue
+import signal
+import sys
+import threading
+import time
+from collections.abc import Callable, Iterator
+from concurrent.futures import Executor, Future, ProcessPoolExecutor
+from contextlib import contextmanager
+from contextvars import ContextVar, copy_context
+from typing import Any, TypeVar
+
+from hysim._basics.frozen import check_count
+from hysim._basics.progress import Progress, followed, silence
+
+T = TypeVar("T")
+
+_LONGEST = 2_000_000  # samples to begin with, which take some tenths of a second
+_PIECE, _GROWTH = 0.2, 16.0  # seconds of a call of a kernel, and largest ratio of a call to the one before
+_STRETCH = 100_000  # samples of one path: some hundredths of a second
+GLANCE = 0.1  # longest wait without a check for signals [s]
+_SIGNAL_OF_PARENTS_DEATH = 1  # PR_SET_PDEATHSIG of Linux
+_PATIENCE = 0.3  # seconds to wait for threads that are being stopped
+
+_most: ContextVar[int | None] = ContextVar("most threads", default=None)
+
+
+def cores() -> int:
+    """Number of processor cores that this process may use."""
+    return len(os.sched_getaffinity(0)) if sys.platform == "linux" else os.cpu_count() or 1
+
+
+def in_chunks(
+    work: Callable[[int, int], None],
+    n_items: int,
+    *,
+    workers: int | None = None,
+    minimum: int = 64,
+    n_samples: int = 1,
+) -> None:
+    """Call `work(start, stop)` on several threads so that the calls cover `range(n_items)` once.
+
+    A call computes the items from `start` to `stop - 1`. The number of threads is `workers`, by default one for each
+    core; each has at least `minimum` items, or fewer if an item has many samples, `n_samples`.
+    """
+    _check(workers)
+    minimum = max(1, min(minimum, _LONGEST // max(1, n_samples)))
+    n_chunks = max(1, min(workers or _most.get() or cores(), n_items // minimum))
+    edges = [n_items * k // n_chunks for k in range(n_chunks + 1)]
+    own, *others = itertools.pairwise(edges)
+    if not others:
+        _piece_by_piece(work, *own, minimum)
+        return
+    with threads(len(others)) as pool:
+        running = [pool.submit(_piece_by_piece, work, *chunk, minimum) for chunk in others]
+        _piece_by_piece(work, *own, minimum)
+        for chunk in running:
+            awaited(chunk)
+
+
+def in_pieces(work: Callable[[slice], int], n_samples: int) -> int:
+    """Call `work` for one short stretch of samples after the other, so that interrupts are handled between them.
+
+    `work` returns -1, or the first sample that failed, counted from the start of its stretch, and keeps its state
+    between stretches. The result is -1, or the first sample that failed, counted from the first of all.
+    """
+    for start in range(0, n_samples, _STRETCH):
+        failed = work(slice(start, min(start + _STRETCH, n_samples)))
+        if failed >= 0:
+            return start + failed
+        followed(min(start + _STRETCH, n_samples), n_samples)
+    return -1
+
+
+def _piece_by_piece(work: Callable[[int, int], None], start: int, stop: int, size: int) -> None:
+    """Call `work` for pieces of `size` items, then of about `_PIECE` seconds, so that interrupts come between them."""
+    while start < stop:
+        begin, end = time.perf_counter(), min(start + size, stop)
+        work(start, end)
+        share = _PIECE / max(time.perf_counter() - begin, 1e-9)
+        size = max(1, int(size * min(share, _GROWTH)))
+        start = end
+
+
+def map_on_threads(
+    work: Callable[[int], T], n_items: int, *, workers: int | None = None, progress: Progress | None = None
+) -> list[T]:
+    """The results of `work(k)` for k in `range(n_items)`, in order, on one thread for each core or `workers` threads.
+
+    `in_chunks` inside `work` uses one thread. `progress(done, total)` is called after each item.
+    """
+    _check(workers)
+    n_threads = min(workers or _most.get() or cores(), n_items)
+    context = copy_context()  # which contains numpy's error state
+
+    def on_one_thread(k: int) -> T:
+        with at_most(1 if n_threads > 1 else None):
+            return work(k)
+
+    results = []
+    with threads(n_threads) as pool:
+        for item in [pool.submit(context.copy().run, on_one_thread, k) for k in range(n_items)]:
+            results.append(awaited(item))
+            if progress is not None:
+                progress(len(results), n_items)
+    return results
+
+
+@contextmanager
+def at_most(workers: int | None) -> Iterator[None]:
+    """Set the default number of threads of `in_chunks` in this thread; None for all cores."""
+    _check(workers)
+    token = _most.set(workers or _most.get())
+    try:
+        yield
+    finally:
+        _most.reset(token)
+
+
+def _check(workers: int | None) -> None:
+    if workers is not None:
+        check_count("workers", workers)
+
+
+def awaited(future: Future[T]) -> T:
+    """The result of a future; during the wait an interrupt is handled within `GLANCE`.
+
+    In a wait without an end, Python would not handle an interrupt that arrives just before the wait begins.
+    """
+    while not future.done():
+        with contextlib.suppress(TimeoutError):
+            future.exception(timeout=GLANCE)
+    return future.result()
+
+
+@contextmanager
+def threads(number: int) -> Iterator[Executor]:
+    """Threads that end with the block: after their work, or as soon as they can be stopped if the block fails."""
+    pool = _Threads(number)
+    try:
+        yield pool
+    except BaseException:
+        pool.stop(_PATIENCE)
+        raise
+    pool.shutdown()
+
+
+class _Stopped(BaseException):
+    """Raised in a thread to stop it."""
+
+
+class _Threads(Executor):
+    """A pool of threads that can be stopped during their work.
+
+    The interpreter waits for threads of `concurrent.futures` to finish all of their work before it ends.
+    """
+
+    def __init__(self, number: int) -> None:
+        self._work: queue.SimpleQueue[tuple[Future[Any], Callable[[], Any]] | None] = queue.SimpleQueue()
+        self._is_shut = False
+        self._threads = [threading.Thread(target=self._serve, daemon=True) for _ in range(number)]
+        for thread in self._threads:
+            thread.start()
+
+    def submit(self, function: Callable[..., Any], /, *args: Any, **options: Any) -> Future[Any]:
+        if self._is_shut:
+            raise RuntimeError("cannot submit work after shutdown")
+        future: Future[Any] = Future()
+        self._work.put((future, lambda: function(*args, **options)))
+        return future
+
+    def shutdown(self, wait: bool = True, *, cancel_futures: bool = False) -> None:
+        self._is_shut = True
+        while cancel_futures:
+            try:
+                waiting = self._work.get_nowait()
+            except queue.Empty:
+                break
+            if waiting is not None:
+                waiting[0].cancel()
+        for _ in self._threads:
+            self._work.put(None)
+        for thread in self._threads if wait else ():
+            while thread.is_alive():
+                thread.join(GLANCE)
+
+    def stop(self, patience: float) -> None:
+        """Cancel work that has not begun, raise an exception in every thread, and wait so many seconds for them."""
+        for thread in self._threads:
+            if thread.ident is not None:
+                ctypes.pythonapi.PyThreadState_SetAsyncExc(ctypes.c_ulong(thread.ident), ctypes.py_object(_Stopped))
+        self.shutdown(wait=False, cancel_futures=True)
+        deadline = time.monotonic() + patience
+        for thread in self._threads:
+            thread.join(max(0.0, deadline - time.monotonic()))
+
+    def _serve(self) -> None:
+        try:
+            while (item := self._work.get()) is not None:
+                self._compute(*item)
+                del item  # an idle thread would keep the last result
+        except _Stopped:
+            pass
+
+    @staticmethod
+    def _compute(future: Future[Any], work: Callable[[], Any]) -> None:
+        if not future.set_running_or_notify_cancel():
+            return
+        try:
+            result = work()
+        except BaseException as error:
+            future.set_exception(error)
+        else:
+            future.set_result(result)
+
+
+@contextmanager
+def second_process() -> Iterator[Executor]:
+    """An executor of one further process, forked from this one; on one core, or without fork, one that works at once.
+
+    Only the parent handles interrupts. The process cannot print: the standard output is the parent's.
+    """
+    if not sys.platform.startswith("linux") or cores() < 2:
+        yield _AtOnce()
+        return
+    with processes(1, _print_to_nowhere) as pool:
+        yield pool
+
+
+@contextmanager
+def processes(number: int, begin: Callable[..., None], *arguments: Any) -> Iterator[Executor]:
+    """Processes that end with the block, at once if it fails, and with this process in whatever way it ends.
+
+    Each calls `begin` first. On Linux they are forked, so that the arguments need not be pickled; BLAS then uses one
+    thread in each.
+    """
+    before = {*multiprocessing.active_children()}
+    context = multiprocessing.get_context("fork" if sys.platform.startswith("linux") else None)
+    pool = ProcessPoolExecutor(number, context, _begin, (begin, arguments))
+    try:
+        with _one_blas_thread_if_loaded(), _without_signals():
+            pool.submit(_do_nothing)  # which starts the processes, where they are forked
+        yield pool
+    except BaseException:
+        pool.shutdown(wait=False, cancel_futures=True)
+        for process in {*multiprocessing.active_children()} - before:
+            process.terminate()
+        raise
+    pool.shutdown()
+
+
+def _do_nothing() -> None:
+    pass
+
+
+@contextmanager
+def _one_blas_thread_if_loaded() -> Iterator[None]:
+    """Let processes that are forked here have one thread of BLAS for good, if there is a BLAS to limit.
+
+    A forked OpenBLAS would start its threads anew when their number is set, and they wait busily at first: in each
+    process this takes as long as a short task. To load a BLAS for this would take longer.
+    """
+    if "scipy.linalg" not in sys.modules:
+        yield
+        return
+    from hysim._basics.blas import one_blas_thread
+
+    with one_blas_thread():
+        yield
+
+
+@contextmanager
+def _without_signals() -> Iterator[None]:
+    """Block signals until a process that is started here has set its handlers."""
+    if sys.platform == "win32":
+        yield
+        return
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT, signal.SIGTERM})
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
+
+
+def _begin(begin: Callable[..., None], arguments: tuple[Any, ...]) -> None:
+    """Ignore interrupts, which the parent handles, end at once on request, and end with the parent."""
+    signal.set_wakeup_fd(-1)  # it is the parent's
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    signal.signal(signal.SIGTERM, signal.SIG_DFL)
+    if sys.platform != "win32":
+        signal.signal(signal.SIGHUP, signal.SIG_DFL)
+        signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGINT, signal.SIGTERM})
+    if sys.platform.startswith("linux"):  # a long call that holds the interpreter's lock would keep the thread waiting
+        ctypes.CDLL(None).prctl(_SIGNAL_OF_PARENTS_DEATH, signal.SIGKILL)
+    threading.Thread(target=_end_with_parent, daemon=True).start()
+    silence()  # the parent reports
+    begin(*arguments)
+
+
+def _end_with_parent() -> None:
+    """Wait until the parent has ended."""
+    parent = multiprocessing.parent_process()
+    if parent is not None:
+        multiprocessing.connection.wait([parent.sentinel])
+        os._exit(1)
+
+
+def _print_to_nowhere() -> None:
+    """Close the standard output, so that its reader need not wait for this process."""
+    nowhere = os.open(os.devnull, os.O_WRONLY)
+    os.dup2(nowhere, 1)
+    os.close(nowhere)
+
+
+class _AtOnce(Executor):
+    """Runs a function in `submit`."""
+
+    def submit(self, function: Callable[..., Any], /, *args: Any, **options: Any) -> Future[Any]:
+        future: Future[Any] = Future()
+        try:
+            future.set_result(function(*args, **options))
+        except Exception as error:
+            future.set_exception(error)
+        return future

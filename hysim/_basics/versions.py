@@ -1,0 +1,55 @@
+"""The libraries that hysim uses: their versions, for bug reports, and those that are optional."""
+
+import importlib.util
+import platform
+import sys
+from typing import Any
+
+from hysim._release import __version__
+
+DEPENDENCIES = ("numpy", "scipy", "numba", "matplotlib", "pysindy", "control", "threadpoolctl", "click")
+EXTRAS = (
+    *("h5py", "scikit-image", "imageio", "pandas", "xarray", "dask", "distributed", "ziglang"),
+    *("emcee", "dynesty", "arviz"),
+)
+
+
+def show_versions() -> None:
+    """Print the versions of hysim, Python, the platform, and every library that hysim can use.
+
+    Examples
+    --------
+    >>> import hysim as hs
+    >>> hs.show_versions()  # doctest: +ELLIPSIS
+    hysim ...
+    """
+    versions = {
+        "hysim": __version__,
+        "Python": f"{platform.python_version()} ({platform.python_implementation()}, {sys.byteorder} endian)",
+        "platform": platform.platform(),
+        **{name: _version(name) for name in DEPENDENCIES + EXTRAS},
+    }
+    width = max(map(len, versions))
+    print("\n".join(f"{name:<{width}}  {version}" for name, version in versions.items()))
+
+
+def optional(library: str, purpose: str, extra: str, error: type[Exception] = ImportError) -> Any:
+    """Import a library of an extra; without it, raise an error that says what to install."""
+    try:
+        return importlib.import_module(library)
+    except ImportError:
+        raise error(f"{purpose} needs {library.partition('.')[0]}: pip install 'hysim[{extra}]'") from None
+
+
+def is_installed(library: str) -> bool:
+    """Whether a library can be imported, without importing it."""
+    return importlib.util.find_spec(library) is not None
+
+
+def _version(name: str) -> str:
+    from importlib import metadata  # which takes as long to import as the front door of hysim
+
+    try:
+        return metadata.version(name)
+    except metadata.PackageNotFoundError:
+        return "not installed"

@@ -1,1 +1,0 @@
-"""Outputs of a law through the linear stages of an actuator."""

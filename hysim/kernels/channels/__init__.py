@@ -1,1 +1,0 @@
-"""Laws whose parameters change from sample to sample."""

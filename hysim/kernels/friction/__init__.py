@@ -1,1 +1,0 @@
-"""Friction and backlash: what depends on the velocity of the input as well as on its path."""

@@ -1,1 +1,0 @@
-"""Steps of laws of magnetic cores."""

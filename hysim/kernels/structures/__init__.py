@@ -1,1 +1,0 @@
-"""Many masses on elements with memory: exact linear propagation, and sweeps for the rest of the forces."""
