@@ -141,4 +141,4 @@ from hysim.models.storage import save as save
 from hysim.models.storage import load_model as load_model
 from hysim.errors import SimulationError as SimulationError
 from hysim.errors import HysimWarning as HysimWarning
-from hysim._basics.versions import show_versions as show_versions
+from hysim._basics.libraries import show_versions as show_versions

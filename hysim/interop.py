@@ -21,7 +21,7 @@ import numpy as np
 import numpy.typing as npt
 
 from hysim._basics.frozen import FloatArray
-from hysim._basics.versions import optional
+from hysim._basics.libraries import optional
 
 __all__ = ["ForeignTable", "channels_of", "dataset", "frame", "heading", "table_in", "told_by"]
 

@@ -15,7 +15,7 @@ PACKAGE = Path(hysim.__file__).parent
 RANKS = (
     ("_names", "_release"),
     ("_basics", "errors"),  # they know nothing of hysteresis
-    ("_channels", "_turns", "_resolution", "interop"),  # turning points, the quantum of a sensor, tables of others
+    ("_columns", "interop"),  # turning points, cycles, the quantum of a sensor; tables of other libraries
     ("signals", "records", "metrics", "kernels"),
     ("datasets", "files", "models", "vision"),
     ("laws",),

@@ -12,7 +12,7 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 
 import hysim as hs
-from hysim._turns.excursions import protocol
+from hysim._columns.excursions import protocol
 
 ROUNDING = 1e-12  # relative; sums of some hundred terms of order one
 YIELDING = 0.5

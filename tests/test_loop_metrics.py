@@ -11,7 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import hysim as hs
-from hysim._turns.turning import TOLERANCE, complete_cycles
+from hysim._columns.turning import TOLERANCE, complete_cycles
 from hysim.cli import main
 from hysim.metrics.rows import LoopRows
 

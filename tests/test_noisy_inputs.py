@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 import hysim as hs
-from hysim._turns.input_noise import input_noise, quiet_path
-from hysim._turns.repeats import repeated_cycle
+from hysim._columns.input_noise import input_noise, quiet_path
+from hysim._columns.repeats import repeated_cycle
 from hysim.cli import main
 from hysim.identification._diagnostics import rate_noise_warning
 

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 import hysim as hs
-from hysim._turns.turning import TOLERANCE, complete_cycles
+from hysim._columns.turning import TOLERANCE, complete_cycles
 from hysim.cli import main
 from hysim.export import explorer
 from hysim.export._compilers import FOLDER, c_source, compiled, mark, module_of

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 import hysim as hs
-from hysim._basics import versions as _versions
+from hysim._basics import libraries as _versions
 from hysim._basics.printing import LETTERS, LINES, summary_text, wrapped
 
 UNITS = {"t": "s", "u": "V", "y": "um"}

@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import Annotated, Any, Literal, NamedTuple
 
 import hysim as hs
-from hysim._basics.versions import optional
+from hysim._basics.libraries import optional
 from hysim.cli import models, options, outputs
 from hysim.cli.records import STANDARD
 

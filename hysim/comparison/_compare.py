@@ -17,8 +17,8 @@ from hysim._basics.frozen import FloatArray
 from hysim._basics.parallel import map_on_threads
 from hysim._basics.progress import Reports, announced_by, reports
 from hysim._basics.results import Result, model_of
-from hysim._turns.excursions import measured_cycles
-from hysim._turns.turning import TOLERANCE
+from hysim._columns.excursions import measured_cycles
+from hysim._columns.turning import TOLERANCE
 from hysim.comparison._result import Comparison, ComparisonRow
 from hysim.errors import Interrupted, SimulationError
 from hysim.identification import Identification, identify

@@ -32,7 +32,7 @@ from scipy.linalg import block_diag
 
 from hysim import metrics
 from hysim._basics.frozen import FloatArray, checked
-from hysim._turns.turning import TOLERANCE
+from hysim._columns.turning import TOLERANCE
 from hysim.errors import SimulationError
 from hysim.identification import identify
 from hysim.laws.operators.prandtl_ishlinskii import PrandtlIshlinskii

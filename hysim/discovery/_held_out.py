@@ -21,7 +21,7 @@ import numpy.typing as npt
 from scipy import special
 
 from hysim._basics.frozen import FloatArray
-from hysim._turns.turning import TOLERANCE, complete_cycles
+from hysim._columns.turning import TOLERANCE, complete_cycles
 from hysim.discovery._competitors import FLOOR, Rival, curve, means, plays, relaxations, trend
 from hysim.errors import SimulationError
 from hysim.identification import folds as blocks

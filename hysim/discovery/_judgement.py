@@ -26,7 +26,7 @@ import numpy as np
 
 from hysim import metrics, signals
 from hysim._basics.frozen import FloatArray, frozen
-from hysim._turns.turning import TOLERANCE, complete_cycles
+from hysim._columns.turning import TOLERANCE, complete_cycles
 from hysim.discovery import _held_out as held_out
 from hysim.discovery._competitors import FLOOR, Rival, rival, steady_width
 from hysim.discovery._held_out import CURVE, LAW, PLAYS, RELAXATIONS, RIVAL, SEVERAL, Law, Refit, Trial

@@ -28,7 +28,7 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import NamedTuple
 
-from hysim._basics.versions import optional
+from hysim._basics.libraries import optional
 from hysim.export._c import plain
 from hysim.export._program import entries
 from hysim.models.law import Law

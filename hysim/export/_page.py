@@ -21,9 +21,9 @@ from hysim._basics.atomic import write_text
 from hysim._basics.frozen import FloatArray, items
 from hysim._basics.prefixes import label, printed
 from hysim._basics.results import model_of
+from hysim._columns.excursions import measured_cycles
+from hysim._columns.turning import TOLERANCE, Samples
 from hysim._release import __version__
-from hysim._turns.excursions import measured_cycles
-from hysim._turns.turning import TOLERANCE, Samples
 from hysim.export._compilers import compressed
 from hysim.export._page_model import Parts, about, heading, node_of, plane_of
 from hysim.records import Record

@@ -26,7 +26,7 @@ from typing import Any, BinaryIO, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from hysim._basics.versions import optional
+from hysim._basics.libraries import optional
 from hysim.files._arrays import KINDS, MOST_BYTES, NOTES, TEXT, UNITS, Array, Arrays, with_notes
 from hysim.files._table import UnreadableError, damaged, notes_in, require
 

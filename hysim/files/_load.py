@@ -18,7 +18,7 @@ import numpy.typing as npt
 
 from hysim._basics.frozen import FloatArray, check_choice
 from hysim._basics.progress import Progress, Reports, reports
-from hysim._resolution import output_quantum
+from hysim._columns.resolution import output_quantum
 from hysim.files._arrays import NUMBERS, Arrays, mat, npy, npz
 from hysim.files._delimited import DECIMALS, THOUSANDS, Delimited, Text, delimited
 from hysim.files._hdf5 import hdf5

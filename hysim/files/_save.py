@@ -13,9 +13,9 @@ import numpy as np
 
 from hysim._basics.atomic import write_all
 from hysim._basics.frozen import FloatArray
+from hysim._basics.libraries import optional
 from hysim._basics.printing import csv_text
-from hysim._basics.versions import optional
-from hysim._channels import along
+from hysim._columns.channels import along
 from hysim.files._arrays import NOTES, UNITS
 from hysim.files._table import Notes
 from hysim.records import Record, as_record

@@ -14,7 +14,7 @@ import numpy.typing as npt
 from hysim._basics.frozen import FloatArray, frozen
 from hysim._basics.printing import printed, quantity, summary_text
 from hysim._basics.results import model_of
-from hysim._channels import value_in
+from hysim._columns.channels import value_in
 from hysim.identification._identify import identify
 from hysim.identification._result import Identification
 from hysim.identification.forms import Stored

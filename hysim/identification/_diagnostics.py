@@ -11,8 +11,8 @@ import numpy.typing as npt
 
 from hysim import metrics
 from hysim._basics.frozen import FloatArray
-from hysim._turns.input_noise import noise_level
-from hysim._turns.turning import TOLERANCE
+from hysim._columns.input_noise import noise_level
+from hysim._columns.turning import TOLERANCE
 from hysim.errors import SimulationError
 from hysim.identification._descent import Descent
 from hysim.identification._noise import Gaussian, Noise

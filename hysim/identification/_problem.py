@@ -18,9 +18,9 @@ import numpy as np
 import numpy.typing as npt
 
 from hysim._basics.frozen import FloatArray
-from hysim._channels import taken
+from hysim._columns.channels import taken
+from hysim._columns.repeats import repeated_cycle
 from hysim._names import meant
-from hysim._turns.repeats import repeated_cycle
 from hysim.identification.marquardt import Settled, least_squares, triangle
 from hysim.models.protocols import Forgetting, Identifiable, Staged, placed
 from hysim.models.search_space import STATES, STATES_IN_WORDS, Freedom, Parameters, SearchSpace

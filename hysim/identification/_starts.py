@@ -29,7 +29,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from hysim._basics.frozen import FloatArray
-from hysim._channels import steady
+from hysim._columns.channels import steady
 from hysim.errors import SimulationError
 from hysim.identification._assumptions import decided
 from hysim.identification._problem import Problem, Setting

@@ -1,6 +1,6 @@
 """The measures of every cycle of a record, one row a cycle.
 
-Cycles begin and end at a level of the input (see `hysim._turns.excursions`), and each is measured by the code of
+Cycles begin and end at a level of the input (see `hysim._columns.excursions`), and each is measured by the code of
 `loop_metrics`. If a cycle begins and ends at exactly the same input, which is the rule,
 
     energy = integral of y du over the cycle = -signed area
@@ -28,8 +28,8 @@ import numpy.typing as npt
 from hysim._basics.frozen import FloatArray, frozen
 from hysim._basics.prefixes import in_brackets
 from hysim._basics.printing import aligned, csv_text, extent, folded, printed, quantity, summary_text
-from hysim._turns.excursions import Loops, protocol
-from hysim._turns.turning import ROUNDING, TOLERANCE, too_few
+from hysim._columns.excursions import Loops, protocol
+from hysim._columns.turning import ROUNDING, TOLERANCE, too_few
 from hysim.metrics._loop import COUNTERCLOCKWISE, FORCE, LoopMetrics, measure, samples_of_a_loop
 
 

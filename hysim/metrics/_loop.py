@@ -53,8 +53,8 @@ import numpy.typing as npt
 
 from hysim._basics.frozen import FloatArray, check_positive, frozen, items, vectors
 from hysim._basics.printing import extent, printed, summary_text
-from hysim._turns.excursions import measured_cycles
-from hysim._turns.turning import ROUNDING, TOLERANCE, Cycle, settled, turns
+from hysim._columns.excursions import measured_cycles
+from hysim._columns.turning import ROUNDING, TOLERANCE, Cycle, settled, turns
 
 COUNTERCLOCKWISE = (
     "counterclockwise, as a piezo's displacement over its voltage: the integral of y du is negative, and "

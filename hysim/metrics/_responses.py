@@ -37,7 +37,7 @@ import numpy.typing as npt
 from hysim._basics.frozen import FloatArray, frozen, read_only, vectors
 from hysim._basics.printing import printed, summary_text
 from hysim._basics.results import model_of
-from hysim._turns.turning import ROUNDING
+from hysim._columns.turning import ROUNDING
 from hysim.errors import SimulationError
 
 _BATCHES = tuple(2**k for k in range(4, 18))  # cycles of each of the successive runs

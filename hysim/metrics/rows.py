@@ -9,8 +9,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from hysim._basics.frozen import FloatArray
-from hysim._turns.excursions import measured_cycles
-from hysim._turns.turning import TOLERANCE, settled
+from hysim._columns.excursions import measured_cycles
+from hysim._columns.turning import TOLERANCE, settled
 from hysim.metrics._loop import common_inputs, signed_area
 
 

@@ -13,7 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 from hysim._basics.frozen import FloatArray, read_only
-from hysim._channels import Channels, checked_channels, steady, taken, value_in
+from hysim._columns.channels import Channels, checked_channels, steady, taken, value_in
 from hysim.models.dependent_structure import DependentStructure
 from hysim.models.model import family
 from hysim.models.parts import response_of

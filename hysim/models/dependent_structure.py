@@ -19,7 +19,7 @@ import numpy as np
 import numpy.typing as npt
 
 from hysim._basics.frozen import FloatArray, checked
-from hysim._channels import value_in
+from hysim._columns.channels import value_in
 from hysim._names import among
 from hysim.models.protocols import Identifiable, PartByPart, Recorded, Staged, Undecided, Variant
 from hysim.models.search_space import ALL_FREE, Freedom, Parameters, SearchSpace

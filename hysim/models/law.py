@@ -19,7 +19,7 @@ import numpy.typing as npt
 
 from hysim._basics.frozen import FloatArray, items, last_names, read_only
 from hysim._basics.parallel import in_pieces
-from hysim._turns.turning import TOLERANCE
+from hysim._columns.turning import TOLERANCE
 from hysim.errors import SimulationError, warn_beyond
 from hysim.kernels import stepping
 from hysim.kernels.stepping import Start, Step, drive

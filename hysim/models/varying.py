@@ -23,7 +23,7 @@ import numpy.typing as npt
 
 from hysim._basics.frozen import FloatArray, read_only
 from hysim._basics.parallel import in_chunks
-from hysim._channels import label
+from hysim._columns.channels import label
 from hysim.errors import SimulationError
 from hysim.kernels import stepping
 from hysim.models.compiled_step import compiled_start, compiled_step

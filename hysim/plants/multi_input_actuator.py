@@ -18,7 +18,7 @@ import numpy as np
 import numpy.typing as npt
 
 from hysim._basics.frozen import FloatArray, read_only
-from hysim._channels import Channels, checked_channels, value_in
+from hysim._columns.channels import Channels, checked_channels, value_in
 from hysim.laws.static import Line
 from hysim.models.dependent import AlongRecord
 from hysim.models.joint_space import columns_beside, declared, together, without_repetition

@@ -9,7 +9,7 @@ from matplotlib.axes import Axes
 
 from hysim._basics.prefixes import in_unit, label
 from hysim._basics.results import model_of
-from hysim._channels import steady
+from hysim._columns.channels import steady
 from hysim.control import Tuning
 from hysim.discovery import Discovery, OscillatorDiscovery
 from hysim.identification import Identification, ParameterCurve, parameter_curve

@@ -13,7 +13,7 @@ from matplotlib.ticker import MaxNLocator
 
 from hysim._basics.frozen import FloatArray
 from hysim._basics.prefixes import in_unit, label
-from hysim._turns.turning import TOLERANCE, turns
+from hysim._columns.turning import TOLERANCE, turns
 from hysim.laws.operators.preisach import Preisach, PreisachRelays
 from hysim.plot._style import DIVERGING, GUIDE, MEASURED, POINTS, AxesArray, line, one, several
 from hysim.records import Record

@@ -24,7 +24,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from hysim._basics.frozen import FloatArray
-from hysim._basics.versions import optional
+from hysim._basics.libraries import optional
 from hysim.posterior._sampler import Chains, effective_samples, split_rhat
 from hysim.posterior._target import Target
 

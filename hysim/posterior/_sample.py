@@ -10,9 +10,9 @@ import numpy.typing as npt
 
 from hysim._basics.blas import one_blas_thread
 from hysim._basics.frozen import FloatArray, check_count, frozen, read_only
+from hysim._basics.libraries import optional
 from hysim._basics.printing import aligned, csv_text, printed, quantity, summary_text, wrapped
 from hysim._basics.progress import Reports, reports
-from hysim._basics.versions import optional
 from hysim.errors import SimulationError
 from hysim.identification import Identification, Width
 from hysim.identification.likelihood import Problem, again, density, optima

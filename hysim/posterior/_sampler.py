@@ -34,7 +34,7 @@ from typing import Any
 import numpy as np
 
 from hysim._basics.frozen import FloatArray
-from hysim._basics.versions import optional
+from hysim._basics.libraries import optional
 from hysim.posterior._proposal import EARLY_SHARE, GOOD, POOR, Proposal, mixture, moved, proposal_for
 from hysim.posterior._target import Target
 

@@ -19,8 +19,8 @@ import numpy as np
 import numpy.typing as npt
 
 from hysim._basics.frozen import FloatArray, frozen
+from hysim._basics.libraries import optional
 from hysim._basics.printing import csv_text, printed, summary_text
-from hysim._basics.versions import optional
 from hysim._names import among
 from hysim.sweeps._chunks import Table, seeds
 from hysim.sweeps._space import Column

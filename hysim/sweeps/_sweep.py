@@ -25,9 +25,9 @@ from typing import Any, NamedTuple, Protocol, runtime_checkable
 import numpy as np
 
 from hysim._basics.frozen import check_choice, check_count, last_names
+from hysim._basics.libraries import is_installed
 from hysim._basics.parallel import GLANCE, cores, processes, threads
 from hysim._basics.progress import Line, Progress, Reports, reports
-from hysim._basics.versions import is_installed
 from hysim._release import __version__
 from hysim.sweeps._chunks import Chunk, Outcome, Table, Task, computed, part_of, seeds
 from hysim.sweeps._result import Sweep, result_of

@@ -14,7 +14,7 @@ import numpy as np
 import numpy.typing as npt
 
 from hysim._basics.frozen import frozen
-from hysim._basics.versions import optional
+from hysim._basics.libraries import optional
 
 Picture = npt.NDArray[np.float32]
 

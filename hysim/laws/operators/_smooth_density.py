@@ -28,7 +28,7 @@ import numpy as np
 import numpy.typing as npt
 
 from hysim._basics.frozen import FloatArray
-from hysim._turns.turning import TOLERANCE
+from hysim._columns.turning import TOLERANCE
 from hysim.records import Record
 
 STRENGTHS = np.logspace(-10.0, 4.0, 43)

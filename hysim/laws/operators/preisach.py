@@ -42,7 +42,7 @@ import numpy.typing as npt
 
 from hysim._basics.blas import one_blas_thread
 from hysim._basics.frozen import FloatArray, check_whole, read_only
-from hysim._turns.turning import TOLERANCE
+from hysim._columns.turning import TOLERANCE
 from hysim.kernels import preisach as kernels
 from hysim.laws.operators._relays import RelayLaw, everett_of, weights_of
 from hysim.laws.operators._smooth_density import smooth, supported

@@ -23,7 +23,7 @@ import numpy as np
 import numpy.typing as npt
 
 from hysim._basics.frozen import FloatArray
-from hysim._turns.turning import NEAR, ROUNDING, Cycle, complete_cycles, too_few, turns
+from hysim._columns.turning import NEAR, ROUNDING, Cycle, complete_cycles, too_few, turns
 
 _FULL = 1.0 - 2.0 * NEAR
 """Least span of a cycle of full amplitude, as a fraction of the widest cycle's: each end may miss by `NEAR`."""

@@ -16,7 +16,7 @@ from itertools import pairwise
 import numpy as np
 
 from hysim._basics.frozen import FloatArray
-from hysim._turns.turning import turns
+from hysim._columns.turning import turns
 
 _ORDERS = (3, 4, 5)
 _AGREE = 1.0 / 3.0

@@ -11,7 +11,7 @@ which p is fitted: a loop of any shape is neither tilted nor narrowed.
 import numpy as np
 
 from hysim._basics.frozen import FloatArray
-from hysim._turns.turning import Cycle, settled
+from hysim._columns.turning import Cycle, settled
 
 _NODES = 64  # inputs on each branch at which the cycles are compared
 

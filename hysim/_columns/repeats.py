@@ -13,8 +13,8 @@ input, so that a measured input has a cycle as well.
 import numpy as np
 
 from hysim._basics.frozen import FloatArray
-from hysim._turns.input_noise import MOST_IGNORED, input_noise, reach
-from hysim._turns.turning import NEAR, ROUNDING, TOLERANCE, turns
+from hysim._columns.input_noise import MOST_IGNORED, input_noise, reach
+from hysim._columns.turning import NEAR, ROUNDING, TOLERANCE, turns
 
 _CLOSING = 2.0  # largest steps of the input, by which a record may end before its first input
 
