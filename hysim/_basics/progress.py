@@ -138,6 +138,8 @@ class Line:
             return
         line = ": ".join(filter(None, (self.verb, self.subject, text)))
         is_terminal = sys.stderr.isatty()
+        if line == self.verb and not is_terminal:  # nothing is known but that it goes on
+            return
         warning, self.warning = self.warning and f"{self.verb}: {self.warning}\n", ""
         self._write(f"{warning}\r\x1b[K{line}" if is_terminal else f"{warning}{line}\n")
         self.due, self.is_shown = now + (_ON_TERMINAL if is_terminal else _IN_FILE), True
