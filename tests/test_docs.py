@@ -19,7 +19,7 @@ NEEDS = {
     "posterior": pytest.mark.extra("emcee"),
 }
 
-WITHOUT_FIGURE = {"scope", "versions"}  # a list of what is not there, and a table of versions
+WITHOUT_FIGURE = {"decisions", "scope", "versions"}  # reasons, a list of what is not there, a table of versions
 
 
 def loaded(name):
