@@ -1,1 +1,1 @@
-"""What the columns of a record show: channels, turning points, cycles and their drift, noise, a sensor's quantum."""
+"""Properties of the columns of a record: channels, turning points, cycles, drift, noise, the quantum of a sensor."""

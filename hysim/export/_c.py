@@ -335,7 +335,7 @@ class Scope:
         self.written |= {name} | self.roots.get(name, frozenset())
 
     def c_name(self, name: str) -> str:
-        """The name in C, which is none of a function that an expression may call."""
+        """Name in C, different from those of the functions that an expression may call."""
         plain_name = name.strip("_") or "ignored"
         return f"{plain_name}_" if plain_name in RESERVED | HELPERS.keys() | MATHEMATICS | TESTS else plain_name
 

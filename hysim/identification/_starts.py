@@ -1,4 +1,4 @@
-"""Where searches begin that are too wide for a search at once: plants of several parts, parameters of a channel.
+"""Starting points of searches that are too wide for one pass: plants of several parts, parameters of a channel.
 
 **A plant of several parts** is searched part by part, and where that ends all parts are searched at once.
 

@@ -40,7 +40,7 @@ CYCLES, MEASURED = 10, 5
 NOISES = 15  # of a step
 LOW = 0.1  # of the triangle [um]
 PERIODS = (13.0, 26.0, 52.0, 104.0, 260.0, 520.0)
-"""Of the triangle, in the curves [s]."""
+"""Periods of the triangle in the curves [s]."""
 
 TARGETS = {"bouc-wen+eq7": ("90 % of the hysteresis", 89.5), "eq4": ("97 % of the vibration", 96.5)}
 """The two headline figures by their plant, and what rounds to them [%]."""

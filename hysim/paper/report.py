@@ -181,7 +181,7 @@ def _parameters(fit: Identification) -> list[Row]:
 
 
 def _equation_row(name: str, facts: Characteristics) -> Row:
-    """Of each pair of conjugate roots one, and each number once."""
+    """One root of each conjugate pair, without repetitions."""
     roots = {
         key: ", ".join(_complex(root) for root in values if root.imag >= 0.0) or None
         for key, values in (("poles", facts.poles), ("zeros", facts.zeros))

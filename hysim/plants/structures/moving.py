@@ -146,7 +146,7 @@ class MovingStructure(AssembledStructure):
     def kernel_arguments(
         self, directions: FloatArray, pushing: Sequence[float], sample_time: float
     ) -> tuple[Elements, Flows, Plant, Steps]:
-        """What the kernels move the structure with, under loads in the directions (n_loads, n_nodes)."""
+        """Tables by which the kernels move the structure, under loads in the directions (n_loads, n_nodes)."""
         A, loads, rates = assembly.linear_parts(self.matrices._replace(directions=directions[np.newaxis]))
         plant = Plant(A[0], loads[0], np.array(self.damping_matrix), np.array(directions), np.array(pushing))
         steps = assembly.steps_of(float(rates[0]), sample_time, self.substeps, self.tolerance)
