@@ -20,6 +20,7 @@ from typing import Any, NamedTuple, Protocol
 import numpy as np
 from numba.core.dispatcher import Dispatcher
 
+from hysim.kernels._compile import sources
 from hysim.kernels.stepping import Addressed
 
 HELPERS = MappingProxyType(
@@ -194,7 +195,7 @@ def routine(function: Callable[..., Any]) -> Routine:
     if not isinstance(function, FunctionType):
         raise UntranslatableError(f"a step must be a Python function or a kernel, got {function!r}")
     try:
-        text = textwrap.dedent(inspect.getsource(function))
+        text = sources.get(function) or textwrap.dedent(inspect.getsource(function))
         file = inspect.getsourcefile(function) or "<unknown>"
     except (OSError, TypeError):
         name = function.__qualname__

@@ -22,6 +22,9 @@ from numba.extending import intrinsic
 
 F = TypeVar("F", bound=Callable[..., Any])
 
+sources: dict[Any, str] = {}
+"""Text of the functions that stand in no file."""
+
 _NO_ENTRY = {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}
 
 
@@ -58,6 +61,11 @@ def inlined(function: F) -> F:
     return _compiled(function, (), forceinline=True, **_NO_ENTRY)
 
 
+def inlined_kernel(function: F) -> F:
+    """As `inlined`, for a function that Python calls, too: a slope is also evaluated as it is written."""
+    return _compiled(function, (), forceinline=True)
+
+
 def pasted(function: F) -> F:
     """As `inlined`, copied into its callers before these are compiled: it has no code of its own to make and link."""
     return _compiled(function, (), inline="always", **_NO_ENTRY)
@@ -78,6 +86,12 @@ def closure(function: F) -> F:
     """As `kernel`, for a function that closes over kernels: no later process would find it in the cache."""
     compiler: Any = numba.njit
     return compiler(nogil=True, error_model="numpy")(function)  # type: ignore[no-any-return]
+
+
+def unstored(function: F) -> F:
+    """As `inlined`, for a function that is written out when its family is defined: its callers' files are kept."""
+    compiler: Any = numba.njit
+    return compiler(nogil=True, error_model="numpy", _nrt=False, **_NO_ENTRY)(function)  # type: ignore[no-any-return]
 
 
 class Addressed(types.WrapperAddressProtocol):

@@ -24,7 +24,7 @@ from fractions import Fraction
 from numba import float64, int64, types
 
 from hysim._basics.frozen import FloatArray, read_only
-from hysim.kernels._compile import inlined, inner, signed_inlined
+from hysim.kernels._compile import inlined, inlined_kernel, inner, signed_inlined
 
 N_TERMS = 16
 _COEFFICIENTS = types.Array(float64, 1, "C", readonly=True)
@@ -71,7 +71,7 @@ _SMALL = 2.0**-54
 _FAR = 4.0  # times the balance, or more: from there on a decay is not taken as a change
 
 
-@inlined
+@inlined_kernel
 def power(w: float, n: float) -> float:
     """|w|^n, and its analytic continuation to w < 0 where n is 1 or 2."""
     if n == 1.0:

@@ -30,6 +30,7 @@ from hysim.models.inverse_search import inverse_at_rest, inverse_response, not_r
 from hysim.models.parameters import Parameter, declared_space
 from hysim.models.protocols import UNLIMITED, CompiledLaw, Limits, Startable
 from hysim.models.search_space import ALL_FREE, Freedom, Parameters, SearchSpace
+from hysim.models.slope import states_of, step_of
 from hysim.models.stages import Simpler, Stage, Subset
 from hysim.models.steady_cycle import Pass, PassOf, fixed_point
 from hysim.models.tables import Tables, arguments_of, check_signs, scalars_of, table_of_one, tables_of
@@ -106,6 +107,10 @@ class Law(Placed, ABC):
     """
 
     step: ClassVar[Any]
+    longest: ClassVar[Any] = None
+    flow: ClassVar[Any] = None
+    flows: ClassVar[Any] = None
+    hidden: ClassVar[int] = 0
     start: ClassVar[Any] = staticmethod(stepping.start)
     initial: ClassVar[tuple[str, ...]] = ("z0",)
     searched: ClassVar[tuple[Parameter, ...]] = ()
@@ -118,6 +123,13 @@ class Law(Placed, ABC):
     exact_strokes: ClassVar[bool] = False
     resume: ClassVar[Any] = None
 
+    def __init_subclass__(cls) -> None:
+        super().__init_subclass__()
+        if isinstance(slope := vars(cls).get("slope"), staticmethod):  # and no number of this name
+            cls.hidden = states_of(slope)
+            step, cls.workspace = step_of(cls)
+            cls.step = staticmethod(step)
+
     # ------------------------------------------------------------------------------ what a family may say more
 
     @classmethod
@@ -125,10 +137,15 @@ class Law(Placed, ABC):
         """Raise a ValueError where the tables, every field over sets, hold parameters that are no law."""
         check_signs(tables, cls.positive, cls.not_negative)
 
+    @staticmethod
+    def output(p: Any, x: float, u: float) -> float:
+        """Output of a law that says its slope: by default its first hidden state."""
+        return x
+
     @classmethod
     def pack(cls, tables: Tables) -> Packed:
         """Laws as the step takes them: by default the fields one behind the other, and the initial memory."""
-        memory = cls.initial_memory(tables)
+        memory = cls.initial_memory(tables, further=max(0, cls.hidden - len(cls.initial)))
         constants = [table for name, table in tables.items() if name not in cls.initial]
         return Packed(np.concatenate([memory[:, :0], *constants], axis=1), memory)
 

@@ -6,15 +6,15 @@
 u is the input, z the memory, y the output; time has no part in it.
 """
 
-from abc import abstractmethod
 from collections.abc import Callable, Mapping
 from functools import cached_property
-from typing import ClassVar, Self
+from typing import Any, ClassVar, Self
 
 import numpy as np
 import numpy.typing as npt
 
 from hysim._basics.frozen import FloatArray
+from hysim.kernels.boucwen import polynomial
 from hysim.laws.differential import _boucwen_search, boucwen_inverse
 from hysim.models.law import Law, State, of_sets
 from hysim.models.protocols import CompiledLaw
@@ -37,6 +37,7 @@ class MemoryLaw(Law):
     positive = ("n",)
     units: ClassVar[Mapping[str, str]] = {"n": "1", "offset": "y"}
 
+    slope: ClassVar[Any]
     A: float
     beta: float
     gamma: float
@@ -44,6 +45,11 @@ class MemoryLaw(Law):
     gain: float
     offset: float
     z0: float
+
+    @staticmethod
+    def output(p: Any, z: float, u: float) -> float:
+        """y = offset + c1 u + c2 u^2 + ... + gain z."""
+        return float(p.offset + polynomial(u, p.input_coefficients, 0) + p.gain * z)
 
     @classmethod
     def check(cls, tables: Tables) -> None:
@@ -113,9 +119,12 @@ class MemoryLaw(Law):
         further = (np.asarray(other, dtype=float) for other in others)
         return np.asarray(static + self.gain * self._memory_slope(np.sign(velocity), memory, inputs, *further))
 
-    @abstractmethod
     def _memory_slope(self, direction: FloatArray, z: FloatArray, u: FloatArray, *others: FloatArray) -> FloatArray:
         """Slope dz/du for an input at `u` that moves in `direction`, 1 or -1."""
+        hidden = self.packed[1].size - 2
+        further = (*others, *(np.zeros(()) for _ in range(hidden - len(others))))
+        slope = np.vectorize(lambda s, *x: np.ravel(self.slope(self, *x, s))[0], otypes=[float])
+        return np.asarray(slope(direction, z, *further, u))
 
     def search_space(self, record: Record, freedom: Freedom = ALL_FREE) -> SearchSpace:
         return _boucwen_search.search_space(

@@ -4,22 +4,21 @@ The two materials of OpenSees that change with the energy count it as e' = (1 - 
 that rates go over by the factor (1 - alpha) ko. Source: OpenSees command manual, uniaxialMaterial BoucWen and BWBN.
 """
 
+import math
 from dataclasses import replace
-from typing import ClassVar, Self
+from typing import Any, Self
 
 import numpy as np
 import numpy.typing as npt
 
 from hysim._basics.frozen import FloatArray
-from hysim.kernels import baber_noori as kernels
-from hysim.kernels.baber_noori_search import close_step
-from hysim.kernels.remainder import ROUNDING
-from hysim.laws.differential import _boucwen_search, _power_units, _wear_search
+from hysim.kernels._compile import inlined_kernel
+from hysim.kernels.elementary import power
+from hysim.laws.differential import _boucwen_search, _wear_search
 from hysim.laws.differential._memory_law import MemoryLaw
 from hysim.laws.differential.boucwen import BoucWen
 from hysim.laws.differential.polynomial_boucwen import PolynomialBoucWen
 from hysim.models.by_structure import Holding
-from hysim.models.law import Packed, Stepping
 from hysim.models.model import Example, family
 from hysim.models.search_space import ALL_FREE, Freedom, Parameters, SearchSpace
 from hysim.models.stages import Stage, Subset
@@ -51,7 +50,20 @@ _SPREAD = Stage(
     idle={"zeta_s": 0.0},
 )
 _WEARING = ("delta_a", "delta_nu", "delta_eta", "zeta_s")
-_OWN = ("delta_a", "delta_nu", "delta_eta", "zeta_s", "q", "p", "psi", "delta_psi", "lambda_")
+_LARGEST_EXPONENT = 700.0
+_WIDTHS, _BESIDE = 0.7, 4.0  # of the bell: the most that a step goes within it, and where it begins
+
+
+@inlined_kernel
+def bell(
+    e: float, loading: float, n: float, zeta_s: float, q: float, p: float, psi: float, lambda_: float
+) -> tuple[float, float, float]:
+    """Depth, place and width of the pinching; `psi` is that at `e`."""
+    where = 0.0
+    if q != 0.0:
+        where = q * loading ** (-1.0 / n) if loading > 0.0 else math.nan
+    depth = -zeta_s * math.expm1(min(-p * e, _LARGEST_EXPONENT))
+    return depth, where, psi * (lambda_ + depth)
 
 
 @family
@@ -96,15 +108,14 @@ class BoucWenBaberNoori(MemoryLaw):
 
     Notes
     -----
-    Solved by power series along monotone strokes, good to 1e-12 of the range; a law that neither degrades nor pinches
-    is the Bouc-Wen law to the bit. A law that degrades is never in a steady cycle. `identify` searches the Bouc-Wen
-    law, then the wear, then the pinching, then ``lambda_``, and keeps of them what lowers the BIC; a start that wears
-    off or pinches, or ``free=`` or ``bounds=`` with one of its parameters, keeps it in any case. Pinching is searched
-    beside wear only: each stage begins where the one before ended, and wear at a rate of zero costs no more than its
-    two parameters in the BIC. For pinching alone, ``fixed={"delta_nu": 0.0, "delta_eta": 0.0}`` leaves the wear out. It
-    holds delta_a and delta_psi, whose work the other rates and psi nearly do. Sources: T. T. Baber and Y. K. Wen, J.
-    Eng. Mech. Div. 107 (1981); T. T. Baber and M. N. Noori, J. Eng. Mech. 111 (1985); G. C. Foliente, J. Struct. Eng.
-    121 (1995), for the form of the pinching.
+    Integrated along monotone strokes to 1e-10 of the range (`hysim.kernels.branch`). A law that degrades is never in a
+    steady cycle. `identify` searches the Bouc-Wen law, then the wear, then the pinching, then ``lambda_``, and keeps of
+    them what lowers the BIC; a start that wears off or pinches, or ``free=`` or ``bounds=`` with one of its parameters,
+    keeps it in any case. Pinching is searched beside wear only: each stage begins where the one before ended, and wear
+    at a rate of zero costs no more than its two parameters in the BIC. For pinching alone, ``fixed={"delta_nu": 0.0,
+    "delta_eta": 0.0}`` leaves the wear out. It holds delta_a and delta_psi, whose work the other rates and psi nearly
+    do. Sources: T. T. Baber and Y. K. Wen, J. Eng. Mech. Div. 107 (1981); T. T. Baber and M. N. Noori, J. Eng. Mech.
+    111 (1985); G. C. Foliente, J. Struct. Eng. 121 (1995), for the form of the pinching.
 
     Examples
     --------
@@ -149,10 +160,28 @@ class BoucWenBaberNoori(MemoryLaw):
         names={"feedthrough": "input_coefficients[0]"},
     )
     stages = (_WEAR, _PINCHING, _SPREAD)
-    step = staticmethod(kernels.step)
-    workspace: ClassVar[int] = kernels.N_STATE - 3
     samples_a_thread = 2_000
-    tolerance: ClassVar[float] = ROUNDING  # of what the series leave out, beside the memory
+
+    @staticmethod
+    def slope(p: Any, z: float, e: float, u: float, s: float) -> tuple[float, float]:
+        w, nu = z * s, 1.0 + p.delta_nu * e
+        bend = nu * power(abs(z), p.n) * (p.gamma + math.copysign(1.0, w) * p.beta)
+        slope = (p.A - p.delta_a * e - bend) / (1.0 + p.delta_eta * e)
+        if p.zeta_s != 0.0:
+            depth, where, width = bell(
+                e, nu * (p.beta + p.gamma), p.n, p.zeta_s, p.q, p.p, p.psi + p.delta_psi * e, p.lambda_
+            )
+            slope *= 1.0 - depth * math.exp(-(((w - where) / width) ** 2))
+        return slope, z
+
+    @staticmethod
+    def longest(p: Any, z: float, e: float, slope: float, s: float) -> float:
+        if p.zeta_s == 0.0:
+            return math.inf
+        nu = 1.0 + p.delta_nu * e
+        _, where, width = bell(e, nu * (p.beta + p.gamma), p.n, p.zeta_s, p.q, p.p, p.psi + p.delta_psi * e, p.lambda_)
+        speed = abs(slope) + abs(where * p.delta_nu / (p.n * nu) * z)
+        return float(max(_WIDTHS * abs(width), abs(z * s - where) - _BESIDE * abs(width)) / speed)
 
     @classmethod
     def check(cls, tables: Tables) -> None:
@@ -163,21 +192,6 @@ class BoucWenBaberNoori(MemoryLaw):
         for name, value in sums.items():
             if (wrong := pinches & (value <= 0.0)).any():
                 raise ValueError(f"{name} must be positive in a law that pinches, got {value[wrong][0]}")
-
-    @classmethod
-    def pack(cls, tables: Tables) -> Packed:
-        """Parameters as `hysim.kernels.baber_noori.step` takes them, and memory (u, z, e)."""
-        units = _power_units.units_with_wear(tables)
-        energy = units.memory + units.input
-        exponents = {
-            **{"delta_a": 2.0 * units.input, "delta_nu": energy, "delta_eta": energy, "p": energy},
-            **{"q": (units.input - units.memory) / units.n, "psi": -units.memory, "delta_psi": units.input},
-        }
-        own = [units.times(tables[name], exponents.get(name, np.zeros(()))) for name in _OWN]
-        plain = cls.joined(tables, "A", "beta", "gamma", "n")
-        tolerance = np.full((len(plain), 1), cls.tolerance)
-        parameters = np.concatenate([*own, units.shape(tables), units.scales, tolerance, plain], axis=1)
-        return Packed(parameters, cls.initial_memory(tables, further=1))
 
     @classmethod
     def candidates(cls) -> dict[str, Holding]:
@@ -284,13 +298,6 @@ class BoucWenBaberNoori(MemoryLaw):
         return {"alpha": first / ko, "ko": ko, "n": self.n, "gamma": self.gamma, "beta": self.beta, "Ao": self.A}
 
     @property
-    def stepping(self) -> Stepping:
-        """Without the charts that only a law of a general exponent needs that neither degrades nor pinches."""
-        if self.n not in (1.0, 2.0) and not any(self.scalars[name] for name in _WEARING):
-            return super().stepping
-        return super().stepping._replace(workspace=min(self.workspace, kernels.N_LEAN - 3))
-
-    @property
     def known_slopes(self) -> tuple[float, float]:
         """Those of the Bouc-Wen law, where it neither degrades nor pinches."""
         if any(self.scalars[name] for name in _WEARING):
@@ -316,46 +323,9 @@ class BoucWenBaberNoori(MemoryLaw):
             return _boucwen_search.search_space(self.scalars, self.columns, record, every)
         return _wear_search.search_space(self.scalars, self.columns, record, freedom, held)
 
-    def rough(self) -> MemoryLaw:
-        """The law by Rosenbrock steps, good to a few parts in a thousand."""
-        return _RoughBaberNoori(**self.arguments)
-
-    def close(self) -> MemoryLaw:
-        """The law with shorter series, and few evaluations near a memory of zero, good to 1e-8 of the range."""
-        return _CloseBaberNoori(**self.arguments)
-
     def steady(self, parameters: Parameters, record: Record) -> dict[str, FloatArray]:
         """Initial memory of a steady cycle; ValueError for a law that degrades or pinches, which has none."""
         values = {**self.scalars, **parameters}
         if any(np.any(values[name]) for name in _WEARING):
             raise ValueError('a law that wears off has no steady cycle: use initial="free"')
         return super().steady(parameters, record)
-
-    def _memory_slope(self, direction: FloatArray, z: FloatArray, u: FloatArray, *others: FloatArray) -> FloatArray:
-        e = others[0] if others else np.zeros(())
-        nu, eta = 1.0 + self.delta_nu * e, 1.0 + self.delta_eta * e
-        bend = nu * np.abs(z) ** self.n * (self.gamma + self.beta * np.sign(z * direction))
-        return np.asarray(self._pinching(direction * z, e, nu) * (self.A - self.delta_a * e - bend) / eta)
-
-    def _pinching(self, w: FloatArray, e: FloatArray, nu: FloatArray) -> FloatArray | float:
-        """h at w = z sgn(u')."""
-        if self.zeta_s == 0.0:
-            return 1.0
-        where = self.q * (nu * (self.beta + self.gamma)) ** (-1.0 / self.n)
-        depth = -self.zeta_s * np.expm1(-self.p * e)
-        width = (self.psi + self.delta_psi * e) * (self.lambda_ + depth)
-        return np.asarray(1.0 - depth * np.exp(-(((w - where) / width) ** 2)))
-
-
-class _RoughBaberNoori(BoucWenBaberNoori):
-    """The law as the first steps of a search take it."""
-
-    step = staticmethod(kernels.rough_step)
-    workspace: ClassVar[int] = 0
-
-
-class _CloseBaberNoori(BoucWenBaberNoori):
-    """The law as the later steps of a search take it: its differences over 1e-6 of the box are still good slopes."""
-
-    step = staticmethod(close_step)
-    tolerance: ClassVar[float] = 2.0**-30

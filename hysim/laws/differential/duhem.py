@@ -28,7 +28,8 @@ import numpy.typing as npt
 
 from hysim._basics.frozen import FloatArray, check_whole, read_only
 from hysim.kernels import duhem as kernels
-from hysim.laws.differential.duhem_runs import branches, free_runs, outputs
+from hysim.kernels.branch import LARGEST
+from hysim.laws.differential.duhem_runs import branches, free_runs, outputs, packed
 from hysim.laws.differential.terms import (
     Polynomials,
     Term,
@@ -181,7 +182,8 @@ class Duhem(Law):
         Bouc-Wen, n = 2    p = A - gamma z^2,    q = -beta |z| z
 
     dz/du is p + q where u rises and p - q where it falls: the law has hysteresis exactly if q is not zero. Without
-    feedthrough and offset the memory z is the output. It is computed by power series to 1e-12 of the range. Sources: P.
+    feedthrough and offset the memory z is the output. It is integrated to 1e-10 of the range
+    (`hysim.kernels.branch`). Sources: P.
     Duhem 1897; B. D. Coleman and M. L. Hodgdon, Int. J. Eng. Sci. 24 (1986).
 
     Parameters
@@ -228,6 +230,7 @@ class Duhem(Law):
     units: ClassVar = {"feedthrough": "y/u", "offset": "y", "y0": "y"}
     example = Example({"p": ((1.0, -0.5),), "q": ((0.3, -0.2),)}, (-2.0, 2.0), title="Duhem")
     step = staticmethod(kernels.step)
+    workspace: ClassVar[int] = kernels.N_STATE - 2
     start = staticmethod(kernels.start)
     initial: ClassVar[tuple[str, ...]] = ("y0",)
 
@@ -347,11 +350,6 @@ class Duhem(Law):
         terms = abs(self.offset) + abs(self.feedthrough * begin[0]) + abs(begin[1])
         return self.search_inverse(begin, terms=terms)
 
-    @property
-    def workspace(self) -> int:  # type: ignore[override]
-        """Places for the series of the law."""
-        return kernels.state_size(*branches(self._parts).shape[1:]) - 2
-
     @classmethod
     def defaults(cls) -> dict[str, Any]:
         """Zero polynomials, and the other defaults."""
@@ -361,10 +359,11 @@ class Duhem(Law):
     def pack(cls, tables: Tables) -> Packed:
         """Parameters (offset, feedthrough, shape and numbers of the slopes by direction), memory (u, y0 - offset)."""
         laws = branches(Polynomials(*(tables[name] for name in Polynomials._fields)))
-        shape = np.broadcast_to(np.array(laws.shape[1:], dtype=float), (len(laws), 3))
-        parts = (tables["offset"], tables["feedthrough"], shape, laws.reshape(len(laws), -1))
         first = np.broadcast_to(tables["y0"] - tables["offset"], (len(laws), 1))
-        return Packed(np.concatenate(parts, axis=1), np.concatenate([np.zeros((len(laws), 1)), first], axis=1))
+        return Packed(
+            packed(laws, tables["offset"], tables["feedthrough"]),
+            np.concatenate([np.zeros((len(laws), 1)), first], axis=1),
+        )
 
     def exchanged(self, columns: Mapping[str, FloatArray]) -> dict[str, FloatArray]:
         tables = super().exchanged({name: columns[name] for name in columns if name in _OUTPUT})
@@ -378,20 +377,10 @@ class Duhem(Law):
         return tables
 
     @classmethod
-    def path(cls, law: CompiledLaw, u: FloatArray, y: FloatArray) -> int:
-        offset, feedthrough, *shape = law.parameters[:5]
-        slopes = law.parameters[5:].reshape([int(length) for length in shape])
-        lost = int(kernels.path(slopes, law.state[0], law.state[1], u, kernels.LARGEST, kernels.MAX_STEPS, y)[0])
-        if lost < 0:
-            law.state[:2] = u[-1], y[-1]
-            y[:] = offset + (feedthrough * u + y)
-        return lost
-
-    @classmethod
     def rows(cls, tables: Tables, u: FloatArray, y: FloatArray) -> None:
         laws = branches(Polynomials(*(tables[name] for name in Polynomials._fields)))
         offset, feedthrough, y0 = (tables[name][:, 0] for name in ("offset", "feedthrough", "y0"))
-        y[:] = outputs(laws, feedthrough, y0 - offset, u, kernels.LARGEST, 1)[0] + offset[:, np.newaxis]
+        y[:] = outputs(laws, feedthrough, y0 - offset, u, LARGEST, 1)[0] + offset[:, np.newaxis]
 
     def divergence(self, sample: int, u: float, y: float) -> str:
         """Message with the law's equation."""

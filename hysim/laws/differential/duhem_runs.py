@@ -12,6 +12,7 @@ import numpy.typing as npt
 from hysim._basics.frozen import FloatArray, read_only
 from hysim._basics.parallel import in_chunks
 from hysim.kernels import duhem as kernels
+from hysim.kernels.branch import MAX_STEPS
 from hysim.laws.differential.terms import Polynomials, Term, polynomials
 
 _SAMPLES_PER_THREAD = 20_000
@@ -25,14 +26,14 @@ def free_runs(
     u: FloatArray,
     bound: float,
     *,
-    most_steps: int = kernels.MAX_STEPS,
+    most_steps: int = MAX_STEPS,
     workers: int | None = None,
 ) -> tuple[FloatArray, int]:
-    """Outputs (n_sets, n_samples) of many laws, inf where one diverges, and the terms of series that they take.
+    """Outputs (n_sets, n_samples) of many laws, inf where one diverges, and the slopes that they take.
 
     The `coefficients` are (n_sets, n_terms), `feedthrough` and `y0` one number or (n_sets,), the inputs `u` (1 or
     n_sets, n_samples) and read-only. A law whose memory goes beyond the `bound`, or that needs more than `most_steps`
-    steps of its series between two samples, counts as diverging. The result does not depend on the number of `workers`.
+    steps between two samples, counts as diverging. The result does not depend on the number of `workers`.
     """
     laws = branches(polynomials(terms, np.atleast_2d(coefficients)))
     return outputs(laws, np.asarray(feedthrough), np.asarray(y0), u, bound, workers, most_steps)
@@ -45,23 +46,31 @@ def outputs(
     u: FloatArray,
     bound: float,
     workers: int | None,
-    most_steps: int = kernels.MAX_STEPS,
+    most_steps: int = MAX_STEPS,
 ) -> tuple[FloatArray, int]:
     """As `free_runs`, of the laws (1 or n_sets, 2 or 4, rows, columns) of `branches`; all lengths may be 1."""
     n_sets = max(len(laws), feedthrough.size, y0.size, len(u))
-    laws = read_only(np.broadcast_to(laws, (n_sets, *laws.shape[1:])), finite=False)
+    parameters = np.broadcast_to(packed(laws), (n_sets, kernels.N_HEAD + laws[0].size))
+    parameters = read_only(parameters, finite=False)
     direct = np.broadcast_to(feedthrough, n_sets)
     z0 = read_only(y0 - direct * (u[:, 0] if u.size else 0.0), finite=False)
-    y, terms = np.empty((n_sets, u.shape[1])), list[int]()
+    y, taken = np.empty((n_sets, u.shape[1])), list[int]()
 
     def work(start: int, stop: int) -> None:
         with np.errstate(all="ignore"):  # a memory that diverges overflows, and uncompiled kernels would warn of it
-            terms.append(kernels.batch(laws, z0, u, bound, most_steps, y, start, stop))
+            taken.append(kernels.batch(parameters, z0, u, bound, most_steps, y, start, stop))
 
     in_chunks(work, n_sets, workers=workers, minimum=1 + _SAMPLES_PER_THREAD // max(1, u.shape[1]))
     if feedthrough.any():
         y += direct[:, np.newaxis] * u
-    return y, sum(terms)
+    return y, sum(taken)
+
+
+def packed(laws: FloatArray, offset: FloatArray | float = 0.0, feedthrough: FloatArray | float = 0.0) -> FloatArray:
+    """Parameters (n_sets, n_parameters) of the step of laws of `branches`."""
+    head = [*np.broadcast_arrays(offset, feedthrough, np.zeros((len(laws), 1)))[:2]]
+    shape = np.broadcast_to(np.array(laws.shape[1:], dtype=float), (len(laws), 3))
+    return np.concatenate([*head, shape, laws.reshape(len(laws), -1)], axis=1)
 
 
 def branches(parts: Polynomials) -> FloatArray:

