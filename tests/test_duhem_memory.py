@@ -98,14 +98,14 @@ def test_a_dip_below_zero_and_back_is_not_stepped_over(depth):
     touching = (np.exp(-1.4) - 1.0) / 1.96 + 1.0 / 1.4
     law = hs.Duhem(p=law.p, q=law.q, p_abs=law.p_abs, y0=touching - depth * np.exp(-1.4))
     u = np.linspace(-1.0, 1.0, 2001)
-    assert law.response(u[[0, -1]])[1] == pytest.approx(law.response(u)[-1], rel=1e-12)  # the series' promise
+    assert law.response(u[[0, -1]])[1] == pytest.approx(law.response(u)[-1], rel=1e-10)
 
 
 def test_a_slope_that_begins_with_a_high_power_of_the_input_is_not_taken_for_none():
     """dz/du = u^30 from zero on: no term that is computed is other than zero."""
     law = hs.Duhem(p=[*[[0.0]] * 30, [1.0]], q=[[0.0]])
     for end in (0.3, 1.0, 2.0, -1.0):
-        assert law.response([0.0, end])[-1] == pytest.approx(end**31 / 31.0, rel=1e-14)
+        assert law.response([0.0, end])[-1] == pytest.approx(end**31 / 31.0, rel=1e-10)
 
 
 @pytest.mark.parametrize("unit", [1e-200, 1e-100, 1e-12, 1e100])
@@ -181,13 +181,13 @@ def test_a_run_that_needs_more_steps_than_allowed_is_a_row_of_inf():
     u = hs.Record(u=[0.0, 1.0, -1.0, 1.0], y=np.zeros(4)).u[np.newaxis]
     laws = np.array([[1.0, -2.0], [1.0, -2e3]])  # the second one turns within a 2000th of a stroke
     terms = [Term.parse("u'"), Term.parse("|u'| z")]
-    few, many = (free_runs(terms, laws, 0.0, 0.0, u, 100.0, most_steps=most)[0] for most in (5, 20_000))
+    few, many = (free_runs(terms, laws, 0.0, 0.0, u, 100.0, most_steps=most)[0] for most in (100, 20_000))
     assert np.isposinf(few[1]).all()
     assert np.isfinite(many).all()
     assert np.array_equal(few[0], many[0])
 
 
-def test_the_terms_of_series_count_the_work_of_each_law():
+def test_the_slopes_count_the_work_of_each_law():
     u = hs.Record(u=np.tile([1.0, -1.0], 150), y=np.zeros(300)).u[np.newaxis]
     laws = np.repeat([[1.0, -1.0], [1.0, -2e3]], 150, axis=0)  # the second one turns within a 2000th of a stroke
     terms = [Term.parse("u'"), Term.parse("|u'| z")]

@@ -16,11 +16,11 @@ PLACES = {
     hs.GeneralizedBoucWen(n=1.0, b2=0.1, b4=-0.1, b6=0.2): 2,
     hs.GeneralizedBoucWen(n=2.0, b3=0.1, b5=-0.1): 2,
     hs.GeneralizedBoucWen(n=1.5, b3=0.1): 5024,
-    hs.ZhuWangBoucWen(n=1.0, delta=0.1): 2,
-    hs.ZhuWangBoucWen(n=1.5, delta=0.1): 52,
-    hs.BoucWenBaberNoori(n=1.0): 332,
-    hs.BoucWenBaberNoori(n=1.5, delta_nu=0.1): 332,
-    hs.BoucWenBaberNoori(n=1.5): 5328,
+    hs.ZhuWangBoucWen(n=1.0, delta=0.1): 20,
+    hs.ZhuWangBoucWen(n=1.5, delta=0.1): 20,
+    hs.BoucWenBaberNoori(n=1.0): 37,
+    hs.BoucWenBaberNoori(n=1.5, delta_nu=0.1): 37,
+    hs.BoucWenBaberNoori(n=1.5): 37,
     hs.Dahl(): 2,
     hs.JilesAtherton(): 4,
     hs.ColemanHodgdon(): 2,
@@ -43,13 +43,6 @@ def test_the_leanest_step_has_the_bits_of_the_family(law):
     assert drive(family, law.packed[0], state, U, theirs) == -1
     np.testing.assert_array_equal(ours, theirs)
     np.testing.assert_array_equal(lean.state[: law.packed[1].size], state[: law.packed[1].size])
-
-
-def test_a_worn_law_without_wear_is_computed_without_charts():
-    worn, plain = hs.BoucWenBaberNoori(n=1.5, delta_nu=0.1), hs.BoucWenBaberNoori(n=1.5)
-    state, y = worn.compiled(0.0).state, np.empty(U.size)
-    drive(worn.stepping.step, plain.packed[0], state, U, y)
-    assert y == pytest.approx(plain.response(U), abs=1e-12)
 
 
 @pytest.mark.parametrize(

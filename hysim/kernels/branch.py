@@ -3,12 +3,12 @@
     dx/du = f(p, x, u, s),    s = sign(du),    x the hidden states of the law
 
 The embedded Runge-Kutta pairs of Dormand and Prince, of order 5(4) for a stroke that one step takes and of order
-8(5, 3) for the others; the coefficients are those of SciPy. Each step leaves out no more than TOLERANCE of what a state
-comes to: the largest of its values, and of what the rest of the stroke would add at the present slope. A law may have a
-corner where its first state is zero, as `|z|^n` has, so a step that changes the sign of z is repeated until it ends at
-z = 0. What is not smooth elsewhere makes the steps short, as a power of z does near zero.
+8(5, 3) for the others; the coefficients are those of SciPy. Each step leaves out no more than a tolerance of what a
+state comes to: the largest of its values, and of what the rest of the stroke would add at the present slope. A law may
+have a corner where its first state is zero, as `|z|^n` has, so a step that changes the sign of z is repeated until it
+ends at z = 0. What is not smooth elsewhere makes the steps short, as a power of z does near zero.
 
-A law that diverges is `inf`: its steps become a rounding of the stroke while z grows. One that needs more than
+A law that diverges is `inf`: its steps become a rounding of the way behind them while z grows. One that needs more than
 MAX_STEPS steps, or is undefined, is `nan`.
 """
 
@@ -39,7 +39,7 @@ _A8 = read_only(DOP853.A[:_MANY, :_MANY].ravel())
 _B8, _C8 = read_only(DOP853.B), read_only(DOP853.C[:_MANY])
 _E8, _E8_LOW = read_only(DOP853.E5), read_only(DOP853.E3)
 
-_ROUNDING = 1e-15  # of a stroke: no step is shorter
+_ROUNDING = 1e-15  # of the way: a memory that grows by steps of it diverges, and a zero is not looked for nearer
 _HOPELESS = 1e6  # error of order 5, times what is allowed, up to which order 8 is tried over the same length
 _SAFETY, _LEAST, _MOST = 0.9, 0.1, 5.0  # of the next length: those of SciPy, but for a growth by half as much
 _NEWTON = 8  # tries to end at zero by Newton's rule; then by the rule of false position
@@ -75,8 +75,13 @@ def retreat(error: float, is_high: bool) -> float:
     return 1.0 if error < _HOPELESS else max(_LEAST, (_HOPELESS / error) ** 0.2) if error < math.inf else _LEAST
 
 
-def follower(rates: Rates, longest: Longest) -> Callable[[int, FloatArray, FloatArray, float, bool, float, int], int]:
-    """The kernel ``follow(n, parameters, state, u, corner, bound, most)`` of a law, compiled with its slopes inside."""
+def follower(
+    rates: Rates, longest: Longest
+) -> Callable[[int, FloatArray, FloatArray, float, float, bool, float, int], int]:
+    """The kernel ``follow(n, parameters, state, u, tolerance, corner, bound, most)`` of a law.
+
+    It is compiled with the slopes inside, since numba keeps no code that takes functions.
+    """
 
     @unstored
     def combine(
@@ -111,12 +116,19 @@ def follower(rates: Rates, longest: Longest) -> Callable[[int, FloatArray, Float
 
     @unstored
     def follow(
-        n: int, parameters: FloatArray, state: FloatArray, u: float, corner: bool, bound: float, most: int
+        n: int,
+        parameters: FloatArray,
+        state: FloatArray,
+        u: float,
+        tolerance: float,
+        corner: bool,
+        bound: float,
+        most: int,
     ) -> int:
         """Move `state`, (last u, the `n` states, work), to the input `u`, and return how many slopes this takes.
 
-        The law may have a `corner` where its first state is zero. This state is inf beyond `bound`, and nan where
-        `most` steps do not reach the end.
+        A step leaves out no more than the `tolerance`. The law may have a `corner` where its first state is zero. This
+        state is inf beyond `bound`, and nan where `most` steps do not reach the end.
         """
         last = state[0]
         state[0] = u
@@ -142,12 +154,12 @@ def follower(rates: Rates, longest: Longest) -> Callable[[int, FloatArray, Float
         for i in range(n):
             largest[i] = abs(x[i])
         left = h = u - last
-        aims, is_high, evaluated = 0, False, 1
+        aims, is_high, evaluated, done = 0, False, 1, 0.0
         for _ in range(most):
             h = math.copysign(min(abs(h), longest(parameters, x, k[0], s)), s)
             if abs(h) >= abs(left):
                 h = left
-            if h == 0.0 or (abs(h) <= _ROUNDING * abs(u - last) < abs(left) and k[0] * s * x[0] > 0.0):
+            if h == 0.0 or (abs(h) <= _ROUNDING * done and k[0] * s * x[0] > 0.0):
                 x[0] = math.copysign(math.inf, x[0]) if k[0] * s * x[0] > 0.0 else math.nan
                 return evaluated
             at = u - left
@@ -162,14 +174,14 @@ def follower(rates: Rates, longest: Longest) -> Callable[[int, FloatArray, Float
             for i in range(n):
                 slope = min(abs(k[0]), farthest / abs(left)) if i == 0 else max(abs(k[i]), abs(k[end + i]))
                 size = max(largest[i], slope * abs(left))
-                room = TOLERANCE * (size if size > 0.0 else abs(after[i]))
+                room = tolerance * (size if size > 0.0 else abs(after[i]))
                 if room != 0.0:
                     error += abs(h) * missed(k, i, n, is_high) / room
             if not error <= 1.0:
                 h *= retreat(error, is_high)
                 is_high = True
                 continue
-            taken, rounding = h, _AT_ZERO * TOLERANCE * max(largest[0], min(farthest, abs(k[0] * left)))
+            taken, rounding = h, _AT_ZERO * tolerance * max(largest[0], min(farthest, abs(k[0] * left)))
             if corner and x[0] * after[0] < 0.0 and abs(after[0]) > rounding:
                 aims += 1
                 aimed, secant = h - after[0] / k[end], h * (abs(x[0]) / (abs(x[0]) + abs(after[0])))
@@ -194,6 +206,7 @@ def follower(rates: Rates, longest: Longest) -> Callable[[int, FloatArray, Float
             if taken == left:
                 return evaluated
             left -= taken
+            done += abs(taken)
             h *= min(_MOST, _SAFETY * max(error, 1e-10) ** (-0.125 if is_high else -0.2))
         x[0] = math.nan
         return evaluated

@@ -18,7 +18,7 @@ import numpy as np
 
 from hysim._basics.frozen import FloatArray
 from hysim.kernels._compile import kernel, uncounted
-from hysim.kernels.branch import LARGEST, MAX_STEPS, follower, workspace
+from hysim.kernels.branch import LARGEST, MAX_STEPS, TOLERANCE, follower, workspace
 
 N_HEAD = 5
 N_STATE = 2 + workspace(1)
@@ -51,7 +51,7 @@ follow = follower(rates, unlimited)
 @kernel
 def step(parameters: FloatArray, state: FloatArray, u: float) -> float:
     """Output at the next input `u`; `state`, shape (N_STATE,), is (last u, z, work), and moves along."""
-    follow(1, parameters, state, u, parameters[2] == 4.0, LARGEST, MAX_STEPS)
+    follow(1, parameters, state, u, TOLERANCE, parameters[2] == 4.0, LARGEST, MAX_STEPS)
     return float(parameters[0] + (parameters[1] * u + state[1]))
 
 
@@ -83,7 +83,7 @@ def batch(
         row = u[min(i, u.shape[0] - 1)]
         state[0], state[1] = row[0], z0[i]
         for k in range(row.size):
-            total += follow(1, parameters[i], state, row[k], parameters[i, 2] == 4.0, bound, most)
+            total += follow(1, parameters[i], state, row[k], TOLERANCE, parameters[i, 2] == 4.0, bound, most)
             out[i, k] = state[1]
             if not math.isfinite(state[1]):
                 out[i] = math.inf

@@ -11,7 +11,7 @@ import math
 from abc import ABC
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import MISSING, Field, dataclass, fields
-from functools import cached_property
+from functools import cached_property, lru_cache
 from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple, Self
 
 import numpy as np
@@ -43,6 +43,9 @@ State = tuple[float, ...]
 """Last input, and what the law remembers."""
 
 _AHEAD = 4  # runs through the turning points before the search for a steady memory
+_EXACT = 1e-12  # of the range: what a step along a branch leaves out,
+_ROUGH = 1e-4  # in the first steps of a search, which rank points,
+_CLOSE = 1e-8  # and in its later ones, whose differences over 1e-6 of the box are still slopes
 _FEW = 0.5  # of the samples: more turning points are those of noise
 
 
@@ -111,6 +114,7 @@ class Law(Placed, ABC):
     flow: ClassVar[Any] = None
     flows: ClassVar[Any] = None
     hidden: ClassVar[int] = 0
+    tolerance: ClassVar[float] = _EXACT
     start: ClassVar[Any] = staticmethod(stepping.start)
     initial: ClassVar[tuple[str, ...]] = ("z0",)
     searched: ClassVar[tuple[Parameter, ...]] = ()
@@ -147,6 +151,8 @@ class Law(Placed, ABC):
         """Laws as the step takes them: by default the fields one behind the other, and the initial memory."""
         memory = cls.initial_memory(tables, further=max(0, cls.hidden - len(cls.initial)))
         constants = [table for name, table in tables.items() if name not in cls.initial]
+        if cls.hidden:
+            constants.insert(0, np.full((len(memory), 1), cls.tolerance))
         return Packed(np.concatenate([memory[:, :0], *constants], axis=1), memory)
 
     @classmethod
@@ -567,11 +573,11 @@ class Law(Placed, ABC):
 
     def rough(self) -> "Law":
         """A law with nearly the same output, for the first steps of a search; itself where that is cheap enough."""
-        return self
+        return _loose(type(self), _ROUGH)(**self.arguments) if self.hidden else self
 
     def close(self) -> "Law":
         """A law with the same output to what a search can tell, cheaper to compute; itself where there is none."""
-        return self
+        return _loose(type(self), _CLOSE)(**self.arguments) if self.hidden else self
 
     def regressors(self, parameters: Parameters, record: Record) -> FloatArray:
         """Columns in which the output is affine, and the rest of it, shape (n_sets, n_samples, n_columns + 1)."""
@@ -704,6 +710,12 @@ class Law(Placed, ABC):
             lost = in_pieces(lambda k: self.path(law, u[k], y[k]), u.size)
         if lost >= 0:
             raise SimulationError(self.divergence(lost, u[lost], y[lost]))
+
+
+@lru_cache(maxsize=256)
+def _loose(family: type[Law], tolerance: float) -> type[Law]:
+    """The family with the tolerance of a search."""
+    return type(f"Loose{family.__name__}", (family,), {"tolerance": tolerance})
 
 
 def _first(u: FloatArray) -> float:

@@ -25,7 +25,7 @@ def step(parameters: FloatArray, state: FloatArray, u: float) -> float:
     {move}
     return output(parameters, {memory}, u)
 """
-_MOVE = "follow({n}, parameters, state, u, True, LARGEST, MAX_STEPS)"
+_MOVE = "follow({n}, parameters, state, u, parameters[0], True, LARGEST, MAX_STEPS)"
 _FLOW = """\
 if flows(parameters):
         if u != state[0] and math.isfinite(state[1]):  # a memory that has diverged remains so
@@ -36,8 +36,8 @@ if flows(parameters):
 
 
 def constants_of(cls: Any) -> dict[str, bool]:
-    """The fields that a family declares beside its initial memory, in their order, and whether they are tuples."""
-    return {
+    """The parameters of the step, and whether they are tuples: a tolerance, and the fields but the initial memory."""
+    return {"tolerance": False} | {
         name: annotation == tuple[float, ...]
         for name, annotation in inspect.get_annotations(cls).items()
         if not str(annotation).startswith("typing.ClassVar") and name not in cls.initial

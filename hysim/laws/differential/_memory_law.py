@@ -147,7 +147,10 @@ class MemoryLaw(Law):
             state = self.state_at(first)
         u, z, *_ = state
         powers = [abs(c * u**k) for k, c in enumerate(self.input_polynomial.tolist(), 1)]
-        return self.search_inverse(state, terms=float(abs(self.offset) + sum(powers) + abs(self.gain * z)))
+        terms = float(abs(self.offset) + sum(powers) + abs(self.gain * z))
+        if self.hidden:  # an integrated memory is known to a tolerance of its range
+            terms += self.tolerance / np.finfo(float).eps * float(np.abs(y).max())
+        return self.search_inverse(state, terms=terms)
 
     def _check_memory_is_its_own(self, parameters: Parameters, u: FloatArray) -> None:
         """It is: the polynomial and the gain stand behind it."""

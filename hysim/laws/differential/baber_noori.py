@@ -166,7 +166,8 @@ class BoucWenBaberNoori(MemoryLaw):
     def slope(p: Any, z: float, e: float, u: float, s: float) -> tuple[float, float]:
         w, nu = z * s, 1.0 + p.delta_nu * e
         bend = nu * power(abs(z), p.n) * (p.gamma + math.copysign(1.0, w) * p.beta)
-        slope = (p.A - p.delta_a * e - bend) / (1.0 + p.delta_eta * e)
+        eta = 1.0 + p.delta_eta * e
+        slope = (p.A - p.delta_a * e - bend) / eta if eta > 0.0 else math.nan
         if p.zeta_s != 0.0:
             depth, where, width = bell(
                 e, nu * (p.beta + p.gamma), p.n, p.zeta_s, p.q, p.p, p.psi + p.delta_psi * e, p.lambda_

@@ -28,7 +28,7 @@ import numpy.typing as npt
 
 from hysim._basics.frozen import FloatArray, check_whole, read_only
 from hysim.kernels import duhem as kernels
-from hysim.kernels.branch import LARGEST
+from hysim.kernels.branch import LARGEST, TOLERANCE
 from hysim.laws.differential.duhem_runs import branches, free_runs, outputs, packed
 from hysim.laws.differential.terms import (
     Polynomials,
@@ -348,6 +348,7 @@ class Duhem(Law):
         """By a search on the step; by default from rest at u = 0, the output at y0."""
         begin = state or self.state_at(float(u0 or 0.0))
         terms = abs(self.offset) + abs(self.feedthrough * begin[0]) + abs(begin[1])
+        terms += TOLERANCE / np.finfo(float).eps * float(np.abs(y).max())  # the memory is known to so much of its range
         return self.search_inverse(begin, terms=terms)
 
     @classmethod
