@@ -42,7 +42,6 @@ def _table(text: str) -> str:
 
 
 def _figure(result: Any, alternative: str, draw: Callable[[Any, Any], object]) -> str:
-    """Picture that a function draws on new Axes, with a text in its place for those who cannot see it."""
     with plot.house_style():
         canvas = plot.figure(*_SIZE)
         axes = canvas.add_subplot()

@@ -114,7 +114,6 @@ class Record:
             raise ValueError(f"resolution must be positive, got {self.resolution}")
 
     def _signals(self) -> dict[str, FloatArray]:
-        """The arrays by name, without the time if there is none."""
         return {"u": self.u, "y": self.y} | ({} if self.t is None else {"t": self.t})
 
     def __str__(self) -> str:
@@ -555,6 +554,5 @@ def last_digit(values: FloatArray) -> float:
 
 
 def _scaled(values: T, power: int) -> T:
-    """Values times a power of ten, each rounded once."""
     scaled: T = values * 10.0**power if power >= 0 else values / 10.0**-power
     return scaled

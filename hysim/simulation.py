@@ -136,7 +136,6 @@ def _second_axis(name: str) -> str:
 
 
 def _unit_of(label: str, units: Mapping[str, str]) -> str | None:
-    """The unit of a column: that of its own name, or of the signal that it is one column of."""
     signal, _, number = label.rpartition("_")
     return units.get(label, units.get(signal) if number.isdigit() else None)
 

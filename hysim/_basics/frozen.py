@@ -299,7 +299,6 @@ def last_names(cls: Any) -> tuple[str, ...]:
 
 @functools.cache
 def _field_names(cls: Any) -> tuple[tuple[str, ...], ...]:
-    """Names of all fields, of those that count in comparisons, and of those that are `LAST`."""
     fields = sorted(dataclasses.fields(cls), key=lambda field: "last" in field.metadata)
     return (
         tuple(field.name for field in fields),

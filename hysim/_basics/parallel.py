@@ -312,7 +312,6 @@ def _begin(begin: Callable[..., None], arguments: tuple[Any, ...]) -> None:
 
 
 def _end_with_parent() -> None:
-    """Wait until the parent has ended."""
     parent = multiprocessing.parent_process()
     if parent is not None:
         multiprocessing.connection.wait([parent.sentinel])
@@ -327,8 +326,6 @@ def _print_to_nowhere() -> None:
 
 
 class _AtOnce(Executor):
-    """Runs a function in `submit`."""
-
     def submit(self, function: Callable[..., Any], /, *args: Any, **options: Any) -> Future[Any]:
         future: Future[Any] = Future()
         try:

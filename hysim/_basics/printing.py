@@ -150,7 +150,6 @@ def value_in_words(value: Any) -> str:
 
 
 def _cut(name: str, text: str) -> str:
-    """A row over at most two lines."""
     indent = " " * len(name)
     lines = textwrap.wrap(
         text, LETTERS, initial_indent=name, subsequent_indent=indent, max_lines=2, placeholder=" ...",

@@ -367,7 +367,6 @@ def _head(design: Design) -> Iterator[str]:
 
 
 def _signal(design: Design, name: str) -> str:
-    """The quantity of the input or the output with its unit."""
     text = label(design.units, name)
     return text[0].lower() + text[1:]
 
@@ -410,7 +409,6 @@ def _row(name: str, value: str) -> str:
 
 
 def _conditions(design: Design) -> Iterator[str]:
-    """The conditions of all results, with the model as the plant."""
     conditions, u, y = design.triangle.closed.conditions, design.units.get("u", ""), design.units.get("y", "")
     limits = "none" if conditions["limits"] is None else extent(conditions["limits"], u)
     times = ", ".join(

@@ -344,7 +344,6 @@ def measure(
 
 
 def _table(motion: Any, log: "hs.Record | None", times: Any, on_lost: Any) -> tuple[dict[str, Any], dict[str, str]]:
-    """Columns and their units."""
     import numpy as np
 
     unit = motion.units["y"]

@@ -62,7 +62,6 @@ def _short(families: Iterable[str]) -> list[str]:
 
 
 def _is_family(name: str) -> bool:
-    """Whether a family has this name, short or not."""
     from hysim.models.model import family_named
 
     try:
@@ -356,7 +355,6 @@ def _argument(model: Any, option: str) -> str | None:
 
 
 def _actuator(chosen: ActuatorOptions) -> Any:
-    """The structure of an actuator with these chosen."""
     return hs.Actuator.structure(
         model_or_family(chosen.law or "bouc-wen"),
         creep=chosen.creep if chosen.creep_elements is None else chosen.creep_elements,

@@ -231,7 +231,6 @@ Place = tuple[float, str]
 
 
 def _place(text: str) -> Place:
-    """A place in a record, such as ``100`` or ``2.5s``."""
     number, unit = matched(r"(.*?)((?:[mun]?s)?)", str, str)(text)
     return (float(number) if unit else at_least(0)(number)), unit
 

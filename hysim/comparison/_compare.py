@@ -165,8 +165,6 @@ class _Trial:
 
 @dataclass(frozen=True)
 class _Protocol:
-    """The treatment of every model."""
-
     records: tuple[Record, ...]
     measured: LoopMetrics
     cross_validate: str | int | None
@@ -176,7 +174,6 @@ class _Protocol:
     announce: Callable[[str], None] | None
 
     def row(self, name: str, subject: Any) -> ComparisonRow | str:
-        """The row of one subject, or the reason why there is none."""
         identified_here = _is_family(subject)
         if self.announce is not None:
             self.announce(name)
@@ -240,7 +237,6 @@ class _Protocol:
         )
 
     def _test_errors(self, subject: Any, model: Any, identified_here: bool) -> tuple[float, float]:
-        """Fit and rmse on the test."""
         if self.trial is None or isinstance(subject, OneByOne):
             return math.nan, math.nan
         drive, test = self.trial.drive, self.trial.record
@@ -284,7 +280,6 @@ def _distinct(records: tuple[Record, ...], subjects: dict[str, Any]) -> tuple[tu
 
 
 def _named(models: Any) -> dict[str, Any]:
-    """Families by their names; the candidates of a family by theirs."""
     if not isinstance(models, Sequence) or not all(isinstance(each, str | type) for each in models):
         raise TypeError(
             f'compare takes a mapping of names to models, a list of families or their names, or "all", got {models!r}'
@@ -321,7 +316,6 @@ def _trial(records: Sequence[Record], test: Record | int | None) -> _Trial | Non
 
 
 def _is_family(subject: Any) -> bool:
-    """Whether the subject is a class or a structure, to be identified."""
     return isinstance(subject, type) or not isinstance(subject, Responding | Result | list | tuple)
 
 

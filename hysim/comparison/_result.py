@@ -234,7 +234,6 @@ class Comparison:
         )
 
     def __str__(self) -> str:
-        """The rows that predict best, and the verdict."""
         best = [row.name for row in self.ranked()]
         unknown = [row.name for row in self.rows if math.isnan(row.cv_rmse)]
         by_name = {row["name"]: row for row in rows(self)}
@@ -290,7 +289,6 @@ class Comparison:
         return csv_text([table, *(map(_exact, row) for row in zip(*table.values(), strict=True))])
 
     def _columns(self) -> dict[str, list[Value | None]]:
-        """Heading to values; a model that could not be compared has its name and message only."""
         failed = [{"name": name, "success": False, "message": reason} for name, reason in self.failed.items()]
         every = [*rows(self), *failed]
         return {column.heading: [row.get(column.name) for row in every] for column in columns(self)}
@@ -336,7 +334,6 @@ class Comparison:
 
 
 def _first(names: Sequence[str]) -> str:
-    """The names in a sentence; of many the first ones, and the number of the others."""
     return listed(names if len(names) <= _NAMED else [*names[: _NAMED - 1], f"{len(names) - _NAMED + 1} others"])
 
 
@@ -350,7 +347,6 @@ class Column(NamedTuple):
 
 
 def columns(comparison: Comparison) -> list[Column]:
-    """The columns that this comparison can fill."""
     units = comparison.record.units
     u, y = (f" [{units[name]}]" if name in units else "" for name in ("u", "y"))
     area = f" [{units['y']} {units['u']}]" if {"u", "y"} <= units.keys() else ""
@@ -402,7 +398,6 @@ def rows(comparison: Comparison) -> list[dict[str, Any]]:
 
 
 def _short(comparison: Comparison) -> list[list[str]]:
-    """Headings and printed cells of the short columns, one row a model."""
     selected = [column for column in columns(comparison) if column.short]
     body = [[_printed(row[column.name], column.digits) for column in selected] for row in rows(comparison)]
     for cells, row in zip(body, comparison.rows, strict=True):

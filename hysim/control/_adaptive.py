@@ -145,7 +145,6 @@ class AdaptiveInverse(WithoutFeedback):
         return here, np.array(rates)
 
     def _packed(self, name: str, value: float) -> tuple[FloatArray, FloatArray]:
-        """Parameters and memory of the law with another number."""
         law = self.law
         parameters, memory = law.pack(law.completed(law.exchanged({name: np.array([[value]])})))
         return parameters[0], memory[0]
@@ -161,5 +160,4 @@ class AdaptiveInverse(WithoutFeedback):
         return float(self.law.step(constants, state, u0)), state
 
     def _own_state(self, law: Any, u0: float) -> FloatArray:
-        """State of the law's own step at rest at `u0`."""
         return self._begun(law.parameters, u0)[1]

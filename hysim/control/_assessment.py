@@ -207,7 +207,6 @@ class OpenLoop:
         return signal[-self.samples_per_cycle - 1 :]
 
     def loop_of(self, y: FloatArray) -> LoopMetrics:
-        """Measures of a displacement against the reference in the last cycle."""
         return loop_metrics(self.cycle, self.last(y))
 
     def reduction_percent(self, y: FloatArray) -> float:

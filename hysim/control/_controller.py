@@ -24,8 +24,6 @@ from hysim.models.protocols import CompiledController, positive_time
 
 @runtime_checkable
 class Controller(Protocol):
-    """Settings of a sampled controller."""
-
     def compiled(self, sample_time: float, u0: float, y0: float) -> CompiledController:
         """Step, parameters, and state at rest at the command `u0` and the displacement `y0`."""
         ...
@@ -187,11 +185,9 @@ class WithoutFeedback(SampledController):
     """Controllers of which the measurement does not move the command itself."""
 
     def frequency_response(self, frequency: npt.ArrayLike, sample_time: float) -> npt.NDArray[np.complex128]:
-        """Zeros: there is no feedback."""
         return np.zeros(np.shape(frequency), dtype=complex)
 
     def linear(self, sample_time: float) -> Feedback:
-        """No feedback, a system without states."""
         return Feedback(np.zeros((0, 0)), np.zeros(0), np.zeros(0), 0.0)
 
 

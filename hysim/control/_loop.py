@@ -116,7 +116,6 @@ class ClosedLoop:
 
     @property
     def _signal_units(self) -> dict[str, str]:
-        """Units by the signals' names."""
         like = {**dict.fromkeys(_OF_REFERENCE, "y"), **dict.fromkeys(_OF_COMMAND, "u")}
         return {name: self.units[signal] for name, signal in like.items() if signal in self.units} | dict(self.units)
 
@@ -282,7 +281,6 @@ class RestingPlant:
         self.y0 = self.chain.displacement(self.state)
 
     def quiet(self) -> "RestingPlant":
-        """The plant without the noise of its sensor."""
         if self.actuator.sensor is None:
             return self
         actuator = replace(self.actuator, sensor=replace(self.actuator.sensor, noise=0.0))
@@ -344,7 +342,6 @@ def _around_structure(
     units: Mapping[str, str],
     progress: Progress | None,
 ) -> ClosedLoop:
-    """The loop around a structure."""
     compiled = begun(controller, sample_time, 0.0, plant.y0)
     run = plant.run(compiled, _ahead(controller, sample_time, reference), progress)
     if run.lost >= 0:

@@ -422,7 +422,6 @@ class _Search:
         return value * (1.0 + _BARRIER * self.excess(sensitivity, noise))
 
     def result(self) -> Tuning:
-        """Best controller within the bounds, or the nearest to them, with its margins."""
         best, trade_off = self.chosen()
         gains, phases = np.array([loop.margins(best.controller, slope) for loop, slope in self.loops()]).T
         signals = self.resting.attempt(best.controller, self.reference)

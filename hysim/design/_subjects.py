@@ -96,7 +96,6 @@ class LawAlone:
         return np.asarray(np.linalg.inv(self.law.response_jacobian(u, self.names).information(self.noise)))
 
     def only(self, names: Sequence[str]) -> "LawAlone":
-        """The subject whose other numbers are known."""
         return replace(self, names=tuple(names))
 
 
@@ -141,7 +140,6 @@ class WholeActuator:
         return np.asarray(np.linalg.inv(scaled.T @ scaled) / np.outer(lengths, lengths))
 
     def only(self, names: Sequence[str]) -> "WholeActuator":
-        """The subject whose other numbers are known."""
         return replace(self, expected=_expected(self.structure, self.record, self.known, names))
 
 

@@ -84,7 +84,6 @@ class Trial:
 
     @property
     def errors(self) -> dict[str, float]:
-        """Rmse on held-out samples by name."""
         return {name: scores.error for name, scores in self.scores.items()}
 
     def explains(self, name: str) -> bool:

@@ -249,7 +249,6 @@ def _thinned(records: Sequence[Record]) -> list[Record]:
 
 
 def doubts(judgement: Judgement) -> tuple[str, ...]:
-    """Reasons to doubt a law, one sentence each."""
     errors = judgement.held_out
     law, plays, curve = errors[LAW], errors[PLAYS], errors[CURVE]
     linear = min((errors[name] for name in (RIVAL, RELAXATIONS) if not math.isnan(errors[name])), default=math.inf)

@@ -40,8 +40,6 @@ _MOST_STEPS = 500  # of the series from one sample to the next: laws that need m
 
 
 class Terms(NamedTuple):
-    """The law of some terms of a library."""
-
     terms: tuple[Term, ...]
     feedthrough: bool = False
     offset: bool = False
@@ -234,7 +232,6 @@ class Work:
         return self.done / self.most
 
     def steps(self, cost: float) -> float:
-        """How many steps of this cost remain."""
         return max(0.0, self.most - self.done) / cost if cost else math.inf
 
 
@@ -326,7 +323,6 @@ class FreeRun:
         return Candidate(structure, unknowns, slopes(x, residual) / units, residual, self._settles(structure, unknowns))
 
     def _scaled(self, structure: Structure) -> Callable[[FloatArray], FloatArray]:
-        """The residuals as a function of the unknowns in their units."""
         units = self.units(structure)
         return lambda x: self.residuals(structure, x * units)
 

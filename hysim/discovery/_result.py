@@ -50,7 +50,6 @@ class ModelledLaw(NamedTuple):
 
 
 def law_from(candidate: Candidate[Any], records: Sequence[Record], letter: str) -> ModelledLaw:
-    """The law of a structure refined on `records`, its memory called `letter`."""
     structure, unknowns = candidate.structure, candidate.unknowns
     numbers = _numbers(structure, letter)
     values = numbers(unknowns[: structure.size])

@@ -55,7 +55,6 @@ class Body:
             raise source.refusal(loop, f"{ast.unparse(loop.target)} counts a loop and has another use: rename one")
 
     def settled(self) -> str:
-        """The text of the body."""
         for _ in range(_MOST_PASSES):
             returns, self._results = self.returns, 0
             lines = self._block(self._statements, _STEP)
@@ -191,7 +190,6 @@ class Body:
         return f"{self._target(node.target, Scalar.DOUBLE)} {sign} {value.text};"
 
     def _target(self, node: ast.expr, type_: Type) -> str:
-        """A place that is assigned."""
         if isinstance(node, ast.Name):
             return self.scope.c_name(node.id)
         if not isinstance(node, ast.Subscript) or isinstance(node.slice, ast.Slice):
@@ -305,7 +303,6 @@ class Body:
         return [line, *self._several(target, together, indent, declared)]
 
     def _unpacked(self, target: ast.Tuple, node: ast.expr, declared: set[str]) -> list[str]:
-        """Results of a function."""
         if (shaped := self.of.shape(node)) is not None:
             lengths = [Value(length(), Scalar.INT, _c.SUM) for length in shaped.lengths]
             return self._numbers(list(zip(target.elts, lengths, strict=True)), declared)

@@ -92,7 +92,6 @@ def table(name: str, values: Sequence[float]) -> str:
 
 
 def is_table(value: Any) -> bool:
-    """Whether a value is a vector of doubles."""
     if isinstance(value, np.ndarray):
         return value.ndim == 1 and value.dtype == np.float64
     return isinstance(value, tuple) and bool(value) and all(isinstance(each, float) for each in value)
@@ -107,7 +106,6 @@ class Scalar(IntEnum):
 
     @property
     def c_type(self) -> str:
-        """Type in C."""
         return "double" if self is Scalar.DOUBLE else "int"
 
 
@@ -134,7 +132,6 @@ class Several(NamedTuple):
 
     @property
     def c_type(self) -> str:
-        """Name of the struct in C."""
         return "several_" + "".join("d" if member is Scalar.DOUBLE else "i" for member in self.members)
 
 
@@ -165,7 +162,6 @@ class Routine(NamedTuple):
     file: str
 
     def refusal(self, node: ast.AST, reason: str) -> UntranslatableError:
-        """The error for a place in the function."""
         first = node.lineno if isinstance(node, ast.stmt | ast.expr) else 1
         line = self.function.__code__.co_firstlineno + first - 1
         return UntranslatableError(f"{self.file}:{line}: {reason}; hysim/kernels/__init__.py says what is translated")
@@ -229,7 +225,6 @@ class Stretch(NamedTuple):
 
     @property
     def type(self) -> Vector:
-        """Its type."""
         return Vector(len(self.lengths))
 
 
@@ -324,14 +319,12 @@ class Scope:
         return () if self.before is None else tuple(sorted(axis for each, axis in self.before.lengths if each == name))
 
     def assign(self, name: str, type_: Type, node: ast.AST) -> None:
-        """Note that a name gets a value of this type."""
         known = joined(self.types.get(name), type_)
         if known is None:
             raise self.source.refusal(node, f"{name} cannot be both {self.types[name]} and {type_}")
         self.types[name] = known
 
     def write(self, name: str) -> None:
-        """Note that a vector is written to."""
         self.written |= {name} | self.roots.get(name, frozenset())
 
     def c_name(self, name: str) -> str:
@@ -352,7 +345,6 @@ def homes(body: list[ast.stmt], arguments: Iterable[str]) -> Mapping[Place, list
 
 
 def assignments(body: list[ast.stmt]) -> Mapping[str, int]:
-    """The number of statements that assign each name."""
     counts: dict[str, int] = {}
     for node in (node for statement in body for node in ast.walk(statement)):
         if isinstance(node, ast.Name) and isinstance(node.ctx, ast.Store):
@@ -416,7 +408,6 @@ def _blocks(statement: ast.stmt) -> list[list[ast.stmt]]:
 
 
 def _headed(statement: ast.stmt) -> set[str]:
-    """Names in the head of a compound statement."""
     if isinstance(statement, ast.For):
         return set(_mentioned(statement.iter))
     return set(_mentioned(statement.test)) if isinstance(statement, ast.If | ast.While) else set()

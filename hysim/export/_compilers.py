@@ -58,7 +58,6 @@ class Target(NamedTuple):
 
     @property
     def is_host(self) -> bool:
-        """Whether this machine is one."""
         return self.name == host()
 
 
@@ -125,7 +124,6 @@ def web_module(source: str) -> bytes:
 
 
 def _built(source: str, result: str, command: Sequence[str], libraries: Sequence[str], target: str) -> bytes:
-    """The file that a compiler makes of a C source."""
     with tempfile.TemporaryDirectory() as folder:
         name = f"{Path(result).stem}.c"
         Path(folder, name).write_text(source, encoding="utf-8")
@@ -164,7 +162,6 @@ class Kernels(NamedTuple):
 
 
 def kernels_of(law: Law) -> Kernels:
-    """The step of a law, and how it starts."""
     return Kernels(plain(law.step), plain(law.start))
 
 
@@ -200,7 +197,6 @@ def compressed(module: bytes) -> bytes:
 
 
 def c_source(kernels: Kernels) -> str:
-    """C99 text of a module."""
     text, has_start = entries(kernels.step, kernels.start)
     wrapper = files("hysim.export").joinpath("page/module.c").read_text(encoding="utf-8")
     return f"#include <math.h>\n{text}{'' if has_start else _NO_START}\n{wrapper}"

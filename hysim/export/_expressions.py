@@ -46,8 +46,6 @@ _COMPARED = MappingProxyType(
 
 
 class Expressions:
-    """Translates the expressions of one function."""
-
     def __init__(self, library: Library, scope: Scope) -> None:
         self.library, self.scope = library, scope
 
@@ -61,7 +59,6 @@ class Expressions:
         return result
 
     def condition(self, node: ast.expr) -> Value:
-        """A truth value."""
         result = self.value(node)
         if result.type is Scalar.BOOL:
             return result
@@ -284,7 +281,6 @@ class Expressions:
         return Stretch(f"{whole.text} + {offset.within(_c.SUM + 1)}", lengths, whole.roots, _c.SUM)
 
     def _member(self, node: ast.Subscript, several: Value) -> Value:
-        """One of the numbers that a function returns together."""
         place = node.slice.value if isinstance(node.slice, ast.Constant) else None
         if not isinstance(several.type, Several) or not isinstance(place, int):
             raise self._refusal(node, "an array, or one of the results of a function, is expected here")
@@ -338,7 +334,6 @@ class Expressions:
         raise self._refusal(node, f"{ast.unparse(node)} is no function that is known beforehand")
 
     def _reshaped(self, node: ast.Call, of: ast.expr) -> Stretch:
-        """A vector as an array of more axes."""
         if len(node.args) != 1 or not isinstance(node.args[0], ast.Tuple):
             raise self._refusal(node, "reshape takes a tuple of lengths")
         whole, lengths = self._vector(of), node.args[0].elts
@@ -408,7 +403,6 @@ class Expressions:
         return [*[stretch.text] * parameter.is_used, *(stretch.lengths[axis]() for axis in parameter.axes)]
 
     def writes(self, node: ast.expr) -> bool:
-        """Whether an expression writes to an array."""
         return bool(self._tried(node)[1])
 
     def _type(self, node: ast.expr) -> Type:

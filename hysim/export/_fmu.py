@@ -45,7 +45,6 @@ def token_of(*contents: str) -> str:
 
 
 def source_of(program: Program, variables: Sequence[Variable], version: str, token: str) -> str:
-    """The text of the one C file of a unit."""
     parts = [
         f"/* {', '.join(program.inputs)} to {program.output}; written by hysim {__version__}. */",
         "\n".join(f"#include <{header}>" for header in _HEADERS),
@@ -58,7 +57,6 @@ def source_of(program: Program, variables: Sequence[Variable], version: str, tok
 
 
 def _numbers(program: Program, variables: Sequence[Variable], token: str) -> str:
-    """Sizes, tables, and the calls of the program's functions."""
     inputs = [each for each in variables if each.causality == "input"]
     fields = list(variables[len(variables) - len(program.fields) :]) if program.fields else []
     sizes = {
@@ -96,8 +94,6 @@ def _numbers(program: Program, variables: Sequence[Variable], token: str) -> str
 
 
 class Options(NamedTuple):
-    """Options of a unit: its name, version of FMI, platforms and units, and the input at which it starts."""
-
     name: str
     version: str
     platforms: tuple[str, ...] | None
@@ -238,7 +234,6 @@ def _checked_name(name: str) -> str:
 
 
 def archive(program: Program, options: Options) -> bytes:
-    """The bytes of a unit."""
     version, name = options.version, options.name
     variables = variables_of(program, options.units, options.u0)
     blank = description(program, variables, name, version, ""), source_of(program, variables, version, "")

@@ -105,7 +105,6 @@ class Variable(NamedTuple):
         return {name: value for name, value in named.items() if value}
 
     def numbers(self) -> dict[str, str]:
-        """Unit, start value and limits."""
         limits = {"min": self.lower, "max": self.upper}
         finite = {name: repr(value) for name, value in limits.items() if math.isfinite(value)}
         start = {} if self.start is None else {"start": repr(self.start)}
@@ -118,7 +117,6 @@ def is_tunable(program: Program) -> bool:
 
 
 def start_name(program: Program) -> str:
-    """Name of the input at the start."""
     return f"{program.inputs[0]}0"
 
 
@@ -158,7 +156,6 @@ def variables_of(program: Program, units: Mapping[str, str], u0: float) -> list[
 
 
 def description(program: Program, variables: list[Variable], name: str, version: str, token: str) -> str:
-    """The text of ``modelDescription.xml``."""
     sampled, is_2 = math.isfinite(program.sample_time), version == "2.0"
     step = repr(program.sample_time)
     common = {"modelIdentifier": name, "canHandleVariableCommunicationStepSize": "true"}

@@ -147,7 +147,6 @@ def packing(law: Law, free: Iterable[str] | None = None) -> Packing:
 
 
 def _row(table: FloatArray) -> tuple[Number, ...]:
-    """The numbers of one law."""
     return tuple(number if isinstance(number, Symbol) else float(number) for number in table[0].tolist())
 
 

@@ -180,7 +180,6 @@ def _model(name: str, shown: Shown, parts: Parts, record: Record | None) -> dict
 
 
 def _inputs(amplitude: float, middle: float, timed: bool) -> list[dict[str, Any]]:
-    """Sliders of the input."""
     sides = {"lower": _short(middle - 2.0 * amplitude), "upper": _short(middle + 2.0 * amplitude)}
     sliders: list[dict[str, Any]] = [
         {"name": "amplitude", "value": amplitude, "lower": _short(amplitude / 20.0), "upper": _short(2.0 * amplitude)},

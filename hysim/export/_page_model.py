@@ -95,7 +95,6 @@ class _Reach:
         self.boxes = _boxes(law, Record(u=self.u, y=self.y))
 
     def control(self, name: str, place: int) -> Control:
-        """The slider of a number."""
         value = self.law.scalars[name]
         low, high = self.boxes.get(name, (-math.inf, math.inf))
         if value > 0.0 and self._with(name, 0.0) is None:
@@ -267,7 +266,6 @@ def _plays(law: Law, step: Callable[..., float]) -> dict[str, Any]:
 
 
 def steps_of(thing: Any) -> list[Kernels]:
-    """The steps that a page for a model needs."""
     if isinstance(thing, (Sum, Cascade)):
         members = thing.parts if isinstance(thing, Sum) else thing.stages
         return [kernels for member in members for kernels in steps_of(member)]
@@ -301,7 +299,6 @@ def _printed(law: Law, first: int) -> dict[str, Any]:
 
 
 def _in_python(law: Law) -> str:
-    """The law's constructor with all its arguments."""
     plain = {name: np.asarray(value).tolist() for name, value in law.arguments.items()}
     return f"{_name(type(law))}({', '.join(f'{name}={value!r}' for name, value in plain.items())})"
 
@@ -373,7 +370,6 @@ def output_of(family: type) -> str:
 
 
 def heading(thing: Any) -> str:
-    """The family of a model in a few words."""
     if isinstance(thing, (Sum, Cascade)):
         return about(thing)[0].rstrip(".")
     words = re.split(r"[,;:.`]", getdoc(type(thing)) or "")[0].strip()

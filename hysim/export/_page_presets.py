@@ -69,7 +69,6 @@ def _text() -> str:
 
 
 def _shown(family: type[Any]) -> Shown:
-    """The example of a family as the page takes it."""
     fields, between, _, group, units, kind, stack = family.example
     folder = family.__module__.split(".")[-2]
     return Shown(family(**fields), between, units, stack, group or _GROUPS[folder], kind)

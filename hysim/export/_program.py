@@ -67,13 +67,11 @@ class Translation:
         return self.functions[key]
 
     def table(self, name: str, values: Any) -> str:
-        """Name of a constant vector in C."""
         if id(values) not in self._tables:
             self._tables[id(values)] = self._free(f"table_{name.strip('_').lower()}"), values
         return self._tables[id(values)][0]
 
     def text(self) -> str:
-        """Everything that was translated."""
         structs = [
             f"typedef struct {{ {' '.join(f'{m.c_type} at{i};' for i, m in enumerate(each.members))} }} {each.c_type};"
             for each in sorted(self._structs, key=lambda each: each.c_type)

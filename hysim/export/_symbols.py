@@ -100,11 +100,9 @@ class Tape:
         self._places: dict[Any, int] = {}
 
     def field(self, k: int) -> Symbol:
-        """The field number `k`."""
         return Symbol(self, k)
 
     def record(self, operation: str, *operands: Number) -> Symbol:
-        """The result of an operation."""
         key = operation, *(_key(operand) for operand in operands)
         if key not in self._places:
             self._places[key] = len(self._entries)
@@ -127,7 +125,6 @@ class Tape:
         return tuple(self.names[place] for place in self.needed((number,)) if place < len(self.names))
 
     def evaluate(self, numbers: Sequence[Number], values: Sequence[float]) -> list[float]:
-        """The numbers for these values of the fields."""
         results: dict[int, Any] = {}
 
         def value(number: Number) -> Any:

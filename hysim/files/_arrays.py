@@ -73,7 +73,6 @@ class Array:
 
     @property
     def size(self) -> int:
-        """Number of elements."""
         return math.prod(self.shape)
 
     @property
@@ -124,7 +123,6 @@ class Arrays:
 
     @property
     def labels(self) -> Sequence[str]:
-        """Names of the arrays."""
         return [array.label for array in self.arrays]
 
     def column(self, key: str | int) -> Column:
@@ -143,7 +141,6 @@ class Arrays:
         return array.column(index)
 
     def values(self, columns: list[Column]) -> FloatArray:
-        """The numbers of the columns, shape (n_columns, n_samples), nan where one is missing."""
         with damaged(self.format):
             numbers = {id(array): array.numbers() for array in {id(c.place[0]): c.place[0] for c in columns}.values()}
         values = [numbers[id(array)][(slice(None), *index)] for array, index in (column.place for column in columns)]
@@ -201,7 +198,6 @@ def _path(name: str) -> str:
 
 
 def npz(file: BinaryIO) -> Arrays:
-    """The arrays of a zip archive as NumPy saves it."""
     archive = zipfile.ZipFile(file)
     entries = [entry for entry in archive.infolist() if entry.filename.endswith(_ENDING)]
     names = shown(", ".join(archive.namelist()[:3]))
@@ -211,8 +207,6 @@ def npz(file: BinaryIO) -> Arrays:
 
 
 def npy(file: BinaryIO) -> Arrays:
-    """The one array of a file as NumPy saves it."""
-
     def rewound() -> AbstractContextManager[IO[bytes]]:
         file.seek(0)
         return nullcontext(file)
@@ -274,7 +268,6 @@ class _MatReader:
         self.head = _MAT_TITLE + version
 
     def variables(self) -> Iterator[Array]:
-        """The arrays of all variables."""
         end, at = self.file.seek(0, 2), _MAT_HEAD
         while at < end:
             self.file.seek(at)

@@ -117,7 +117,6 @@ class Text(NamedTuple):
             yield Lines([numbers[k] for k in kept], [texts[k] for k in kept])
 
     def whole(self) -> str:
-        """All of the text."""
         return "\n".join(line for lines in self.lines() for line in lines.texts)
 
     def _no_text(self, encoding: str, reason: str) -> str:
@@ -135,7 +134,6 @@ class Signs(NamedTuple):
     thousands: str | None = None
 
     def number(self, cell: str) -> float | None:
-        """The number in a cell, or None if it holds none."""
         cell = cell.strip().replace("\u2212", "-")  # the minus sign of typesetters
         grouped = _GROUPED.fullmatch(cell)
         if grouped and grouped["mark"] != self.decimal and grouped["point"] in (None, self.decimal):
@@ -237,7 +235,6 @@ class Delimited:
 
     @property
     def labels(self) -> Sequence[str]:
-        """Names of the columns."""
         return [column.label for column in self.columns]
 
     def column(self, key: str | int) -> Column:
@@ -245,7 +242,6 @@ class Delimited:
         return column_of(key, self.columns)
 
     def values(self, columns: list[Column]) -> FloatArray:
-        """The numbers of the columns, shape (n_columns, n_samples), nan where one is missing."""
         result, at = np.empty((len(columns), self.n_samples)), 0
         for lines in self._samples():
             values = plain_numbers(lines.texts, [column.place for column in columns], self.signs)
@@ -259,7 +255,6 @@ class Delimited:
         return result
 
     def place(self, sample: int) -> str:
-        """The sample's line."""
         numbers = itertools.chain.from_iterable(lines.numbers for lines in self._samples())
         return f"line {next(itertools.islice(numbers, sample, None))}"
 

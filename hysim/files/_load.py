@@ -366,7 +366,6 @@ def _columns(table: Table, keys: Mapping[str, str | int | None]) -> dict[str, Co
 def _parts(
     table: Table, columns: Mapping[str, Column], values: FloatArray, on_missing: str
 ) -> list[npt.NDArray[np.intp]]:
-    """Places of the samples of each record."""
     is_missing = np.isnan(values)
     if on_missing == "error" and is_missing.any():
         k, j = np.argwhere(is_missing.T)[0]

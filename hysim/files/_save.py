@@ -91,8 +91,6 @@ class _InputOutput(Protocol):
 
 @runtime_checkable
 class _Responding(Protocol):
-    """A model."""
-
     def response(self, u: Any, /) -> Any: ...
 
 

@@ -70,7 +70,6 @@ class Frame:
 
     @property
     def notes(self) -> Notes:
-        """Units, resolution, name and channels in the notes of the frame."""
         return notes_in(self.table.notes, self.table.units)
 
     @property
@@ -86,7 +85,6 @@ class Frame:
         return Column(values, label, unit)
 
     def values(self, columns: list[Column]) -> FloatArray:
-        """The numbers of the columns, shape (n_columns, n_samples), nan where one is missing."""
         return np.stack([column.place for column in columns])
 
     def place(self, sample: int) -> str:

@@ -178,7 +178,6 @@ def _by_region(search: Search, best: LocalOptimum) -> dict[str, tuple[Search, li
 
 
 def _inside(search: Search, lower: FloatArray, upper: FloatArray) -> Search:
-    """The same search in a part of its box."""
     return replace(search, problem=replace(search.problem, space=_part(search.problem.space, lower, upper), ends=None))
 
 

@@ -78,7 +78,6 @@ class _Trial(NamedTuple):
 
     @property
     def names(self) -> tuple[str, ...]:
-        """Names of the coordinates."""
         return self.problem.space.coordinates
 
 

@@ -272,7 +272,6 @@ class _UnknownChannel(Identifiable):
         return np.asarray(output)[..., np.newaxis]
 
     def steady(self, parameters: Parameters, record: Record) -> dict[str, Any]:
-        """The parameters with the law's state in the steady cycle."""
         own = self._numbers(parameters)
         state = self.model.law.steady({**self.model.law.scalars, **own}, record)
         return {**parameters, **{name: state[name] for name in self.state}}
@@ -284,6 +283,5 @@ class _UnknownChannel(Identifiable):
         return values | {each.parameter: each.value(channels[each.channel]) for each in self.model.polynomials}
 
     def assemble(self, parameters: Mapping[str, float]) -> Any:
-        """The ordinary law at a value of the channel."""
         law = self.model.constant({**self.others, self.channel: parameters[self.channel]})
         return law.with_scalars({name: parameters[name] for name in self.state})

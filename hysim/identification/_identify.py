@@ -247,7 +247,6 @@ def _searched(
 
 
 def _weights(weights: Any, records: Sequence[Record]) -> list[FloatArray] | None:
-    """One array of weights for each record."""
     if weights is None:
         return None
     single = len(records) == 1 and np.ndim(weights[0]) == 0

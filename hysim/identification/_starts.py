@@ -75,7 +75,6 @@ class _End(NamedTuple):
     ends: FloatArray
 
     def criterion(self) -> float:
-        """Bayesian information criterion."""
         n = self.whole.n_samples
         return information(max(float(self.whole.costs(self.ends)[0]), 1e-300) / n, n, len(self.whole.space.names))
 
@@ -265,7 +264,6 @@ def _excess(stderr: float, largest: float) -> float:
 
 
 def _stderr(whole: Problem, theta: FloatArray) -> dict[str, float]:
-    """Standard errors by name at `theta`."""
     residual = whole.y - whole.model(theta[np.newaxis])[0]
     variance = float(np.average(residual**2, weights=whole.weights)) or 1e-300
     covariance = uncertainty(whole, theta, np.full(residual.size, 1.0 / variance)).covariance

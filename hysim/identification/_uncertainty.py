@@ -226,7 +226,6 @@ def _at(names: Sequence[str], values: Mapping[str, float], verb: str, bound: str
 
 
 def _shortened(names: Sequence[str]) -> str:
-    """The names, of many the first ones."""
     if len(names) <= _MOST_NAMES:
         return ", ".join(names)
     return f"{', '.join(names[: _MOST_NAMES - 1])} and {len(names) - _MOST_NAMES + 1} others"

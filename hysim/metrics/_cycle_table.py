@@ -43,7 +43,6 @@ class _Column:
     in_text: bool = True
 
     def cell(self, value: float | int) -> str:
-        """A number in the text."""
         if isinstance(value, int):
             return f"{value}"
         if math.isnan(value):

@@ -270,8 +270,6 @@ class Dependent:
 
 @runtime_checkable
 class _OnChannels(Protocol):
-    """A model whose output depends on the channels of a record."""
-
     def on(self, record: Record) -> Any: ...
 
 

@@ -172,7 +172,6 @@ def from_document(document: Mapping[str, Any], path: str | Path) -> Any:
 
 
 def _value(value: Any, path: str | Path) -> Any:
-    """A parameter's value from its plain form."""
     if isinstance(value, list):
         return [_value(each, path) for each in value]
     return from_document(value, path) if is_document(value) else value

@@ -232,7 +232,6 @@ class UnitGain:
         return affine_columns(monic, record.u, record.sample_time, zeros=0, hold=hold, sample=sample)[..., 1:-1]
 
     def assemble(self, parameters: Mapping[str, float]) -> Any:
-        """The transfer function with these parameters."""
         return self.structure.assemble(parameters)
 
     def _parameters(self, found: dict[str, FloatArray], shape: FloatArray) -> dict[str, FloatArray]:

@@ -365,7 +365,6 @@ class Actuator:
     def compiled(
         self, u0: float = 0.0, *, sample_time: float | None = None, substeps: int | None = None
     ) -> CompiledLaw:
-        """The step of `startable` at rest at the command `u0`; ValueError also if the actuator cannot rest there."""
         self.chain(self._any_time(sample_time), substeps).rest(u0)
         return self.startable(sample_time, substeps=substeps).started(u0)
 
@@ -394,7 +393,6 @@ class Actuator:
     def memory(
         self, u: npt.ArrayLike, sample_time: float | None = None, *, substeps: int | None = None
     ) -> FloatArray | None:
-        """Memory of the law at the samples of `u`, shape (n,); None for a law without one. See `response`."""
         if not isinstance(self.hysteresis, Remembering):
             return None
         inputs = read_only(u, "u", ndim=1)

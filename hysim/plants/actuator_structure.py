@@ -360,7 +360,6 @@ class ActuatorStructure(Identifiable):
         return np.concatenate([*(block[..., :1] for block in blocks), blocks[0][..., 1:]], axis=-1)
 
     def _offsets(self, linear: Sequence[str]) -> list[str]:
-        """The offsets of the laws that are free."""
         names = [_OFFSET] if len(self.inputs) == 1 else [f"{_LAW}.{name}.offset" for name in self.inputs]
         return [name for name in names if name in linear]
 

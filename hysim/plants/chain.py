@@ -232,7 +232,6 @@ class Chain:
 
     @property
     def _jumps(self) -> bool:
-        """Whether the displacement jumps with the command."""
         takes_time = self.amplifier.dynamic or whole_and_part(self.delay / self.step)[1]
         return bool(not takes_time and self.linear.D)
 

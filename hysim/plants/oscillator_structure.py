@@ -325,7 +325,6 @@ class _Box(NamedTuple):
 
     @property
     def plant(self) -> tuple[str, ...]:
-        """Free parameters of the plant."""
         return tuple(name for name in _PLANT if name not in self.held)
 
     def side(self, which: int) -> FloatArray:

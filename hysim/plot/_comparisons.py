@@ -237,7 +237,6 @@ def _draw_residual(ax: Axes, comparison: Comparison, row: ComparisonRow, quanta:
 
 
 def _draw_width(ax: Axes, comparison: Comparison) -> None:
-    """The measured width, under the lines of the models."""
     units, loop = comparison.record.units, comparison.loop
     style = scattered(loop.u.size, **_FILLED) if loop.u.size <= MANY else {"linewidth": 1.8}
     ax.plot(loop.u, loop.width, color=MEASURED, label="measured", zorder=3 if loop.u.size <= MANY else 1, **style)

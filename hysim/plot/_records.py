@@ -54,7 +54,6 @@ class _WithMemory(Protocol):
 
 
 def times_of(result: InputOutput) -> FloatArray | None:
-    """The times of a result, if it has any."""
     return result.t if isinstance(result, _WithTime) else None
 
 

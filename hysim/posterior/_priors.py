@@ -157,15 +157,12 @@ class Scale:
     is_log: bool
 
     def value(self, x: FloatArray) -> FloatArray:
-        """Parameter at the coordinate."""
         return self.unit * np.exp(x) if self.is_log else self.origin + self.unit * x
 
     def coordinate(self, value: FloatArray) -> FloatArray:
-        """Coordinate of the parameter."""
         return np.log(value / self.unit) if self.is_log else (value - self.origin) / self.unit
 
     def log_slope(self, x: FloatArray) -> FloatArray | float:
-        """Logarithm of the slope of the parameter."""
         return math.log(abs(self.unit)) + (x if self.is_log else 0.0)
 
 

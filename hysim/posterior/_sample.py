@@ -446,7 +446,6 @@ def walkers_of(n_dim: int, walkers: int | None, samples: int) -> int:
 
 
 def described(fit: Identification, posterior: Target, chains: Chains, samples: int, seed: int) -> Posterior:
-    """The result."""
     n_walkers = chains.q.shape[1]
     table = chains.parameters.reshape(-1, len(posterior.names))
     paths = {name: chains.parameters[..., k] for k, name in enumerate(posterior.names)}

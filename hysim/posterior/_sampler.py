@@ -209,8 +209,6 @@ def sampled(
 
 
 class _Ensemble:
-    """Walkers of emcee on a target, with a proposal close to it."""
-
     def __init__(self, emcee: Any, target: Target, walkers: int, proposal: Proposal, reaching: Proposal) -> None:
         self.target, self.proposal, self.reaching = target, proposal, reaching
         self.walkers, self.acceptance = walkers, float("nan")

@@ -102,12 +102,10 @@ class Target:
 
     @property
     def n_x(self) -> int:
-        """Number of coordinates of the search."""
         return self.problem.n_x
 
     @property
     def n_linear(self) -> int:
-        """Number of linear parameters."""
         return len(self.problem.space.linear)
 
     @property

@@ -125,7 +125,6 @@ def _joined(parts: list[Outcome]) -> Outcome:
 
 
 def _row(returned: Any) -> tuple[Layout, list[Any]]:
-    """Layout and values of what one task returned."""
     values = {name: value if type(value) is float else _numbers(name, value) for name, value in _named(returned)}
     layout = tuple((name, () if isinstance(value, float) else value.shape) for name, value in values.items())
     return layout, [*values.values()]

@@ -196,7 +196,6 @@ class Store:
 
     @property
     def seed(self) -> int:
-        """Seed of the study."""
         return int(self._study.identity["seed"])
 
     def layout(self) -> Layout | None:
@@ -384,7 +383,6 @@ class Store:
 
     @staticmethod
     def _is_shard(name: str, study: Study) -> bool:
-        """Whether a file of this name is a shard of the study."""
         return re.fullmatch(rf"{study.shards}-[0-9]{{9,18}}\.npz", name) is not None
 
     def _refuse_arrays_of_others(self, before: Study | None) -> None:
@@ -441,7 +439,6 @@ def _built_in_errors(path: Path) -> Iterator[None]:
 
 
 def _changes(before: Mapping[str, str], now: Mapping[str, str]) -> dict[str, str]:
-    """Descriptions of the differences."""
     words = {name: f"the {name} was {before.get(name)} and is {value}" for name, value in now.items()}
     words["task"] = "the task's source or a value bound to it has changed"
     tasks = now["space"].rpartition(" (")[0]  # without the digest of the values

@@ -319,7 +319,6 @@ class _Run:
             return lost
 
     def _size(self, remaining: int, number: int) -> int:
-        """Number of tasks in the next chunk."""
         if not self.largest:
             return 1
         has_arrays = any(shape for _, shape in self.table.layout or ())
@@ -374,7 +373,6 @@ class _Run:
         ) from error
 
     def _end(self, patience: float) -> None:
-        """Cancel chunks that have not begun, and wait so many seconds for the others."""
         for future in list(self.running):
             if future.cancel():
                 del self.running[future]

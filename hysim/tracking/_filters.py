@@ -71,7 +71,6 @@ def _must_be_positive(law: Law, name: str) -> bool:
 
 
 def _place(name: str) -> tuple[str, int]:
-    """Field of a number, and its place there."""
     field, _, place = name.partition("[")
     return field, int(place[:-1]) if place else 0
 

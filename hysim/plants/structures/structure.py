@@ -116,7 +116,6 @@ class _Columns:
         return float(law.step(law.parameters, law.state, drift))
 
     def forces(self, drifts: FloatArray) -> FloatArray:
-        """Forces of all elements."""
         return np.array([self.force(e, float(d)) for e, d in enumerate(drifts)])
 
     def tangents(self, drifts: FloatArray) -> FloatArray:
@@ -136,8 +135,6 @@ class _Columns:
 
 
 class _Push:
-    """A structure that is pushed along."""
-
     def __init__(self, structure: AssembledStructure, x: FloatArray, pattern: FloatArray, row: FloatArray) -> None:
         self.stiffness, self.rows = structure.stiffness_matrix, structure.drift_matrix
         self.slopes, self.pattern, self.row = structure.elastic_slopes, pattern, row
@@ -526,7 +523,6 @@ class Structure(SearchedStructure):
 
 
 def _elements(values: Any) -> tuple[Element, ...]:
-    """The elements as a tuple."""
     members = (values,) if isinstance(values, Element) else tuple(values)
     for each in members:
         if not isinstance(each, Element):
