@@ -1,7 +1,4 @@
-"""The public names in reading order, and the modules that hold them, as the stub of the front door lists them.
-
-Beside them the one helper that finds the name which was meant.
-"""
+"""The public names in reading order, the modules that hold them, and the nearest name to a misspelt one."""
 
 from collections.abc import Iterable
 from pathlib import Path

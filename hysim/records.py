@@ -76,9 +76,6 @@ class Record:
     >>> rec = hs.Record(u=[0.0, 1.0, 0.0], y=[0.0, 0.9, 0.2], units={"u": "V", "y": "um"})
     >>> len(rec), rec[1:].u.tolist(), rec[1:].units["y"]
     (3, [1.0, 0.0], 'um')
-    >>> warm = hs.Record(u=[0, 1, 0], y=[0, 1, 0], channels={"T": 40.0, "current": [0.1, 0.2, 0.3]})
-    >>> warm[1:].channel("T"), warm[1:].channel("current").tolist()
-    (40.0, [0.2, 0.3])
     """
 
     u: FloatArray
@@ -152,9 +149,7 @@ class Record:
         return dataclasses.replace(self, **cut, channels=taken(self.channels, samples))
 
     def channel(self, name: str) -> float | FloatArray:
-        """A channel by name: its number, or its values where they vary along the record, shape (n,).
-
-        Raises ValueError if the record has no channel of this name.
+        """A channel by name: its number, or its values (n,) where they vary; ValueError if there is none of this name.
         """
         owner = f"the record {self.name!r}" if self.name else "the record"
         value: float | FloatArray = value_in(self.channels, name, owner)
@@ -239,8 +234,6 @@ class Record:
         >>> u = hs.signals.triangle(0.0, 1.0, cycles=3, samples_per_cycle=4)
         >>> [cycle.u.tolist() for cycle in hs.Record(u=u, y=u).cycles()][0]
         [0.0, 0.5, 1.0, 0.5, 0.0]
-        >>> [cycle.u.tolist() for cycle in hs.Record(u=[0, 2, -2, 0, 1], y=[0, 2, -1, 0, 1]).cycles()]
-        [[0.0, 2.0, -2.0, 0.0]]
         """
         if between_extremes := complete_cycles(self.u, tolerance):
             return tuple(self[cycle.path] for cycle in reversed(between_extremes))
@@ -503,15 +496,10 @@ def check_increasing(t: FloatArray) -> None:
 
 
 def even_step(t: FloatArray) -> float:
-    """The constant step of increasing times, shape (n_samples,).
+    """The constant step of increasing times (n_samples,); ValueError unless there are 2 or more, which increase evenly.
 
     Times are even if they lie within 1e-4 of a step from multiples of one, or as near to them as the rounding of their
     digits allows, where the last digit is at most a tenth of a step.
-
-    Raises
-    ------
-    ValueError
-        If there are fewer than 2 samples, times do not increase, or are not even.
     """
     if t.size < 2:
         raise ValueError(f"t must hold at least 2 samples, got {t.size}")

@@ -95,9 +95,7 @@ class Simulation:
         return {label: column for columns in named.values() for label, column in columns.items()}
 
     def to_frame(self) -> Any:
-        """The `columns` as a `pandas.DataFrame`, with the time as index; ImportError without pandas.
-
-        ``attrs["units"]`` holds the unit of each column.
+        """The `columns` as a `pandas.DataFrame` over the time, units in ``attrs["units"]``; ImportError without pandas.
         """
         return frame_of_signals(self.columns, self.units)
 
@@ -252,8 +250,7 @@ def models_on(thing: Any, records: Sequence[Record]) -> list[Any]:
 def free_run(thing: Any, record: Record, units: Mapping[str, str] | None = None) -> Simulation:
     """The simulation of a model, or of a result's model, on the input of a record as it was measured.
 
-    Every verb that judges or draws a model beside a record takes its output from here: what the model's sensor, if it
-    has one, reads without noise and steps.
+    All verbs that judge or draw a model use it: readings of the model's sensor, if any, without noise and steps.
     """
     (model,) = models_on(thing, [record])
     plant = model.as_read if isinstance(model, _Read) else model

@@ -122,12 +122,10 @@ def listed(names: Sequence[str]) -> str:
 
 
 def quantity(value: float, unit: str = "") -> str:
-    """A number with its unit."""
     return f"{value:.4g} {unit}".rstrip()
 
 
 def extent(values: npt.ArrayLike, unit: str = "") -> str:
-    """The least and the largest of some values."""
     array = np.asarray(values)
     if not array.size:
         return "no values"

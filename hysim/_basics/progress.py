@@ -120,11 +120,9 @@ class Line:
         self._show(self.counted)
 
     def warn(self, warning: str) -> None:
-        """Write a warning on a line of its own, above the next report."""
         self.warning = warning
 
     def announce(self, subject: str) -> None:
-        """Name what is at work from now on."""
         self.subject = subject
         self._show(self.counted)
 

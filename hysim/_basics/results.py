@@ -14,12 +14,7 @@ class Result(Protocol):
 
 
 def model_of(thing: Any) -> Any:
-    """The model of a result, which every verb takes in place of a model; anything else as it is.
-
-    Raises
-    ------
-    ValueError
-        If the result has no model, as that of `discover_oscillator` for a law that hysim lacks.
+    """The model of a result, anything else as it is; ValueError if the result has none, as for a law that hysim lacks.
     """
     if not isinstance(thing, Result):
         return thing

@@ -76,9 +76,7 @@ class _Excursion(NamedTuple):
 
 
 def measured_cycles(u: FloatArray, cycles: int, tolerance: float) -> Loops:
-    """The last complete cycles between the record's extremes, or else of full amplitude about a level, latest first.
-
-    A ValueError is raised if the record has too few of both kinds, or an argument is out of its range.
+    """The last cycles between the extremes, else of full amplitude about a level, latest first; ValueError if too few.
     """
     if cycles < 1:
         raise ValueError(f"cycles must be at least 1, got {cycles}")
@@ -120,10 +118,7 @@ def protocol(u: FloatArray, tolerance: float, level: float | None = None) -> Pro
 
 
 def _candidates(levels: FloatArray, first: float, reach: float) -> list[float]:
-    """The first input, and the middle of the levels that most of the branches' length reaches if it is not one of them.
-
-    The record's first and last branch, which may be incomplete, are not counted.
-    """
+    """The first input, and the middle of the levels that the branches reach most, the first and the last left out."""
     ends = np.sort(np.column_stack([levels[1:-2], levels[2:-1]]), axis=1)
     if not ends.size:
         return [first]

@@ -54,7 +54,6 @@ class Task(NamedTuple):
 
     @property
     def samples_per_cycle(self) -> int:
-        """Samples of a cycle of the triangle."""
         return round(self.period / self.sample_time)
 
 
@@ -75,7 +74,6 @@ class Design(NamedTuple):
 
     @property
     def last_cycle(self) -> slice:
-        """Samples of the triangle's last cycle."""
         return slice(-self.task.samples_per_cycle - 1, None)
 
     @property
@@ -209,10 +207,7 @@ def in_units(record: hs.Record, units: Mapping[str, str], source: str) -> hs.Rec
 
 
 def reference(task: Task, rest: float, kind: str, unit: str | None) -> tuple[FloatArray, float, str]:
-    """Values for the tuning, the first seconds that do not count, and the objective.
-
-    They are the triangle, the step from a displacement at rest, or the reference in a file, in the unit of the output.
-    """
+    """Triangle, step from rest or reference in a file [unit of y]; seconds that do not count; and the objective."""
     h = task.sample_time
     if kind == "step":
         return np.full(round(task.duration / h) + 1, rest + task.step), 0.0, "itae"
@@ -224,9 +219,7 @@ def reference(task: Task, rest: float, kind: str, unit: str | None) -> tuple[Flo
 
 
 def feedback(actuator: hs.Actuator, kind: str, within: Pair | None) -> hs.PID | hs.TrackingController | None:
-    """The feedback before its tuning, whose nonzero gains are free; None for the default of `tune`.
-
-    It is tuned without the inverse: the inverse knows the simulated plant exactly, and would leave it nothing to do.
+    """Feedback before its tuning, None for `tune`'s default; tuned without the inverse, which knows the plant exactly.
     """
     if kind == "pid":
         return None
@@ -238,11 +231,7 @@ def feedback(actuator: hs.Actuator, kind: str, within: Pair | None) -> hs.PID | 
 
 
 def controller(actuator: hs.Actuator, kind: str, within: Pair | None, tuned: Any, *, preview: bool) -> Any:
-    """The controller of a kind, with a tuned feedback.
-
-    A TypeError or ValueError is raised if the plant lacks the inverse or the single mode that the kind needs, or a
-    preview has no inverse to serve.
-    """
+    """The controller of a kind, with a tuned feedback; TypeError or ValueError if plant or options do not allow it."""
     if kind not in INVERTING:
         if preview:
             raise ValueError(f"--preview is for {', '.join(INVERTING)}: the controller {kind} has no inverse")
@@ -320,7 +309,6 @@ def _slowest_decay(actuator: hs.Actuator) -> float:
 
 
 def document(design: Design) -> dict[str, Any]:
-    """All results, for JSON."""
     triangle, reduction, task = design.triangle, design.step.reduction, design.task
     return {
         "plant": to_document(design.actuator),
@@ -343,7 +331,6 @@ def document(design: Design) -> dict[str, Any]:
 
 
 def text(design: Design) -> str:
-    """All results, in words."""
     lines = [*_head(design), *_triangle(design), *_step(design), *_conditions(design)]
     return "\n".join(part for line in lines for part in folded(line, indent=12 * " "))
 

@@ -151,7 +151,6 @@ class Contents(NamedTuple):
 
     @property
     def results(self) -> "list[Any]":
-        """Records, and the runs of models by their names."""
         named = zip(self.laws, self.simulated, strict=True)
         return [*self.measured, *(replace(run, name=name) for name, run in named)]
 

@@ -266,10 +266,7 @@ def family(name: str) -> Any:
 
 
 def resolved(path: str) -> Any:
-    """The object at an import path, `module:name`; modules in the current folder are importable.
-
-    A ValueError is raised if there is no such module, or it does not have the name.
-    """
+    """The object at an import path, `module:name`, the current folder included; ValueError if there is none."""
     module, _, _ = path.partition(":")
     if os.getcwd() not in sys.path:
         sys.path.insert(0, os.getcwd())  # as `python -m hysim` has it
@@ -311,10 +308,8 @@ def model_or_family(text: str) -> Any:
 
 
 def to_identify(chosen: FitOptions) -> Any:
-    """The argument of `identify` for these options, whose `initial` becomes None where the structure takes it.
-
-    A ValueError is raised if there is no such model, an option belongs to another one, or one that this model needs is
-    missing.
+    """The argument of `identify`, whose `initial` becomes None where the structure takes it; ValueError if options
+    clash.
     """
     from hysim.models.model import FAMILIES
 
@@ -365,10 +360,7 @@ def _actuator(chosen: ActuatorOptions) -> Any:
 
 
 def read(path: str) -> tuple[Any, dict[str, str]]:
-    """The model in a file, on the standard input, or at an import path, and its units.
-
-    A class at an import path stands for the model with its default values.
-    """
+    """The model in a file, on standard input or at an import path (a class: with its default values), and its units."""
     from hysim.models.storage import from_json
 
     if is_import_path(path):

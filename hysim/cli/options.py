@@ -78,7 +78,6 @@ class Value:
         raise click.BadParameter(f"expected {self.expected}, got {text!r}{near and f': {near}'}")
 
     def complete(self, _context: click.Context, _parameter: click.Parameter, begin: str) -> list[CompletionItem]:
-        """Words that begin like this, and files if there may be other values than words."""
         words = [CompletionItem(word) for word in (*self.words, *self.offers()) if word.startswith(begin)]
         return words if self.read is None else [CompletionItem(begin, type="file"), *words]
 
@@ -208,21 +207,18 @@ def matched(pattern: str, *readers: Callable[[str], Any]) -> Callable[[str], Any
 
 
 def positive(option: str, value: float) -> float:
-    """The value of an option; ValueError unless it is positive and finite."""
     if not 0.0 < value < float("inf"):
         raise ValueError(f"{option} must be positive, got {value:g}")
     return value
 
 
 def exclusive(**values: Any) -> None:
-    """ValueError if more than one of some options is used."""
     used = [flag(name) for name, value in values.items() if value not in (None, False)]
     if len(used) > 1:
         raise ValueError(f"{' and '.join(used)} exclude each other: leave one of them out")
 
 
 def column(text: str) -> str | int:
-    """A column by its name, or by its number from 0."""
     return int(text) if text.isascii() and text.isdigit() else text
 
 
@@ -248,7 +244,6 @@ def _terms(text: str) -> str | list[str]:
 
 
 def file(name: str, role: str = RESULT, help_: str = "") -> Value:
-    """Values that name a file."""
     return Value(name, role=role, help=help_)
 
 

@@ -26,11 +26,10 @@ _LOOPS_IN_A_ROW = 3
 
 
 def check(files: Sequence[tuple[str, str]], *, prints: bool) -> None:
-    """Refuse results of a command that cannot be written, before anything is computed.
+    """Refuse results that cannot be written with a ValueError, before anything is computed.
 
-    A ValueError is raised if a folder does not exist or may not be written to, the ending of a picture or a table is
-    unknown, two results would go to one place, such as the standard output, or a result would overwrite an input.
-    `files` are paths and their roles, and `prints` whether a document is printed.
+    `files` are paths and their roles, of which no two may be one place, nor an input; `prints` is whether a document is
+    printed.
     """
     results = [(path, role) for path, role in files if role != INPUT]
     for path, role in results:
@@ -80,9 +79,7 @@ def _behind(source: str) -> Iterator[os.stat_result]:
 def write(
     files: Files, text: Callable[[], str] | None = None, document: Callable[[], Mapping[str, Any]] | None = None
 ) -> None:
-    """Write a content to each path that is not None, all of the files or none, and print the result.
-
-    The result is a text, or with ``--json`` a document; it is not printed if a path is the standard output.
+    """Write all files or none, and print `text`, or with ``--json`` `document`, unless a path is the standard output.
     """
     contents = {path: _encoded(path, content()) for path, content in files.items() if path is not None}
     if text is not None and STANDARD not in contents:
@@ -133,14 +130,12 @@ def scalars(result: Any) -> dict[str, Any]:
 
 
 def fields_of(result: Any, names: Iterable[str]) -> dict[str, Any]:
-    """Some fields of a result by name."""
     return {name: attrgetter(name)(result) for name in names}
 
 
 def table(path: str, columns: Mapping[str, Any], units: Mapping[str, str]) -> bytes:
-    """Columns in the format of their path's ending; the standard output gets comma-separated text.
-
-    A ValueError is raised if the ending is unknown, or its format needs an extra.
+    """Columns in the format of the path's ending, CSV on standard output; ValueError if it is unknown or needs an
+    extra.
     """
     from hysim.files import Notes, packed
 
@@ -149,7 +144,6 @@ def table(path: str, columns: Mapping[str, Any], units: Mapping[str, str]) -> by
 
 
 def drawn(draw: Callable[[Any], object], width: float = 6.0, height: float = 4.0) -> Any:
-    """A figure in the house style, which a function has drawn on."""
     with hs.plot.house_style():
         canvas = hs.plot.figure(width, height)
         draw(canvas)

@@ -16,14 +16,13 @@ which need no such assumption,
     T = mean(s) sqrt(N) / sqrt(mean of B_j^2),    J degrees of freedom.
 
 If d is as often positive as negative, and as large, T has about Student's distribution. With fewer than 5 independent
-samples no difference could be shown, however large;
-a model whose median error is 10 times that of the best one is worse all the same. Differences below a thousandth of the
+samples no difference could be shown, however large; a model whose median error is 10 times that of the best one is
+worse all the same. Differences below a thousandth of the
 typical error count as none.
 Several models are compared with the best one by Holm's correction. The best one was chosen by the same errors, which
 makes a small probability less remarkable.
 
-`python experiments/equal_models.py` counts how often equal models are called unequal. A mean of squared errors with 3
-to 6 lags (Diebold and Mariano 1995) fails where one error is huge.
+A mean of squared errors with 3 to 6 lags (Diebold and Mariano 1995) fails where one error is huge.
 
 Sources: F. Wilcoxon, Biometrics Bull. 1 (1945) 80 for signed ranks; F. W. Zwiers and H. von Storch, J. Climate 8
 (1995) 336 for M; F. H. C. Marriott and J. A. Pope, Biometrika 41 (1954) 390 for the bias; S. Holm, Scand. J. Stat. 6

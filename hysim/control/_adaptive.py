@@ -1,7 +1,4 @@
-"""Feed-forward by the inverse of a law whose numbers drift.
-
-Its equations stand in `hysim.kernels.adaptive_inverse`.
-"""
+"""Feed-forward by the inverse of a law whose numbers drift; `hysim.kernels.adaptive_inverse` has its equations."""
 
 import functools
 import math

@@ -233,10 +233,8 @@ class HysteresisAssessment:
         Rms error, and displacement at the end minus at the start [unit of y].
     secant_gain : float
         Secant gain of the open loop [unit of y / unit of u].
-    open_u, open_y, closed
-        Signals of the open loop, shape (n,), and the closed loop.
-    loop : LoopAssessment
-        Stability, robustness, and share of limited samples.
+    open_u, open_y, closed, loop
+        Signals of the open loop, shape (n,); the closed loop; and its judgement.
     """
 
     hysteresis_reduction_percent: float
@@ -283,10 +281,8 @@ class StepAssessment:
     ----------
     reduction : VibrationReduction
         The three figures, nan if the loop is not stable, and the measures of both responses.
-    open_y, closed
-        Displacement in open loop, shape (n,), where the voltage steps to its final value; and the closed loop.
-    loop : LoopAssessment
-        Stability, robustness, and share of limited samples.
+    open_y, closed, loop
+        Displacement in open loop, shape (n,), where the voltage steps to its final value; closed loop; its judgement.
     """
 
     reduction: VibrationReduction
@@ -314,10 +310,8 @@ class SquareWaveAssessment:
     reduction : VibrationReduction, or None
         The step's figures over the last half period, if it lasts the open loop's t98 and five of its periods, and the
         loop is stable.
-    open_y, closed
-        Displacement in open loop, shape (n,), and the closed loop.
-    loop : LoopAssessment
-        Stability, robustness, and share of limited samples.
+    open_y, closed, loop
+        Displacement in open loop, shape (n,); the closed loop; and its judgement.
     """
 
     open_tracking_rms: float

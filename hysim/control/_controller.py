@@ -140,12 +140,8 @@ class SampledController(ABC):
         return 0
 
     def initial(self, sample_time: float, u: float = 0.0, y: float = 0.0) -> CompiledController:
-        """State to `step` from, at rest at a command [unit of u] and a displacement [unit of y].
-
-        Raises
-        ------
-        ValueError
-            If the sample time [s] is not positive and finite.
+        """State to `step` from, at rest at a command and a displacement; ValueError if the sample time [s] is not
+        positive.
         """
         return begun(self, sample_time, u, y)
 
@@ -260,25 +256,10 @@ class PID(SampledController):
         setpoint_weight: float = 1.0,
         derivative_weight: float = 0.0,
     ) -> Self:
-        """PID in its standard form, u = Kp (e + 1/Ti integral e dt + Td de/dt).
+        """PID in its standard form, u = Kp (e + 1/Ti integral e dt + Td de/dt); other arguments as of the constructor.
 
-        Parameters
-        ----------
-        Kp : float
-            Gain [unit of u / unit of y].
-        Ti, Td : float
-            Integral time, positive and infinite for none, and derivative time [s].
-        derivative_filter, limits, tracking_time, setpoint_weight, derivative_weight
-            As in the constructor.
-
-        Returns
-        -------
-        PID
-
-        Raises
-        ------
-        ValueError
-            If Ti is not positive, or as the constructor.
+        `Kp` is the gain [unit of u / unit of y], `Ti` the integral time, infinite for none, and `Td` the derivative time [s].
+        Raises ValueError if `Ti` is not positive, or as the constructor.
         """
         if not Ti > 0.0:
             raise ValueError(f"Ti must be positive, got {Ti}: an infinite one leaves the integral out")

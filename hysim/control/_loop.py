@@ -98,9 +98,7 @@ class ClosedLoop:
         return {label: column for columns in named for label, column in columns.items()}
 
     def to_frame(self) -> Any:
-        """The `columns` as a `pandas.DataFrame`, with the time as index; ImportError without pandas.
-
-        ``attrs["units"]`` holds the unit of each column.
+        """The `columns` as a `pandas.DataFrame` over the time, units in ``attrs["units"]``; ImportError without pandas.
         """
         return frame_of_signals(self.columns, self._signal_units)
 
@@ -185,21 +183,6 @@ def close_loop(
     >>> run = hs.close_loop(lag, hs.PID(kp=4.0, ki=4.0), np.arange(0.0, 5.0, 0.01), np.ones(500))
     >>> round(float(run.y[-1]), 3), run.conditions["sample_time"]
     (1.0, 0.01)
-
-    An active damper in an earthquake, which reads the velocity of the floor that it pushes:
-
-    >>> column = hs.BoucWen(beta=15.0, gamma=15.0, feedthrough=20.0, gain=80.0)
-    >>> frame = hs.Structure(
-    ...     mass=1.0, elements=[hs.Element(column, between=(0, 1))], excitation="force", output="velocity"
-    ... )
-    >>> quake = hs.signals.ground_motion(4.0, duration=5.0, sample_time=0.01)
-    >>> still = np.zeros(quake.size)
-    >>> free, damped = (
-    ...     hs.close_loop(frame, hs.PID(kp=kp), 0.01 * np.arange(quake.size), still, ground_acceleration=quake)
-    ...     for kp in (0.0, 5.0)
-    ... )
-    >>> bool(damped.signals["peak_drift"][-1] < 0.7 * free.signals["peak_drift"][-1])
-    True
     """
     _check_controller(controller)
     times, r, h = sampled(t, reference)
@@ -306,9 +289,8 @@ class RestingPlant:
     def attempt_each(
         self, controllers: Sequence[Controller], reference: FloatArray
     ) -> tuple[FloatArray, npt.NDArray[np.int64]]:
-        """Displacements of the loops of several controllers of one class without preview, shape (m, n).
-
-        With them the first sample of each that is not finite, -1 without one.
+        """Displacements (m, n) of the loops of controllers of one class, and the first sample of each that diverges, or
+        -1.
         """
         compiled = [begun(each, self.sample_time, self.u0, self.y0) for each in controllers]
         return self.chain.run_each(compiled, self.state, reference)

@@ -249,9 +249,8 @@ def later(plant: Actuator, time: float) -> Actuator:
 def judge(
     resting: RestingPlant, controller: Controller, reference: FloatArray, cycle: FloatArray, gain: float
 ) -> tuple[LinearFigures, str]:
-    """Figures of the linear loop, and in words how the loop fails to come to rest behind the reference, empty if not.
-
-    `gain` is the secant gain along `cycle`, a cycle of the reference.
+    """Figures of the linear loop along a `cycle` of this secant gain, and how the loop fails to rest; empty if it
+    rests.
     """
     linear = _linear_figures(resting.actuator, controller, resting.sample_time, cycle, gain)
     if linear.max_sensitivity == math.inf:

@@ -1,7 +1,4 @@
-"""Subjects of a design: numbers of a law or of a whole actuator, and the information that an input gives on them.
-
-The problem of a whole actuator is that of `hysim.identify`, at known parameters.
-"""
+"""Numbers of a law or of an actuator (the problem of `hysim.identify`), and the information of an input on them."""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -28,10 +25,7 @@ _TAKES_PART = 1e-3  # share of a number in such a direction, from which on it is
 
 
 def merit(matrix: FloatArray, criterion: Criterion) -> float:
-    """Measure to maximise, a number that is proportional to the number of samples; zero if a direction is not seen.
-
-    D is the root of the determinant, A the harmonic mean of the eigenvalues, E the smallest one.
-    """
+    """Criterion to maximise: D root of the determinant, A harmonic mean of eigenvalues, E the least; 0 if singular."""
     size = np.sqrt(np.maximum(matrix.diagonal(), 0.0))
     if not (size > 0.0).all() or np.linalg.eigvalsh(matrix / np.outer(size, size))[0] < _LEAST:
         return 0.0

@@ -87,9 +87,8 @@ class Trial:
         return {name: scores.error for name, scores in self.scores.items()}
 
     def explains(self, name: str) -> bool:
-        """Whether a model predicts the held-out samples nearly as well as the fitted ones, or most of the memory.
-
-        The error of the plays may also be that of one fit to all samples: they have many parameters.
+        """Whether a model predicts held-out samples nearly as well as fitted ones; plays also by one fit to all
+        samples.
         """
         own, curve = self.scores[name], self.scores[CURVE]
         usual = own.fitted if self.by in ("record", "rate") else self.noise

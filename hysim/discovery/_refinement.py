@@ -66,9 +66,8 @@ class Terms(NamedTuple):
         return np.where(wanted > 0, 0.0, -np.inf), np.where(wanted < 0, 0.0, np.inf)
 
     def run(self, u: FloatArray, numbers: FloatArray, y0: FloatArray, bound: float) -> tuple[FloatArray, int]:
-        """Outputs (n_sets, n_samples) of numbers (n_sets, size) from y0 (n_sets,), and the terms of series they take.
-
-        A law that diverges is a row of inf.
+        """Outputs (n_sets, n_samples) from y0 (n_sets,), inf where a law diverges, and the terms of series that they
+        take.
         """
         feedthrough, offset = shifts(self, numbers)
         coefficients = numbers[:, : len(self.terms)]
@@ -219,9 +218,7 @@ def bic_of(cost: float, n_samples: int, n_parameters: int) -> float:
 
 @dataclass
 class Work:
-    """Terms of series for each sample that free runs have taken, and the `most` that a search may take.
-
-    A stiff law takes a hundred times as many as a smooth one. No clock is read: the result is always the same.
+    """Terms of series per sample that free runs have taken, and the `most` allowed: no clock, so that results repeat.
     """
 
     most: float = math.inf
@@ -237,9 +234,7 @@ class Work:
 
 @dataclass(frozen=True)
 class FreeRun:
-    """Least-squares problem of some records; `signs` are those that coefficients must have.
-
-    `masks`, (n_samples,) for each record, mark the visible outputs; by default all. All runs add to the `work`.
+    """Least-squares problem of records; `signs` of coefficients, `masks` (n_samples,) of visible outputs, `work` done.
     """
 
     records: tuple[Record, ...]
@@ -292,10 +287,8 @@ class FreeRun:
     def refine(
         self, structure: S, starts: FloatArray, *, tolerance: float = RANKING, hopeless: float = math.inf
     ) -> Candidate[S] | None:
-        """Optimum that is reached from the best of `starts` (n_starts, size + n_records); None if all diverge.
-
-        A descent that will not come below the cost `hopeless` [squared strokes] is given up, and has few steps where
-        the work is nearly done.
+        """Optimum from the best of `starts` (n_starts, size + n_records), None if all diverge; given up above
+        `hopeless`.
         """
         units = self.units(structure)
         lower, upper = self._bounds(structure, units)

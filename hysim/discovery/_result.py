@@ -36,9 +36,7 @@ OTHERS = ("n", "feedthrough", "offset", "gain")
 
 
 class ModelledLaw(NamedTuple):
-    """A model for each record, numbers and standard errors by name, and the law as text.
-
-    `parameters` are the numbers that are no coefficients, `initial_states` the memory at the first samples.
+    """A model for each record; coefficients, other `parameters`, standard errors, memories at first samples; the text.
     """
 
     models: tuple[Any, ...]

@@ -88,10 +88,7 @@ class Options:
 
 @dataclass(frozen=True)
 class Outcome:
-    """Law of one library for the records, and its search; `is_short` if only the optimizer's path was searched.
-
-    `is_cut` if the search ended at its limit of work.
-    """
+    """Law of one library and its search: `is_short` on the optimizer's path alone, `is_cut` at the limit of work."""
 
     library: Library
     candidate: Candidate[Terms]

@@ -226,10 +226,7 @@ class Search:
         return max(cost_of(best.bic + HOPELESS, n, d), best.cost + n * ALIKE**2)
 
     def explore(self, largest: Terms) -> bool:
-        """Steps 2 and 3: the structures inside `largest` that the linearised free run predicts to be best.
-
-        Returns whether all of them were tried before the work was done.
-        """
+        """Steps 2 and 3 about structures inside `largest`; whether all of them were tried before the work was done."""
         done: set[Terms] = set()
         for _ in range(ROUNDS):
             points = [c for c in self.sound[:_POINTS] if c.structure not in done]

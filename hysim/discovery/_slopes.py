@@ -300,9 +300,8 @@ def signs_of(terms: Sequence[Term], signs: Mapping[str, int] | None) -> dict[Ter
 
 @dataclass(frozen=True)
 class Regression:
-    """slope = features @ coefficients, scaled by the rms values `sizes` (n_terms,) and `slope_size`.
-
-    `dependent` are terms left out since their columns are combinations of those of lower degree.
+    """slope = features @ coefficients in units of `sizes` and `slope_size`; `dependent` are the collinear terms left
+    out.
     """
 
     terms: tuple[Term, ...]

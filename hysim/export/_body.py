@@ -30,17 +30,7 @@ _SIGNS = {ast.Add: "+=", ast.Sub: "-=", ast.Mult: "*=", ast.Div: "/="}
 
 
 class Body:
-    """Translates the statements of a function again and again, until the types of its names have settled.
-
-    Parameters
-    ----------
-    library : Library
-        Where the functions that it calls are collected.
-    source : Routine
-        The function.
-    arguments : dict
-        Types of its arguments.
-    """
+    """Translates the statements of a function again and again, until the types of its names have settled."""
 
     def __init__(self, library: Library, source: Routine, arguments: dict[str, Type]) -> None:
         self.source, self.arguments = source, list(arguments)

@@ -180,13 +180,7 @@ def plain(function: Any) -> Any:
 
 @lru_cache(maxsize=1024)
 def routine(function: Callable[..., Any]) -> Routine:
-    """Read a function.
-
-    Raises
-    ------
-    UntranslatableError
-        If it is no Python function whose source can be read.
-    """
+    """Read a function; UntranslatableError if it is no Python function whose source can be read."""
     if not isinstance(function, FunctionType):
         raise UntranslatableError(f"a step must be a Python function or a kernel, got {function!r}")
     try:
@@ -271,23 +265,8 @@ class Uses(NamedTuple):
 class Scope:
     """Names of a function while it is translated, and what was learnt about them.
 
-    Parameters
-    ----------
-    source, arguments : Routine and dict
-        The function, and the types of its arguments.
-
-    Attributes
-    ----------
-    types : dict
-        Type of each local name, as far as it is known.
-    lengths : set of (str, int)
-        Arrays and their axes whose length is used.
-    written, used : set of str
-        Arrays that are written to, and names that are read.
-    roots : dict
-        Arrays in which a local array lies.
-    before : Uses, optional
-        What the last pass has learnt.
+    `lengths` are arrays and axes whose length is used, `written` arrays that are written to, `used` names that are read,
+    `roots` the arrays in which a local one lies, and `before` what the last pass has learnt.
     """
 
     def __init__(self, source: Routine, arguments: dict[str, Type]) -> None:

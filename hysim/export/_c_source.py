@@ -116,8 +116,6 @@ def to_c(
     >>> code = hs.to_c(hs.PID(kp=2.0, ki=100.0, limits=(0.0, 5.0)), sample_time=1e-3, name="axis")
     >>> "double axis_step(axis_state *state, double reference, double measurement);" in code.header
     True
-    >>> hs.to_c(hs.BoucWen(), name="stack").state_size
-    2
     """
     if reason := _refusal(name):
         raise ValueError(f"name must be letters, digits and underscores after a letter, got {name!r}: {reason}")

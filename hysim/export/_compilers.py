@@ -84,9 +84,7 @@ def host() -> str:
 
 
 def compiler(target: Target) -> tuple[str, ...] | None:
-    """The beginning of a command that compiles for a target; None where there is no compiler.
-
-    A compiler of this machine comes first, for this machine.
+    """Beginning of a command that compiles for a target, this machine's own compiler first; None where there is none.
     """
     own = shutil.which("gcc") or shutil.which("clang") if target.is_host else None
     if own is not None:
@@ -97,27 +95,13 @@ def compiler(target: Target) -> tuple[str, ...] | None:
 
 
 def shared_library(source: str, name: str, target: Target, command: Sequence[str]) -> bytes:
-    """The shared library of a C source; `command` is what `compiler` returned.
-
-    Raises
-    ------
-    OSError
-        If it cannot be compiled; the message has the compiler's first error.
-    """
+    """The shared library of a C source by a `compiler`; OSError with the compiler's first error."""
     libraries = () if target.name.endswith("windows") else ("-lm",)
     return _built(source, f"{name}{target.ending}", (*command, *OPTIONS), libraries, target.name)
 
 
 def web_module(source: str) -> bytes:
-    """The WebAssembly module of a C source, by ziglang.
-
-    Raises
-    ------
-    ImportError
-        If ziglang is not installed.
-    OSError
-        If it cannot be compiled; the message has the compiler's first error.
-    """
+    """WebAssembly module of a C source; ImportError without ziglang, OSError with the compiler's first error."""
     optional("ziglang", "a page for a step that is not hysim's own", "export")
     command = (sys.executable, "-m", "ziglang", "cc", "-target", _WEB, *_WEB_OPTIONS)
     return _built(source, "step.wasm", command, ("-lm",), _WEB)
@@ -166,24 +150,8 @@ def kernels_of(law: Law) -> Kernels:
 
 
 def module_of(kernels: Kernels) -> bytes:
-    """The module of a step, compressed: from the package, or for another step than hysim's compiled now.
-
-    Parameters
-    ----------
-    kernels : Kernels
-        The step.
-
-    Returns
-    -------
-    bytes
-        In the format of gzip.
-
-    Raises
-    ------
-    ImportError
-        If the module must be compiled and the extra `export` is missing.
-    UntranslatableError
-        If the step is not in the portable subset of Python.
+    """Compressed module of a step, from the package or compiled now; ImportError or UntranslatableError if it cannot
+    be.
     """
     own = files("hysim.export").joinpath(f"{FOLDER}/{kernels.name}.wasm.gz")
     if kernels.step.__module__.startswith("hysim.") and own.is_file():

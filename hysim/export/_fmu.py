@@ -206,12 +206,7 @@ def _with_units(program: Program, thing: Any) -> Program:
 
 
 def field_unit(law: Law, name: str) -> str:
-    """The unit of one number of a law, as in ``"y/u"``; empty where it is not known.
-
-    >>> import hysim as hs
-    >>> field_unit(hs.Dahl(), "stiffness")
-    'y/u'
-    """
+    """Unit of one number of a law, as in ``"y/u"``; empty where it is not known."""
     searched = {each.name: each.unit for each in law.searched if each.unit != "1"}
     return {**searched, **law.units}.get(name.partition("[")[0], "")
 
@@ -249,13 +244,7 @@ def archive(program: Program, options: Options) -> bytes:
 
 
 def libraries(source: str, options: Options) -> dict[str, bytes]:
-    """Shared libraries by their places in the unit.
-
-    Raises
-    ------
-    ImportError
-        If a platform is asked for by name and no compiler can compile for it.
-    """
+    """Shared libraries by their places in the unit; ImportError if no compiler serves a platform asked for by name."""
     compiled = {
         target: shared_library(source, options.name, target, command)
         for target, command in _commands(options.platforms, options.version).items()

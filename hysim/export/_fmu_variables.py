@@ -121,13 +121,7 @@ def start_name(program: Program) -> str:
 
 
 def variables_of(program: Program, units: Mapping[str, str], u0: float) -> list[Variable]:
-    """The variables of a program in the order of their value references.
-
-    Raises
-    ------
-    ValueError
-        If two of them have one name.
-    """
+    """Variables in the order of their value references; ValueError if two have one name."""
     output = 1 + len(program.inputs)
     first = label(program.inputs[0], units)
     variables = [

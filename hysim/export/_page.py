@@ -98,8 +98,7 @@ def to_page(
 
     Examples
     --------
-    >>> import tempfile, pathlib
-    >>> import hysim as hs
+    >>> import tempfile, pathlib, hysim as hs
     >>> with tempfile.TemporaryDirectory() as folder:
     ...     page = hs.to_page(hs.Dahl(coulomb=0.5), pathlib.Path(folder, "dahl.html"), units={"u": "mm", "y": "N"})
     ...     page.read_text()[:15]

@@ -171,10 +171,7 @@ def _rounded(value: float) -> float:
 
 @dataclass
 class Parts:
-    """Parts of the models of a page: modules by name, functions that pack, numbers and sliders.
-
-    `sample_time` is that of the input on which the ends of sliders are found [s].
-    """
+    """Modules, packing functions, numbers and sliders of a page's models; `sample_time` [s] is that of their input."""
 
     modules: dict[str, bytes] = field(default_factory=dict)
     packs: list[str] = field(default_factory=list)
@@ -185,12 +182,7 @@ class Parts:
 
 
 def node_of(thing: Any, u: FloatArray, parts: Parts, prefix: str = "") -> dict[str, Any]:
-    """A model as the page takes it; what it consists of goes into `parts`.
-
-    Raises
-    ------
-    TypeError
-        If it is no law, no sum and no cascade of laws.
+    """A model as the page takes it, its contents put into `parts`; TypeError if it is no law, sum or cascade of laws.
     """
     if isinstance(thing, Sum):
         return {"sum": _members(thing.parts, u, parts, prefix)}

@@ -31,32 +31,9 @@ def presets() -> dict[str, Shown]:
 
 
 def explorer(path: str | Path) -> Path:
-    """Write the page with a choice of families and devices.
+    """Write the page with a choice of families and devices to an ``.html`` file, and return its path.
 
-    Parameters
-    ----------
-    path : path
-        The file to write, which ends in ``.html`` or ``.htm``.
-
-    Returns
-    -------
-    Path
-        The file.
-
-    Raises
-    ------
-    OSError
-        If it cannot be written.
-    ValueError
-        For another ending of the path.
-
-    Examples
-    --------
-    >>> import tempfile, pathlib
-    >>> from hysim.export import explorer
-    >>> with tempfile.TemporaryDirectory() as folder:
-    ...     "Loop explorer" in explorer(pathlib.Path(folder, "explorer.html")).read_text()
-    True
+    A ValueError is raised for another ending of the path, an OSError if the file cannot be written.
     """
     page = checked_path(path)
     write_text(page, _text())

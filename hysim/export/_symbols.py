@@ -86,13 +86,7 @@ class Symbol:
 
 
 class Tape:
-    """Operations on fields, in an order in which they can be computed.
-
-    Parameters
-    ----------
-    names : tuple of str
-        The fields.
-    """
+    """Operations on the fields `names`, in an order in which they can be computed."""
 
     def __init__(self, names: tuple[str, ...]) -> None:
         self.names = names
@@ -140,9 +134,8 @@ class Tape:
         return [float(value(number)) for number in numbers]
 
     def texts(self, numbers: Sequence[Number]) -> tuple[list[tuple[str, str]], list[str]]:
-        """Names and texts of what occurs more than once, in an order to compute them in, and the texts of the numbers.
-
-        Names of helping functions begin with ``@``.
+        """Names and texts of what occurs more than once, in order, and texts of the numbers; ``@`` begins a helper's
+        name.
         """
         places = self.needed(numbers)
         uses = dict.fromkeys(places, 0)

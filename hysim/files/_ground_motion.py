@@ -125,15 +125,9 @@ def load_ground_motion(
         even, a value is missing, a unit is unknown, or the file is damaged. The message is one line that names the
         file, the line and what to do.
 
-    References
-    ----------
-    PEER Strong Motion Database, "Time history" files: four header lines, the last of which states NPTS and DT; the
-    values are read line by line.
-
     Examples
     --------
-    >>> import io
-    >>> import hysim as hs
+    >>> import io, hysim as hs
     >>> header = "RECORD\\nSITE, 180\\nACCELERATION TIME SERIES IN UNITS OF G\\nNPTS=  3, DT= .0050 SEC\\n"
     >>> t, acceleration = hs.load_ground_motion(io.StringIO(header + " 0. .1E+00-.2E+00\\n"))
     >>> t.tolist(), acceleration.round(6).tolist()

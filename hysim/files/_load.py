@@ -94,8 +94,8 @@ def load(
 
     In the other formats a column is an array by its name: a variable, a field of a struct (``rec.u``), a dataset
     (``group/displacement``). Samples run along the first axis; a column of an array with several axes is ``x[2]`` or
-    ``x[0,1]``. Its unit is an attribute `units` in HDF5, or a text beside it called ``u_units``. A missing value is
-    nan. HDF5, and MATLAB's ``-v7.3``, need h5py. A file of `hysim.save_record` needs no further arguments.
+    ``x[0,1]``. Its unit is an attribute `units` in HDF5, or a text ``u_units``. A missing value is nan. HDF5, and
+    MATLAB's ``-v7.3``, need h5py. A file of `hysim.save_record` needs no further arguments.
 
     A table in memory is a frame of pandas, polars or the like, a table of Arrow or a dataset of xarray. Its columns are
     taken by name; ``voltage [V]`` is a name with a unit here, too, and ``attrs["units"]`` of pandas and xarray holds
@@ -160,8 +160,7 @@ def load(
 
     Examples
     --------
-    >>> import io
-    >>> import hysim as hs
+    >>> import io, hysim as hs
     >>> text = io.StringIO("voltage [V], displacement [um]\\n0, 0.0\\n5, 0.079\\n10, 0.152\\n")
     >>> rec = hs.load(text, u="voltage", y="displacement")
     >>> rec.u.tolist(), dict(rec.units)
@@ -217,9 +216,7 @@ def options_of_a_text(
 
 
 class Opened(NamedTuple):
-    """Name, format and content of a source, its path if it is a file with one, and its encoding if that is known.
-
-    The content of a DataFrame or the like is its table.
+    """Name, format, content (of a DataFrame its table), path and encoding of a source, the last two if they are known.
     """
 
     name: str
@@ -241,10 +238,7 @@ class _Named(Protocol):
 
 @contextmanager
 def opened(source: Source) -> Iterator[Opened]:
-    """Open a source to read from, and make every message about it one line that begins with its name.
-
-    OSError, TypeError or ValueError if it cannot be read or is too large.
-    """
+    """Open a source to read from, and begin every message about it with its name; OSError, TypeError or ValueError."""
     with ExitStack() as stack:
         if isinstance(source, (str, os.PathLike)):
             path = Path(source)
@@ -457,8 +451,7 @@ def list_columns(
 
     Examples
     --------
-    >>> import io
-    >>> import hysim as hs
+    >>> import io, hysim as hs
     >>> text = io.StringIO("t [s], voltage [V], note\\n0, 0.0, a\\n1, 5.0, b\\n")
     >>> [(each.name, each.unit, each.highest) for each in hs.list_columns(text)]
     [('t', 's', 1.0), ('voltage', 'V', 5.0), ('note', '', nan)]

@@ -115,10 +115,7 @@ class NumberList(NamedTuple):
 
 
 def number_list(text: str, decimal: str | None, skip: int = 0) -> NumberList:
-    """All numbers of a text from the line after `skip`, or from the first line of numbers on.
-
-    A ValueError names the first line below that holds something else.
-    """
+    """All numbers of a text after `skip` lines, or from the first line of numbers on; ValueError for anything else."""
     lines = text.split("\n")
     if (decimal or _decimal_sign(lines[skip:])) == ",":
         lines = [line.replace(",", ".") for line in lines]
@@ -131,10 +128,7 @@ def number_list(text: str, decimal: str | None, skip: int = 0) -> NumberList:
 
 
 def _from_numbers_on(lines: list[str], samples: list[int]) -> list[int]:
-    """The samples from the first line on that holds nothing but numbers.
-
-    A line above it that is rather a line of numbers with a fault in it is refused.
-    """
+    """The samples from the first line of numbers on; a line above that looks like one with a fault in it is refused."""
     above = ""
     for at, place in enumerate(samples):
         try:

@@ -59,8 +59,7 @@ def save_record(record: Record, path: str | Path) -> None:
     Examples
     --------
     >>> import tempfile
-    >>> from pathlib import Path
-    >>> import hysim as hs
+    >>> import tempfile, hysim as hs
     >>> rec = hs.datasets.table1()
     >>> with tempfile.TemporaryDirectory() as folder:
     ...     path = Path(folder) / "table1.npz"

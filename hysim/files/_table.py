@@ -30,9 +30,7 @@ class Column(NamedTuple):
 
 @dataclass(frozen=True)
 class Notes:
-    """Units, resolution, name and channels of a record, as a file states them.
-
-    `channels` are names to columns, or to the numbers of those that are constant.
+    """Units, resolution, name and channels of a record as a file states them: names to columns, or to constant numbers.
     """
 
     units: Mapping[str, str] = field(default_factory=dict)
@@ -117,10 +115,7 @@ def damaged(form: str) -> Iterator[None]:
 
 
 def number_of(key: str, kind: str, *names: Sequence[str]) -> int | None:
-    """Number of the one column with this name, from the first list of names that has it; None if there is none.
-
-    If there are several in a list, a ValueError calls them by the plural `kind`.
-    """
+    """Number of the one column of this name in the first of the lists that has it, or None; ValueError for several."""
     for labels in names:
         matches = [k for k, label in enumerate(labels) if label == key]
         if len(matches) > 1:

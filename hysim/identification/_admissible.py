@@ -85,9 +85,7 @@ class Choice(NamedTuple):
 
 
 def excursion(models: Sequence[Any], records: Sequence[Record]) -> Excursion | None:
-    """That of the models, one for each record, on the record of the widest input.
-
-    It is None where a model depends on time or on a channel that varies, or no input turns back.
+    """Excursion of the models on the record of the widest input; None if time or a channel matters, or nothing turns.
     """
     k = max(range(len(records)), key=lambda k: float(np.ptp(records[k].u)))
     model, record = models[k], records[k]

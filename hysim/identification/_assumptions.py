@@ -53,9 +53,8 @@ _STATES = {
 
 
 class Decision(NamedTuple):
-    """The problems to be searched, and a sentence on what was chosen and why.
-
-    There are several, the simplest first, where the family's search has stages.
+    """The problems to be searched, the simplest first where there are stages, and a sentence on what was chosen and
+    why.
     """
 
     problems: Sequence[Problem]
@@ -147,9 +146,8 @@ def _left_out(family: Any, setting: Setting, paths: Sequence[Record], quiet: Seq
 
 
 def quiet_rmse(family: Any, setting: Setting, treatment: Treated) -> float:
-    """Error of a short fit along the quiet paths, with what their noise adds through the slope of the record.
-
-    It is infinite where there is no noise, or such a fit.
+    """Error of a short fit along the quiet paths, with what their noise adds by the record's slope; infinite without
+    one.
     """
     if not treatment.noises or isinstance(family, PartByPart):
         return math.inf
@@ -283,9 +281,7 @@ def _tried(attempt: Problem, state: _State, variant: Variant, before: Sequence[_
 
 
 def _starts_beside(space: SearchSpace, before: Sequence[_Trial]) -> FloatArray:
-    """The starts of a space, and those that hold the end of a search with coordinates of the state alone.
-
-    The numbers of a shorter state keep their order: what is new stands before them, between them or behind them.
+    """The starts of a space, and those of a search with coordinates of the state alone, whose numbers keep their order.
     """
     starts, coordinates = [space.starts], space.coordinates
     for each in before:

@@ -1,7 +1,6 @@
 """Laws that depend on a channel: the curve of a parameter against it, and the value of a channel on a record.
 
-**The value of a channel.** The law is what it was identified to be; only the channel, and the state at the first
-sample, are searched. The standard error is that of the noise of this record: the law's own uncertainty is not in it.
+A search for that value keeps the law: the standard error is that of the noise of this record alone.
 """
 
 from collections.abc import Mapping
@@ -69,9 +68,8 @@ class ParameterCurve(Stored):
         return _roots(weights(self.polynomial.at, channel), self.covariance)
 
     def band(self, channel: npt.ArrayLike) -> tuple[FloatArray, FloatArray]:
-        """Ends of the interval at 95 % at values of the channel, of the same shape each; it holds at each value alone.
-
-        Outside the identified range the band is that of the polynomial, which is all that it knows.
+        """Ends of the interval at 95 % at each value of the channel, of its shape; beyond the identified range no
+        wider.
         """
         middle, half = self.value(channel), self.reach * self.stderr(channel)
         return middle - half, middle + half

@@ -1,7 +1,7 @@
 """The verb `identify`: declare, search, describe.
 
-A family that is fitted in one step (`hysim.models.protocols.Direct`) is not searched. Its number of parameters is that
-of its degrees of freedom, rounded; it has none by name, and no standard errors.
+A family that is fitted in one step (`hysim.models.protocols.Direct`) is not searched. Its number of parameters is its
+degrees of freedom, rounded; it has none by name.
 """
 
 import inspect

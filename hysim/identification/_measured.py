@@ -1,7 +1,4 @@
-"""The model as it is returned: behind the filter of its input, standing where its record began, with its own residual.
-
-What a result says is computed from the model that it holds, on the records as they were measured.
-"""
+"""The model as it is returned: behind the filter of its input, from its record's start, with its own residual."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace

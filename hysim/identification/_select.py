@@ -19,12 +19,11 @@ CRITERIA = ("bic", "aic", "fpe", "cv_rmse")
 @printed
 @frozen
 class Selection:
-    """Candidates identified on the same records, ranked.
+    """Candidates identified on the same records, ranked by a criterion.
 
     Parameters
     ----------
     criterion : {"bic", "aic", "fpe", "cv_rmse"}
-        Criterion of the ranking.
     name : str
         Name of the best candidate.
     fits : mapping

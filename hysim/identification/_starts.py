@@ -300,10 +300,7 @@ _MOST_GROUPS = 12
 
 
 def begun(structure: DependentStructure, setting: Setting) -> DependentStructure:
-    """The structure with starts where short searches of its law end; itself where nothing searched depends.
-
-    All of them together simulate half of the user's `max_evaluations` parameter sets at most.
-    """
+    """The structure with starts where short searches of its law end; they take half of `max_evaluations` at most."""
     if all(name in structure.columns for name in structure.at):
         return structure
     records, most = setting.records, setting.max_evaluations

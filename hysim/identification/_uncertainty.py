@@ -52,8 +52,8 @@ class Uncertainty:
     def with_disturbances(self, disturbances: FloatArray, curvature: FloatArray) -> "Uncertainty":
         """The covariance with what disturbances of the output (n_draws, n_samples) add to the estimates.
 
-        Each moves the optimum by (J^T W J)^-1 J^T W d, to first order; the `curvature` W is (n_samples,). Their mean is
-        a bias, and counts as a part of the error.
+        Each moves the optimum by (J^T W J)^-1 J^T W d to first order, with `curvature` W; their mean, a bias, counts
+        too.
         """
         if self.slopes is None:
             return self
@@ -196,9 +196,7 @@ def _in_words(names: tuple[str, ...], groups: tuple[tuple[str, ...], ...]) -> st
 def _bounds_in_words(
     problem: Problem, theta: FloatArray, way_back: FloatArray, at_side: Flags
 ) -> tuple[tuple[str, ...], list[str]]:
-    """Sides of the box at which the search has stopped, and other bounds at which parameters stand.
-
-    A coordinate that is no parameter of the user stands for those that it moves.
+    """Sides of the box where the search stopped, and other bounds; own coordinates stand for the parameters they move.
     """
     space, x = problem.space, theta[: problem.n_x]
     values = dict(zip(space.names, problem.named(theta[np.newaxis])[0].tolist(), strict=True))

@@ -1,7 +1,4 @@
-"""Results to plain JSON values and back, and warnings for users of a result.
-
-In JSON nan is null, an infinity its name, a model its family and parameters.
-"""
+"""Results to plain JSON values and back (nan is null, an infinity its name), and warnings for users of a result."""
 
 import json
 import math

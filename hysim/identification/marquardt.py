@@ -44,10 +44,7 @@ class Settled:
 
 
 def triangle(columns: FloatArray, target: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Columns (n_sets, n_rows, n_linear) and target (n_sets, n_rows) of the same regression with few rows.
-
-    There is one row more than there are columns: the last one holds what no parameters explain.
-    """
+    """The same regression with one row more than columns, (n_sets, n_rows, ...); the last is what nothing explains."""
     both = np.asarray(np.linalg.qr(np.concatenate([columns, target[..., np.newaxis]], axis=2), mode="r"))
     return both[..., :-1], both[..., -1]
 
@@ -93,10 +90,8 @@ _ONE_SIDED = 1e-7  # those of a one-sided one near 1e-7, at half the cost
 
 @dataclass(frozen=True)
 class Schedule:
-    """Damping: each trial has the set's times one of `factors`; a set ends beyond `most`.
-
-    After a step that lowers the loss it is that of the best trial times `success`, otherwise the last one times
-    `failure`.
+    """Damping, times `success` or `failure` after a step; each trial has it times a factor, and beyond `most` a set
+    ends.
     """
 
     factors: tuple[float, ...] = (1.0,)
@@ -126,9 +121,8 @@ class Problem(Protocol):
     """A loss to minimise; `sets` (n,) says which set each point belongs to."""
 
     def evaluate(self, x: FloatArray, sets: Sets) -> tuple[FloatArray, tuple[FloatArray, ...]]:
-        """Losses (n,) at points `x` (n, n_x), inf where it diverges, and arrays of n rows for `linearised`.
-
-        Numbers that follow from the others may be changed in `x`, in place.
+        """Losses (n,) at points `x` (n, n_x), inf where it diverges, with arrays for `linearised`; may change `x` in
+        place.
         """
         ...
 
@@ -258,10 +252,9 @@ def _regressed(jacobian: FloatArray, goal: FloatArray, damping: FloatArray, n_da
 
 @dataclass(frozen=True)
 class SumOfSquares:
-    """Problem of one set: the sum of squared residuals between bounds.
+    """Sum of squared residuals between bounds, for one set.
 
-    `residuals` maps points (n, n_x) to residuals (n, n_samples); `slopes` one point (n_x,) and its residual to
-    derivatives (n_samples, n_x); `sizes`, if given, one point to D (n_x,).
+    `residuals` maps points (n, n_x) to (n, n_samples), `slopes` a point and its residual to (n_samples, n_x), `sizes` to D.
     """
 
     residuals: Callable[[FloatArray], FloatArray]

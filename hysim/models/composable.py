@@ -88,7 +88,6 @@ class Placed(Composable):
 
     @property
     def arguments(self) -> dict[str, Any]:
-        """The fields of the family by name."""
         return own_items(self)
 
     def placed(self, u0: float | None, u_range: tuple[float, ...] | None = None) -> Self:

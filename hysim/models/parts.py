@@ -88,7 +88,6 @@ def _joined(join: Callable[[Any, Any], _Kernel], first: Step | Start, second: St
 
 
 def compiled_law(part: Any, u0: float, sample_time: float | None) -> CompiledLaw:
-    """A part as compiled loops take it."""
     if not isinstance(part, Steppable):
         raise TypeError(f"a {type(part).__name__} cannot be stepped as a law: it has no compiled step")
     time = {"sample_time": needed_time(part, sample_time)} if needs_time(part) else {}

@@ -1,7 +1,4 @@
-"""Models to and from JSON: the version of hysim, the family, the parameters, the units.
-
-A model inside another, such as the law of an actuator, is a family with its parameters in its place.
-"""
+"""Models to and from JSON: version of hysim, family, parameters (also of a model in a model), and units."""
 
 import importlib
 import json
@@ -82,11 +79,7 @@ def _advice(value: Any) -> str:
 
 
 def load_model(path: str | Path) -> Any:
-    """Read a model that `save` wrote.
-
-    Raises ValueError if the file does not hold a model; the message names the file and what is wrong. Raises OSError if
-    it cannot be read.
-    """
+    """Read a model that `save` wrote; ValueError names what is wrong in the file, OSError if it cannot be read."""
     return from_json(Path(path).read_bytes(), path)[0]
 
 
@@ -188,7 +181,6 @@ def _shown(value: Any) -> str:
 
 
 def is_model(value: Any) -> bool:
-    """Whether a value is a model of a known family."""
     return FAMILIES.get(type(value).__name__) is type(value)
 
 

@@ -77,7 +77,6 @@ class Composite(ByStructure, Composable):
 
     @property
     def members(self) -> tuple[Any, ...]:
-        """The models."""
         members: tuple[Any, ...] = vars(self)[self.members_are]
         return members
 
@@ -256,7 +255,6 @@ class SumStructure(Identifiable, Composable):
         return columns_beside(blocks, fixed[np.newaxis, :, np.newaxis])
 
     def steady(self, parameters: Parameters, record: Record) -> dict[str, Any]:
-        """The parameters with the parts' states in the steady cycle of which `record` is one period or more."""
         states: dict[str, Any] = {}
         moving = record if np.ptp(record.u) else replace(record, u=record.u + np.arange(len(record)))
         for label, part in self._identified.items():
@@ -269,11 +267,9 @@ class SumStructure(Identifiable, Composable):
         return {**parameters, **states}
 
     def assemble(self, parameters: Mapping[str, float]) -> Any:
-        """The sum with these parameters."""
         return Sum(parts=assembled(self.parts, self._identified, parameters))
 
     def notes(self, record: Record, model: Any) -> tuple[str, ...]:
-        """Remarks of the laws among the parts."""
         return tuple(
             f"{label}: {note}"
             for label, part, found in zip(labels(self.parts), self.parts, model.parts, strict=True)
@@ -282,11 +278,9 @@ class SumStructure(Identifiable, Composable):
         )
 
     def assumed_states(self, record: Record) -> tuple[str, ...]:
-        """The states that all parts with a memory leave to the record."""
         return common_states(self._identified, record)
 
     def variants(self) -> tuple[Variant, ...]:
-        """The choices of the parts, in every combination."""
         return combined_variants(self._identified, lambda others: replace(self, parts=exchanged(self.parts, others)))
 
     @property
@@ -332,9 +326,6 @@ class Sum(Composite):
     >>> damper = hs.BoucWen() + hs.Dashpot(c=2.0)
     >>> damper.response([0.0, 1.0, 1.0], sample_time=0.5).round(6).tolist()
     [0.0, 4.632121, 0.632121]
-    >>> twice = hs.Play(threshold=0.25) + hs.Line(slope=1.0)
-    >>> twice.inverse_response(twice.response([0.0, 1.0, 0.75, 0.0])).round(9).tolist()
-    [0.0, 1.0, 0.75, 0.0]
     """
 
     parts: tuple[Any, ...]

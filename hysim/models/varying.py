@@ -153,10 +153,7 @@ def power_coefficients(at: tuple[float, ...]) -> FloatArray:
 def columns_along(
     subject: Any, parameters: Parameters, varying: Mapping[str, FloatArray], record: Record
 ) -> FloatArray:
-    """As `Identifiable.regressors`, of parameters `varying` along the record, (n_sets, n_samples) each.
-
-    Those in which the output is affine are not among them: their columns are multiplied by their values. Raises
-    TypeError if a model has no parameters that could change from sample to sample.
+    """As `Identifiable.regressors`, with parameters `varying` (n_sets, n_samples), none of them affine; else TypeError.
     """
     if not varying:
         return np.asarray(subject.regressors(parameters, record))
@@ -175,10 +172,8 @@ def columns_along(
 def response_along(
     model: Any, series: Mapping[str, FloatArray], u: FloatArray, sample_time: float | None = None
 ) -> FloatArray:
-    """Output (n_samples,) of a model some of whose numbers, by name, are a `series` of one for each sample.
-
-    Raises SimulationError if the output diverges, and TypeError if the model's numbers cannot change from sample to
-    sample.
+    """Output (n_samples,) of a model with a `series` of some numbers; SimulationError, or TypeError if they cannot
+    vary.
     """
     if not series:
         return response_of(model, u, sample_time)
@@ -223,10 +218,7 @@ def _of_sum(
 
 
 def paths(law: Law, parameters: Parameters, u: FloatArray) -> FloatArray:
-    """Outputs (n_sets, n_samples) of laws with these numbers by name; inf where one diverges.
-
-    A number has the shape (n_sets, n_samples), (n_sets,) or (). Raises ValueError if the law's state holds what depends
-    on a number that varies.
+    """Outputs (n_sets, n_samples), inf where one diverges, for numbers of this shape, (n_sets,) or (); else ValueError.
     """
     from hysim.kernels.varying import drive_varying  # compiled where it is needed
 

@@ -239,8 +239,7 @@ class Actuator:
 
         Examples
         --------
-        >>> import numpy as np
-        >>> import hysim as hs
+        >>> import numpy as np, hysim as hs
         >>> stage = hs.Actuator(hysteresis=hs.Play(threshold=0.2), vibration=hs.mode(300.0, 0.05, delay=0.4e-3))
         >>> slow, fast = np.sin(np.linspace(0.0, 9.0, 90)), np.repeat([0.0, 1.0, -0.5, 0.5], 40)
         >>> recs = [
@@ -286,29 +285,12 @@ class Actuator:
     def response(
         self, u: npt.ArrayLike, sample_time: float | None = None, *, substeps: int | None = None
     ) -> FloatArray:
-        """True displacement at the samples of a command that is held between them.
+        """True displacement (n,) at the samples of a command `u` (n,) that is held between them.
 
-        Parameters
-        ----------
-        u : array, shape (n,)
-            Command. At its first sample the law has its initial memory and everything is at rest, creep included.
-        sample_time : float, optional
-            Time between two samples [s]; an actuator that is not `dynamic` needs none.
-        substeps : int, optional
-            Sub-steps of a sample behind an amplifier that takes time, by default 4 to 64 of a quarter of its time
-            constant.
-
-        Returns
-        -------
-        array, shape (n,)
-
-        Raises
-        ------
-        SimulationError
-            If a stage diverges.
-        ValueError
-            If `u` is not finite or has not one axis, no time is given where one is needed, or the vibration cannot
-            rest at the first sample because it integrates.
+        At the first sample the law has its initial memory and everything is at rest, creep included. Only a `dynamic` actuator
+        needs the `sample_time` [s]. `substeps` are those of a sample behind an amplifier that takes time, by default 4 to 64 of
+        a quarter of its time constant. Raises SimulationError if a stage diverges; ValueError if `u` is not finite or has not
+        one axis, no time is given where one is needed, or the vibration cannot rest at the first sample because it integrates.
         """
         inputs = read_only(u, "u", ndim=1)
         if not self._moves or not inputs.size:
@@ -323,9 +305,8 @@ class Actuator:
         sample_time: float | None = None,
         substeps: int | None = None,
     ) -> tuple[FloatArray, ChainState]:
-        """As `response`, continued from `state` (by default rest), and the state after the last sample.
-
-        The bits are those of one uncut command. Raises ValueError also if there is neither a state nor a sample.
+        """As `response`, continued from `state` (by default rest) with the bits of one command, and the state at the
+        end.
         """
         inputs = read_only(u, "u", ndim=1)
         chain = self.chain(self._any_time(sample_time), substeps)
@@ -353,10 +334,7 @@ class Actuator:
         return self.sensor.measure(self.as_read.response(u, sample_time, substeps=substeps))
 
     def startable(self, sample_time: float | None = None, *, substeps: int | None = None) -> Startable:
-        """The actuator as a step from the command to what `measured` reads without noise, for exports.
-
-        An actuator that is not `dynamic` needs no `sample_time` [s]. Raises ValueError if one is needed, and TypeError
-        if the law has no start.
+        """A step from the command to what `measured` reads without noise; ValueError if it lacks a `sample_time` [s].
         """
         whole = self.as_read
         at_end = isinstance(whole.vibration, TransferFunction) and whole.vibration.sample == "end"
@@ -463,9 +441,6 @@ def as_actuator(plant: Any) -> Actuator:
     >>> import hysim as hs
     >>> hs.control.as_actuator(hs.Line(slope=2.0)) == hs.Actuator(hysteresis=hs.Line(slope=2.0))
     True
-    >>> mode = hs.mode(2.0, 0.1)
-    >>> hs.control.as_actuator(hs.Line(slope=2.0) >> mode) == hs.Actuator(hysteresis=hs.Line(slope=2.0), vibration=mode)
-    True
     """
     warn_unsafe(plant)
     plant = model_of(plant)
@@ -493,15 +468,5 @@ def _hammerstein(stages: tuple[Any, ...]) -> Actuator:
 
 
 def as_stepwise(plant: Any) -> Stepwise:
-    """A model as one that runs sample by sample: itself where it does, else as an actuator; TypeError if neither.
-
-    Examples
-    --------
-    >>> import hysim as hs
-    >>> from hysim.plants.actuator import as_stepwise
-    >>> creep = hs.Creep(time_constants=(1.0,), weights=(0.1,))
-    >>> step, parameters, state = as_stepwise(creep).startable(0.5).started(0.0)
-    >>> [round(step(parameters, state, u), 6) for u in (0.0, 1.0, 1.0)]
-    [0.0, 1.0, 1.039347]
-    """
+    """A model as one that runs sample by sample: itself where it does, else as an actuator; TypeError if neither."""
     return plant if isinstance(plant, Stepwise) else as_actuator(plant)

@@ -174,9 +174,8 @@ def finer(space: SearchSpace, modes: int, best: FloatArray) -> FloatArray:
 
 
 def between_samples(space: SearchSpace, end: FloatArray) -> FloatArray:
-    """The end (1, n_x) of a descent, and points with delays in the middle of the samples about its own.
-
-    Slopes by the delay jump at whole samples, where a descent may rest that should go on.
+    """The end (1, n_x) of a descent, and points between whole samples of delay, where slopes jump and it may have
+    stuck.
     """
     if _DELAY not in space.coordinates:
         return end

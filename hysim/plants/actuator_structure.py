@@ -127,7 +127,6 @@ class ActuatorStructure(Identifiable):
     # ------------------------------------------------------------------------------ as `identify` sees it
 
     def search_space(self, record: Record, freedom: Freedom = ALL_FREE) -> SearchSpace:
-        """The law's box and that of the other parts, side by side; ValueError without even times."""
         if self.offsets == "own" and freedom.initial not in (None, "free"):
             raise ValueError('offsets="own" needs initial="free"; fix the memory by fixed={"hysteresis.z0": 0}')
         parts = self.parts([record])
@@ -143,7 +142,6 @@ class ActuatorStructure(Identifiable):
         return replace(space, starts=points, screened=0, regions={}, state=state)
 
     def regressors(self, parameters: Parameters, record: Record) -> FloatArray:
-        """The law's columns through the parts behind it, (n_sets, n_samples, n_columns + 1)."""
         late = 0.0 if self.sensor is None else self.sensor.delay
         parts = self.parts([record])
         others = {name: value for name, value in parameters.items() if not name.startswith(f"{_LAW}.")}
@@ -163,7 +161,6 @@ class ActuatorStructure(Identifiable):
         return {f"{_LAW}.{name}": value for name, value in found.items()}
 
     def assemble(self, parameters: Mapping[str, float]) -> Any:
-        """The actuator with these parameters."""
         parts, law = self.parts([]), self.law.assemble(own(parameters, _LAW))
         if not isinstance(law, InputSum):
             stages = parts.stages(parameters)._replace(hysteresis=law, sensor=self.sensor)
@@ -220,7 +217,6 @@ class ActuatorStructure(Identifiable):
         return replace(record, u=self.amplifier.voltage(record.u), channels={**record.channels, **others})
 
     def with_law(self, law: Any) -> "ActuatorStructure":
-        """The structure with this law, or this start of it."""
         return replace(self, law=law)
 
     def behind(self, law: Any) -> "ActuatorStructure":
@@ -252,11 +248,9 @@ class ActuatorStructure(Identifiable):
         return [replace(self, modes=k, creep=creep, known=known) for k in range(self.modes + 1)]
 
     def points(self, space: SearchSpace, known: Sequence[Mapping[str, float]]) -> FloatArray:
-        """Points of a space of this structure, spread over its last mode and its delay."""
         return points(space, self.modes, known)
 
     def finer(self, space: SearchSpace, best: FloatArray) -> FloatArray:
-        """Points about the best of `points`, and these."""
         return finer(space, self.modes, best)
 
     def beyond(self, space: SearchSpace, end: FloatArray) -> FloatArray:
@@ -272,7 +266,6 @@ class ActuatorStructure(Identifiable):
         return [self._delayed(k, self.survey.shortest) for k in range(MOST_LATE)]
 
     def begun(self, starting: Sequence[Mapping[str, float]]) -> "ActuatorStructure":
-        """The structure with a search that begins at these coordinates by name."""
         return replace(self, starting=tuple(dict(each) for each in starting))
 
     def smaller(self, freedom: Freedom) -> tuple["ActuatorStructure", str] | None:

@@ -68,21 +68,18 @@ class CreepBank:
 
     @property
     def coordinates(self) -> tuple[Coordinate, ...]:
-        """Coordinates that are searched."""
         if self.unit is None:
             return tuple(Coordinate(f"weights[{k}]", -1.0, 4.0) for k in range(len(self.time_constants)))
         return (_PERCENT, _SLOPE) if self.sloped else (_PERCENT,)
 
     @property
     def defaults(self) -> dict[str, float]:
-        """Starts of the search."""
         if self.unit is None:
             idle = {f"weights[{k}]": 0.0 for k in self.idle}
             return {each.name: _START_OF_WEIGHTS for each in self.coordinates} | idle
         return {each.name: value for each, value in zip(self.coordinates, (_START, 0.0), strict=False)}
 
     def made(self, values: Mapping[str, float]) -> Creep:
-        """The creep with these values."""
         taus = np.array(self.time_constants)
         if self.unit is None:
             weights = np.array([values[each.name] for each in self.coordinates])
@@ -198,7 +195,6 @@ class LinearParts:
     gains: bool = True  # whether gains of modes are coordinates
 
     def spaces(self, freedom: Mapping[str, Freedom]) -> dict[str, SearchSpace]:
-        """The search space of each part by its name."""
         spaces = {}
         for name, (box, defaults) in self.boxes().items():
             wish = freedom.get(name, Freedom())
@@ -252,7 +248,6 @@ class LinearParts:
         return {each: value for each, value in values.items() if each not in others}
 
     def gain_of(self, k: int, name: str) -> str:
-        """Name of the gain of a mode for an input."""
         return f"{GAIN}[{k}]" if len(self.inputs) == 1 else f"{GAIN}[{k}].{name}"
 
     def coordinates_of(self, vibrations: Mapping[str, Any]) -> dict[str, float]:

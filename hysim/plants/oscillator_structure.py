@@ -213,7 +213,6 @@ class OscillatorStructure(Identifiable):
             raise ValueError('initial="periodic" takes a period in samples, and nothing else does')
 
     def search_space(self, record: Record, freedom: Freedom = ALL_FREE) -> SearchSpace:
-        """The box around the plant of small motions, and where the equation of motion says to begin."""
         if freedom.initial is not None:
             raise ValueError("the structure says how the record begins: BoucWenOscillator.structure(initial=...)")
         motion = self.motion(record)

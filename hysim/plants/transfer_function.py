@@ -138,9 +138,8 @@ class TransferFunction(Composable):
     def advance(
         self, u: npt.ArrayLike, state: LinearState | None = None, *, sample_time: float | None = None
     ) -> tuple[FloatArray, LinearState]:
-        """As `response`, continued from `state`, by default the initial one, and the state after the last sample.
-
-        The bits are those of one uncut input.
+        """As `response`, continued from `state` (by default the initial one) with the same bits, and the state at the
+        end.
         """
         inputs = read_only(u, "u", ndim=1)
         time = positive_time(needed_time(self, sample_time))
@@ -161,17 +160,13 @@ class TransferFunction(Composable):
         return y, end
 
     def startable(self, sample_time: float | None = None) -> Startable:
-        """The plant at a sample time [s] as a step with the bits of `response`, for exports.
-
-        As there, the input is zero before the first sample, whatever that is.
-        """
+        """A step with the bits of `response` at a sample time [s]; the input is zero before its first sample."""
         plant = self._plant(positive_time(needed_time(self, sample_time)))
         return plant.startable(self.initial_state, hold=self.hold, sample=self.sample)
 
     def compiled(self, u0: float = 0.0, *, sample_time: float | None = None) -> CompiledLaw:
-        """The plant as compiled loops take it, at rest at the input `u0`, beside the free response.
-
-        Raises ValueError without a sample time [s], or if a plant that integrates is to rest elsewhere than at zero.
+        """The plant at rest at `u0` beside the free response; ValueError without a sample time [s], or if it cannot
+        rest.
         """
         law = self.startable(sample_time).law
         if u0:
@@ -333,7 +328,6 @@ class TransferFunctionStructure(Identifiable, Composable):
         return ("delay",) if self.delay is None else ()
 
     def search_space(self, record: Record, freedom: Freedom = ALL_FREE) -> SearchSpace:
-        """The box of the sections, and of the delay where it is free."""
         sample_time = record.sample_time
         if np.ptp(record.u) == 0.0 and record.u[0] == 0.0:
             raise ValueError("the input is zero throughout: nothing can be identified from it")
@@ -378,7 +372,6 @@ class TransferFunctionStructure(Identifiable, Composable):
         )
 
     def regressors(self, parameters: Parameters, record: Record) -> FloatArray:
-        """Columns of the numerator and of the initial state, and zero, (n_sets, n_samples, n_columns + 1)."""
         delay = parameters["delay"] if self.delay is None else self.delay
         options = {"hold": self.hold, "sample": self.sample}
         return affine_columns(self.monic(parameters), record.u, record.sample_time, delay, zeros=self.zeros, **options)
@@ -396,7 +389,6 @@ class TransferFunctionStructure(Identifiable, Composable):
         return ("rest",) if begins_at_zero else ("rest", "free")
 
     def variants(self) -> tuple[Variant, ...]:
-        """None."""
         return ()
 
     def with_unit_gain(self) -> UnitGain:
@@ -404,7 +396,6 @@ class TransferFunctionStructure(Identifiable, Composable):
         return UnitGain(self)
 
     def assemble(self, parameters: Mapping[str, float]) -> TransferFunction:
-        """The transfer function with these parameters."""
         initial_state = tuple(parameters[f"x0[{k}]"] for k in range(self.poles))
         return TransferFunction(
             num=tuple(parameters[f"num[{k}]"] for k in range(self.zeros + 1)),
@@ -416,7 +407,6 @@ class TransferFunctionStructure(Identifiable, Composable):
         )
 
     def notes(self, record: Record, model: TransferFunction) -> tuple[str, ...]:
-        """Whether a curve without memory fits as well, and whether the record shows more than one rate."""
         n_parameters = self.poles + self.zeros + 1 + len(self.free_delay)
         return notes(record, model.response(record.u, record.sample_time), n_parameters)
 

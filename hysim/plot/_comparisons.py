@@ -123,10 +123,10 @@ def identification(
 
     `record` is the Record, or the sequence of them, from which `fit` was identified; another one is a ValueError. The
     band is two standard errors of the model's output to each side, and the model's line its free run on the measured
-    input. Residuals are counted in quanta of the sensor if its
-    resolution is known, with lines at one quantum. A profile is the signed root of the deviance over the distance from
-    the estimate in standard errors, on the diagonal for a normal distribution; the interval at 95 % lies between the
-    horizontal lines. The result has shape (2,), or (3,) with profiles.
+    input. Residuals are counted in quanta of the sensor if its resolution is known, with lines at one quantum. A
+    profile is the signed root of the deviance over the distance from the estimate in standard errors, on the diagonal
+    for a normal distribution; the interval at 95 % lies between the horizontal lines. The result has shape (2,), or
+    (3,) with profiles.
 
     Examples
     --------

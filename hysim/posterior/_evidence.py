@@ -281,10 +281,7 @@ def log_evidence(
     live_points: int = 500,
     seed: int = 0,
 ) -> LogEvidence:
-    """ln Z of one fit, its standard error, and the number of simulated sets, with boxes enlarged by `factor`.
-
-    The arguments are those of `compare_evidence`, and `priors` are those of this model.
-    """
+    """ln Z of one fit with boxes enlarged by `factor`; arguments as of `compare_evidence`, `priors` of this model."""
     records = several(record_or_records, "log_evidence")
     check_choice("method", method, ("nested", "bridge"))
     check_count("live_points", live_points)

@@ -338,9 +338,7 @@ def _even(log_weight: FloatArray) -> float:
 
 
 def particles(target: Target, rng: np.random.Generator) -> tuple[FloatArray, FloatArray]:
-    """Particles (n, n_v) of about the posterior of v, drawn from the prior, and those at a lower power on the way.
-
-    The latter reach farther: parts of the proposal with their shape keep the weights of rare draws bounded.
+    """Particles (n, n_v) of about the posterior of v from the prior, and those at a lower power, which reach farther.
     """
     v = target.prior_draws(min(_PARTICLES, _PARTICLES_EACH * (target.n_x + 1)), rng)
     value, prior = target.marginal(v)

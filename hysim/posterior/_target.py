@@ -86,10 +86,7 @@ class Columns(NamedTuple):
 
 @dataclass
 class Target:
-    """Posterior of a problem with a noise and priors.
-
-    `evaluations` counts the sets that were simulated; `optima` are points v (n_optima, n_x + 1), the best first.
-    """
+    """Posterior of a problem with noise and priors; `evaluations` counts sets, `optima` are v (n_optima, n_x + 1)."""
 
     problem: Problem
     noise: Noise

@@ -27,9 +27,7 @@ OUTPUTS = (*OF_NODES, *OF_ELEMENTS)
 
 
 class Laws(NamedTuple):
-    """The laws of a structure; their steps are held here, since the kernel knows the addresses only.
-
-    Those that are `rated` depend on the rate of the drift.
+    """Laws of a structure; steps are held, as the kernel knows only addresses; `rated` ones depend on the drift's rate.
     """
 
     steppers: tuple[Startable, ...]
@@ -43,17 +41,14 @@ class Laws(NamedTuple):
 
     @property
     def parameters(self) -> FloatArray:
-        """Parameters of all laws, one behind the other."""
         return read_only(joined([each.parameters for each in self.steppers]), finite=False)
 
     @property
     def states(self) -> FloatArray:
-        """States of all laws before their start."""
         return read_only(joined([each.state for each in self.steppers]), finite=False)
 
     @property
     def starts(self) -> Any:
-        """Addresses of the starts."""
         return addresses([each.start for each in self.steppers], START)
 
     def slopes(self, parameters: FloatArray, states: FloatArray) -> FloatArray:
@@ -92,7 +87,6 @@ class Matrices(NamedTuple):
 
 
 def laws_of(models: Sequence[Any]) -> Laws:
-    """Steps and memories of laws."""
     rated = tuple(isinstance(model, Rated) for model in models)
     steppers = tuple(model.rated() if isinstance(model, Rated) else startable(model) for model in models)
     stretches = tuple(
@@ -103,7 +97,6 @@ def laws_of(models: Sequence[Any]) -> Laws:
 
 
 def elements_of(laws: Laws, rows: FloatArray, slopes: FloatArray) -> Elements:
-    """The elements as the kernel takes them."""
     nodes = [np.flatnonzero(row) for row in rows]
     begins = zip(laws.stretches, laws.state_ends, strict=False)
     stretches = [np.array([(begin + a, n) for a, n in each], dtype=np.int64).reshape(-1, 2) for each, begin in begins]
@@ -123,7 +116,6 @@ def elements_of(laws: Laws, rows: FloatArray, slopes: FloatArray) -> Elements:
 
 
 def joined(parts: Sequence[Any], kind: Any = np.float64) -> Any:
-    """Vectors one behind the other."""
     return np.concatenate([np.zeros(0, dtype=kind), *parts]).astype(kind)
 
 
@@ -187,7 +179,6 @@ def flows_of(elements: Elements, plant: Plant, steps: Steps) -> Flows:
 
 
 def empty_motion(m: int, n_state: int, n_elements: int, n_loads: int = 1, *, with_accelerations: bool = True) -> Motion:
-    """Room for what moves."""
     return Motion(
         x=np.zeros(m),
         laws=np.zeros(n_state),
@@ -200,13 +191,11 @@ def empty_motion(m: int, n_state: int, n_elements: int, n_loads: int = 1, *, wit
 
 
 def empty_tracks(n: int, motion: Motion, *, with_laws: bool = False) -> Tracks:
-    """Room for `n` samples."""
     x, carry, peaks, work = (np.empty((n, *part.shape)) for part in (motion.x, motion.carry, motion.peaks, motion.work))
     return Tracks(x, carry, peaks, work, np.empty((n if with_laws else 0, motion.laws.size)))
 
 
 def room_for(motion: Motion) -> Room:
-    """Room for the work of the kernel."""
     return make_room(motion.carry.shape[1], motion.x.size, motion.laws.size, motion.loads.size)
 
 
@@ -321,7 +310,6 @@ class AssembledStructure:
 
     @cached_property
     def kernel_elements(self) -> Elements:
-        """The elements as the kernel takes them."""
         return elements_of(self.laws, self.drift_matrix, self.elastic_slopes)
 
     @property
@@ -354,9 +342,8 @@ class AssembledStructure:
         return len(self.elements) if signal in OF_ELEMENTS else self.n_nodes
 
     def periods(self) -> FloatArray:
-        """Periods of small motions at the start, the longest first, shape (n,) [s]; inf for a mass that is free.
-
-        Raises ValueError if the stiffness at the start is negative.
+        """Periods (n,) [s] of small motions at the start, the longest first, inf if free; ValueError if stiffness is
+        negative.
         """
         squares = eigh(self.initial_stiffness, self.mass_matrix, eigvals_only=True)
         if squares[0] < -1e-9 * np.abs(squares).max():
@@ -365,9 +352,8 @@ class AssembledStructure:
             return np.asarray(2.0 * np.pi / np.sqrt(np.maximum(squares, 0.0)))
 
     def modes(self) -> FloatArray:
-        """Shapes of small motions at the start, one a column, in the order of `periods`, shape (n, n).
-
-        They have modal masses of one; the largest displacement of each is positive.
+        """Shapes (n, n) of small motions, columns in the order of `periods`, of modal mass one, the largest part
+        positive.
         """
         shapes = eigh(self.initial_stiffness, self.mass_matrix)[1]
         largest = shapes[np.abs(shapes).argmax(axis=0), np.arange(self.n_nodes)]

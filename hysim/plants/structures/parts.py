@@ -174,23 +174,8 @@ class Rayleigh:
 
     @classmethod
     def at(cls, ratio: float, periods: tuple[float, float]) -> Self:
-        """Damping with a given ratio of modes at two periods.
-
-        Parameters
-        ----------
-        ratio : float
-            Share of the critical damping at both periods.
-        periods : (float, float)
-            [s]
-
-        Returns
-        -------
-        Rayleigh
-
-        Raises
-        ------
-        ValueError
-            If the ratio is negative, or the periods are not two positive and different ones.
+        """Damping with one ratio of the critical damping at two periods [s]; ValueError unless these differ and are
+        positive.
         """
         check_not_negative(ratio=ratio)
         if len(periods) != 2 or periods[0] == periods[1]:
@@ -233,9 +218,8 @@ class ModalDamping:
         object.__setattr__(self, "ratio", tuple(ratios.tolist()) if ratios.ndim else float(ratios))
 
     def matrix(self, mass: FloatArray, stiffness: FloatArray) -> FloatArray:
-        """The damping matrix, shape (n_nodes, n_nodes), or many of them for stacks of matrices.
-
-        Raises ValueError if the number of ratios is not that of the modes, or the stiffness is negative.
+        """The damping matrix (n_nodes, n_nodes), or a stack; ValueError for a wrong number of ratios or negative
+        stiffness.
         """
         if np.ndim(self.ratio) and len(self.ratio) != mass.shape[-1]:
             raise ValueError(f"ratio must hold one number for each of {mass.shape[-1]} modes, got {len(self.ratio)}")
@@ -255,7 +239,6 @@ def modal_damping(ratios: FloatArray, mass: FloatArray, stiffness: FloatArray) -
 
 
 def scalars_of(structure: Any) -> dict[str, float]:
-    """Every number of a structure by name."""
     numbers: dict[str, float] = {}
     for name in MATRICES:
         numbers |= _numbers(name, vars(structure)[name])
@@ -268,10 +251,7 @@ def scalars_of(structure: Any) -> dict[str, float]:
 
 
 def assembled(structure: Any, parameters: Mapping[str, float]) -> Any:
-    """The structure with some numbers exchanged.
-
-    Raises ValueError if a name is unknown, or a constructor refuses a number.
-    """
+    """The structure with some numbers exchanged; ValueError if a name is unknown, or a constructor refuses a number."""
     others = expanded(structure.scalars, parameters)
     changes: dict[str, Any] = {}
     for name in MATRICES:
