@@ -149,8 +149,7 @@ class Record:
         return dataclasses.replace(self, **cut, channels=taken(self.channels, samples))
 
     def channel(self, name: str) -> float | FloatArray:
-        """A channel by name: its number, or its values (n,) where they vary; ValueError if there is none of this name.
-        """
+        """A channel by name: its number, or its values (n,) where they vary; ValueError if there is none of this name."""
         owner = f"the record {self.name!r}" if self.name else "the record"
         value: float | FloatArray = value_in(self.channels, name, owner)
         return value
@@ -303,8 +302,7 @@ class Record:
 
         Examples
         --------
-        >>> import numpy as np
-        >>> import hysim as hs
+        >>> import numpy as np, hysim as hs
         >>> u = hs.signals.triangle(0.0, 1.0, cycles=4, samples_per_cycle=40)
         >>> drifting = hs.BoucWen(beta=2.0).response(u) + 0.001 * np.arange(u.size)
         >>> rec = hs.Record(u=u, y=drifting)[80:]

@@ -113,8 +113,7 @@ class WeighedOptions(RecordOptions):
 
 
 def read(settings: InputOptions, path: str, *, uncut: bool = False) -> "hs.Record":
-    """The record that the settings describe, y = u without an output column; `uncut` ignores --from, --to and --every.
-    """
+    """The record that the settings describe, y = u without an output column; `uncut` ignores --from, --to and --every."""
     return _read(settings, path, source_of(path), uncut=uncut)
 
 

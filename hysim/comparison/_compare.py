@@ -78,8 +78,7 @@ def compare(
     workers : int, optional
         Number of threads; by default one for each core. The result does not depend on it.
     progress : callable or False, optional
-        Called as ``progress(done, total)`` after each model.
-        By default calls beyond 2 s report on the standard error; False turns this off.
+        Called as ``progress(done, total)`` after each model; see `hysim.simulate`.
     announce : callable, optional
         Called as ``announce(name)`` when a model's turn begins, on the thread that works on it.
 

@@ -98,8 +98,7 @@ class ClosedLoop:
         return {label: column for columns in named for label, column in columns.items()}
 
     def to_frame(self) -> Any:
-        """The `columns` as a `pandas.DataFrame` over the time, units in ``attrs["units"]``; ImportError without pandas.
-        """
+        """The `columns` as a `pandas.DataFrame` over the time, units in ``attrs["units"]``; ImportError without pandas."""
         return frame_of_signals(self.columns, self._signal_units)
 
     def to_xarray(self) -> Any:
@@ -161,8 +160,7 @@ def close_loop(
     units : mapping, optional
         Labels of the units.
     progress : callable or False, optional
-        Called as ``progress(done, total)`` with numbers of samples, in long runs.
-        By default calls beyond 2 s report on the standard error; False turns this off.
+        Called as ``progress(done, total)`` with numbers of samples, in long runs; see `hysim.simulate`.
 
     Returns
     -------

@@ -424,8 +424,7 @@ def discover_oscillator(
     seed : int
         Seed of the resampling behind `OscillatorDiscovery.inclusion`.
     progress : callable or False, optional
-        Called as ``progress(done, total)``.
-        By default calls beyond 2 s report on the standard error; False turns this off.
+        Called as ``progress(done, total)``; see `hysim.simulate`.
 
     Returns
     -------
@@ -442,8 +441,7 @@ def discover_oscillator(
 
     Examples
     --------
-    >>> import numpy as np
-    >>> import hysim as hs
+    >>> import numpy as np, hysim as hs
     >>> law = hs.BoucWen(A=5e4, beta=800.0, gamma=-300.0)
     >>> plant = hs.BoucWenOscillator(mass=2.0, damping=10.0, stiffness=5e4, law=law)
     >>> t = np.arange(300) / 750

@@ -182,8 +182,7 @@ class Parts:
 
 
 def node_of(thing: Any, u: FloatArray, parts: Parts, prefix: str = "") -> dict[str, Any]:
-    """A model as the page takes it, its contents put into `parts`; TypeError if it is no law, sum or cascade of laws.
-    """
+    """A model as the page takes it, its contents put into `parts`; TypeError if it is no law, sum or cascade of laws."""
     if isinstance(thing, Sum):
         return {"sum": _members(thing.parts, u, parts, prefix)}
     if isinstance(thing, Cascade):

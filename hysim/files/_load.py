@@ -216,8 +216,7 @@ def options_of_a_text(
 
 
 class Opened(NamedTuple):
-    """Name, format, content (of a DataFrame its table), path and encoding of a source, the last two if they are known.
-    """
+    """Name, format, content (of a DataFrame its table), path and encoding of a source, the last two if they are known."""
 
     name: str
     format: str

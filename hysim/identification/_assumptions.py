@@ -281,8 +281,7 @@ def _tried(attempt: Problem, state: _State, variant: Variant, before: Sequence[_
 
 
 def _starts_beside(space: SearchSpace, before: Sequence[_Trial]) -> FloatArray:
-    """The starts of a space, and those of a search with coordinates of the state alone, whose numbers keep their order.
-    """
+    """The starts of a space, and those of a search with coordinates of the state alone, whose numbers keep their order."""
     starts, coordinates = [space.starts], space.coordinates
     for each in before:
         if each.names and {*each.names, *coordinates} <= {*space.state}:

@@ -122,8 +122,7 @@ def identify(
     workers : int, optional
         Number of threads; by default one for each core.
     progress : callable or False, optional
-        Called as ``progress(done, total)``.
-        By default calls beyond 2 s report on the standard error; False turns this off.
+        Called as ``progress(done, total)``; see `hysim.simulate`.
 
     Returns
     -------

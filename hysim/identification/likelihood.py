@@ -44,8 +44,7 @@ def again(fit: Identification, records: Sequence[Record], bounds: Bounds, initia
 
 
 def optima(fit: Identification, known: Problem, bounds: Bounds, initial: Initial) -> FloatArray:
-    """Coordinates (n_optima, n_x) of the fit and its rivals, best first, in the problem of `again`; states of record 0.
-    """
+    """Coordinates (n_optima, n_x) of the fit and its rivals, best first, in the problem of `again`; states of record 0."""
     paths = [part.record for part in known.parts]
     freedom, initial = _freedom(fit, known.family, paths, initial)
     freedom = replace(freedom, bounds=_inner(bounds, known))
@@ -130,7 +129,6 @@ class Expected:
         return self.problem.space.names
 
     def jacobian(self, record: Record, *, refined: bool = False) -> FloatArray:
-        """dy/d(free parameters) (n_samples, n_names) on a record; `refined` as for the standard errors of `identify`.
-        """
+        """dy/d(free parameters) (n_samples, n_names) on a record; `refined` as for the standard errors of `identify`."""
         own = replace(self.problem, parts=(replace(self.problem.parts[0], record=record),))
         return np.asarray(output_slopes(own, self.theta, refined=refined) @ self.way_there)

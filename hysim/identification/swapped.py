@@ -60,8 +60,7 @@ def _is_generated(signal: FloatArray) -> bool:
 
 
 def swapped_for(family: Identifiable, setting: Setting, error: float) -> str:
-    """A sentence where the family fits the first record better from y to u, else ""; `error` is relative to y's spread.
-    """
+    """A sentence where the family fits the first record better from y to u, else ""; `error` is relative to y's spread."""
     record = setting.records[0]
     if len(setting.records) > 1 or not error > _PERFECT or not _is_clockwise(record):
         return ""

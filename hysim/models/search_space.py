@@ -190,8 +190,7 @@ class Freedom:
         return held
 
     def limits(self, defaults: Mapping[str, float], held: Mapping[str, float]) -> dict[str, tuple[float, float]]:
-        """The bounds as floats; ValueError if a name is unknown or held, or a lower bound is not below its upper one.
-        """
+        """The bounds as floats; ValueError if a name is unknown or held, or a lower bound is not below its upper one."""
         for name, pair in self.bounds.items():
             if name not in defaults or name in held:
                 raise ValueError(f"bounds name {name!r}, which is not free; the parameters are {among(name, defaults)}")

@@ -153,8 +153,7 @@ def power_coefficients(at: tuple[float, ...]) -> FloatArray:
 def columns_along(
     subject: Any, parameters: Parameters, varying: Mapping[str, FloatArray], record: Record
 ) -> FloatArray:
-    """As `Identifiable.regressors`, with parameters `varying` (n_sets, n_samples), none of them affine; else TypeError.
-    """
+    """As `Identifiable.regressors`, with parameters `varying` (n_sets, n_samples), none of them affine; else TypeError."""
     if not varying:
         return np.asarray(subject.regressors(parameters, record))
     if isinstance(subject, Sum):
@@ -218,8 +217,7 @@ def _of_sum(
 
 
 def paths(law: Law, parameters: Parameters, u: FloatArray) -> FloatArray:
-    """Outputs (n_sets, n_samples), inf where one diverges, for numbers of this shape, (n_sets,) or (); else ValueError.
-    """
+    """Outputs (n_sets, n_samples), inf where one diverges, for numbers of this shape, (n_sets,) or (); else ValueError."""
     from hysim.kernels.varying import drive_varying  # compiled where it is needed
 
     if law.u0 is not None:

@@ -334,8 +334,7 @@ class Actuator:
         return self.sensor.measure(self.as_read.response(u, sample_time, substeps=substeps))
 
     def startable(self, sample_time: float | None = None, *, substeps: int | None = None) -> Startable:
-        """A step from the command to what `measured` reads without noise; ValueError if it lacks a `sample_time` [s].
-        """
+        """A step from the command to what `measured` reads without noise; ValueError if it lacks a `sample_time` [s]."""
         whole = self.as_read
         at_end = isinstance(whole.vibration, TransferFunction) and whole.vibration.sample == "end"
         return whole.chain(self._any_time(sample_time), substeps).startable(at_end=at_end)

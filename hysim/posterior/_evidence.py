@@ -220,8 +220,7 @@ def compare_evidence(
     seed : int
         The same seed gives the same evidences to the last bit.
     progress : callable or False, optional
-        Called as ``progress(done, total)`` after each evidence.
-        By default calls beyond 2 s report on the standard error; False turns this off.
+        Called as ``progress(done, total)`` after each evidence; see `hysim.simulate`.
 
     Returns
     -------

@@ -369,8 +369,7 @@ def sample_posterior(
     seed : int
         The same seed gives the same draws to the last bit.
     progress : callable or False, optional
-        Called as ``progress(done, total)`` with effective samples.
-        By default calls beyond 2 s report on the standard error; False turns this off.
+        Called as ``progress(done, total)`` with effective samples; see `hysim.simulate`.
 
     Returns
     -------

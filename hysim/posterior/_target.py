@@ -40,11 +40,7 @@ _FAR = 9.0  # from which on an end cuts off nothing that is seen in 64 bits
 def solved_within(
     triangle: FloatArray, best: FloatArray, e: FloatArray, low: FloatArray, high: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
-    """The w with R w - best normal between the ends low <= w <= high, and ln |dw/de|.
-
-    `triangle` are the R (n_sets, n, n), of which no diagonal is zero; the others are (n_sets, n), and e is standard
-    normal. From the last number up each has its ends given those below.
-    """
+    """The w with R w - best normal between low and high, and ln |dw/de|; R (n_sets, n, n) has no zero on its diagonal."""
     w, log_volume = np.empty_like(e), np.zeros(len(e))
     for k in reversed(range(e.shape[1])):
         scale = triangle[:, k, k]

@@ -174,9 +174,8 @@ class Table:
         self._other_names = (*OWN_NAMES, *parameters)
 
     def judge(self, outcome: Outcome) -> Outcome:
-        """The outcome with the values of the study's layout, and an error for every task that returned another.
-
-        Until a task has succeeded, outcomes must be passed in the order of their places.
+        """The outcome in the study's layout, an error for each task with another; first outcomes in the order of
+        places.
         """
         if self.layout is None and outcome.groups:
             self.begin(min(outcome.groups, key=lambda group: int(group.places.min())).layout)

@@ -402,14 +402,8 @@ class Store:
 
 @contextmanager
 def opened(path: str | Path, *, to_read: bool = False) -> Iterator[Store]:
-    """The store in a file, which is created if it is missing and to be written.
-
-    Raises
-    ------
-    OSError
-        If it cannot be opened, read or written, with the reason.
-    ValueError
-        If the file is not a store.
+    """The store in a file, made if it is to be written and missing; OSError with the reason, ValueError if it is no
+    store.
     """
     path = Path(path)
     if to_read and not path.is_file():

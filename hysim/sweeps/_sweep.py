@@ -217,8 +217,7 @@ def sweep(
         If the store holds a study with another task, space, seed or version of hysim: raise; keep the finished rows if
         space and seed are the same; or start again.
     progress : callable or False, optional
-        Called as ``progress(done, total)`` when rows are finished and written.
-        By default calls beyond 2 s report on the standard error; False turns this off.
+        Called as ``progress(done, total)`` when rows are finished and written; see `hysim.simulate`.
 
     Returns
     -------

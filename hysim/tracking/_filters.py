@@ -76,15 +76,7 @@ def _place(name: str) -> tuple[str, int]:
 
 
 class Copies:
-    """Copies of a law with other numbers, moved sample by sample.
-
-    Parameters
-    ----------
-    law : Law
-        The law; numbers that are not tracked are its own.
-    coordinates : Coordinates
-        The numbers that differ from copy to copy.
-    """
+    """Copies of a law, moved sample by sample, that differ in the numbers of their `coordinates`."""
 
     def __init__(self, law: Law, coordinates: Coordinates) -> None:
         self._law, self._coordinates = law, coordinates
