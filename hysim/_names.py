@@ -30,7 +30,6 @@ def meant(name: object, known: Iterable[object]) -> str:
 
 
 def among(name: object, known: Iterable[object]) -> str:
-    """The known names in a row, the first ones of hundreds, and the one that may have been meant by an unknown one."""
     names = [*map(str, known)]
     shown = names if len(names) <= _MANY else [*names[:_FIRST], f"{len(names) - _FIRST} others"]
     return f"{', '.join(shown)}{meant(name, names)}"

@@ -287,7 +287,6 @@ def frame(
 
 
 def _is_empty(value: Any) -> bool:
-    """Whether a note says nothing, or is a number that JSON cannot hold."""
     return value is None or value in ("", {}) or (isinstance(value, float) and not math.isfinite(value))
 
 

@@ -87,7 +87,6 @@ class Record:
     channels: Channels = field(default_factory=dict)
 
     def _prepare(self) -> None:
-        """Take times and units that columns of other libraries state, where none are given."""
         if not type(self.u) is type(self.y) is np.ndarray and isinstance(self.units, Mapping):
             t, units = told_by(self.u, self.y, self.t, self.units)
             object.__setattr__(self, "t", t)

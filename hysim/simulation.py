@@ -138,7 +138,6 @@ def _unit_of(label: str, units: Mapping[str, str]) -> str | None:
 
 
 def columns_of(name: str, values: FloatArray) -> dict[str, FloatArray]:
-    """A signal as columns by their names, one of its own name if it has one axis."""
     if values.ndim == 1:
         return {name: values}
     first = 1 if name.removeprefix(_PEAK) in _BY_NODE else 0
@@ -146,7 +145,6 @@ def columns_of(name: str, values: FloatArray) -> dict[str, FloatArray]:
 
 
 def has_elements(result: Simulation) -> bool:
-    """Whether a simulation has drifts and forces of at least one element."""
     drift, force = result.signals.get("drift"), result.signals.get("force")
     return drift is not None and force is not None and drift.ndim == 2 and drift.shape == force.shape and drift.size > 0
 
@@ -258,7 +256,6 @@ def free_run(thing: Any, record: Record, units: Mapping[str, str] | None = None)
 
 
 def _signals(plant: Responding, u: FloatArray, times: FloatArray | None) -> Mapping[str, FloatArray]:
-    """The plant's own signals, at least its output."""
     time: tuple[float, ...] = ()
     if needs_time(plant):
         if times is None:

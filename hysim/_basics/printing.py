@@ -57,7 +57,6 @@ def bic_in_words(bic: float) -> str:
 
 
 def summary_text(lines: Iterable[str], rows: Mapping[str, str] | None = None) -> str:
-    """Lines, and rows of a name and a text, up to the largest number of lines."""
     width = max(map(len, rows or {}), default=0)
     named = [_cut(f"  {name:<{width}}  ", text) for name, text in (rows or {}).items() if text]
     all_lines = [part for line in [*lines, *named] for part in line.splitlines()]
@@ -112,7 +111,6 @@ def _is_number(text: str) -> bool:
 
 
 def text_in_cell(cell: str) -> str:
-    """The text that `csv_text` has written to a cell."""
     return cell[1:] if cell.startswith("'") and _FORMULA.match(cell, 1) else cell
 
 

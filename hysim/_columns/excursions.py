@@ -50,7 +50,6 @@ class Loops(NamedTuple):
         return inserted
 
     def first_sample(self, cycle: Cycle) -> int:
-        """The record's sample at which a cycle begins, or the next one."""
         return cycle.path.start if self.places is None else int(np.ceil(self.places[cycle.path.start]))
 
 
@@ -64,7 +63,6 @@ class Protocol(NamedTuple):
 
     @property
     def slices(self) -> list[slice]:
-        """The fewest samples that contain each cycle."""
         return [slice(int(np.floor(begin)), int(np.ceil(end)) + 1) for begin, end in self.spans]
 
 

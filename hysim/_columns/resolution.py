@@ -84,6 +84,5 @@ def _log_chance(n_levels: int, farthest: FloatArray, n_steps: FloatArray) -> Flo
 
 
 def _shortest(value: float, error: float) -> float:
-    """The number with the fewest digits within the error."""
     rounded = (float(f"{value:.{digits}g}") for digits in range(1, 18))
     return next(short for short in rounded if abs(short - value) <= error or short == value)

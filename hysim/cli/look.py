@@ -136,7 +136,6 @@ def _lines(loop: "hs.LoopMetrics", units: Mapping[str, str]) -> Iterator[str]:
 
 
 def _step(record: "hs.Record") -> Iterator[str]:
-    """The resolution that the outputs show, if none was given."""
     if record.resolution is None and (step := record.detect_resolution()) is not None:
         unit = record.units.get("y", "")
         yield f"the output has steps of {f'{step:.6g} {unit}'.rstrip()}: --resolution detect takes them"
@@ -174,8 +173,6 @@ def _history(canvas: Any, contents: Contents) -> None:
 
 
 def _each(name: str) -> Callable[[Any, Contents], None]:
-    """A drawing of every result in a panel of its own."""
-
     def draw(canvas: Any, contents: Contents) -> None:
         for result, ax in zip(contents.results, hs.plot.panels(canvas, len(contents.results)), strict=True):
             vars(hs.plot)[name](result, ax)

@@ -281,7 +281,6 @@ def resolved(path: str) -> Any:
 
 
 def is_import_path(text: str) -> bool:
-    """Whether a text is `module:name`, and not the path of a file."""
     return bool(re.fullmatch(r"[^\W\d]\w*(\.\w+)*:\w+(\.\w+)*", text)) and not Path(text).exists()
 
 
@@ -308,9 +307,7 @@ def model_or_family(text: str) -> Any:
 
 
 def to_identify(chosen: FitOptions) -> Any:
-    """The argument of `identify`, whose `initial` becomes None where the structure takes it; ValueError if options
-    clash.
-    """
+    """The argument of `identify`; its `initial` becomes None where the structure takes it. ValueError if options clash."""
     from hysim.models.model import FAMILIES
 
     name, of_actuator, used = (chosen.model, _used(chosen, ActuatorOptions), _used(chosen, StructureOptions))

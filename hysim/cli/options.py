@@ -178,7 +178,6 @@ def _value(hint: Any) -> Value:
 
 
 def one_of(words: Mapping[str, str]) -> Value:
-    """Values that are one of some words, with what each stands for."""
     text = "; ".join(f"{word}: {meaning}" for word, meaning in words.items())
     return Value(f"[{'|'.join(words)}]", None, ", ".join(words), words=(*words,), help=text)
 

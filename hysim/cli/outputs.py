@@ -103,7 +103,6 @@ def printed(text: Callable[[], str], document: Callable[[], Mapping[str, Any]] |
 
 
 def flags(command: click.Command) -> dict[str, str]:
-    """The options of a command by the names of their values."""
     options = [each for each in command.params if isinstance(each, click.Option)]
     return {(each.name or "").rstrip("_"): each.opts[0] for each in options}
 
@@ -122,7 +121,6 @@ def _jsonable(value: Any) -> Any:
 
 
 def scalars(result: Any) -> dict[str, Any]:
-    """The fields of a result that are numbers, words or truth values, by name."""
     from hysim._basics.frozen import items
 
     return {name: value for name, value in items(result).items() if isinstance(value, (str, int, float))}
@@ -133,7 +131,7 @@ def fields_of(result: Any, names: Iterable[str]) -> dict[str, Any]:
 
 
 def table(path: str, columns: Mapping[str, Any], units: Mapping[str, str]) -> bytes:
-    """Columns in the format of the path's ending, CSV on standard output; ValueError if it is unknown or needs an
+    """Columns in the format of the path's ending, CSV on standard output; ValueError if it is unknown or lacks an
     extra.
     """
     from hysim.files import Notes, packed

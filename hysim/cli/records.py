@@ -139,9 +139,7 @@ def read_input(settings: InputOptions, path: str, *, of_the_ground: bool) -> "hs
 
 
 def read_with_weights(settings: WeighedOptions, path: str) -> "tuple[hs.Record, Any]":
-    """The record, columns of sensors as its channels (the first one is y, unless y is named), and the column of
-    weights.
-    """
+    """The record with columns of sensors as channels (the first one is y if no y is named), and the column of weights."""
     if settings.sensor and settings.y is None:
         settings.y = settings.sensor[0][1]
     settings.channel += settings.sensor
@@ -192,9 +190,7 @@ def _sample(record: "hs.Record", place: options.Place | None, option: str) -> in
 
 
 def of_structure(structure: Any, record: "hs.Record", columns: Mapping[str, Any]) -> "hs.StructureRecord":
-    """The record of a structure with these channels as sensors; ValueError if it is none, or a name or the time is
-    missing.
-    """
+    """The record of a structure with these channels as sensors; ValueError if a name or the time is missing."""
     import numpy as np
 
     if not isinstance(structure, hs.Structure):

@@ -158,7 +158,6 @@ class _Trial:
 
     @property
     def record(self) -> Record:
-        """The samples that are judged."""
         return self.drive[self.begin :]
 
 
@@ -375,7 +374,6 @@ class OneByOne(NamedTuple):
 
     @property
     def model(self) -> Any:
-        """The model on the last record."""
         return self.models[-1]
 
 

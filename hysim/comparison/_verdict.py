@@ -58,21 +58,10 @@ _ROUNDING = 1e-9  # of the output's range
 class Contrast:
     """A model compared with the best one, by their errors at samples that were left out of both.
 
-    Parameters
-    ----------
-    name : str
-        Name of the model.
-    rmse_ratio : float
-        Its cross-validated rmse over that of the best model.
-    typical_ratio : float
-        Its median absolute error over that of the best model; nan if errors are unknown.
-    probability : float
-        Two-sided probability of equally one-sided signed ranks if both predicted equally well, after Holm's correction
-        for the number of models; nan if errors are unknown.
-    has_larger_errors : bool
-        Whether its errors are the larger ones by their signed ranks.
-    diverged : bool
-        Whether a left-out error is not finite, or more than 10 times the range of the measured output.
+    `rmse_ratio` and `typical_ratio` are its cross-validated rmse and its median absolute error over those of the best model.
+    `probability` is the two-sided one of equally one-sided signed ranks if both predicted equally well, after Holm's
+    correction. Both are nan if errors are unknown. `has_larger_errors` is the verdict of the signed ranks; `diverged` is
+    whether an error is not finite, or more than 10 times the range of the measured output.
     """
 
     name: str

@@ -140,9 +140,7 @@ class SampledController(ABC):
         return 0
 
     def initial(self, sample_time: float, u: float = 0.0, y: float = 0.0) -> CompiledController:
-        """State to `step` from, at rest at a command and a displacement; ValueError if the sample time [s] is not
-        positive.
-        """
+        """State to `step` from, at rest at a command and a displacement; ValueError unless the sample time is positive."""
         return begun(self, sample_time, u, y)
 
     def step(self, state: CompiledController, reference: float, measurement: float) -> tuple[float, CompiledController]:

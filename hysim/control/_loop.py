@@ -287,9 +287,7 @@ class RestingPlant:
     def attempt_each(
         self, controllers: Sequence[Controller], reference: FloatArray
     ) -> tuple[FloatArray, npt.NDArray[np.int64]]:
-        """Displacements (m, n) of the loops of controllers of one class, and the first sample of each that diverges, or
-        -1.
-        """
+        """Displacements (m, n) of the loops of controllers of one class, and the first sample that diverges, or -1."""
         compiled = [begun(each, self.sample_time, self.u0, self.y0) for each in controllers]
         return self.chain.run_each(compiled, self.state, reference)
 
@@ -308,7 +306,6 @@ class RestingPlant:
 
 
 def _ahead(controller: Controller, sample_time: float, reference: FloatArray) -> FloatArray:
-    """The reference as the controller gets it, at the end its last value."""
     samples = min(preview(controller, sample_time), reference.size)
     return read_only(np.append(reference[samples:], np.full(samples, reference[-1])))
 
@@ -376,5 +373,4 @@ def sampled(t: npt.ArrayLike, reference: npt.ArrayLike) -> tuple[FloatArray, Flo
 
 
 def is_controller(value: Any) -> TypeGuard[Controller]:
-    """Whether a value closes a loop: it is compiled, and is no law."""
     return isinstance(value, Controller) and not isinstance(value, Responding)

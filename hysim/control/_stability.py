@@ -249,9 +249,7 @@ def later(plant: Actuator, time: float) -> Actuator:
 def judge(
     resting: RestingPlant, controller: Controller, reference: FloatArray, cycle: FloatArray, gain: float
 ) -> tuple[LinearFigures, str]:
-    """Figures of the linear loop along a `cycle` of this secant gain, and how the loop fails to rest; empty if it
-    rests.
-    """
+    """Figures of the linear loop along a `cycle` with this secant gain, and why the loop does not rest, or ""."""
     linear = _linear_figures(resting.actuator, controller, resting.sample_time, cycle, gain)
     if linear.max_sensitivity == math.inf:
         return linear, "is unstable"

@@ -384,11 +384,9 @@ class _Search:
         return points
 
     def loops(self) -> Iterator[tuple[LinearLoop, float]]:
-        """Linear loops of every plant, at both extreme slopes of its law."""
         return ((plant.loop, slope) for plant in self.plants for slope in plant.slopes)
 
     def judge(self, controller: SampledController) -> tuple[float, float]:
-        """Maximum sensitivity and voltage noise of the worst linear loop."""
         sensitivity = 0.0
         for loop, slope in self.loops():
             sensitivity = max(sensitivity, loop.max_sensitivity(controller, slope))

@@ -51,7 +51,6 @@ _DIFFERENCE = 1e-4  # of a number, or of one where that is smaller: both errors 
 
 
 def sizes_of(values: FloatArray) -> FloatArray:
-    """Units in which numbers are judged: their sizes, one for zeros."""
     return np.where(values == 0.0, 1.0, np.abs(values))
 
 
@@ -86,7 +85,6 @@ class LawAlone:
         return squared(slopes.T)
 
     def covariance(self, u: FloatArray) -> FloatArray:
-        """Expected covariance of the numbers, by extrapolated differences."""
         return np.asarray(np.linalg.inv(self.law.response_jacobian(u, self.names).information(self.noise)))
 
     def only(self, names: Sequence[str]) -> "LawAlone":

@@ -87,9 +87,7 @@ class Trial:
         return {name: scores.error for name, scores in self.scores.items()}
 
     def explains(self, name: str) -> bool:
-        """Whether a model predicts held-out samples nearly as well as fitted ones; plays also by one fit to all
-        samples.
-        """
+        """Whether a model predicts held-out samples nearly as well as fitted ones; plays may also be fitted to all."""
         own, curve = self.scores[name], self.scores[CURVE]
         usual = own.fitted if self.by in ("record", "rate") else self.noise
         error = min(own.error, self.together) if name == PLAYS else own.error

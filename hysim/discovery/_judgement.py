@@ -113,9 +113,7 @@ class Competitors:
 
     @property
     def enough(self) -> float:
-        """Rmse that a law must reach to change the verdict of a curve or a linear model [unit of y]; inf if any law
-        may.
-        """
+        """Rmse below which a law could change the verdict [unit of y]; inf if any law could."""
         verdict = _verdict(self.trial, self.linear, single_valued=False, spread=self.spread)
         if verdict == NO_STRUCTURE:
             return BETTER * _still(self.trial, self.linear)

@@ -66,9 +66,7 @@ class Terms(NamedTuple):
         return np.where(wanted > 0, 0.0, -np.inf), np.where(wanted < 0, 0.0, np.inf)
 
     def run(self, u: FloatArray, numbers: FloatArray, y0: FloatArray, bound: float) -> tuple[FloatArray, int]:
-        """Outputs (n_sets, n_samples) from y0 (n_sets,), inf where a law diverges, and the terms of series that they
-        take.
-        """
+        """Outputs (n_sets, n_samples) from y0 (n_sets,), inf where a law diverges, and the terms of series taken."""
         feedthrough, offset = shifts(self, numbers)
         coefficients = numbers[:, : len(self.terms)]
         memory = y0 - offset
@@ -259,12 +257,10 @@ class FreeRun:
 
     @cached_property
     def largest(self) -> Record:
-        """Record with the widest input, which sets the units."""
         return max(self.visible, key=lambda record: float(np.ptp(record.u)))
 
     @property
     def measured_starts(self) -> FloatArray:
-        """First visible output of each record."""
         return np.array([record.y[0] for record in self.visible])
 
     @property
@@ -285,9 +281,7 @@ class FreeRun:
     def refine(
         self, structure: S, starts: FloatArray, *, tolerance: float = RANKING, hopeless: float = math.inf
     ) -> Candidate[S] | None:
-        """Optimum from the best of `starts` (n_starts, size + n_records), None if all diverge; given up above
-        `hopeless`.
-        """
+        """Optimum from the best of `starts` (n_starts, size + n_records); None if all diverge or cost > `hopeless`."""
         units = self.units(structure)
         lower, upper = self._bounds(structure, units)
         starts, before = np.clip(starts, lower, upper), self.work.done

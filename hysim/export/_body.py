@@ -65,7 +65,6 @@ class Body:
         return lines
 
     def _declares(self, statement: ast.stmt) -> bool:
-        """Whether a statement can declare the names that it assigns."""
         return isinstance(statement, ast.Assign) and not set(targets(statement)) & reads(statement.value)
 
     def _is_real(self, name: str) -> bool:
@@ -73,7 +72,6 @@ class Body:
         return known is not None and not isinstance(known, Known) and self.scope.is_used(name)
 
     def _zero(self, name: str) -> str:
-        """Declaration of a name that gets its value in a block within this one."""
         type_, c_name = self.scope.types[name], self.scope.c_name(name)
         if isinstance(type_, Vector):
             sizes = [f" int {type_.length(c_name, axis)} = 0;" for axis in self.scope.axes(name)]
@@ -82,7 +80,6 @@ class Body:
         return f"{type_.c_type} {c_name} = {'0.0' if type_ is Scalar.DOUBLE else '0'};"
 
     def _constant(self, name: str) -> str:
-        """`const` for a vector that is not written to."""
         return "" if self.scope.is_written(name) else "const "
 
     # ------------------------------------------------------------------------------ statements
@@ -251,7 +248,6 @@ class Body:
         return lines
 
     def _room(self, target: ast.Name, node: ast.Call) -> str:
-        """A vector for work."""
         size = self.of.index(node.args[0]).text
         if not size.isdigit() or len(node.args) != 1 or node.keywords:
             raise self.source.refusal(node, "room for work has a constant size")

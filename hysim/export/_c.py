@@ -115,7 +115,6 @@ class Vector(NamedTuple):
     rank: int = 1
 
     def length(self, name: str, axis: int) -> str:
-        """Name in C of the length of an axis."""
         return f"{name}_size" if self.rank == 1 else f"{name}_shape{axis}"
 
 
@@ -286,15 +285,12 @@ class Scope:
         return not settled
 
     def is_used(self, name: str) -> bool:
-        """Whether a name was read in the last pass."""
         return self.before is None or name in self.before.used
 
     def is_written(self, name: str) -> bool:
-        """Whether an array was written to in the last pass."""
         return self.before is not None and bool((self.roots.get(name, frozenset()) | {name}) & self.before.written)
 
     def axes(self, name: str) -> tuple[int, ...]:
-        """Axes of an array whose lengths were used in the last pass."""
         return () if self.before is None else tuple(sorted(axis for each, axis in self.before.lengths if each == name))
 
     def assign(self, name: str, type_: Type, node: ast.AST) -> None:

@@ -149,9 +149,7 @@ def kernels_of(law: Law) -> Kernels:
 
 
 def module_of(kernels: Kernels) -> bytes:
-    """Compressed module of a step, from the package or compiled now; ImportError or UntranslatableError if it cannot
-    be.
-    """
+    """Compressed module of a step, from the package or compiled now; ImportError or UntranslatableError if it fails."""
     own = files("hysim.export").joinpath(f"{FOLDER}/{kernels.name}.wasm.gz")
     if kernels.step.__module__.startswith("hysim.") and own.is_file():
         return own.read_bytes()

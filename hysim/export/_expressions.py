@@ -155,7 +155,6 @@ class Expressions:
         return result
 
     def _vector(self, node: ast.expr, *, quietly: bool = False) -> Stretch:
-        """An array of one axis."""
         result = self.quietly(node) if quietly else self.stretch(node)
         if len(result.lengths) != 1:
             raise self._refusal(node, "an array of one axis is expected here")
@@ -406,7 +405,6 @@ class Expressions:
         return bool(self._tried(node)[1])
 
     def _type(self, node: ast.expr) -> Type:
-        """Type of an expression, which is not used yet."""
         return self._tried(node)[0]
 
     def _tried(self, node: ast.expr) -> tuple[Type, set[str]]:

@@ -180,7 +180,6 @@ def description(program: Program, variables: list[Variable], name: str, version:
 
 
 def _sentences(program: Program) -> str:
-    """The delay of the output, and how far ahead the reference is."""
     if math.isnan(program.sample_time):
         return DELAY
     ahead = f" The reference is that of {program.ahead} samples later." if program.ahead else ""

@@ -40,9 +40,7 @@ class Packing:
         return np.array(numbers[:size]), np.array(numbers[size:])
 
     def to_c(self, name: str) -> str:
-        """``static void name(const double *fields, double *parameters, double *state)`` in C99, for ``-ffp-
-        contract=off``.
-        """
+        """C99 text of ``static void name(const double *fields, double *parameters, double *state)``."""
         function, helpers = self._function(name)
         return "\n".join((*(helper(each, "c") for each in helpers), function)).replace("@", f"{name}_")
 
@@ -153,7 +151,6 @@ class Traced(np.ndarray[Any, np.dtype[np.object_]]):
         return any(isinstance(number, Symbol) or bool(number) for number in self.ravel().tolist())
 
     def astype(self, dtype: Any, *_: Any, **__: Any) -> Any:
-        """Rounded as numbers of this type."""
         kind = np.dtype(dtype)
         if not _has_symbols(self):
             return _plain(self).astype(kind)

@@ -254,7 +254,6 @@ def _packed(values: FloatArray) -> str:
 
 
 def _expression(function: str, place: int) -> str:
-    """A function that packs, with its helpers, as one expression of the script."""
     return f"(() => {{\n{function.strip()}\nreturn pack{place};\n}})()"
 
 

@@ -50,7 +50,6 @@ class Control(NamedTuple):
     scale: bool = False
 
     def to_json(self, first: int, prefix: str = "") -> dict[str, Any]:
-        """As the page takes it, for a law whose numbers begin at the place `first`."""
         described = {"name": prefix + self.name, "value": self.value, "lower": self.lower, "upper": self.upper}
         flags = {name: True for name, is_on in (("log", self.log), ("scale", self.scale)) if is_on}
         return {**described, **flags, "places": [first + place for place in self.places]}
@@ -244,8 +243,7 @@ def _law(law: Law, parts: Parts, first: int) -> dict[str, Any]:
 
 
 def _plays(law: Law, step: Callable[..., float]) -> dict[str, Any]:
-    """Place of the first threshold among the parameters of plays, whose weights follow; `cone` is whether each play
-    lies between u - r and u + r."""
+    """Place of the first threshold of plays, whose weights follow; `cone` is whether plays lie between u - r and u + r."""
     coefficients = int(law.packed[0][0]) if step is plain(clamps.bent_step) else 0
     first = {
         plain(clamps.step): clamps.N_OUTPUT,

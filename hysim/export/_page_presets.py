@@ -23,7 +23,6 @@ _DAMPER = {"u": "mm", "y": "kN"}
 
 
 def presets() -> dict[str, Shown]:
-    """Names to models, in the order in which the page lists them."""
     examples = {family.example.title: _shown(family) for family in families().values() if family.example.title}
     every = {**examples, **_sums_and_materials()}
     groups = (*_GROUPS.values(), _DEVICES)

@@ -104,7 +104,6 @@ class Translation:
 
 
 def _declared(parameter: Parameter, name: str) -> list[str]:
-    """An argument in C, and its length."""
     if isinstance(parameter.type, Vector):
         pointer = f"{'' if parameter.is_written else 'const '}double *{name}"
         lengths = [f"int {parameter.type.length(name, axis)}" for axis in parameter.axes]

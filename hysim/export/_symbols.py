@@ -115,7 +115,6 @@ class Tape:
         return sorted(seen)
 
     def fields_of(self, number: Number) -> tuple[str, ...]:
-        """Names of the fields on which a number depends."""
         return tuple(self.names[place] for place in self.needed((number,)) if place < len(self.names))
 
     def evaluate(self, numbers: Sequence[Number], values: Sequence[float]) -> list[float]:
@@ -134,9 +133,7 @@ class Tape:
         return [float(value(number)) for number in numbers]
 
     def texts(self, numbers: Sequence[Number]) -> tuple[list[tuple[str, str]], list[str]]:
-        """Names and texts of what occurs more than once, in order, and texts of the numbers; ``@`` begins a helper's
-        name.
-        """
+        """Names and texts of what occurs more than once, in order, and texts of the numbers; helpers begin with ``@``."""
         places = self.needed(numbers)
         uses = dict.fromkeys(places, 0)
         for number in (*numbers, *(operand for place in places for operand in self._operands(place))):
@@ -161,7 +158,6 @@ class Tape:
         return locals_, [text(number) for number in numbers]
 
     def truth_values(self) -> frozenset[str]:
-        """Names in `texts` of what is true or false."""
         return frozenset(f"t{k}" for k, (operation, _) in enumerate(self._entries) if operation in TRUTH_VALUES)
 
     def _operands(self, place: int) -> tuple[Number, ...]:

@@ -82,7 +82,6 @@ class Array:
 
     @property
     def description(self) -> str:
-        """Name and shape, or the kind of the content where that is no number."""
         shape = " x ".join(map(str, self.shape)) if self.shape else "one value"
         return f"{listed([self.label])} ({shape if self.kind == NUMBERS else self.kind})"
 
@@ -185,7 +184,6 @@ def with_notes(arrays: list[Array], form: str, attributes: Mapping[str, Any] | N
 
 
 def _short_value(array: Array) -> str | float | None:
-    """The text or the number in an array that holds a short one."""
     if array.size * array.item_bytes > _LONGEST_TEXT:
         return None
     if array.kind == TEXT:
@@ -337,7 +335,6 @@ class _MatReader:
                 yield str(names[k * step : (k + 1) * step], "latin-1").rstrip("\0"), matrix
 
     def value(self, matrix: Callable[..., bytes | memoryview]) -> npt.NDArray[Any] | str:
-        """The numbers of a matrix, or its text."""
         from scipy.io import loadmat
 
         with warnings.catch_warnings(action="error"):  # SciPy warns of what it cannot read

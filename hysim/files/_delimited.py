@@ -148,7 +148,6 @@ class Signs(NamedTuple):
             return None
 
     def kind(self, cell: str) -> str:
-        """Whether a cell is "missing", a "number", or "text"."""
         return "missing" if cell.strip().lower() in MISSING else "text" if self.number(cell) is None else "number"
 
     def cells(self, line: str, *, strict: bool = False) -> list[str]:
@@ -259,7 +258,6 @@ class Delimited:
         return f"line {next(itertools.islice(numbers, sample, None))}"
 
     def _samples(self) -> Iterator[Lines]:
-        """The lines of the samples, which are those below the header, some at a time."""
         head = self.head
         for lines in self.text.samples():
             if head < len(lines.texts):

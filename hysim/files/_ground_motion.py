@@ -160,7 +160,6 @@ def is_at2(path: Source, encoding: str | None = None) -> bool:
 
 
 def column_names(path: Source, **for_text: Any) -> tuple[str, ...]:
-    """Names of the columns of a file, with the options for texts and the errors of `hysim.load`."""
     for_text = {**dict.fromkeys(("delimiter", "decimal", "encoding")), **for_text, "skip": for_text.get("skip") or None}
     with opened(path) as source, table_of(source, for_text) as table:
         return tuple(table.labels)

@@ -394,7 +394,6 @@ def _channels(
 
 
 def _units(table: Table, columns: Mapping[str, Column], constants: Iterable[str]) -> dict[str, str]:
-    """Units of the signals and channels where the file states them."""
     units = {signal: table.notes.units.get(c.label, c.unit or None) for signal, c in columns.items()}
     units |= {label: table.notes.units.get(label) for label in constants}
     if "t" not in columns and "t" not in table.labels:

@@ -79,7 +79,6 @@ def cosmos_blocks(text: str, skip: int) -> list[StatedValues]:
 
 
 def block_below(text: str, line: int) -> str:
-    """A text as far as the numbers below a line go."""
     lines = text.split("\n")
     end = next((k for k in range(line, len(lines)) if not _NUMBERS_ONLY.fullmatch(lines[k])), len(lines))
     return "\n".join(lines[:end])

@@ -307,6 +307,5 @@ def _trials(past: FloatArray) -> Iterator[tuple[str, FloatArray]]:
 
 
 def _sampled(corners: FloatArray) -> FloatArray:
-    """A path through these corners with some samples on each branch."""
     places = np.arange((corners.size - 1) * _POINTS + 1) / _POINTS
     return np.interp(places, np.arange(corners.size), corners)

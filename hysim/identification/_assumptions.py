@@ -53,9 +53,7 @@ _STATES = {
 
 
 class Decision(NamedTuple):
-    """The problems to be searched, the simplest first where there are stages, and a sentence on what was chosen and
-    why.
-    """
+    """The problems to be searched, the simplest first if there are stages, and a sentence on what was chosen and why."""
 
     problems: Sequence[Problem]
     sentence: str = ""
@@ -146,9 +144,7 @@ def _left_out(family: Any, setting: Setting, paths: Sequence[Record], quiet: Seq
 
 
 def quiet_rmse(family: Any, setting: Setting, treatment: Treated) -> float:
-    """Error of a short fit along the quiet paths, with what their noise adds by the record's slope; infinite without
-    one.
-    """
+    """Error of a short fit along the quiet paths, with what noise adds through the record's slope; else infinite."""
     if not treatment.noises or isinstance(family, PartByPart):
         return math.inf
     try:
@@ -256,7 +252,6 @@ def _longer(variant: Variant, times: int) -> Variant:
 
 
 def _possible(family: Undecided, records: Sequence[Record]) -> list[str]:
-    """The states that these records can have, in the order of the first of them."""
     named = [family.assumed_states(record) for record in records]
     return [
         state

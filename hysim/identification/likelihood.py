@@ -53,7 +53,6 @@ def optima(fit: Identification, known: Problem, bounds: Bounds, initial: Initial
 
 
 def _inner(bounds: Bounds, known: Problem) -> dict[str, tuple[float, float]]:
-    """Bounds of parameters that are not linear."""
     return {name: pair for name, pair in bounds.items() if name not in known.own.columns}
 
 
@@ -109,9 +108,7 @@ class Expected:
         coordinates: Mapping[str, float],
         values: Mapping[str, float],
     ) -> Self:
-        """The model with these `values`, at these coordinates by name; ValueError for one outside the box of the
-        search.
-        """
+        """The model with these `values`, at these coordinates by name; ValueError for a value outside the box."""
         attempt = problem(family, [record], freedom, None)
         x = [coordinates[name] for name in attempt.space.coordinates]
         theta = np.array([*x, *(values[name] for name in attempt.space.linear)], dtype=float)

@@ -55,7 +55,6 @@ def least_squares(columns: FloatArray, target: FloatArray) -> FloatArray:
 
 
 def _by_singular_values(columns: FloatArray, target: FloatArray) -> FloatArray:
-    """`least_squares` by singular values."""
     basis, singular, right = np.linalg.svd(columns, full_matrices=False)
     inverse = np.where(singular > _RANK, 1.0 / np.maximum(singular, _RANK), 0.0)
     projected = inverse[..., np.newaxis] * (basis.transpose(0, 2, 1) @ target[..., np.newaxis])
@@ -90,9 +89,7 @@ _ONE_SIDED = 1e-7  # those of a one-sided one near 1e-7, at half the cost
 
 @dataclass(frozen=True)
 class Schedule:
-    """Damping, times `success` or `failure` after a step; each trial has it times a factor, and beyond `most` a set
-    ends.
-    """
+    """Damping after a step: times `success` or `failure`; trials multiply it by `factors`; a set ends beyond `most`."""
 
     factors: tuple[float, ...] = (1.0,)
     success: float = 0.1
@@ -121,9 +118,7 @@ class Problem(Protocol):
     """A loss to minimise; `sets` (n,) says which set each point belongs to."""
 
     def evaluate(self, x: FloatArray, sets: Sets) -> tuple[FloatArray, tuple[FloatArray, ...]]:
-        """Losses (n,) at points `x` (n, n_x), inf where it diverges, with arrays for `linearised`; may change `x` in
-        place.
-        """
+        """Losses (n,) at points `x` (n, n_x), which it may change in place, and arrays that `linearised` needs."""
         ...
 
     def linearised(

@@ -43,7 +43,6 @@ class Batch(NamedTuple):
     samples_a_thread: int | None = None
 
     def result(self, reduce: Reduction | None, target: npt.ArrayLike | None, workers: int | None) -> FloatArray:
-        """Rows, or one number of each where `reduce` names it."""
         return self.rows(workers) if reduce is None else self.reduced(reduce, target, workers)
 
     def rows(self, workers: int | None) -> FloatArray:

@@ -63,7 +63,6 @@ class Holding(ByStructure):
 
     @property
     def scalars(self) -> Mapping[str, float]:
-        """Every parameter of a staged structure by name, with the values that are held."""
         return {**self.structure.scalars, **self.values} if isinstance(self.structure, Staged) else self.values
 
     @property

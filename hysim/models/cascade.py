@@ -71,7 +71,6 @@ class CascadeStructure(Identifiable, Composable):
 
     @property
     def carrier(self) -> int:
-        """Which stage carries the gain."""
         linear = [isinstance(stage, LinearStage | LinearStructure) for stage in self.stages]
         if not all(linear):
             return len(linear) - 1 - linear[::-1].index(False)

@@ -52,7 +52,6 @@ class Composable:
         return _joined(self, other, _KINDS["+"])
 
     def __radd__(self, other: Any) -> Any:
-        """Sum of a result's model and this."""
         return _joined(other, self, _KINDS["+"])
 
     def __rshift__(self, other: "Composable") -> Any:
@@ -60,7 +59,6 @@ class Composable:
         return _joined(self, other, _KINDS[">>"])
 
     def __rrshift__(self, other: Any) -> Any:
-        """This behind a result's model."""
         return _joined(other, self, _KINDS[">>"])
 
 

@@ -219,7 +219,6 @@ class Dependent:
         return ", ".join(map(repr, self.channels)) or "no channel"
 
     def _along(self, u: FloatArray, sample_time: float | None, values: Mapping[str, Any]) -> FloatArray:
-        """Output where a channel varies."""
         series = {each.parameter: each.value(values[each.channel]) for each in self.polynomials}
         for name, each in series.items():
             for value in (float(each.min()), float(each.max())):
@@ -234,7 +233,6 @@ class _OnChannels(Protocol):
 
 
 def on_record(model: Any, record: Record) -> Any:
-    """A model as it is on a record, at the channels of this if it depends on such."""
     return model.on(record) if isinstance(model, _OnChannels) else model
 
 

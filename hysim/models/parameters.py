@@ -144,9 +144,7 @@ def space_of(
     points: Sequence[Mapping[str, float]] = ({},),
     **others: Any,
 ) -> SearchSpace:
-    """Space of the coordinates that are not held, from `points`; columns are affine, limits the user's, others as they
-    are.
-    """
+    """The space of the coordinates that are not held, with starts at `points` and the user's `limits`."""
     searched = [each.limited(limits) for each in coordinates if each.name not in held]
     names = tuple(each.name for each in searched)
     lower = np.array([each.encode(each.lower) for each in searched])
@@ -183,9 +181,7 @@ def spans(record: Record) -> dict[str, float]:
 
 
 def rate_spans(record: Record) -> dict[str, float]:
-    """`spans` with ``"v"``, the highest speed of the input, and ``"r"`` that of the output; ValueError without even
-    times.
-    """
+    """`spans` with ``"v"``, the highest speed of the input, and ``"r"``, that of the output; ValueError without time."""
     units, time = spans(record), record.sample_time
     speed = float(np.abs(np.diff(record.u)).max()) / time
     return {**units, "v": speed, "r": units["y"] / units["u"] * speed}

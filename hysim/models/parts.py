@@ -19,7 +19,6 @@ def labels(parts: Sequence[Any]) -> tuple[str, ...]:
 
 
 def exchanged(parts: Sequence[Any], others: Mapping[str, Any]) -> tuple[Any, ...]:
-    """The parts, those with a label in `others` exchanged."""
     return tuple(others.get(label, part) for label, part in zip(labels(parts), parts, strict=True))
 
 
@@ -42,7 +41,6 @@ def check_parts(parts: Any, what: str) -> tuple[Any, ...]:
 
 
 def checked_tuple(parts: Any, what: str) -> tuple[Any, ...]:
-    """The parts as a tuple that is not empty."""
     if not isinstance(parts, (tuple, list)):
         raise TypeError(f"{what} must be a tuple of models, got {type(parts).__name__}")
     if not parts:
@@ -51,7 +49,6 @@ def checked_tuple(parts: Any, what: str) -> tuple[Any, ...]:
 
 
 def response_of(part: Any, u: FloatArray, sample_time: float | None) -> FloatArray:
-    """Output of a part from its first sample on."""
     return np.asarray(part.response(u, needed_time(part, sample_time)) if needs_time(part) else part.response(u))
 
 
@@ -95,5 +92,4 @@ def compiled_law(part: Any, u0: float, sample_time: float | None) -> CompiledLaw
 
 
 def own(parameters: Mapping[str, Any], label: str) -> dict[str, Any]:
-    """The parameters of one part, under the names that it gives them."""
     return {name[len(label) + 1 :]: value for name, value in parameters.items() if name.startswith(f"{label}.")}

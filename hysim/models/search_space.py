@@ -171,9 +171,9 @@ class Freedom:
         redundant: tuple[tuple[str, ...], ...] = (),
         at_rest: Iterable[str] = (),
     ) -> dict[str, float]:
-        """Fixed parameters, those that are zero `at_rest`, and the first of each redundant group without one; and their values.
+        """The parameters that are not free, and their values: fixed ones, zeros `at_rest`, one of each redundant group.
 
-        A name in `free` is none of the last two. Raises ValueError if a name is unknown, or both fixed and free.
+        A name in `free` is not among the last two kinds. Raises ValueError if a name is unknown, or both fixed and free.
         """
         for argument, names in (("fixed", tuple(self.fixed)), ("free", self.free)):
             for name in names:

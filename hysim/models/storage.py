@@ -54,7 +54,6 @@ def save(model: Any, path: str | Path, *, units: Mapping[str, str] | None = None
 
 
 def to_json(model: Any, *, units: Mapping[str, str] | None = None) -> str:
-    """The text that `save` writes."""
     model = model_of(model)
     if not is_model(model):
         raise TypeError(f"save takes a model of hysim, got {type(model).__name__}{_advice(model)}")
@@ -185,12 +184,10 @@ def is_model(value: Any) -> bool:
 
 
 def is_document(value: Any) -> bool:
-    """Whether a value read from JSON is what `to_document` makes of a model."""
     return isinstance(value, dict) and value.keys() == {"family", "parameters"}
 
 
 def to_document(value: Any) -> Any:
-    """The plain form of a model, or of a value inside one."""
     if is_model(value):
         parameters = {name: to_document(item) for name, item in given_items(value).items()}
         return {"family": type(value).__name__, "parameters": parameters}

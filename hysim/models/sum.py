@@ -210,12 +210,10 @@ def started(parts: Any, what: str) -> tuple[Any, ...]:
 
 
 def time_of(part: Any, record: Record) -> float | None:
-    """The sample time where the part needs one."""
     return record.sample_time if needs_time(part) else None
 
 
 def assembled(members: Sequence[Any], searched: Mapping[str, Any], parameters: Parameters) -> tuple[Any, ...]:
-    """The models of the members, those that are searched by their labels with their parameters."""
     parts = zip(labels(members), members, strict=True)
     return tuple(
         searched[label].assemble(own(parameters, label)) if label in searched else part for label, part in parts
@@ -247,7 +245,6 @@ class SumStructure(Identifiable, Composable):
         )
 
     def regressors(self, parameters: Parameters, record: Record) -> FloatArray:
-        """The parts' columns one after the other, and the sum of what is known."""
         found = self._identified
         known = [part for part in self.parts if not isinstance(part, Identifiable)]
         fixed = sum((response_of(part, record.u, time_of(part, record)) for part in known), np.zeros(len(record)))
@@ -292,7 +289,6 @@ class SumStructure(Identifiable, Composable):
         }
 
     def _values(self, columns: Sequence[str]) -> dict[str, float]:
-        """The numbers that models have for linear parameters of theirs."""
         return {
             f"{label}.{name}": value
             for label, part in self._identified.items()

@@ -116,7 +116,6 @@ class ChannelPolynomial:
 
 
 def names_of(parameter: str, channel: str, at: tuple[float, ...]) -> tuple[str, ...]:
-    """Name of the value at each place."""
     return tuple(f"{parameter}({channel}={label(place, at)})" for place in at) if len(at) > 1 else (parameter,)
 
 
@@ -171,9 +170,7 @@ def columns_along(
 def response_along(
     model: Any, series: Mapping[str, FloatArray], u: FloatArray, sample_time: float | None = None
 ) -> FloatArray:
-    """Output (n_samples,) of a model with a `series` of some numbers; SimulationError, or TypeError if they cannot
-    vary.
-    """
+    """Output (n_samples,) of a model with a `series` of some numbers; SimulationError, or TypeError if one cannot vary."""
     if not series:
         return response_of(model, u, sample_time)
     if isinstance(model, Sum):
@@ -206,7 +203,6 @@ def _cannot_vary(names: Iterable[str], model: Any) -> TypeError:
 def _of_sum(
     structure: SumStructure, parameters: Parameters, varying: Mapping[str, FloatArray], record: Record
 ) -> FloatArray:
-    """The parts' columns one after the other, and the sum of what is known."""
     known = tuple(part for part in structure.parts if not isinstance(part, Identifiable))
     blocks = [
         columns_along(part, own(parameters, name), own(varying, name), record)

@@ -178,7 +178,6 @@ class UnitGain:
 
     @property
     def shape(self) -> tuple[str, ...]:
-        """Names of the coefficients that say where the zeros are."""
         return tuple(f"num[{k}]" for k in range(self.structure.zeros))
 
     def search_space(self, record: Record, freedom: Freedom = ALL_FREE) -> SearchSpace:

@@ -305,9 +305,7 @@ class Actuator:
         sample_time: float | None = None,
         substeps: int | None = None,
     ) -> tuple[FloatArray, ChainState]:
-        """As `response`, continued from `state` (by default rest) with the bits of one command, and the state at the
-        end.
-        """
+        """As `response`, continued from `state` (by default rest) with the same bits, and the state at the end."""
         inputs = read_only(u, "u", ndim=1)
         chain = self.chain(self._any_time(sample_time), substeps)
         if state is None and not inputs.size:
@@ -400,7 +398,6 @@ class Actuator:
 
     @property
     def _moves(self) -> bool:
-        """Whether the true displacement depends on time."""
         slow = self._drive_takes_time or needs_time(self.hysteresis)
         return slow or self.creep is not None or self.vibration is not None
 

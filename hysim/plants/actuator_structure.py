@@ -196,7 +196,6 @@ class ActuatorStructure(Identifiable):
 
     @property
     def noise(self) -> str:
-        """Noise of a sensor that rounds, or the normal one."""
         return "quantised" if self.sensor is not None and self.sensor.quantum else "gaussian"
 
     @property
@@ -206,7 +205,6 @@ class ActuatorStructure(Identifiable):
 
     @property
     def fastest(self) -> int:
-        """The record with the shortest sample time."""
         return 0 if self.survey is None else int(self.survey.fastest)
 
     def static(self, record: Record) -> Record:
@@ -237,7 +235,6 @@ class ActuatorStructure(Identifiable):
 
     @property
     def names(self) -> frozenset[str]:
-        """Names of the parameters of the parts beside the law."""
         boxes = {} if self.survey is None else self.parts([]).boxes()
         return frozenset(f"{part}.{each.name}" for part, (box, _) in boxes.items() for each in box)
 
@@ -254,7 +251,6 @@ class ActuatorStructure(Identifiable):
         return finer(space, self.modes, best)
 
     def beyond(self, space: SearchSpace, end: FloatArray) -> FloatArray:
-        """The end of a descent, and points of other delays."""
         return between_samples(space, end)
 
     def trials(self) -> Sequence["ActuatorStructure"]:
@@ -327,7 +323,6 @@ class ActuatorStructure(Identifiable):
         return replace(self, remarks=(*self.remarks, remark), **changes)
 
     def parts(self, records: Sequence[Record]) -> LinearParts:
-        """The parts beside the law, for the records that the structure is for or else for these."""
         survey = self.survey if self.survey is not None or not records else Survey.of(records)
         bank: Any = self.creep
         if survey is not None:
@@ -336,7 +331,6 @@ class ActuatorStructure(Identifiable):
         return LinearParts(self.amplifier, bank, self.modes, self.delay, survey, self.inputs, gains)
 
     def _laws(self, parameters: Parameters, record: Record) -> list[tuple[str, Any, Parameters, Record]]:
-        """Each input, its law, the law's parameters, and the record as the law sees it."""
         if not isinstance(self.law, InputSum):
             return [(MAIN, self.law, parameters, record)]
         return [(name, law, own(parameters, name), seen_by(record, name)) for name, law in self.law.laws.items()]

@@ -172,9 +172,7 @@ class Chain:
     def run_each(
         self, controllers: Sequence[CompiledController], state: ChainState, reference: FloatArray
     ) -> tuple[FloatArray, npt.NDArray[np.int64]]:
-        """Displacements (m, n) of controllers of one kind, each from `state`, and the first sample of each that
-        diverges, or -1.
-        """
+        """Displacements (m, n) of controllers of one kind from `state`, and the first sample that diverges, or -1."""
         n, m = reference.size, len(controllers)
         parameters = np.stack([each.parameters for each in controllers])
         states = np.stack([each.state for each in controllers])
@@ -223,7 +221,6 @@ class Chain:
 
     @functools.cached_property
     def _parameters(self) -> FloatArray:
-        """The stages apart from the law, as `hysim.kernels.loop` takes them."""
         stage = self.stage
         head = [
             stage.decline.size, stage.rest.size, stage.lag, self.samples_late,
@@ -238,7 +235,6 @@ class Chain:
 
 
 def linear_stage(creep: Creep | None, vibration: Vibration | None, step: float) -> Stage:
-    """The linear stage behind the law."""
     first = gain(1.0) if creep is None else creep_stage(creep)
     return first if vibration is None else first.then(vibration_stage(vibration, step))
 

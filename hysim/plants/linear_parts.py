@@ -233,17 +233,14 @@ class LinearParts:
         return Stages(amplifier, creep=creep, vibration=vibration)
 
     def one_mode(self, values: Mapping[str, float], k: int) -> Stages:
-        """The stages with one of the modes, of the gain one."""
         vibration = self._modes(values, [k], (1.0,), values["vibration.delay"] if self.delay else 0.0)
         return replace(self, modes=0).stages(values)._replace(vibration=vibration)
 
     def of_input(self, values: Parameters, name: str) -> Parameters:
-        """The parameters but the gains of the other inputs."""
         others = {self.gain_of(k, other) for k in range(self.modes) for other in self.inputs if other != name}
         return {each: value for each, value in values.items() if each.removeprefix("vibration.") not in others}
 
     def of_mode(self, values: Parameters, k: int) -> Parameters:
-        """The parameters but those of the other modes."""
         others = {f"vibration.{each}[{j}]" for each in (FREQUENCY, DAMPING) for j in range(self.modes) if j != k}
         return {each: value for each, value in values.items() if each not in others}
 

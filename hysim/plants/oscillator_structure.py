@@ -299,7 +299,6 @@ class OscillatorStructure(Identifiable):
         return np.asarray(signal[:whole].reshape(-1, self.period).mean(axis=0))
 
     def fine_input(self, u: FloatArray) -> FloatArray:
-        """Inputs at the ends of the steps: of one period, or of the whole record."""
         u, factor = self._mean_period(u), self.oversampling
         if self.hold == "band-limited":
             return interpolated(u, factor) if self.period else interpolated_record(u, factor)
@@ -309,7 +308,6 @@ class OscillatorStructure(Identifiable):
         return np.asarray(np.interp(places, np.arange(u.size + 1), np.append(u, u[0])))
 
     def sampled(self, y: FloatArray) -> FloatArray:
-        """The record's samples of an output at the ends of the steps."""
         if self.decimation:
             return decimated(y, self.decimation, periodic=self.period is not None)
         return y[:: self.oversampling]
@@ -334,7 +332,6 @@ class _Box(NamedTuple):
         return np.array([math.log(values[name]) if name == "mass" else values[name] for name in self.plant])
 
     def laws(self, values: Mapping[str, float]) -> SearchSpace:
-        """The law's part, with `values` as its start."""
         fixed = {name: value for name, value in self.held.items() if name in _LAW}
         bounds = {name: pair for name, pair in self.limits.items() if name in _LAW}
         defaults = {name: values[name] for name in _LAW} | _REST_OF_LAW
@@ -394,7 +391,6 @@ def _factor(values: Mapping[str, float], held: Mapping[str, float]) -> float:
 
 
 def _scaled(values: Mapping[str, float], factor: float) -> dict[str, float]:
-    """The plant with all forces multiplied by `factor`."""
     scaled = {name: value * factor if name in _SCALED else value for name, value in values.items()}
     unit = factor ** (1.0 - values["n"])
     return scaled | {"beta": values["beta"] * unit, "gamma": values["gamma"] * unit}

@@ -138,9 +138,7 @@ class TransferFunction(Composable):
     def advance(
         self, u: npt.ArrayLike, state: LinearState | None = None, *, sample_time: float | None = None
     ) -> tuple[FloatArray, LinearState]:
-        """As `response`, continued from `state` (by default the initial one) with the same bits, and the state at the
-        end.
-        """
+        """As `response`, continued from `state` (by default the initial one), and the state at the end; same bits."""
         inputs = read_only(u, "u", ndim=1)
         time = positive_time(needed_time(self, sample_time))
         with np.errstate(all="ignore"):
@@ -165,9 +163,7 @@ class TransferFunction(Composable):
         return plant.startable(self.initial_state, hold=self.hold, sample=self.sample)
 
     def compiled(self, u0: float = 0.0, *, sample_time: float | None = None) -> CompiledLaw:
-        """The plant at rest at `u0` beside the free response; ValueError without a sample time [s], or if it cannot
-        rest.
-        """
+        """The plant at rest at `u0`, beside the free response; ValueError without a sample time [s] or such a rest."""
         law = self.startable(sample_time).law
         if u0:
             if self.order and not self.den[-1]:
@@ -314,7 +310,6 @@ class TransferFunctionStructure(Identifiable, Composable):
 
     @property
     def columns(self) -> tuple[str, ...]:
-        """The names in which the output is affine: numerator, initial state."""
         return (*(f"num[{k}]" for k in range(self.zeros + 1)), *(f"x0[{k}]" for k in range(self.poles)))
 
     @property
@@ -324,7 +319,6 @@ class TransferFunctionStructure(Identifiable, Composable):
 
     @property
     def free_delay(self) -> tuple[str, ...]:
-        """The delay's name where it is searched."""
         return ("delay",) if self.delay is None else ()
 
     def search_space(self, record: Record, freedom: Freedom = ALL_FREE) -> SearchSpace:
@@ -431,7 +425,6 @@ class TransferFunctionStructure(Identifiable, Composable):
         return np.append(sections(guess.poles, sample_time), guess.delay / sample_time)
 
     def _searched(self, x: FloatArray, sample_time: float, delay: float | None) -> dict[str, FloatArray]:
-        """The denominators, and the delay where it is not the structure's own."""
         columns = denominators(x, self.poles).T
         results = {name: columns[k] / sample_time**k for k, name in enumerate(self.denominator, 1)}
         late = x[:, -1] * sample_time if delay is None else np.full(len(x), delay)

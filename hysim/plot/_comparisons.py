@@ -181,7 +181,6 @@ def _draw_fit(
 
 
 def _draw_measured(ax: Axes, u: FloatArray, y: FloatArray, parts: list[NDArray[np.intp]]) -> None:
-    """Measured samples of some records: dots, or broad lines where there are many."""
     if u.size <= MANY:
         ax.plot(u, y, label="measured", color=POINTS, **scattered(u.size, **_FILLED))
         return
@@ -205,7 +204,6 @@ def _draw_profiles(ax: Axes, fit: Identification) -> None:
 
 
 def _draw_guides(ax: Axes, sizes: dict[float, str]) -> None:
-    """Lines at zero, and at both signs of some sizes."""
     ax.axhline(0.0, color=GUIDE, linewidth=0.8)
     for size, dashes in sizes.items():
         for height in (size, -size):
@@ -244,7 +242,6 @@ def _draw_width(ax: Axes, comparison: Comparison) -> None:
 
 
 def _quantum(record: Record, quanta: str) -> tuple[float, str]:
-    """The divisor of residuals, and their unit after the division."""
     return (record.resolution, quanta) if record.resolution else (1.0, printed(record.units.get("y", "")))
 
 

@@ -218,7 +218,6 @@ def parameter(
 
 
 def _draw_alone(ax: Axes, fit: Identification, parameter: str, place: Any, is_first: bool) -> None:
-    """One fit at one value of the channel, with its interval."""
     if np.ndim(place):
         raise ValueError("a channel varies along a record of these fits: a fit stands at one value of it")
     value, (low, high) = fit.estimates[parameter], fit.intervals.get(parameter, (np.nan, np.nan))

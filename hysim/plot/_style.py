@@ -145,7 +145,6 @@ def upright(ax: Axes, text: str) -> None:
 
 
 def line(k: int) -> dict[str, Any]:
-    """Colour and dashes of the line with the number `k`."""
     colour, dashes = _LINES[k % len(_LINES)]
     return {"color": colour, "linestyle": dashes}
 

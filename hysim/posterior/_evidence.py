@@ -132,14 +132,12 @@ class Evidence:
 
     @property
     def _reason(self) -> str:
-        """Why the data do not decide between several models."""
         lost = [_quoted(row.name) for row in self.rows if not np.isfinite(row.error).all()]
         if lost:
             return f"the evidence of {listed(lost)} was not found"
         return "it depends on the boxes" if len(set(self.best)) > 1 else "their odds are too near to 1 : 1"
 
     def _behind(self, others: Sequence[str]) -> str:
-        """The odds of the models that are not in question."""
         if not others:
             return ""
         values = np.array([row.log_evidence for row in self.rows])

@@ -65,7 +65,6 @@ class Given:
         return np.asarray(np.where(inside, self.distribution.logpdf(values), -np.inf))
 
     def quantile(self, share: FloatArray) -> FloatArray:
-        """Values below which this share of the prior lies."""
         if self.distribution is None:
             return self.low + share * (self.high - self.low)
         return np.asarray(np.clip(self.distribution.ppf(share), self.low, self.high))
@@ -262,7 +261,6 @@ class Linear:
 
 
 def linear(problem: Problem, priors: Mapping[str, Given], factor: float = 1.0) -> Linear:
-    """Prior of the linear parameters of a problem, the flat ones enlarged by `factor`."""
     names = problem.space.linear
     own = {k: priors[key].scaled(factor) for k, name in enumerate(names) if (key := _key(name, priors)) is not None}
     span = float(np.ptp(problem.y)) or problem.scale

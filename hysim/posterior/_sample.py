@@ -169,9 +169,7 @@ class Posterior:
         return self.samples[name].reshape(-1, self.n_walkers)
 
     def interval(self, level: float = 0.95) -> dict[str, tuple[float, float]]:
-        """Name to the central interval of probability `level`, with equal tails; ValueError unless it is between 0 and
-        1.
-        """
+        """Name to the central interval of probability `level`, with equal tails; ValueError unless 0 < level < 1."""
         tails = _tails(level)
         ends = {name: np.quantile(draws, tails).tolist() for name, draws in self.samples.items()}
         return {name: (low, high) for name, (low, high) in ends.items()}

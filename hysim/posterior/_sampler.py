@@ -84,7 +84,6 @@ def _ranked(chains: FloatArray) -> FloatArray:
 
 
 def _variances(chains: FloatArray) -> tuple[float, float]:
-    """Variance within the chains, and that of all draws from both parts."""
     n, m = chains.shape
     within = float(chains.var(axis=0, ddof=1).mean())
     between = float(chains.mean(axis=0).var(ddof=1)) if m > 1 else 0.0
@@ -264,7 +263,6 @@ def _some(q: FloatArray, rng: np.random.Generator) -> FloatArray:
 
 
 def _first(target: Target, proposal: Proposal, walkers: int, rng: np.random.Generator) -> FloatArray:
-    """Points of finite density from the proposal, the better of many."""
     drawn = proposal.draw(_TRIED * walkers, rng)
     weight = target.log_posterior(drawn) - proposal.log_density(drawn)
     finite = np.flatnonzero(np.isfinite(weight))

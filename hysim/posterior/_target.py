@@ -201,7 +201,6 @@ class Target:
         return np.asarray(ndtri(np.clip(share, _EDGE, 1.0 - _EDGE)))
 
     def _log_prior(self, x_normal: FloatArray, normal: FloatArray, x: FloatArray, log_sigma: FloatArray) -> FloatArray:
-        """ln of the prior of v at these coordinates."""
         low, high = self.sigma_ends
         every = np.column_stack([x_normal, normal])
         slopes = -0.5 * every**2 - 0.5 * _LOG_2PI  # of Phi

@@ -167,9 +167,7 @@ def _envelope(name: str, time: FloatArray, rise: float, plateau: float, end: flo
 
 
 def _soil_motion(noise: FloatArray, sample_time: float, frequency: float, damping: float) -> FloatArray:
-    """Noise behind the filter of Kanai and Tajimi, by the spectrum: a recursion would bend it at half the sampling
-    rate.
-    """
+    """Noise behind the filter of Kanai and Tajimi, by its spectrum: a recursion would bend it at high frequencies."""
     from scipy.signal import freqs  # loading it takes longer than all other signals together
 
     viscous = 2.0 * damping * frequency

@@ -110,7 +110,6 @@ def _together(batch: Task, chunk: Chunk) -> Outcome:
 
 
 def part_of(chunk: Chunk, part: Any) -> Chunk:
-    """Some of the tasks of a chunk, by a slice or by numbers."""
     columns = {name: values[part] for name, values in chunk.columns.items()}
     return Chunk(chunk.places[part], columns, None if chunk.seeds is None else chunk.seeds[part])
 
@@ -174,9 +173,7 @@ class Table:
         self._other_names = (*OWN_NAMES, *parameters)
 
     def judge(self, outcome: Outcome) -> Outcome:
-        """The outcome in the study's layout, an error for each task with another; first outcomes in the order of
-        places.
-        """
+        """The outcome in the study's layout, with an error for each task whose values have another layout."""
         if self.layout is None and outcome.groups:
             self.begin(min(outcome.groups, key=lambda group: int(group.places.min())).layout)
         errors, groups = dict(outcome.errors), []
@@ -196,13 +193,11 @@ class Table:
         self.layout = layout
 
     def restore(self, layout: Layout | None, outcome: Outcome) -> None:
-        """Enter the rows of a store."""
         if layout:
             self.begin(layout)
         self.enter(outcome)
 
     def enter(self, outcome: Outcome) -> None:
-        """Enter an outcome of `judge`."""
         for group in outcome.groups:
             for (name, _), column in zip(group.layout, group.columns, strict=True):
                 self.values[name][group.places] = column

@@ -74,7 +74,6 @@ class Study(NamedTuple):
 
     @property
     def columns(self) -> list[str]:
-        """Columns of parameters and of the outputs that are numbers."""
         outputs = [output.column for output in self.layout or () if not output.shape]
         return [*self.parameters.values(), *outputs]
 
@@ -180,7 +179,6 @@ class Store:
             self._remove_shards_without_rows(study)
 
     def space(self) -> Space:
-        """Parameters of the finished rows, and axes of the study."""
         study = self._study
         with damage_named(self.path):
             axes = {name: _as_column(values, study.kinds[name]) for name, values in study.axes or ()} or None
@@ -191,7 +189,6 @@ class Store:
 
     @property
     def n_tasks(self) -> int:
-        """Number of tasks that the study has, finished or not."""
         return self._study.n_tasks
 
     @property
@@ -402,9 +399,7 @@ class Store:
 
 @contextmanager
 def opened(path: str | Path, *, to_read: bool = False) -> Iterator[Store]:
-    """The store in a file, made if it is to be written and missing; OSError with the reason, ValueError if it is no
-    store.
-    """
+    """The store in a file, created if missing and to be written; OSError with the reason, ValueError if it is none."""
     path = Path(path)
     if to_read and not path.is_file():
         raise FileNotFoundError(errno.ENOENT, os.strerror(errno.ENOENT), str(path))
@@ -452,7 +447,6 @@ def _distinct(names: Iterable[str], taken: tuple[str, ...]) -> dict[str, str]:
 
 
 def _quoted(columns: Iterable[str]) -> str:
-    """Names in SQL's quotes, so that they may have any characters."""
     return ", ".join('"' + column.replace('"', '""') + '"' for column in columns)
 
 

@@ -43,7 +43,6 @@ class Coordinates(NamedTuple):
         return np.where(self.log, np.exp(np.where(self.log, x, 0.0)), x)
 
     def spread(self, changes: FloatArray) -> FloatArray:
-        """Standard deviations of the coordinates for those of the values."""
         return np.where(self.log, changes / np.where(self.log, self.values, 1.0), changes)
 
 

@@ -119,7 +119,6 @@ def joined(parts: Sequence[Any], kind: Any = np.float64) -> Any:
 
 
 def ends(sizes: Sequence[int]) -> Any:
-    """Places at which parts of these sizes begin, and the end of the last one."""
     return np.concatenate([[0], np.cumsum(np.array(sizes, dtype=np.int64))]).astype(np.int64)
 
 
@@ -170,7 +169,6 @@ def empty_flows(halvings: int, m: int, n_loads: int, n_elements: int) -> tuple[F
 
 
 def flows_of(elements: Elements, plant: Plant, steps: Steps) -> Flows:
-    """The flows over the base step and its parts."""
     n_elements = elements.k0.size
     E, P, flows = empty_flows(steps.halvings, len(plant.A), len(plant.loads) - n_elements, n_elements)
     fill_structure(elements, plant.A, plant.loads, steps.rate, steps.sample_time / steps.base, E, P, flows)
@@ -199,7 +197,6 @@ def room_for(motion: Motion) -> Room:
 
 
 def motion_at(elements: Elements, laws: Laws, x: FloatArray, n_loads: int) -> Motion:
-    """The motion at its start, every law at its first sample."""
     motion = empty_motion(len(x), laws.states.size, len(laws.steppers), n_loads)
     with np.errstate(all="ignore"):
         start_motion(elements, laws.starts, laws.states, read_only(x), motion)
@@ -341,8 +338,8 @@ class AssembledStructure:
         return len(self.elements) if signal in OF_ELEMENTS else self.n_nodes
 
     def periods(self) -> FloatArray:
-        """Periods (n,) [s] of small motions at the start, the longest first, inf if free; ValueError if stiffness is
-        negative.
+        """Periods (n,) [s] of small motions at the start, longest first, inf if free; ValueError for negative
+        stiffness.
         """
         squares = eigh(self.initial_stiffness, self.mass_matrix, eigvals_only=True)
         if squares[0] < -1e-9 * np.abs(squares).max():
@@ -351,9 +348,7 @@ class AssembledStructure:
             return np.asarray(2.0 * np.pi / np.sqrt(np.maximum(squares, 0.0)))
 
     def modes(self) -> FloatArray:
-        """Shapes (n, n) of small motions, columns in the order of `periods`, of modal mass one, the largest part
-        positive.
-        """
+        """Shapes (n, n) of small motions, one a column in the order of `periods`, with modal masses of one."""
         shapes = eigh(self.initial_stiffness, self.mass_matrix)[1]
         largest = shapes[np.abs(shapes).argmax(axis=0), np.arange(self.n_nodes)]
         return np.asarray(shapes * np.sign(largest))

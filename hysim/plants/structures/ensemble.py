@@ -160,7 +160,6 @@ def _matrices(structure: Any, numbers: Mapping[str, FloatArray], slopes: FloatAr
     one, rows, damping = np.eye(structure.n_nodes), structure.drift_matrix, structure.damping
 
     def scaled(name: str, value: FloatArray, matrix: FloatArray) -> FloatArray:
-        """A matrix for each set: by its number, or by a factor of the whole."""
         numbers_of = numbers.get(name)
         if numbers_of is None:
             return np.broadcast_to(matrix, (n_sets, *matrix.shape))

@@ -62,9 +62,7 @@ class MovingStructure(AssembledStructure):
         return self.advance(u, sample_time=sample_time)[0]
 
     def memories(self, u: npt.ArrayLike, sample_time: float) -> tuple[FloatArray, ...]:
-        """State of each element's law, (n_samples, n_numbers) each, at the samples of `u`: its last input and its
-        memory.
-        """
+        """State of each element's law at the samples of `u`, (n_samples, n_numbers) each: last input and memory."""
         states = self._followed(read_only(u, "u", ndim=1), sample_time, None, None, with_laws=True)[1].laws
         ends = np.cumsum([each.state.size for each in self.laws.steppers])[:-1]
         parts = np.split(states, ends, axis=1) if self.elements else []

@@ -174,9 +174,7 @@ class Rayleigh:
 
     @classmethod
     def at(cls, ratio: float, periods: tuple[float, float]) -> Self:
-        """Damping with one ratio of the critical damping at two periods [s]; ValueError unless these differ and are
-        positive.
-        """
+        """Damping with one ratio at two periods [s]; ValueError unless these are positive and different."""
         check_not_negative(ratio=ratio)
         if len(periods) != 2 or periods[0] == periods[1]:
             raise ValueError(f"periods must be two different ones, got {periods}")
@@ -218,9 +216,7 @@ class ModalDamping:
         object.__setattr__(self, "ratio", tuple(ratios.tolist()) if ratios.ndim else float(ratios))
 
     def matrix(self, mass: FloatArray, stiffness: FloatArray) -> FloatArray:
-        """The damping matrix (n_nodes, n_nodes), or a stack; ValueError for a wrong number of ratios or negative
-        stiffness.
-        """
+        """The damping matrix (n_nodes, n_nodes), or a stack; ValueError for a wrong number of ratios."""
         if np.ndim(self.ratio) and len(self.ratio) != mass.shape[-1]:
             raise ValueError(f"ratio must hold one number for each of {mass.shape[-1]} modes, got {len(self.ratio)}")
         return modal_damping(np.asarray(self.ratio), mass, stiffness)
@@ -282,7 +278,6 @@ def expanded(scalars: Mapping[str, float], parameters: Mapping[str, float]) -> d
 
 
 def is_shared(name: str) -> bool:
-    """Whether a name is that of all elements."""
     return name.startswith(f"{_ELEMENTS}.{_ALL}.")
 
 
@@ -296,7 +291,6 @@ def sharing(scalars: Mapping[str, float], name: str) -> list[str]:
 
 
 def unknown(scalars: Mapping[str, float], name: str) -> ValueError:
-    """The error for a name that no number has."""
     return ValueError(f"the structure has no parameter {name!r}; its parameters are {_listed(scalars)}")
 
 
@@ -317,7 +311,6 @@ def _listed(scalars: Iterable[str]) -> str:
 
 
 def _numbers(name: str, value: Any) -> dict[str, float]:
-    """Numbers of the mass, the stiffness or the damping: itself or its factor, and those in it that have a name."""
     if isinstance(value, Rayleigh):
         return {name: 1.0, f"{name}.mass": value.mass, f"{name}.stiffness": value.stiffness}
     several = np.asarray(value.ratio if isinstance(value, ModalDamping) else value)

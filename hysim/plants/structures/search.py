@@ -168,12 +168,7 @@ class SensorRecord(Record):
 
 
 def laid(record: Record | StructureRecord, widths: Mapping[str, int], output: Sensor) -> SensorRecord:
-    """One output of all sensors, each in units of its rms.
-
-    `widths` are the numbers of columns that signals must have, `output` is the sensor of a plain record.
-
-    Raises ValueError if a signal has another number of columns.
-    """
+    """One output of all sensors, each in units of its rms; ValueError unless signals have `widths` columns."""
     if isinstance(record, Record):
         outputs: list[FloatArray] = [record.y]
         sensors: tuple[Sensor, ...] = (output,)

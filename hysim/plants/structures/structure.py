@@ -110,7 +110,6 @@ class _Columns:
         self.keep(drifts)
 
     def force(self, e: int, drift: float) -> float:
-        """Force of an element after a stroke from the last equilibrium."""
         law = self.members[e]
         law.state[self.places[e]] = self.saved[e]
         return float(law.step(law.parameters, law.state, drift))
@@ -128,7 +127,6 @@ class _Columns:
         return slopes
 
     def keep(self, drifts: FloatArray) -> None:
-        """Move all laws to an equilibrium."""
         self.drifts = drifts
         self.forces(drifts)
         self.saved = [law.state[place] for law, place in zip(self.members, self.places, strict=True)]
@@ -145,7 +143,6 @@ class _Push:
         self.now = self.balance(x, 0.0)
 
     def balance(self, x: FloatArray, factor: float) -> _Equilibrium:
-        """Displacements and loads with the forces, and how far these are from balance."""
         at = _Equilibrium(x, factor, self.columns.forces(self.rows @ x), 0.0)
         size = self.size(at)
         return at._replace(residual=float(np.abs(self.out_of_balance(at)).max()) / size) if size else at
@@ -156,7 +153,6 @@ class _Push:
         return max(self.largest, *(float(np.abs(part).max(initial=0.0)) for part in parts))
 
     def allowed(self, at: _Equilibrium) -> float:
-        """Largest residual of an equilibrium."""
         rounding, size = _ROUNDING * self.unit * float(np.abs(at.x).max()), self.size(at)
         return min(max(_ENOUGH, rounding / size), _WORST) if size else _ENOUGH
 
