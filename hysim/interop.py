@@ -173,7 +173,7 @@ def channels_of(table: ForeignTable) -> dict[str, Any]:
 
 
 def told_by(u: Any, y: Any, t: Any, units: Mapping[str, str]) -> tuple[Any, dict[str, str]]:
-    """Times and units of two columns, given or as the columns state them; ValueError if they state times that differ."""
+    """Times and units of two columns, given or as the columns state them; ValueError if the stated times differ."""
     columns = {"u": u, "y": y}
     stated = {name: unit for name, column in columns.items() if (unit := _unit_of(column)) is not None}
     times = [known for column in columns.values() if (known := _times_of(column)) is not None] if t is None else []

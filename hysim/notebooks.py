@@ -1,8 +1,4 @@
-"""Results as notebooks show them: their printed text as a table, and a small figure.
-
-Two blanks divide the cells of a line. A figure is an image of its own, so that neither its styles nor its ids meet
-those of other cells; its white ground makes it readable on a dark page, too.
-"""
+"""Results in notebooks: their printed text as a table, and a small figure as an image with ids and styles of its own."""
 
 import base64
 import html

@@ -1,7 +1,4 @@
-"""Measured or simulated records: input, output and times, with units, resolution and a name.
-
-The sample axis is axis 0. A record never changes; a slice of it keeps its units, resolution and name.
-"""
+"""Measured or simulated records: input, output and times; slices keep units, resolution and name."""
 
 import dataclasses
 import math
@@ -148,7 +145,7 @@ class Record:
         return dataclasses.replace(self, **cut, channels=taken(self.channels, samples))
 
     def channel(self, name: str) -> float | FloatArray:
-        """A channel by name: its number, or its values (n,) where they vary; ValueError if there is none of this name."""
+        """A channel by name: its number, or its values (n,) where they vary; ValueError for an unknown name."""
         owner = f"the record {self.name!r}" if self.name else "the record"
         value: float | FloatArray = value_in(self.channels, name, owner)
         return value

@@ -95,7 +95,7 @@ class Simulation:
         return {label: column for columns in named.values() for label, column in columns.items()}
 
     def to_frame(self) -> Any:
-        """The `columns` as a `pandas.DataFrame` over the time, units in ``attrs["units"]``; ImportError without pandas."""
+        """The `columns` as a `pandas.DataFrame` over time, with ``attrs["units"]``; ImportError without pandas."""
         return frame_of_signals(self.columns, self.units)
 
     def to_xarray(self) -> Any:

@@ -157,7 +157,7 @@ class _Stopped(BaseException):
 
 
 class _Threads(Executor):
-    """A pool of threads that can be stopped; the interpreter would wait for those of `concurrent.futures` at its end."""
+    """A pool of threads that can be stopped: the interpreter waits at its end for those of `concurrent.futures`."""
 
     def __init__(self, number: int) -> None:
         self._work: queue.SimpleQueue[tuple[Future[Any], Callable[[], Any]] | None] = queue.SimpleQueue()

@@ -1,7 +1,4 @@
-"""Printed results: the important numbers in at most ten lines of at most a hundred letters.
-
-The text is the ``__str__`` of a result, its first line the ``repr``; notebooks show all of it. No array is listed.
-"""
+"""Printed results: ``str`` has at most ten lines of a hundred letters and no array, ``repr`` is its first line."""
 
 import csv
 import importlib

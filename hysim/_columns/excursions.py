@@ -74,7 +74,7 @@ class _Excursion(NamedTuple):
 
 
 def measured_cycles(u: FloatArray, cycles: int, tolerance: float) -> Loops:
-    """The last cycles between the extremes, else of full amplitude about a level, latest first; ValueError if too few."""
+    """The last cycles between the extremes, else of full amplitude about a level, latest first; else a ValueError."""
     if cycles < 1:
         raise ValueError(f"cycles must be at least 1, got {cycles}")
     between_extremes = complete_cycles(u, tolerance)

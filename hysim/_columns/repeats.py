@@ -20,7 +20,7 @@ _CLOSING = 2.0  # largest steps of the input, by which a record may end before i
 
 
 def repeated_cycle(u: FloatArray, tolerance: float | None = None) -> int | None:
-    """Samples of the cycle with which `u` (n,) begins, or None; `tolerance` is a share of the span, by default noise."""
+    """Number of samples of the cycle with which `u` (n,) begins, or None; `tolerance` is a share of the span."""
     span = float(np.ptp(u))
     if span == 0.0:
         return None

@@ -219,7 +219,7 @@ def reference(task: Task, rest: float, kind: str, unit: str | None) -> tuple[Flo
 
 
 def feedback(actuator: hs.Actuator, kind: str, within: Pair | None) -> hs.PID | hs.TrackingController | None:
-    """Feedback before its tuning, None for `tune`'s default; tuned without the inverse, which knows the plant exactly."""
+    """Feedback before its tuning, without the inverse, which knows the plant exactly; None for the default of `tune`."""
     if kind == "pid":
         return None
     if kind != "notch":

@@ -307,7 +307,7 @@ def model_or_family(text: str) -> Any:
 
 
 def to_identify(chosen: FitOptions) -> Any:
-    """The argument of `identify`; its `initial` becomes None where the structure takes it. ValueError if options clash."""
+    """The argument of `identify`; `initial` becomes None where the structure takes it. ValueError on a wrong option."""
     from hysim.models.model import FAMILIES
 
     name, of_actuator, used = (chosen.model, _used(chosen, ActuatorOptions), _used(chosen, StructureOptions))

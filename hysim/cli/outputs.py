@@ -79,7 +79,7 @@ def _behind(source: str) -> Iterator[os.stat_result]:
 def write(
     files: Files, text: Callable[[], str] | None = None, document: Callable[[], Mapping[str, Any]] | None = None
 ) -> None:
-    """Write all files or none, and print `text`, or with ``--json`` `document`, unless a path is the standard output."""
+    """Write all files or none, and print `text`, or `document` with ``--json``, unless a path is standard output."""
     contents = {path: _encoded(path, content()) for path, content in files.items() if path is not None}
     if text is not None and STANDARD not in contents:
         contents[STANDARD] = printed(text, document).encode()

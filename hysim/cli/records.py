@@ -113,7 +113,7 @@ class WeighedOptions(RecordOptions):
 
 
 def read(settings: InputOptions, path: str, *, uncut: bool = False) -> "hs.Record":
-    """The record that the settings describe, y = u without an output column; `uncut` ignores --from, --to and --every."""
+    """The record that the settings describe, y = u without an output; `uncut` ignores --from, --to and --every."""
     return _read(settings, path, source_of(path), uncut=uncut)
 
 
@@ -139,7 +139,7 @@ def read_input(settings: InputOptions, path: str, *, of_the_ground: bool) -> "hs
 
 
 def read_with_weights(settings: WeighedOptions, path: str) -> "tuple[hs.Record, Any]":
-    """The record with columns of sensors as channels (the first one is y if no y is named), and the column of weights."""
+    """The record, with columns of sensors as channels (the first is y if none is named), and the column of weights."""
     if settings.sensor and settings.y is None:
         settings.y = settings.sensor[0][1]
     settings.channel += settings.sensor

@@ -58,10 +58,10 @@ _ROUNDING = 1e-9  # of the output's range
 class Contrast:
     """A model compared with the best one, by their errors at samples that were left out of both.
 
-    `rmse_ratio` and `typical_ratio` are its cross-validated rmse and its median absolute error over those of the best model.
-    `probability` is the two-sided one of equally one-sided signed ranks if both predicted equally well, after Holm's
-    correction. Both are nan if errors are unknown. `has_larger_errors` is the verdict of the signed ranks; `diverged` is
-    whether an error is not finite, or more than 10 times the range of the measured output.
+    `rmse_ratio` and `typical_ratio` are its cross-validated rmse and its median absolute error over those of the best
+    model. `probability` is the two-sided one of equally one-sided signed ranks if both predicted equally well, after
+    Holm's correction. Both are nan if errors are unknown. `has_larger_errors` is the verdict of the signed ranks;
+    `diverged` is whether an error is not finite, or more than 10 times the range of the measured output.
     """
 
     name: str

@@ -140,7 +140,7 @@ class SampledController(ABC):
         return 0
 
     def initial(self, sample_time: float, u: float = 0.0, y: float = 0.0) -> CompiledController:
-        """State to `step` from, at rest at a command and a displacement; ValueError unless the sample time is positive."""
+        """State to `step` from, at rest at a command and a displacement; ValueError for a bad sample time [s]."""
         return begun(self, sample_time, u, y)
 
     def step(self, state: CompiledController, reference: float, measurement: float) -> tuple[float, CompiledController]:
@@ -256,8 +256,8 @@ class PID(SampledController):
     ) -> Self:
         """PID in its standard form, u = Kp (e + 1/Ti integral e dt + Td de/dt); other arguments as of the constructor.
 
-        `Kp` is the gain [unit of u / unit of y], `Ti` the integral time, infinite for none, and `Td` the derivative time [s].
-        Raises ValueError if `Ti` is not positive, or as the constructor.
+        `Kp` is the gain [unit of u / unit of y], `Ti` the integral time, infinite for none, and `Td` the derivative
+        time [s]. Raises ValueError if `Ti` is not positive, or as the constructor.
         """
         if not Ti > 0.0:
             raise ValueError(f"Ti must be positive, got {Ti}: an infinite one leaves the integral out")

@@ -144,7 +144,7 @@ def _multisine(limits: InputLimits, highest: float, power: float, rng: np.random
 
 
 def random_strokes(limits: InputLimits, rng: np.random.Generator) -> FloatArray:
-    """Strokes at the full slew to alternate sides, to fill the record; some are short, some hold most turning points."""
+    """Strokes at the full slew to alternate sides, to fill the record; some are short, others mostly held."""
     return _segment(limits, rng, 0.0, limits.duration, _HOLD * limits.duration)
 
 

@@ -216,7 +216,7 @@ def bic_of(cost: float, n_samples: int, n_parameters: int) -> float:
 
 @dataclass
 class Work:
-    """Terms of series per sample that free runs have taken, and the `most` allowed: no clock, so that results repeat."""
+    """Terms of series per sample that free runs have taken, and the `most` allowed; a clock would not repeat."""
 
     most: float = math.inf
     done: float = 0.0
@@ -231,7 +231,7 @@ class Work:
 
 @dataclass(frozen=True)
 class FreeRun:
-    """Least-squares problem of records; `signs` of coefficients, `masks` (n_samples,) of visible outputs, `work` done."""
+    """Least squares over records; `signs` of coefficients, `masks` (n_samples,) of visible outputs, `work` done."""
 
     records: tuple[Record, ...]
     masks: tuple[Samples, ...] | None = None

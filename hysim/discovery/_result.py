@@ -36,7 +36,7 @@ OTHERS = ("n", "feedthrough", "offset", "gain")
 
 
 class ModelledLaw(NamedTuple):
-    """A model for each record; coefficients, other `parameters`, standard errors, memories at first samples; the text."""
+    """A model for each record, coefficients, other `parameters`, standard errors, first memories, and the text."""
 
     models: tuple[Any, ...]
     coefficients: dict[str, float]

@@ -300,7 +300,7 @@ def signs_of(terms: Sequence[Term], signs: Mapping[str, int] | None) -> dict[Ter
 
 @dataclass(frozen=True)
 class Regression:
-    """slope = features @ coefficients in units of `sizes` and `slope_size`; `dependent` are collinear terms, left out."""
+    """slope = features @ coefficients in units of `sizes` and `slope_size`; collinear terms are `dependent`."""
 
     terms: tuple[Term, ...]
     dependent: tuple[Term, ...]

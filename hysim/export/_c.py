@@ -264,8 +264,8 @@ class Uses(NamedTuple):
 class Scope:
     """Names of a function while it is translated, and what was learnt about them.
 
-    `lengths` are arrays and axes whose length is used, `written` arrays that are written to, `used` names that are read,
-    `roots` the arrays in which a local one lies, and `before` what the last pass has learnt.
+    `lengths` are arrays and axes whose length is used, `written` arrays that are written to, `used` names that are
+    read, `roots` the arrays in which a local one lies, and `before` what the last pass has learnt.
     """
 
     def __init__(self, source: Routine, arguments: dict[str, Type]) -> None:

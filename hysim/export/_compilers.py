@@ -84,7 +84,7 @@ def host() -> str:
 
 
 def compiler(target: Target) -> tuple[str, ...] | None:
-    """Beginning of a command that compiles for a target, this machine's own compiler first; None where there is none."""
+    """Beginning of a command that compiles for a target, by this machine's own compiler first; None without one."""
     own = shutil.which("gcc") or shutil.which("clang") if target.is_host else None
     if own is not None:
         return (own,)

@@ -22,8 +22,8 @@ _MANY = 8  # equal numbers in a row
 class Packing:
     """Parameters and first memory of a law's step, as expressions of its numbers.
 
-    `fields` are the numbers that may be changed, in the order of the law's `scalars`. `parameters` and `memory` are floats,
-    and symbols on the `tape` that depend on the fields; `memory` begins with the last input, zero.
+    `fields` are the numbers that may be changed, in the order of the law's `scalars`. `parameters` and `memory` are
+    floats, and symbols on the `tape` that depend on the fields; `memory` begins with the last input, zero.
     """
 
     def __init__(
@@ -67,8 +67,8 @@ class Packing:
 def packing(law: Law, free: Iterable[str] | None = None) -> Packing:
     """Parameters of a law's step as expressions of its numbers.
 
-    `free` names the numbers that may be changed, by default all `law.scalars` but `law.structural`; others are constants.
-    A ValueError is raised if a name is unknown, or the step cannot be computed from it by arithmetic alone.
+    `free` names the numbers that may be changed, by default all `law.scalars` but `law.structural`; others are
+    constants. A ValueError is raised if a name is unknown, or the step cannot be computed from it by arithmetic alone.
     """
     scalars, family = law.scalars, type(law).__name__
     names = [name for name in scalars if name not in law.structural] if free is None else list(free)

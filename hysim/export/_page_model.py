@@ -181,7 +181,7 @@ class Parts:
 
 
 def node_of(thing: Any, u: FloatArray, parts: Parts, prefix: str = "") -> dict[str, Any]:
-    """A model as the page takes it, its contents put into `parts`; TypeError if it is no law, sum or cascade of laws."""
+    """A model as the page takes it, its contents put into `parts`; TypeError if it consists of other than laws."""
     if isinstance(thing, Sum):
         return {"sum": _members(thing.parts, u, parts, prefix)}
     if isinstance(thing, Cascade):
@@ -243,7 +243,7 @@ def _law(law: Law, parts: Parts, first: int) -> dict[str, Any]:
 
 
 def _plays(law: Law, step: Callable[..., float]) -> dict[str, Any]:
-    """Place of the first threshold of plays, whose weights follow; `cone` is whether plays lie between u - r and u + r."""
+    """Place of the first threshold of plays, before their weights; `cone`: plays lie between u - r and u + r."""
     coefficients = int(law.packed[0][0]) if step is plain(clamps.bent_step) else 0
     first = {
         plain(clamps.step): clamps.N_OUTPUT,

@@ -201,9 +201,9 @@ def program_of(
 ) -> Program:
     """The step of a law, a plant or a controller in C99.
 
-    A law that does not depend on time needs no `sample_time` [s]. A controller starts at rest at `u0` and `y0`, by default
-    those of `start_of`. If `tunable`, the numbers of a law may still be changed in the program. A TypeError is raised if
-    the thing cannot be stepped, a ValueError if a sample time is missing or a start is not finite, and an
+    A law that does not depend on time needs no `sample_time` [s]. A controller starts at rest at `u0` and `y0`, by
+    default those of `start_of`. If `tunable`, the numbers of a law may still be changed in the program. A TypeError is
+    raised if the thing cannot be stepped, a ValueError if a sample time is missing or a start is not finite, and an
     UntranslatableError if a step is outside the subset of Python that is translated.
     """
     if sample_time is not None and not 0.0 < sample_time < math.inf:

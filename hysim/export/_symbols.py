@@ -133,7 +133,7 @@ class Tape:
         return [float(value(number)) for number in numbers]
 
     def texts(self, numbers: Sequence[Number]) -> tuple[list[tuple[str, str]], list[str]]:
-        """Names and texts of what occurs more than once, in order, and texts of the numbers; helpers begin with ``@``."""
+        """Names and texts of what occurs more than once, in order, and texts of the numbers; ``@`` marks helpers."""
         places = self.needed(numbers)
         uses = dict.fromkeys(places, 0)
         for number in (*numbers, *(operand for place in places for operand in self._operands(place))):

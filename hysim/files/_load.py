@@ -216,7 +216,7 @@ def options_of_a_text(
 
 
 class Opened(NamedTuple):
-    """Name, format, content (of a DataFrame its table), path and encoding of a source, the last two if they are known."""
+    """Name, format, content (of a DataFrame its table) of a source, and its path and encoding if known."""
 
     name: str
     format: str

@@ -30,7 +30,7 @@ class Column(NamedTuple):
 
 @dataclass(frozen=True)
 class Notes:
-    """Units, resolution, name and channels of a record as a file states them: names to columns, or to constant numbers."""
+    """Units, resolution, name and channels of a record as a file states them; channels are columns or numbers."""
 
     units: Mapping[str, str] = field(default_factory=dict)
     resolution: float | None = None

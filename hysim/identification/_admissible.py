@@ -85,7 +85,7 @@ class Choice(NamedTuple):
 
 
 def excursion(models: Sequence[Any], records: Sequence[Record]) -> Excursion | None:
-    """Excursion of the models on the record of the widest input; None if time or a channel matters, or nothing turns."""
+    """Largest excursion on the record of the widest input; None if time or a channel matters, or nothing turns."""
     k = max(range(len(records)), key=lambda k: float(np.ptp(records[k].u)))
     model, record = models[k], records[k]
     turning = record.reversals(tolerance=_TURN)

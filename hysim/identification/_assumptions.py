@@ -53,7 +53,7 @@ _STATES = {
 
 
 class Decision(NamedTuple):
-    """The problems to be searched, the simplest first if there are stages, and a sentence on what was chosen and why."""
+    """The problems to be searched, the simplest first if there are stages, and a sentence on the choice."""
 
     problems: Sequence[Problem]
     sentence: str = ""
@@ -276,7 +276,7 @@ def _tried(attempt: Problem, state: _State, variant: Variant, before: Sequence[_
 
 
 def _starts_beside(space: SearchSpace, before: Sequence[_Trial]) -> FloatArray:
-    """The starts of a space, and those of a search with coordinates of the state alone, whose numbers keep their order."""
+    """The starts of a space, and the end of a search with coordinates of the state alone, in their order."""
     starts, coordinates = [space.starts], space.coordinates
     for each in before:
         if each.names and {*each.names, *coordinates} <= {*space.state}:

@@ -103,7 +103,7 @@ def loop_widths(descent: Descent, theta: FloatArray) -> FloatArray:
 
 
 def width_stderr(problem: Problem, theta: FloatArray, of_theta: FloatArray, slopes: FloatArray | None = None) -> float:
-    """Standard error of the largest width by the linearised model, nan without a loop; `slopes` are dy/dtheta if known."""
+    """Standard error of the largest width by the linearised model, nan without a loop; `slopes` are dy/dtheta."""
     record = problem.parts[0].record
     slopes = (output_slopes(problem, theta) if slopes is None else slopes)[: len(record)]
     output = problem.model(theta[np.newaxis])[0, : len(record)]

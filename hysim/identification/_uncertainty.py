@@ -196,7 +196,7 @@ def _in_words(names: tuple[str, ...], groups: tuple[tuple[str, ...], ...]) -> st
 def _bounds_in_words(
     problem: Problem, theta: FloatArray, way_back: FloatArray, at_side: Flags
 ) -> tuple[tuple[str, ...], list[str]]:
-    """Sides of the box where the search stopped, and other bounds; own coordinates stand for the parameters they move."""
+    """Sides of the box where the search stopped, and other bounds, in terms of the user's parameters."""
     space, x = problem.space, theta[: problem.n_x]
     values = dict(zip(space.names, problem.named(theta[np.newaxis])[0].tolist(), strict=True))
     is_open = np.logical_or(*space.open_sides(x))

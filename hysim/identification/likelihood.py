@@ -44,7 +44,7 @@ def again(fit: Identification, records: Sequence[Record], bounds: Bounds, initia
 
 
 def optima(fit: Identification, known: Problem, bounds: Bounds, initial: Initial) -> FloatArray:
-    """Coordinates (n_optima, n_x) of the fit and its rivals, best first, in the problem of `again`; states of record 0."""
+    """Coordinates (n_optima, n_x) of the fit and its rivals, best first, in the problem of `again`."""
     paths = [part.record for part in known.parts]
     freedom, initial = _freedom(fit, known.family, paths, initial)
     freedom = replace(freedom, bounds=_inner(bounds, known))
@@ -92,7 +92,8 @@ _CLOSE = 1e-6  # relative distance of a parameter and what its coordinates stand
 class Expected:
     """A model at known parameters, as `identify` would search them on a record.
 
-    `theta` (n_theta,) are its coordinates and linear parameters, `way_there` (n_theta, n_names) their derivatives by those.
+    `theta` (n_theta,) are its coordinates and linear parameters, `way_there` (n_theta, n_names) their derivatives by
+    those.
     """
 
     problem: Problem
@@ -126,6 +127,6 @@ class Expected:
         return self.problem.space.names
 
     def jacobian(self, record: Record, *, refined: bool = False) -> FloatArray:
-        """dy/d(free parameters) (n_samples, n_names) on a record; `refined` as for the standard errors of `identify`."""
+        """dy/d(free parameters) (n_samples, n_names) on a record; `refined` as for standard errors of `identify`."""
         own = replace(self.problem, parts=(replace(self.problem.parts[0], record=record),))
         return np.asarray(output_slopes(own, self.theta, refined=refined) @ self.way_there)

@@ -249,7 +249,8 @@ def _regressed(jacobian: FloatArray, goal: FloatArray, damping: FloatArray, n_da
 class SumOfSquares:
     """Sum of squared residuals between bounds, for one set.
 
-    `residuals` maps points (n, n_x) to (n, n_samples), `slopes` a point and its residual to (n_samples, n_x), `sizes` to D.
+    `residuals` maps points (n, n_x) to residuals (n, n_samples), `slopes` a point and its residual to derivatives
+    (n_samples, n_x), and `sizes`, if given, a point to the scales D (n_x,).
     """
 
     residuals: Callable[[FloatArray], FloatArray]

@@ -60,7 +60,7 @@ def _is_generated(signal: FloatArray) -> bool:
 
 
 def swapped_for(family: Identifiable, setting: Setting, error: float) -> str:
-    """A sentence where the family fits the first record better from y to u, else ""; `error` is relative to y's spread."""
+    """A sentence if the family fits the first record better from y to u; `error` is relative to the spread of y."""
     record = setting.records[0]
     if len(setting.records) > 1 or not error > _PERFECT or not _is_clockwise(record):
         return ""

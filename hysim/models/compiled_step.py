@@ -12,14 +12,14 @@ from hysim.models.protocols import Startable, Stepwise
 
 
 def startable(thing: Any, sample_time: float | None = None) -> Startable:
-    """A law or a plant as a `Startable`; TypeError if it cannot be stepped, ValueError if it needs a sample time [s]."""
+    """A law or a plant as a `Startable`; TypeError if it cannot be stepped, ValueError without a needed time [s]."""
     if not isinstance(thing, Stepwise):
         raise TypeError(f"a {type(thing).__name__} cannot be stepped: it has no compiled step")
     return thing.startable(sample_time)
 
 
 def compiled_step(function: Callable[[Any, Any, float], float]) -> Step:
-    """The step of a family, compiled by numba if it is no kernel; TypeError if (parameters, state, u) give no number."""
+    """The step of a family, compiled by numba if it is no kernel; TypeError unless it returns one number."""
     return function if _is_kernel(function) else _compiled(function, compile_step, "step(parameters, state, u) -> y")
 
 

@@ -163,10 +163,10 @@ class Dependent:
     ) -> FloatArray:
         """Output (n,) [unit of y] at the samples of an input `u` (n,); `sample_time` [s] where the law depends on time.
 
-        `channels` are names to one number, or to values (n,); further ones are ignored. Where a channel varies, each branch
-        between two samples has the parameters of the sample at its end, and the memory is kept. Raises ValueError if a channel
-        is missing, not finite or of another length, or the polynomials make no law there; TypeError if a parameter that depends
-        on a varying channel cannot change from sample to sample.
+        `channels` are names to one number, or to values (n,); further ones are ignored. Where a channel varies, each
+        branch between two samples has the parameters of the sample at its end, and the memory is kept. Raises
+        ValueError if a channel is missing, not finite or of another length, or the polynomials make no law there;
+        TypeError if a parameter that depends on a varying channel cannot change from sample to sample.
         """
         inputs = read_only(u, "u", ndim=1)
         given = checked_channels(channels or {}, inputs.size)

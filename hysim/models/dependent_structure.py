@@ -158,7 +158,7 @@ class DependentStructure(Identifiable):
                 raise ValueError(f"the degree must be a whole number from 0 on, got {pair[1]!r} for {name!r}")
 
     def over(self, records: Sequence[Record]) -> "DependentStructure":
-        """The structure with places for the channels of these records; ValueError for unknown names or too few values."""
+        """The structure with places for the channels of these records; ValueError for unknown names or few values."""
         space = self.law.search_space(max(records, key=lambda record: float(np.ptp(record.u))))
         spans = {}
         for name, (channel, degree) in self.depends.items():
@@ -264,7 +264,7 @@ class DependentStructure(Identifiable):
         return np.atleast_2d(weights(self.at[name], self._channel(name, record)))
 
     def steady(self, parameters: Parameters, record: Record) -> dict[str, Any]:
-        """The parameters with the law's state in the steady cycle of a record; ValueError if a channel varies along it."""
+        """The parameters with the law's state in the steady cycle of a record; ValueError if a channel varies."""
         constant, varying, _ = self._of_record(parameters, record)
         if varying:
             raise ValueError(f'{next(iter(varying))} varies along the record, which has no steady cycle: use "free"')

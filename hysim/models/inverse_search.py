@@ -133,7 +133,7 @@ def _slope(output: Callable[[float], float], here: float) -> float:
 
 
 def inverse_step(law: Any, u0: float, limits: Limits = UNLIMITED, sample_time: float = math.inf) -> CompiledLaw:
-    """The inverse of a law at rest at `u0`, as a step; TypeError if it cannot be stepped, ValueError without inverse."""
+    """The inverse of a law at rest at `u0`, as a step; TypeError or ValueError if it has none."""
     if isinstance(law, StepwiseInvertible):
         return law.compiled_inverse(u0, limits, sample_time)
     return searched_inverse(law, CompiledLaw(*law.compiled(u0)), limits=limits)

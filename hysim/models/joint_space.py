@@ -156,7 +156,7 @@ def _starts(spaces: Sequence[SearchSpace]) -> FloatArray:
 
 
 def common_states(parts: Mapping[str, Any], record: Record) -> tuple[str, ...]:
-    """Values of `initial` that every part with a state leaves to the record; none if one of them leaves nothing open."""
+    """Values of `initial` that every part with a state leaves to the record; empty if one leaves nothing open."""
     offered = [
         part.assumed_states(record) if isinstance(part, Undecided) else ()
         for part in parts.values()

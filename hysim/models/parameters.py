@@ -181,7 +181,7 @@ def spans(record: Record) -> dict[str, float]:
 
 
 def rate_spans(record: Record) -> dict[str, float]:
-    """`spans` with ``"v"``, the highest speed of the input, and ``"r"``, that of the output; ValueError without time."""
+    """`spans`, with the highest speeds ``"v"`` of the input and ``"r"`` of the output; ValueError without time."""
     units, time = spans(record), record.sample_time
     speed = float(np.abs(np.diff(record.u)).max()) / time
     return {**units, "v": speed, "r": units["y"] / units["u"] * speed}

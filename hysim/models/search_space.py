@@ -173,7 +173,8 @@ class Freedom:
     ) -> dict[str, float]:
         """The parameters that are not free, and their values: fixed ones, zeros `at_rest`, one of each redundant group.
 
-        A name in `free` is not among the last two kinds. Raises ValueError if a name is unknown, or both fixed and free.
+        A name in `free` is not among the last two kinds. Raises ValueError if a name is unknown, or both fixed and
+        free.
         """
         for argument, names in (("fixed", tuple(self.fixed)), ("free", self.free)):
             for name in names:
@@ -190,7 +191,7 @@ class Freedom:
         return held
 
     def limits(self, defaults: Mapping[str, float], held: Mapping[str, float]) -> dict[str, tuple[float, float]]:
-        """The bounds as floats; ValueError if a name is unknown or held, or a lower bound is not below its upper one."""
+        """The bounds as floats; ValueError if a name is unknown or held, or a lower bound is not below the upper."""
         for name, pair in self.bounds.items():
             if name not in defaults or name in held:
                 raise ValueError(f"bounds name {name!r}, which is not free; the parameters are {among(name, defaults)}")

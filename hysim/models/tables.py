@@ -51,8 +51,8 @@ def tables_of(
 ) -> tuple[dict[str, FloatArray], FloatArray]:
     """Every field over sets, (n_sets, ...), and the inputs (1 or n_sets, n_samples).
 
-    A parameter is a field or an element ``name[k]`` of a tuple; None is the default. Raises TypeError if a name is unknown,
-    and ValueError if a value has too many axes, or lengths do not fit.
+    A parameter is a field or an element ``name[k]`` of a tuple; None is the default. Raises TypeError if a name is
+    unknown, and ValueError if a value has too many axes, or lengths do not fit.
     """
     inputs = np.atleast_2d(read_only(u, "u"))
     if inputs.ndim != 2:

@@ -152,7 +152,7 @@ def power_coefficients(at: tuple[float, ...]) -> FloatArray:
 def columns_along(
     subject: Any, parameters: Parameters, varying: Mapping[str, FloatArray], record: Record
 ) -> FloatArray:
-    """As `Identifiable.regressors`, with parameters `varying` (n_sets, n_samples), none of them affine; else TypeError."""
+    """As `Identifiable.regressors`, with `varying` parameters (n_sets, n_samples), none affine; else TypeError."""
     if not varying:
         return np.asarray(subject.regressors(parameters, record))
     if isinstance(subject, Sum):
@@ -170,7 +170,7 @@ def columns_along(
 def response_along(
     model: Any, series: Mapping[str, FloatArray], u: FloatArray, sample_time: float | None = None
 ) -> FloatArray:
-    """Output (n_samples,) of a model with a `series` of some numbers; SimulationError, or TypeError if one cannot vary."""
+    """Output (n_samples,) of a model with a `series` of some numbers; TypeError if such a number cannot vary."""
     if not series:
         return response_of(model, u, sample_time)
     if isinstance(model, Sum):
@@ -213,7 +213,7 @@ def _of_sum(
 
 
 def paths(law: Law, parameters: Parameters, u: FloatArray) -> FloatArray:
-    """Outputs (n_sets, n_samples), inf where one diverges, for numbers of this shape, (n_sets,) or (); else ValueError."""
+    """Outputs (n_sets, n_samples) for numbers of this shape, (n_sets,) or (); inf for laws that diverge."""
     from hysim.kernels.varying import drive_varying  # compiled where it is needed
 
     if law.u0 is not None:

@@ -287,10 +287,11 @@ class Actuator:
     ) -> FloatArray:
         """True displacement (n,) at the samples of a command `u` (n,) that is held between them.
 
-        At the first sample the law has its initial memory and everything is at rest, creep included. Only a `dynamic` actuator
-        needs the `sample_time` [s]. `substeps` are those of a sample behind an amplifier that takes time, by default 4 to 64 of
-        a quarter of its time constant. Raises SimulationError if a stage diverges; ValueError if `u` is not finite or has not
-        one axis, no time is given where one is needed, or the vibration cannot rest at the first sample because it integrates.
+        At the first sample the law has its initial memory and everything is at rest, creep included. Only a `dynamic`
+        actuator needs the `sample_time` [s]. `substeps` are those of a sample behind an amplifier that takes time, by
+        default 4 to 64 of a quarter of its time constant. Raises SimulationError if a stage diverges; ValueError if `u`
+        is not finite or has not one axis, no time is given where one is needed, or the vibration cannot rest at the
+        first sample because it integrates.
         """
         inputs = read_only(u, "u", ndim=1)
         if not self._moves or not inputs.size:
@@ -332,7 +333,7 @@ class Actuator:
         return self.sensor.measure(self.as_read.response(u, sample_time, substeps=substeps))
 
     def startable(self, sample_time: float | None = None, *, substeps: int | None = None) -> Startable:
-        """A step from the command to what `measured` reads without noise; ValueError if it lacks a `sample_time` [s]."""
+        """A step from the command to what `measured` reads without noise; ValueError without a needed time [s]."""
         whole = self.as_read
         at_end = isinstance(whole.vibration, TransferFunction) and whole.vibration.sample == "end"
         return whole.chain(self._any_time(sample_time), substeps).startable(at_end=at_end)

@@ -64,7 +64,7 @@ class ChainState(NamedTuple):
 
 
 class Signals(NamedTuple):
-    """Signals at samples, `v` and `w` of the law at sub-steps, the first `lost` sample or -1, and how many were `held`."""
+    """Signals at samples, `v` and `w` of the law at sub-steps, first `lost` sample or -1, number of `held` ones."""
 
     command: FloatArray
     drive: FloatArray

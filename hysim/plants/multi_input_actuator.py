@@ -105,9 +105,9 @@ class MultiInputActuator:
     ) -> FloatArray:
         """Displacement (n,) at the samples of the inputs, each at rest at its first one.
 
-        `u` (n,) is the input ``"u"``, `channels` are the others by name, each one number or (n,); further ones are ignored.
-        Actuators that depend on time need the `sample_time` [s]. Raises ValueError if an input is missing, not finite or of
-        another length, or no time is given where one is needed; SimulationError if an actuator diverges.
+        `u` (n,) is the input ``"u"``, `channels` are the others by name, each one number or (n,); further ones are
+        ignored. Actuators that depend on time need the `sample_time` [s]. Raises ValueError if an input is missing, not
+        finite or of another length, or no time is given where one is needed; SimulationError if an actuator diverges.
         """
         return np.asarray(np.sum([*self.contributions(u, sample_time, channels=channels).values()], axis=0))
 

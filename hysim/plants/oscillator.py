@@ -223,8 +223,8 @@ class BoucWenOscillator:
     def response(self, u: npt.ArrayLike, sample_time: float) -> FloatArray:
         """Displacement (n,) [m] at the samples of `u` (n,) [N, or m/s^2], from the initial state at the first of them.
 
-        The samples are `sample_time` apart [s]. Raises SimulationError if the motion diverges, with the time; ValueError if
-        `u` is not finite or has not one axis, or the sample time is not positive.
+        The samples are `sample_time` apart [s]. Raises SimulationError if the motion diverges, with the time;
+        ValueError if `u` is not finite or has not one axis, or the sample time is not positive.
         """
         return self._states(u, sample_time, None, None)[1][:, 0].copy()
 

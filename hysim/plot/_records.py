@@ -22,7 +22,7 @@ _ARROW = 0.03  # its length along the input, of the span
 
 
 class InputOutput(Protocol):
-    """A Record, a Simulation or anything with `u` and `y`; `units`, `name`, times `t` and memory `z` are used if known."""
+    """A Record, a Simulation or anything with `u` and `y`, and perhaps `units`, `name`, times `t` and memory `z`."""
 
     @property
     def u(self) -> FloatArray: ...

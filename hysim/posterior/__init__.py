@@ -1,4 +1,4 @@
-"""Distributions in place of optima, `sample_posterior`, and `compare_evidence` of models, on the problem of `identify`."""
+"""Distributions in place of optima: `sample_posterior`, and `compare_evidence` of models on the same records."""
 
 from hysim.posterior._evidence import FACTORS, Evidence, EvidenceRow, compare_evidence, log_evidence
 from hysim.posterior._sample import Posterior, Prediction, sample_posterior

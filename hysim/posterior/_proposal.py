@@ -335,7 +335,7 @@ def _even(log_weight: FloatArray) -> float:
 
 
 def particles(target: Target, rng: np.random.Generator) -> tuple[FloatArray, FloatArray]:
-    """Particles (n, n_v) of about the posterior of v from the prior, and those at a lower power, which reach farther."""
+    """Particles (n, n_v) of about the posterior of v, and those at a lower power, which reach farther."""
     v = target.prior_draws(min(_PARTICLES, _PARTICLES_EACH * (target.n_x + 1)), rng)
     value, prior = target.marginal(v)
     power, early = 0.0, np.empty((0, v.shape[1]))

@@ -40,7 +40,7 @@ _FAR = 9.0  # from which on an end cuts off nothing that is seen in 64 bits
 def solved_within(
     triangle: FloatArray, best: FloatArray, e: FloatArray, low: FloatArray, high: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
-    """The w with R w - best normal between low and high, and ln |dw/de|; R (n_sets, n, n) has no zero on its diagonal."""
+    """The w with R w - best normal between low and high, and ln |dw/de|; no diagonal of R (n_sets, n, n) is zero."""
     w, log_volume = np.empty_like(e), np.zeros(len(e))
     for k in reversed(range(e.shape[1])):
         scale = triangle[:, k, k]

@@ -27,7 +27,7 @@ OUTPUTS = (*OF_NODES, *OF_ELEMENTS)
 
 
 class Laws(NamedTuple):
-    """Laws of a structure; steps are held, as the kernel knows only addresses; `rated` ones depend on the drift's rate."""
+    """Laws of a structure, with their steps, of which the kernel knows the address; `rated` ones need drift rates."""
 
     steppers: tuple[Startable, ...]
     stretches: tuple[tuple[tuple[int, int], ...], ...]

@@ -38,9 +38,10 @@ class MovingStructure(AssembledStructure):
     def response(self, u: npt.ArrayLike, sample_time: float) -> FloatArray:
         """Output (n_samples,) that `output` names, at the samples of an input that is linear between them.
 
-        `u` (n_samples,) is the acceleration of the base [m/s^2] or a force [N], whose samples are `sample_time` apart [s]; at
-        the first one the structure has its initial state. Raises SimulationError if the motion diverges or cannot be resolved,
-        with the time; ValueError if `u` is not finite or has not one axis, or the sample time is not positive.
+        `u` (n_samples,) is the acceleration of the base [m/s^2] or a force [N], whose samples are `sample_time` apart
+        [s]; at the first one the structure has its initial state. Raises SimulationError if the motion diverges or
+        cannot be resolved, with the time; ValueError if `u` is not finite or has not one axis, or the sample time is
+        not positive.
         """
         return self.signals(u, sample_time)["y"]
 

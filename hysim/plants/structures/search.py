@@ -208,7 +208,7 @@ class SearchedStructure(MovingStructure, Identifiable):
         return {}
 
     def search_space(self, record: Record, freedom: Freedom = ALL_FREE) -> SearchSpace:
-        """The box around the free numbers, and where parts of the record say to begin; ValueError if it cannot be made."""
+        """The box around the free numbers, and where parts of the record say to begin; ValueError if there is none."""
         if freedom.initial not in (None, "rest"):
             raise ValueError("a structure begins with its initial_state: leave initial out")
         if np.ptp(record.u) == 0.0:
