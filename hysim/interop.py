@@ -116,7 +116,6 @@ class ForeignTable:
 
 
 def table_in(value: Any) -> ForeignTable | None:
-    """The table that a value is; None if it is none."""
     kind = type(value).__name__
     if isinstance(value, type):
         return None

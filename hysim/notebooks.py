@@ -1,4 +1,4 @@
-"""Results in notebooks: their printed text as a table, and a small figure as an image with ids and styles of its own."""
+"""Results in notebooks: the printed text as a table, and a small figure as an image with its own ids and styles."""
 
 import base64
 import html

@@ -483,7 +483,6 @@ def as_record(value: Any, verb: str) -> Record | None:
 
 
 def check_increasing(t: FloatArray) -> None:
-    """Raise a ValueError if times do not increase from sample to sample."""
     if not (np.diff(t) > 0).all():
         k = int(np.argmax(np.diff(t) <= 0)) + 1
         raise ValueError(f"time must increase from sample to sample, got {t[k]} after {t[k - 1]} at sample {k}")

@@ -129,7 +129,6 @@ def extent(values: npt.ArrayLike, unit: str = "") -> str:
 
 
 def value_in_words(value: Any) -> str:
-    """The value of a parameter; an array by its shape and extent."""
     if isinstance(value, np.ndarray):
         size = " x ".join(map(str, value.shape)) or "1"
         return f"{size} values, {extent(value)}"

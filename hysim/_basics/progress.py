@@ -71,7 +71,6 @@ def along(progress: Reports) -> Iterator[None]:
 
 
 def followed(done: int, total: int) -> None:
-    """Report how many samples have been followed, if `along` asks for it."""
     if (progress := _along.get()) is not None:
         progress(done, total)
 
@@ -148,8 +147,6 @@ class Line:
 
 
 def _listener(event: Any, line: Line) -> Any:
-    """What numba tells about each compilation that begins."""
-
     class Listener(event.Listener):  # type: ignore[misc]
         def on_start(self, _: Any) -> None:
             line.compiling()

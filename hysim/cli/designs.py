@@ -126,7 +126,6 @@ def designed(path: str, options: DesignOptions, exported: Callable[[Any], object
 
 
 def plant(model: Any, options: DesignOptions) -> hs.Actuator:
-    """The model as an actuator, with the stages that the options add or replace."""
     actuator = as_actuator(model)
     stages: dict[str, Any] = {}
     if options.mode is not None:
@@ -141,7 +140,6 @@ def plant(model: Any, options: DesignOptions) -> hs.Actuator:
 
 
 def variations(actuator: hs.Actuator, percent: float | None) -> list[hs.Actuator]:
-    """The plant with its only mode at a lower and at a higher frequency."""
     if percent is None:
         return []
     if not 0.0 < percent < 100.0:
@@ -219,7 +217,7 @@ def reference(task: Task, rest: float, kind: str, unit: str | None) -> tuple[Flo
 
 
 def feedback(actuator: hs.Actuator, kind: str, within: Pair | None) -> hs.PID | hs.TrackingController | None:
-    """Feedback before its tuning, without the inverse, which knows the plant exactly; None for the default of `tune`."""
+    """Feedback before its tuning, without the inverse, which knows the plant exactly; None for the default."""
     if kind == "pid":
         return None
     if kind != "notch":

@@ -99,7 +99,6 @@ def parameters(function: Callable[..., int]) -> Iterator[Parameter]:
 
 
 def call(function: Callable[..., int], values: Mapping[str, Any]) -> int:
-    """Call the function of a command with the values of its options."""
     arguments = {}
     for name, hint in typing.get_type_hints(function).items():
         if dataclasses.is_dataclass(hint):

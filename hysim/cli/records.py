@@ -174,7 +174,6 @@ def cut(record: "hs.Record", settings: InputOptions) -> "hs.Record":
 
 
 def _sample(record: "hs.Record", place: options.Place | None, option: str) -> int | None:
-    """The number of the first sample at or after a place."""
     import numpy as np
 
     if place is None:

@@ -318,7 +318,6 @@ def _is_family(subject: Any) -> bool:
 
 
 def _with_initial_state(record: Record, fitted: Identification, seed: int) -> Any:
-    """The identified model, with the initial state that fits another record best."""
     model = on_record(fitted.model, record)
     if not is_searched(model):
         return model

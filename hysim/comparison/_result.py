@@ -320,7 +320,6 @@ class Comparison:
         return f"all others are significantly worse, the nearest {nearest_in_words} {method}"
 
     def _exceptions_in_words(self) -> list[str]:
-        """Models that diverged, and those whose ranks and rmse disagree."""
         diverged = tuple(each.name for each in self.contrasts if each.diverged)
         smaller = tuple(each.name for each in self.contrasts if each.contradicts)
         sentences = [f"{_first(diverged)} diverged on samples left out."] if diverged else []

@@ -147,7 +147,6 @@ class AdaptiveInverse(WithoutFeedback):
         return parameters[0], memory[0]
 
     def _begun(self, parameters: FloatArray, u0: float) -> tuple[float, FloatArray]:
-        """Output at rest at `u0` of a copy of the law, and its state."""
         front = self.law.packed[1]
         state = np.concatenate([front, np.zeros(self.law.workspace)])
         constants = read_only(parameters, finite=False)

@@ -87,7 +87,6 @@ def held_samples(state: CompiledController) -> int:
 
 
 def limits_of(controller: object) -> tuple[float, ...] | None:
-    """Lowest and highest command of a controller; None for no limits."""
     return controller.limits if isinstance(controller, Limited) else None
 
 

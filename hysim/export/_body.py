@@ -231,7 +231,6 @@ class Body:
         return lines
 
     def _named(self, target: ast.expr, value: Stretch, indent: str, declared: set[str]) -> list[str]:
-        """A name for a part of a vector."""
         if not isinstance(target, ast.Name):
             raise self.source.refusal(target, "a vector is copied by a loop")
         name, c_name = target.id, self.scope.c_name(target.id)
@@ -329,7 +328,6 @@ def _independent(places: list[ast.expr], values: list[ast.expr]) -> bool:
 
 
 def _looks(node: ast.expr) -> bool:
-    """Whether an expression reads elements of vectors, or may."""
     return any(isinstance(each, ast.Subscript | ast.Call) for each in ast.walk(node))
 
 

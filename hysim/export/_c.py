@@ -340,7 +340,6 @@ def counters_used_elsewhere(body: list[ast.stmt]) -> list[ast.For]:
 
 
 def targets(statement: ast.stmt) -> list[str]:
-    """Names that a statement assigns, if it is a plain assignment."""
     if not isinstance(statement, ast.Assign):
         return []
     each = [

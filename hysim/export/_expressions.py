@@ -286,7 +286,6 @@ class Expressions:
         return Value(f"{several.text}.at{place}", several.type.members[place])
 
     def place(self, node: ast.Subscript, whole: Stretch) -> str:
-        """The index of an element, in brackets."""
         index = node.slice
         parts = index.elts if isinstance(index, ast.Tuple) else [index]
         if len(parts) != len(whole.lengths):

@@ -51,7 +51,6 @@ class Packing:
         return "\n".join(texts).replace("@", f"{name}_")
 
     def _function(self, name: str) -> tuple[str, list[str]]:
-        """The function in C, and the names of the helpers that it calls."""
         locals_, texts = self._tape.texts((*self.parameters, *self.memory))
         truths, size = self._tape.truth_values(), len(self.parameters)
         lines = [
@@ -249,7 +248,6 @@ def _plain(values: Any) -> Any:
 
 
 def _names(inputs: Sequence[Any]) -> tuple[str, ...]:
-    """The fields on which arrays depend."""
     symbols = [
         number
         for each in inputs

@@ -209,7 +209,6 @@ def _stack(controls: list[dict[str, Any]], law: Any) -> list[dict[str, Any]]:
 
 
 def _between(thing: Any, record: Record | None) -> tuple[float, float]:
-    """Lowest and highest input at the start."""
     if record is not None:
         return float(record.u.min()), float(record.u.max())
     fields = {name: np.asarray(value) for name, value in items(thing).items() if isinstance(value, tuple) and value}
@@ -221,7 +220,6 @@ def _between(thing: Any, record: Record | None) -> tuple[float, float]:
 
 
 def _record(record: Record) -> dict[str, Any]:
-    """A record as the page takes it, with the cycle that is measured."""
     try:
         loops = measured_cycles(record.u, 1, TOLERANCE)
     except ValueError:

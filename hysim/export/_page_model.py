@@ -145,7 +145,6 @@ class _Reach:
 
 
 def _boxes(law: Law, record: Record) -> dict[str, tuple[float, float]]:
-    """Sides of the search box for the numbers that are searched as they are."""
     try:
         space = law.search_space(record)
     except ValueError:
@@ -217,7 +216,6 @@ def _members(members: tuple[Any, ...], u: FloatArray, parts: Parts, prefix: str)
 
 
 def _law(law: Law, parts: Parts, first: int) -> dict[str, Any]:
-    """A law by its module and the function that packs its numbers."""
     general = _general(law)
     packed = packing(general)
     kernels, state = kernels_of(general), general.startable().state
@@ -339,7 +337,6 @@ def _name(family: type) -> str:
 
 
 def about(thing: Any) -> tuple[str, str]:
-    """First sentences about a model's family as markup, and its equation."""
     if isinstance(thing, (Sum, Cascade)):
         members = thing.parts if isinstance(thing, Sum) else thing.stages
         word = "Sum" if isinstance(thing, Sum) else "Cascade"

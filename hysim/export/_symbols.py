@@ -104,7 +104,6 @@ class Tape:
         return Symbol(self, self._places[key])
 
     def needed(self, numbers: Iterable[Number]) -> list[int]:
-        """Places of the operations that lead to these numbers, in their order."""
         seen: set[int] = set()
         waiting = [number.place for number in numbers if isinstance(number, Symbol)]
         while waiting:
@@ -272,7 +271,6 @@ _IN_JS = (
 
 
 def helper(name: str, language: str) -> str:
-    """Text of a function that operations call, in C99 or in JavaScript."""
     if language == "c":
         return HELPERS[name]
     return _JS_HELPERS.get(name) or in_javascript(HELPERS[name])

@@ -103,7 +103,6 @@ class Array:
         return Column((self, index), f"{self.label}[{text}]", self.unit or "")
 
     def numbers(self) -> FloatArray:
-        """All numbers, as one column if there is one long axis."""
         values = np.asarray(self.read())
         kind = KINDS.get(values.dtype.kind, "no numbers")
         require(kind == NUMBERS, f"array {shown(self.label)} holds {kind}: a column must hold real numbers")
@@ -297,7 +296,6 @@ class _MatReader:
         return tag + inside
 
     def arrays(self, matrix: Callable[..., bytes | memoryview], struct: str = "", depth: int = 0) -> Iterator[Array]:
-        """The array in a matrix, or those in a struct."""
         from scipy.io import whosmat
 
         beginning = matrix(most=_BEGINNING)

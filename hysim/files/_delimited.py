@@ -107,7 +107,6 @@ class Text(NamedTuple):
                 stream.detach()
 
     def samples(self) -> Iterator[Lines]:
-        """The lines that are neither blank nor comments."""
         for numbers, texts in self.lines():
             begins = {line[:1] for line in texts}
             if not any(sign in ("", *COMMENTS) or sign.isspace() for sign in begins):
@@ -357,7 +356,6 @@ def _signs(lines: list[str], delimiter: str | None, decimal: str | None, thousan
 
 
 def _heads(rows: list[list[str]], below: list[list[str]], line: int, signs: Signs) -> tuple[bool, bool]:
-    """Whether the first line is a header, and whether the second one holds units."""
     width = len(below[0]) if below else len(rows[0])
     columns = [[signs.kind(row[place]) for row in below] for place in range(width)]
     numeric = {place for place, kinds in enumerate(columns) if kinds.count("number") >= max(1, kinds.count("text"))}

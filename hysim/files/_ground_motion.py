@@ -202,7 +202,6 @@ def _of_text(text: str, choice: _Choice, skip: int, delimiter: str | None, decim
 
 
 def _table_below_titles(text: str, delimiter: str | None, decimal: str | None) -> Table:
-    """The table in a text, below any number of lines of text."""
     lines, errors = text.split("\n"), list[ValueError]()
     titles = _titles(lines)
     for kept in (len(titles), 2, 1, 0):  # all, names and units, names, or none
@@ -397,7 +396,6 @@ def in_si(values: FloatArray, unit: str) -> FloatArray:
 
 
 def check_unit(unit: str | None) -> None:
-    """Raise a ValueError if a unit is given that is none of acceleration."""
     if unit is not None and _name(unit) is None:
         raise ValueError(f"units must be a unit of acceleration: {_KNOWN}, got {unit!r}")
 

@@ -96,7 +96,6 @@ class _Reader(NamedTuple):
         return text is not None and (self.texts or text.length is not None)
 
     def attribute(self, item: Any, name: str) -> str | float | None:
-        """The short text or the number in an attribute."""
         if name not in item.attrs:
             return None
         shape, dtype = item.attrs.get_id(name).shape, item.attrs.get_id(name).dtype

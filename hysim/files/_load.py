@@ -304,7 +304,6 @@ def _check_size(name: str, size: int) -> None:
 
 @contextmanager
 def table_of(source: Opened, for_text: Mapping[str, Any], progress: Progress | None = None) -> Iterator[Table]:
-    """The table that a source holds, open to be read from."""
     if source.format == "text":
         encoding = source.encoding or for_text["encoding"]
         reading = _reading(progress, _TIMES * source.content.seek(0, 2))

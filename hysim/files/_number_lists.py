@@ -85,7 +85,6 @@ def block_below(text: str, line: int) -> str:
 
 
 def check_quantity(header: str) -> None:
-    """Refuse the velocities and displacements that are published beside accelerations."""
     words = {word.upper() for word in re.findall(r"[A-Za-z]+", header)}
     other = next((word for word in ("VELOCITY", "DISPLACEMENT") if word in words), None)
     require(

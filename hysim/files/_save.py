@@ -141,7 +141,6 @@ def _text(columns: Mapping[str, FloatArray], notes: Notes, *, delimiter: str) ->
 
 
 def _arrays(columns: Mapping[str, FloatArray], notes: Notes) -> dict[str, Any]:
-    """The columns, and the notes beside them, by the names that they have in a file."""
     others: dict[str, Any] = {f"{label}_units": unit for label, unit in notes.units.items()}
     if notes.name is not None:
         others["name"] = notes.name

@@ -143,7 +143,6 @@ def shown(text: str, longest: int = 40) -> str:
 
 
 def listed(names: Sequence[str], most: int = 20) -> str:
-    """Names from a file, in one line."""
     plain = [name if name.isprintable() and len(name) <= 80 else shown(name, 80) for name in names[:most]]
     return ", ".join(plain) + (f" and {len(names) - most} more" if len(names) > most else "")
 
@@ -164,7 +163,6 @@ def notes_in(stated: Mapping[str, Any], units: Mapping[Any, Any]) -> Notes:
 
 
 def json_value(text: str) -> Any:
-    """The value that a text in JSON holds; None if it is none."""
     try:
         return json.loads(text)
     except (ValueError, RecursionError):

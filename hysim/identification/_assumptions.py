@@ -302,7 +302,6 @@ def _bic(attempt: Problem, x: FloatArray, cost: float) -> float:
 
 
 def _best(choices: Sequence[int], bic: Callable[[int], float]) -> int:
-    """The first choice, or a later one that is clearly better than it and all before."""
     best = choices[0]
     for k in choices[1:]:
         if bic(k) < bic(best) - _STRONG:

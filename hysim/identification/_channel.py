@@ -227,7 +227,6 @@ class _UnknownChannel(Identifiable):
     state: tuple[str, ...]  # the law's numbers that are searched beside the channel
 
     def search_space(self, record: Record, freedom: Freedom = ALL_FREE) -> SearchSpace:
-        """The channel's range, and the law's box of the state."""
         law = self.model.law
         fixed = {name: value for name, value in law.scalars.items() if name not in self.state}
         own = law.search_space(record, replace(freedom, fixed=fixed))
@@ -259,7 +258,6 @@ class _UnknownChannel(Identifiable):
         return joint
 
     def regressors(self, parameters: Parameters, record: Record) -> FloatArray:
-        """The output itself, shape (n_sets, n_samples, 1)."""
         numbers = {**self.model.law.scalars, **self._numbers(parameters)}
         columns = np.asarray(self.model.law.regressors(numbers, record))
         output = columns[..., -1]

@@ -102,7 +102,6 @@ def _behind(front: ReversalFilter | None, model: Any) -> Any:
 
 
 def _alone(model: Any) -> Any:
-    """A model without the filter that `_behind` has put there."""
     return _with_law(model, lambda law: law.behind_filter)
 
 

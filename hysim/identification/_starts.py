@@ -120,7 +120,6 @@ def _searched(plant: Any, setting: Setting) -> _End:
 
 
 def _gone_on(end: _End) -> _End:
-    """The best end of descents that begin about an end."""
     points = end.plant.beyond(end.whole.space, end.ends)
     return end._replace(ends=_descended(end.whole, points, exact=False)[:1]) if len(points) > 1 else end
 
@@ -195,7 +194,6 @@ def _grown(plant: Any, law: Any, setting: Setting) -> tuple[Any, list[Coordinate
 
 
 def _found(attempt: Problem, plant: Any, known: Sequence[Coordinates]) -> FloatArray:
-    """Ends of descents from the best points on the fastest record, the best first."""
     space = attempt.space
     points = plant.points(space, known)
     best = apart(space, points, attempt.costs(points), _APART, _BEST)
@@ -284,7 +282,6 @@ def _descended(attempt: Problem, points: FloatArray, *, exact: bool) -> FloatArr
 
 
 def _parts_only(attempt: Problem, ends: FloatArray) -> list[Coordinates]:
-    """Coordinates by name, without those of the law."""
     names, plant = attempt.space.coordinates, attempt.family
     known: list[Coordinates] = [
         {name: value for name, value in zip(names, row, strict=True) if not name.startswith("hysteresis.")}
@@ -320,7 +317,6 @@ def begun(structure: DependentStructure, setting: Setting) -> DependentStructure
 
 
 def _short_search(law: Any, setting: Setting) -> dict[str, float] | None:
-    """The parameters of the law where a short search ends; None if it finds nothing."""
     try:
         attempt = setting.problem(law)
         x, cost = brief_optimum(attempt)

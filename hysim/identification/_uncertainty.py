@@ -216,7 +216,6 @@ def _bounds_in_words(
 
 
 def _at(names: Sequence[str], values: Mapping[str, float], verb: str, bound: str) -> str:
-    """Parameters at a bound; the values of a few."""
     if len(names) > _MOST_NAMES:
         return f"{_shortened(names)} {verb.replace('is', 'are')} their {bound}s"
     return ", ".join(f"{name} {verb} its {bound} {values[name]:.4g}" for name in names)

@@ -59,7 +59,6 @@ def to_plain(value: Any) -> Any:
 
 
 def from_plain(value: Any, kinds: Sequence[type]) -> Any:
-    """The value that `to_plain` wrote, of results that are one of `kinds`."""
     if isinstance(value, dict) and value.keys() == {"result", "fields"}:
         kind = {each.__name__: each for each in kinds}[value["result"]]
         hints = typing.get_type_hints(kind)

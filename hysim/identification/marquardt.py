@@ -62,7 +62,6 @@ def _by_singular_values(columns: FloatArray, target: FloatArray) -> FloatArray:
 
 
 def _by_triangle(columns: FloatArray, target: FloatArray) -> FloatArray:
-    """`least_squares` by triangles, where they have full rank."""
     rows, goal = triangle(columns, target)
     n = columns.shape[2]
     solutions = np.empty((len(columns), n))

@@ -261,7 +261,6 @@ def loop_metrics(u: npt.ArrayLike, y: npt.ArrayLike, *, cycles: int = 1, toleran
 
 
 def measure(inputs: FloatArray, outputs: FloatArray, cycles: list[Cycle]) -> LoopMetrics:
-    """Measures of one cycle, or of the mean of several."""
     loadings = [_curve(inputs[cycle.loading], outputs[cycle.loading]) for cycle in cycles]
     unloadings = [_curve(inputs[cycle.unloading], outputs[cycle.unloading]) for cycle in cycles]
     grid = common_inputs([x for x, _ in loadings + unloadings])

@@ -96,7 +96,6 @@ class Batch(NamedTuple):
         )
 
     def _in_blocks(self, keep: Callable[[Sets, FloatArray], None], workers: int | None) -> None:
-        """Call `keep(sets, y)` for blocks of sets that stand together in the order."""
         n_samples = self.u.shape[1]
         size = max(1, _BLOCK // max(1, n_samples))
 

@@ -48,14 +48,12 @@ class Composable:
     units: ClassVar[Mapping[str, str]] = MappingProxyType({})
 
     def __add__(self, other: "Composable") -> Any:
-        """Sum of the outputs; a sum among the operands adds its own parts."""
         return _joined(self, other, _KINDS["+"])
 
     def __radd__(self, other: Any) -> Any:
         return _joined(other, self, _KINDS["+"])
 
     def __rshift__(self, other: "Composable") -> Any:
-        """`other` behind this; a cascade among the operands adds its own stages."""
         return _joined(self, other, _KINDS[">>"])
 
     def __rrshift__(self, other: Any) -> Any:

@@ -186,12 +186,10 @@ class DependentStructure(Identifiable):
 
     @cached_property
     def at(self) -> Places:
-        """Places of the polynomials of degree 1 and more."""
         return {name: places(*self.spans[name], degree) for name, (_, degree) in self.depends.items() if degree}
 
     @cached_property
     def names(self) -> Mapping[str, tuple[str, ...]]:
-        """Names of the values at the places, by parameter."""
         return {name: names_of(name, self.depends[name][0], at) for name, at in self.at.items()}
 
     def search_space(self, record: Record, freedom: Freedom = ALL_FREE) -> SearchSpace:

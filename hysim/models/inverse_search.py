@@ -89,7 +89,6 @@ def inverse_at_rest(law: Any, y: float, u0: float | None) -> CompiledLaw:
 
 
 def first_input(law: Any, y: float) -> float:
-    """The first input whose output is `y`, found from zero."""
     from scipy.optimize import brentq
 
     def error(u: float) -> float:

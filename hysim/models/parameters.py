@@ -188,6 +188,5 @@ def rate_spans(record: Record) -> dict[str, float]:
 
 
 def unit_of(unit: str, units: Mapping[str, float]) -> float:
-    """Value of a unit such as ``"y/u"`` on a record with these spans."""
     numerator, _, denominator = unit.partition("/")
     return units[numerator] / units[denominator or "1"]

@@ -29,7 +29,6 @@ def _label(part: Any) -> str:
 
 
 def check_parts(parts: Any, what: str) -> tuple[Any, ...]:
-    """The parts as a tuple, each with a response."""
     members = checked_tuple(parts, what)
     for member in members:
         if isinstance(member, type) or not isinstance(member, Responding):
@@ -53,7 +52,6 @@ def response_of(part: Any, u: FloatArray, sample_time: float | None) -> FloatArr
 
 
 def compiled_pair(join: Callable[[Step, Step], Step], first: CompiledLaw, second: CompiledLaw) -> CompiledLaw:
-    """Two laws as one, joined by a function of `hysim.kernels.stepping`."""
     sizes = [float(first.parameters.size), float(first.state.size)]
     return CompiledLaw(
         _joined(join, first.step, second.step),

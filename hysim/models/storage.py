@@ -99,7 +99,6 @@ def from_json(text: str | bytes, source: str | Path) -> tuple[Any, dict[str, str
 
 
 def _units(document: Any) -> dict[str, str]:
-    """The units of a document, whose outer form is checked."""
     if not isinstance(document, dict):
         raise ValueError(f'expected a mapping with "family" and "parameters", got {_shown(document)}')
     if missing := [name for name in ("family", "parameters") if name not in document]:
@@ -126,7 +125,6 @@ def _each_name_once(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
 
 
 def _check_depth(document: Any) -> None:
-    """Refuse values nested so deeply that neither Python nor NumPy would take them."""
     layer = [document]
     for _ in range(_DEEPEST):
         layer = [item for each in layer for item in _members(each)]

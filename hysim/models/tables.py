@@ -16,7 +16,6 @@ Tables = Mapping[str, FloatArray]
 
 
 def scalars_of(values: Mapping[str, Any]) -> dict[str, float]:
-    """One number for each name, those of a tuple as ``name[k]``."""
     numbers: dict[str, float] = {}
     for name, value in values.items():
         if isinstance(value, tuple):
@@ -27,7 +26,6 @@ def scalars_of(values: Mapping[str, Any]) -> dict[str, float]:
 
 
 def arguments_of(scalars: Mapping[str, float]) -> dict[str, Any]:
-    """The constructor's arguments, those named ``name[k]`` as one tuple."""
     arguments: dict[str, Any] = {}
     for name, value in scalars.items():
         whole, bracket, _ = name.partition("[")

@@ -163,7 +163,6 @@ def denominators(x: FloatArray, poles: int) -> FloatArray:
 
 
 def _times(polynomials: FloatArray, factor: list[FloatArray]) -> FloatArray:
-    """Products of rows of polynomials with one factor for each row."""
     product = np.zeros((len(polynomials), polynomials.shape[1] + len(factor) - 1))
     for k, coefficient in enumerate(factor):
         product[:, k : k + polynomials.shape[1]] += coefficient[:, np.newaxis] * polynomials

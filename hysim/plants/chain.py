@@ -100,7 +100,6 @@ class Chain:
 
     @property
     def linear_block(self) -> FloatArray:
-        """The linear stage as one block of numbers; see `hysim.kernels.loop`."""
         stage = self.stage
         return np.concatenate([np.ravel(part) for part in (stage.decline, stage.A, stage.B, self.outputs)])
 

@@ -203,7 +203,6 @@ class LinearParts:
         return spaces
 
     def boxes(self) -> dict[str, tuple[tuple[Coordinate, ...], dict[str, float]]]:
-        """Coordinates and defaults of each part that has something to be searched."""
         survey = self.survey
         boxes: dict[str, tuple[tuple[Coordinate, ...], dict[str, float]]] = {}
         if self.amplifier == "first-order":

@@ -209,7 +209,6 @@ class ModalGains(Identifiable):
         return np.stack([record.u, np.ones(len(record)), np.zeros(len(record))], axis=-1)[np.newaxis]
 
     def assemble(self, parameters: Mapping[str, float]) -> InputSum:
-        """Lines in place of the laws."""
         return InputSum({name: Line(slope=1.0) for name in self.inputs})
 
     def _name(self, k: int, name: str) -> str:

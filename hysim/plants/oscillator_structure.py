@@ -147,7 +147,6 @@ class _Equation:
         return np.where(np.isfinite(errors), errors, np.inf)
 
     def parameters(self, x: FloatArray) -> dict[str, float]:
-        """The user's parameters at one point (n_x,)."""
         columns = np.column_stack([self.known, self.memories(x[np.newaxis])[0]])
         mass, damping, stiffness, A = regression(columns, self.target)
         law = {name: float(value[0]) for name, value in self.laws.parameters(x[np.newaxis]).items()}

@@ -103,16 +103,13 @@ class Target:
 
     @property
     def n_dim(self) -> int:
-        """Length of a point."""
         return self.n_x + self.n_linear + 1
 
     @property
     def names(self) -> tuple[str, ...]:
-        """The user's parameters, and sigma."""
         return (*self.problem.space.names, SIGMA)
 
     def priors_in_words(self) -> dict[str, str]:
-        """Name of each coordinate and linear parameter, and of sigma, to its prior."""
         space, ends = self.problem.space, zip(self.x_prior.lower.tolist(), self.x_prior.upper.tolist(), strict=True)
         words = {
             name: f"flat from {low:.4g} to {high:.4g} in the coordinate of the search"

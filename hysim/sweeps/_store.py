@@ -165,7 +165,6 @@ class Store:
         self._tasks: list[Column] = []  # seeds and parameters of all tasks
 
     def begin(self, identity: Mapping[str, str], space: Space, seeds: Column, on_change: OnChange) -> None:
-        """Prepare the store for writing rows of this study, or refuse it."""
         self._tasks = [seeds, *space.columns.values()]
         self._database.execute("BEGIN IMMEDIATE")
         before = self._read()
@@ -200,7 +199,6 @@ class Store:
         return tuple((output.name, output.shape) for output in self._study.layout or ()) or None
 
     def finished(self) -> Outcome:
-        """All finished rows, in the order of the tasks."""
         with damage_named(self.path):
             places = np.array(self._column("task"), dtype=np.int64)
             if places.size and not 0 <= places[0] <= places[-1] < self.n_tasks:
@@ -263,7 +261,6 @@ class Store:
         return facts
 
     def _read(self) -> Study | None:
-        """The study that the store holds; None if it is new."""
         tables = [name for (name,) in self._database.execute("SELECT name FROM sqlite_master WHERE type = 'table'")]
         if not tables:
             return None
@@ -278,7 +275,6 @@ class Store:
         return facts
 
     def _is_continued(self, before: Mapping[str, str], now: Mapping[str, str], on_change: OnChange) -> bool:
-        """Whether the finished rows are kept."""
         changes = _changes(before, now)
         if not changes or on_change == "restart":
             return not changes

@@ -285,7 +285,6 @@ class _Run:
         self.sent, self.largest, self.seconds_a_task = 0, 0, 0.0
 
     def run(self) -> None:
-        """Compute the remaining tasks, a bounded number of chunks at a time."""
         self._report()
         try:
             while self._send() or self.running:

@@ -87,7 +87,6 @@ class Copies:
         self._places = [_place(name) for name in coordinates.names]
 
     def begun(self, u0: float) -> FloatArray:
-        """The memory before a first sample at `u0`."""
         return np.array(self._law.state_at(u0))
 
     def moved(self, x: FloatArray, memory: FloatArray, before: float, u: float) -> FloatArray:

@@ -154,7 +154,6 @@ def steps_of(rate: float, sample_time: float, substeps: int | None, tolerance: f
 
 
 def empty_flows(halvings: int, m: int, n_loads: int, n_elements: int) -> tuple[FloatArray, FloatArray, Flows]:
-    """Room for `fill_structure`: two tables of its own, and the flows."""
     n_levels, n_free = halvings + 2, m + 2 * n_loads
     return (
         np.empty((n_levels, m, m)),

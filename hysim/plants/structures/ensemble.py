@@ -82,7 +82,6 @@ def _values(structure: Any, given: Mapping[str, npt.ArrayLike] | npt.ArrayLike) 
 def _reduced(
     structure: Any, values: Mapping[str, FloatArray], u: FloatArray, n_sets: int, sample_time: float, reduce: Reduction
 ) -> FloatArray:
-    """The measure of each set, a row each."""
     laws, parameters, states, slopes, matrices = _stacked(structure, values, n_sets)
     A, loads, rates = assembly.linear_parts(matrices)
     n_elements, n = len(structure.elements), structure.n_nodes

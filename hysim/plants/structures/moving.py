@@ -92,7 +92,6 @@ class MovingStructure(AssembledStructure):
         self, u: FloatArray, sample_time: float, state: StructureState | None,
         progress: Callable[[int, int], None] | None, *, with_laws: bool,
     ) -> tuple[StructureState, Tracks]:  # fmt: skip
-        """The state after the samples, and all of them."""
         positive_time(sample_time)
         before = state or self.start()
         motion = Motion(*(part.copy() for part in before.motion))
@@ -234,7 +233,6 @@ class ControlledStructure:
         return float(self.weights @ np.concatenate([motion.x, motion.carry[0], [0.0]]))
 
     def run(self, controller: CompiledController, reference: FloatArray, progress: Progress | None) -> Controlled:
-        """The loop with a controller, whose state moves along."""
         n, motion = reference.size, Motion(*(part.copy() for part in self.begin.motion))
         (address,), follow = addresses([controller.step], CONTROLLER), assembly.follow_address()
         inputs = np.column_stack([reference] if self.ground is None else [reference, self.ground])

@@ -320,7 +320,6 @@ def _numbers(name: str, value: Any) -> dict[str, float]:
 
 
 def _changed(name: str, value: Any, numbers: Mapping[str, float]) -> Any:
-    """The mass, the stiffness or the damping with other numbers."""
     whole = numbers.get(name)
     if isinstance(value, Rayleigh):
         own = [numbers.get(f"{name}.{part}", vars(value)[part]) for part in ("mass", "stiffness")]

@@ -118,7 +118,6 @@ class _Columns:
         return np.array([self.force(e, float(d)) for e, d in enumerate(drifts)])
 
     def tangents(self, drifts: FloatArray) -> FloatArray:
-        """Slopes of the forces at the end of strokes."""
         slopes = self.slopes.copy()
         for e, (drift, begin) in enumerate(zip(drifts, self.drifts, strict=True)):
             d = _DIFFERENCE * abs(drift - begin)
@@ -480,7 +479,6 @@ class Structure(SearchedStructure):
         return self._pushed(pattern, at, lambda begin: strokes(turns, begin, steps))
 
     def _pushed(self, pattern: npt.ArrayLike | None, at: str, control: Callable[[float], FloatArray]) -> StaticResponse:
-        """Equilibria at the values of ``control(begin)``."""
         row = self._controlled(at)
         loads = row if pattern is None else read_only(pattern, "pattern", ndim=1)
         n, n_elements = self.n_nodes, len(self.elements)
