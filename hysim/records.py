@@ -161,16 +161,11 @@ class Record:
         return even_step(self.t)
 
     def reversals(self, tolerance: float = 0.0) -> npt.NDArray[np.intp]:
-        """Samples at which the input turns, the middle one of a plateau; the record's ends are not counted.
+        """Samples at which the input turns (n_reversals,), the middle one of a plateau; the record's ends are not
+        counted.
 
-        Parameters
-        ----------
-        tolerance : float
-            Reversals up to this fraction of the input's span are ignored; a ValueError unless from 0 to below 0.5.
-
-        Returns
-        -------
-        array of int, shape (n_reversals,)
+        Reversals up to the fraction `tolerance` of the input's span are ignored; a ValueError unless it is from 0 to
+        below 0.5.
 
         Examples
         --------
@@ -186,16 +181,8 @@ class Record:
         """Branches on which the input rises or falls, in the order of time; none if the input is constant.
 
         A plateau between two branches is divided in its middle; the sample in the very middle, and a reversal without a
-        plateau, belong to both.
-
-        Parameters
-        ----------
-        tolerance : float
-            As in `reversals`: smaller reversals do not end a branch, and are left out at the record's ends.
-
-        Returns
-        -------
-        tuple of Record
+        plateau, belong to both. Reversals within the `tolerance`, as in `reversals`, do not end a branch, and are left
+        out at the record's ends.
 
         Examples
         --------
@@ -238,22 +225,9 @@ class Record:
     def resample(self, sample_time: float) -> Self:
         """Interpolate the record and its channels linearly at even times, from the first time on.
 
-        An extreme of the input between two new samples is lost: choose a step well below the time between reversals.
-
-        Parameters
-        ----------
-        sample_time : float
-            Time between two samples [``units["t"]``].
-
-        Returns
-        -------
-        Record
-
-        Raises
-        ------
-        ValueError
-            If the record has no time, or the step is not positive, longer than the record, or gives more than 1e8
-            samples.
+        An extreme of the input between two new samples is lost: choose a `sample_time` [``units["t"]``] well below the
+        time between reversals. A ValueError is raised if the record has no time, or the step is not positive, longer
+        than the record, or gives more than 1e8 samples.
 
         Examples
         --------
@@ -319,21 +293,9 @@ class Record:
     def split(self, *places: float) -> tuple[Self, ...]:
         """Cut the record in two or more parts without common samples, such as one to identify from and one to test on.
 
-        Parameters
-        ----------
-        *places : int or float
-            Increasing places to cut at: the number of the next part's first sample, or a fraction of the samples.
-
-        Returns
-        -------
-        tuple of Record
-
-        Raises
-        ------
-        ValueError
-            If there is no place, or a part has fewer than 2 samples.
-        TypeError
-            If a place is neither an integer nor a fraction between 0 and 1.
+        The `places` increase: each is the number of the next part's first sample, or a fraction of the samples between
+        0 and 1; anything else is a TypeError. A ValueError is raised without a place, or if a part has fewer than 2
+        samples.
 
         Examples
         --------
@@ -352,20 +314,9 @@ class Record:
     def convert(self, units: Mapping[str, str]) -> Self:
         """Convert the record to units that differ from its own by an SI prefix.
 
-        Parameters
-        ----------
-        units : mapping
-            New units of ``"t"``, ``"u"``, ``"y"`` or channels: ``{"y": "nm"}`` for an output in um.
-
-        Returns
-        -------
-        Record
-            Values, and with the output also the resolution, are multiplied by a power of ten.
-
-        Raises
-        ------
-        ValueError
-            If a signal has no unit or no values, or its unit and the new one differ by more than a prefix.
+        `units` are the new ones of ``"t"``, ``"u"``, ``"y"`` or channels: ``{"y": "nm"}`` for an output in um. Values,
+        and with the output also the resolution, are multiplied by a power of ten. A ValueError is raised if a signal
+        has no unit or no values, or its unit and the new one differ by more than a prefix.
 
         Examples
         --------

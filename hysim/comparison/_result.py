@@ -33,10 +33,8 @@ class ComparisonRow:
 
     Parameters
     ----------
-    name : str
-        Name of the model.
-    model : model
-        The model itself.
+    name, model
+        Its name, and the model itself.
     n_parameters : int
         Number of its parameters that were fitted to this record.
     fit_percent, rmse : float
@@ -58,20 +56,12 @@ class ComparisonRow:
         Whether the output stays the same, to 1e-6 of its range, if the input follows the same path at half the rate.
     rate_deviation : float
         The largest change of the output in that test, as a fraction of its range.
-    y : array, shape (n,)
-        Output at the record's samples.
-    loop : LoopMetrics
-        The model's loop.
+    y, loop
+        Output at the record's samples, shape (n,), and the model's loop.
     test_fit_percent, test_rmse : float
         Fit [%] and rmse [unit of y] on the test; nan without a test.
-    success : bool
-        Whether its identification converged.
-    message : str
-        Message of the identification; empty for a model that was not identified here.
-    warnings : tuple of str
-        Warnings of the identification.
-    unsafe : str
-        Sentence where the identified law is not safe on smaller cycles; see `hysim.Identification`.
+    success, message, warnings, unsafe
+        Those of its `hysim.Identification`; the message is empty for a model that was not identified here.
     """
 
     name: str

@@ -75,16 +75,9 @@ class LoopAssessment:
     def row(self, quantum: float | None = None) -> dict[str, float | bool | None]:
         """The columns beside a reduction in a table: numbers, None where one is infinite or unknown.
 
-        Parameters
-        ----------
-        quantum : float, optional
-            Step of the readings for ``"volts_per_quantum"`` [unit of y]; by default the sensor's own.
-
-        Returns
-        -------
-        dict
-            ``"stable"``, ``"period"``, ``"tracking_rms"``, ``"limited_percent"``, ``"max_sensitivity"``,
-            ``"max_sensitivity_with_delay"`` and ``"volts_per_quantum"``.
+        They are ``"stable"``, ``"period"``, ``"tracking_rms"``, ``"limited_percent"``, ``"max_sensitivity"``,
+        ``"max_sensitivity_with_delay"`` and ``"volts_per_quantum"``, for a step `quantum` of the readings [unit of y],
+        by default the sensor's own.
         """
         step = self.closed.conditions["sensor_quantum"] if quantum is None else quantum
         numbers = {name: vars(self)[name] for name in _IN_A_ROW} | {"volts_per_quantum": self.command_jump * step}

@@ -65,14 +65,7 @@ def with_room(state: FloatArray, u: float, reference: float, measurement: float)
 def held_samples(state: CompiledController) -> int:
     """Number of samples at which a controller has held its last valid inputs, or its last command.
 
-    Parameters
-    ----------
-    state : CompiledController
-        From a controller's ``step``, or ``initial``.
-
-    Returns
-    -------
-    int
+    `state` is what a controller's ``step`` or ``initial`` returned.
 
     Examples
     --------

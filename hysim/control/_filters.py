@@ -229,25 +229,11 @@ class Shaper:
 
     @classmethod
     def ei(cls, natural_frequency: float, damping_ratio: float, tolerance: float = 0.1, zeros: int = 2) -> Self:
-        """Smallest residual of one mode whose frequency lies in a band.
+        """Smallest residual of one mode, [rad/s] and [1], whose frequency lies in a band.
 
-        Parameters
-        ----------
-        natural_frequency, damping_ratio : float
-            [rad/s], [1]
-        tolerance : float
-            Half width of the band, relative to the frequency, from 0 to below 1.
-        zeros : int
-            Number of frequencies in the band without vibration, at least 1; each takes half a period.
-
-        Returns
-        -------
-        Shaper
-
-        Raises
-        ------
-        ValueError
-            If a number is outside its range.
+        `tolerance` is the half width of the band relative to the frequency, from 0 to below 1, and `zeros` the number
+        of frequencies in it without vibration, at least 1, of which each takes half a period. A ValueError is raised if
+        a number is outside its range.
 
         Examples
         --------
