@@ -2,7 +2,7 @@
 
 They are recognised by their attributes, so that no library is imported: a frame (pandas, polars, cuDF, modin) has
 `columns` and `shape`, a table of Arrow `column_names`, a dataset of xarray `data_vars`. Anything else that offers an
-Arrow stream (DuckDB, Ibis) is read by pyarrow. The protocol ``__dataframe__`` is deprecated in pandas.
+Arrow stream (DuckDB, Ibis) is read by pyarrow. pandas deprecates ``__dataframe__``: it is not used.
 
 A missing value, such as None, NA, NaT or an Arrow null, is nan. Dates and time spans become seconds from the first one.
 """

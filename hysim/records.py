@@ -161,8 +161,7 @@ class Record:
         return even_step(self.t)
 
     def reversals(self, tolerance: float = 0.0) -> npt.NDArray[np.intp]:
-        """Samples at which the input turns (n_reversals,), the middle one of a plateau; the record's ends are not
-        counted.
+        """Samples (n_reversals,) at which the input turns, the middle one of a plateau, without the record's ends.
 
         Reversals up to the fraction `tolerance` of the input's span are ignored; a ValueError unless it is from 0 to
         below 0.5.

@@ -26,7 +26,7 @@ _LOOPS_IN_A_ROW = 3
 
 
 def check(files: Sequence[tuple[str, str]], *, prints: bool) -> None:
-    """Refuse results that cannot be written with a ValueError, before anything is computed.
+    """Raise a ValueError for results that cannot be written, before anything is computed.
 
     `files` are paths and their roles, of which no two may be one place, nor an input; `prints` is whether a document is
     printed.
@@ -131,9 +131,7 @@ def fields_of(result: Any, names: Iterable[str]) -> dict[str, Any]:
 
 
 def table(path: str, columns: Mapping[str, Any], units: Mapping[str, str]) -> bytes:
-    """Columns in the format of the path's ending, CSV on standard output; ValueError if it is unknown or lacks an
-    extra.
-    """
+    """Columns in the format of the path's ending, CSV on standard output; ValueError if it is unknown."""
     from hysim.files import Notes, packed
 
     notes = Notes({name: units[name] for name in columns if name in units})

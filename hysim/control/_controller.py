@@ -136,24 +136,12 @@ class SampledController(ABC):
         return begun(self, sample_time, u, y)
 
     def step(self, state: CompiledController, reference: float, measurement: float) -> tuple[float, CompiledController]:
-        """Command for one sample, and the state after it; `state` itself does not change.
+        """Command for one sample, with the same bits as in a loop, and the state after it; `state` itself does not
+        change.
 
-        A reference or measurement that is not finite, or beyond 1e100, is replaced by the last valid one;
-        `hysim.control.held_samples` counts them.
-
-        Parameters
-        ----------
-        state : CompiledController
-            From `initial`, or from the step before.
-        reference, measurement : float
-            Reference, `ahead` of its time where the controller has preview, and measurement [unit of y].
-
-        Returns
-        -------
-        u : float
-            Within the limits, the same bits as in a loop.
-        state : CompiledController
-            To continue from.
+        `state` is from `initial` or the step before; the reference, `ahead` of its time where the controller has
+        preview, and the measurement are in [unit of y]. One that is not finite, or beyond 1e100, is replaced by the
+        last valid one; `hysim.control.held_samples` counts them.
 
         Examples
         --------
@@ -271,28 +259,11 @@ class PID(SampledController):
     def advance(
         self, reference: npt.ArrayLike, measurement: npt.ArrayLike, sample_time: float, state: State | None = None
     ) -> tuple[FloatArray, State]:
-        """Voltages within the limits, the same bits as in a loop, and the state after the last sample.
+        """Voltages (n,) [unit of u] within the limits, the same bits as in a loop, and the state after the last sample.
 
-        Parameters
-        ----------
-        reference, measurement : array, shape (n,)
-            [unit of y]
-        sample_time : float
-            [s]
-        state : State, optional
-            To continue from; by default `start` at no voltage and at the first measurement.
-
-        Returns
-        -------
-        u : array, shape (n,)
-            Commands within the limits [unit of u].
-        state : tuple
-            To continue from.
-
-        Raises
-        ------
-        ValueError
-            If lengths differ, a value is not finite, the sample time is not positive, or the state has not 4 numbers.
+        `reference` and `measurement` are (n,) [unit of y], `sample_time` is in [s], and `state` is one to continue
+        from, by default `start` at no voltage and at the first measurement. A ValueError is raised if lengths differ, a
+        value is not finite, the sample time is not positive, or the state has not 4 numbers.
 
         Examples
         --------

@@ -144,7 +144,7 @@ def _multisine(limits: InputLimits, highest: float, power: float, rng: np.random
 
 
 def random_strokes(limits: InputLimits, rng: np.random.Generator) -> FloatArray:
-    """Strokes at the full slew to alternate sides, to fill the record; some are short, others mostly held."""
+    """Strokes at the full slew to alternate sides that fill the record; some inputs have short ones, or many holds."""
     return _segment(limits, rng, 0.0, limits.duration, _HOLD * limits.duration)
 
 

@@ -216,7 +216,7 @@ def bic_of(cost: float, n_samples: int, n_parameters: int) -> float:
 
 @dataclass
 class Work:
-    """Terms of series per sample that free runs have taken, and the `most` allowed; a clock would not repeat."""
+    """Terms of series per sample that free runs have taken, and the `most` allowed; no clock is read."""
 
     most: float = math.inf
     done: float = 0.0
@@ -281,7 +281,8 @@ class FreeRun:
     def refine(
         self, structure: S, starts: FloatArray, *, tolerance: float = RANKING, hopeless: float = math.inf
     ) -> Candidate[S] | None:
-        """Optimum from the best of `starts` (n_starts, size + n_records); None if all diverge or cost > `hopeless`."""
+        """Optimum from the best of `starts` (n_starts, size + n_records); None if all diverge; `hopeless` as in
+        `descend`."""
         units = self.units(structure)
         lower, upper = self._bounds(structure, units)
         starts, before = np.clip(starts, lower, upper), self.work.done

@@ -68,7 +68,7 @@ class ParameterCurve(Stored):
         return _roots(weights(self.polynomial.at, channel), self.covariance)
 
     def band(self, channel: npt.ArrayLike) -> tuple[FloatArray, FloatArray]:
-        """Ends of the interval at 95 % at each value of the channel, in its shape; the polynomial is taken as true."""
+        """Ends of the interval at 95 % at values of the channel, in their shape; it holds at each value alone."""
         middle, half = self.value(channel), self.reach * self.stderr(channel)
         return middle - half, middle + half
 

@@ -27,8 +27,7 @@ class Profile:
     """Likelihood's profile of one parameter.
 
     `lower` and `upper` are the interval at 95 %, infinite where the profile stays inside the `limit` of the deviance;
-    `at_box` says whether the box ends it. `deviance` (n_points,) is the fall of twice the log-likelihood at the
-    `values`.
+    `at_box` says whether the box ends it. `deviance` (n_points,) is twice the fall of the log-likelihood at `values`.
     """
 
     lower: float

@@ -52,8 +52,7 @@ class Uncertainty:
     def with_disturbances(self, disturbances: FloatArray, curvature: FloatArray) -> "Uncertainty":
         """The covariance with what disturbances of the output (n_draws, n_samples) add to the estimates.
 
-        Each moves the optimum by (J^T W J)^-1 J^T W d to first order, with `curvature` W; their mean, a bias, counts
-        too.
+        Each moves the optimum by (J^T W J)^-1 J^T W d to first order, `curvature` being W; their mean is a bias.
         """
         if self.slopes is None:
             return self

@@ -92,8 +92,7 @@ _CLOSE = 1e-6  # relative distance of a parameter and what its coordinates stand
 class Expected:
     """A model at known parameters, as `identify` would search them on a record.
 
-    `theta` (n_theta,) are its coordinates and linear parameters, `way_there` (n_theta, n_names) their derivatives by
-    those.
+    `theta` (n_theta,) are its coordinates and linear parameters, `way_there` (n_theta, n_names) their derivatives.
     """
 
     problem: Problem

@@ -44,7 +44,7 @@ class Settled:
 
 
 def triangle(columns: FloatArray, target: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """The same regression with one row more than columns, (n_sets, n_rows, ...); the last is what nothing explains."""
+    """The same regression with one row more than it has columns: the last one holds what no parameters explain."""
     both = np.asarray(np.linalg.qr(np.concatenate([columns, target[..., np.newaxis]], axis=2), mode="r"))
     return both[..., :-1], both[..., -1]
 

@@ -1,4 +1,4 @@
-"""Measures of many loops on one input, by the definitions and arithmetic of `hysim.metrics._loop`; sorted once."""
+"""Measures of many loops that share their input, by the definitions and the arithmetic of `hysim.metrics._loop`."""
 
 from dataclasses import dataclass
 

@@ -238,7 +238,7 @@ def on_record(model: Any, record: Record) -> Any:
 
 @dataclass(frozen=True)
 class AlongRecord:
-    """A law, or an actuator of several inputs, on varying channels; a branch has those of the sample at its end."""
+    """A law, or an actuator of several inputs, on varying channels; each branch takes the parameters at its end."""
 
     model: Any
     record: Record

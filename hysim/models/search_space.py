@@ -173,8 +173,7 @@ class Freedom:
     ) -> dict[str, float]:
         """The parameters that are not free, and their values: fixed ones, zeros `at_rest`, one of each redundant group.
 
-        A name in `free` is not among the last two kinds. Raises ValueError if a name is unknown, or both fixed and
-        free.
+        A name in `free` is not among the last two kinds. ValueError if a name is unknown, or both fixed and free.
         """
         for argument, names in (("fixed", tuple(self.fixed)), ("free", self.free)):
             for name in names:

@@ -125,26 +125,13 @@ class Actuator:
 
     @classmethod
     def of(cls, fit: Any, record: Record | None = None) -> "Actuator":
-        """The actuator of a fit, kept within the inputs of its record.
+        """The actuator of a fit, or of a law or plant that `hysim.close_loop` takes, kept within the inputs of its
+        record.
 
-        Parameters
-        ----------
-        fit : Identification, Discovery or model
-            A law, or a plant that `hysim.close_loop` takes.
-        record : Record, optional
-            The record of the fit; by default the range is the one that the model was identified on, ``u_range``, and
-            the resolution that of the fit.
-
-        Returns
-        -------
-        Actuator
-            Its amplifier stops at the lowest and the highest voltage of the record, and its sensor reads in steps of
-            the record's resolution, unless the model's own amplifier and sensor have limits and a quantum.
-
-        Raises
-        ------
-        ValueError
-            If the range is not known.
+        Its amplifier stops at the lowest and the highest voltage of the `record`, and its sensor reads in steps of the
+        record's resolution, unless the model's own amplifier and sensor have limits and a quantum. By default the range
+        is the one that the model was identified on, ``u_range``, and the resolution that of the fit; ValueError if the
+        range is not known.
 
         Examples
         --------

@@ -164,29 +164,11 @@ def parameter(
 ) -> Axes:
     """Draw a parameter against its channel, with its band at 95 %.
 
-    Parameters
-    ----------
-    fit : Identification or ParameterCurve
-        A result of `hysim.identify` with `depends`, or of `hysim.parameter_curve`.
-    name : str, optional
-        The parameter of the fit; not for a curve.
-    ax : Axes, optional
-        To draw on.
-    one_by_one : sequence of Identification, optional
-        Fits of the law without a dependence to records of one value of the channel each, drawn with their intervals.
-    records : sequence of Record, optional
-        The records of these fits, one for each.
-    unit : str
-        Unit of the parameter on the axis; that of the channel is the first record's.
-
-    Returns
-    -------
-    Axes
-
-    Raises
-    ------
-    ValueError
-        If the parameter depends on no channel, the fits are not as many as the records, or a channel varies along one.
+    `fit` is a result of `hysim.identify` with `depends`, with the `name` of the parameter, or one of
+    `hysim.parameter_curve`. `one_by_one` are fits of the law without a dependence to `records` of one value of the
+    channel each, drawn with their intervals. `unit` is that of the parameter on the axis; that of the channel is the
+    first record's. A ValueError is raised if the parameter depends on no channel, the fits are not as many as the
+    records, or a channel varies along one.
 
     Examples
     --------
@@ -237,29 +219,9 @@ def track(
 ) -> Axes:
     """Draw the path of a number of a law with its band at 95 %.
 
-    Parameters
-    ----------
-    result : ParameterTrack
-        A result of `hysim.track_parameters`.
-    name : str, optional
-        The number; by default the first one that is free.
-    ax : Axes, optional
-        To draw on.
-    t : array, shape (n_samples,), optional
-        Times of the samples; by default their numbers [s].
-    truth : array, shape (n_samples,), optional
-        What is known of it otherwise.
-    units : mapping, optional
-        Label of the unit of the number, by its name.
-
-    Returns
-    -------
-    Axes
-
-    Raises
-    ------
-    KeyError
-        If the number is not free.
+    `result` is one of `hysim.track_parameters`, and `name` that of the number, by default the first one that is free;
+    another one is a KeyError. `t` (n_samples,) are times of the samples, by default their numbers [s], `truth`
+    (n_samples,) is what is known of the number otherwise, and `units` has a label of its unit by its name.
 
     Examples
     --------

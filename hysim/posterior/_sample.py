@@ -183,24 +183,11 @@ class Posterior:
         level: float = 0.95,
         seed: int = 0,
     ) -> Prediction:
-        """Bands of the output, and of the loop width, for an input.
+        """Bands of the output, and of the loop width, for an input `u` (n_samples,) [unit of u].
 
-        Parameters
-        ----------
-        u : array, shape (n_samples,) [unit of u]
-            The model starts from the state that each draw has at the first sample of the first record.
-        t : array, shape (n_samples,), optional [s]
-            Times, for models that depend on them.
-        n : int
-            Number of draws, at most as many as there are.
-        level : float
-            Probability of the bands.
-        seed : int
-            Seed of the choice of the draws, and of the noise.
-
-        Returns
-        -------
-        Prediction
+        The model starts from the state that each draw has at the first sample of the first record. Models that depend
+        on time need the times `t` (n_samples,) [s]. `n` is the number of draws, at most as many as there are, `level`
+        the probability of the bands, and `seed` that of the choice of the draws and of the noise.
         """
         inputs, tails = read_only(u, "u", ndim=1), _tails(level)
         check_count("n", n)

@@ -27,7 +27,7 @@ OUTPUTS = (*OF_NODES, *OF_ELEMENTS)
 
 
 class Laws(NamedTuple):
-    """Laws of a structure, with their steps, of which the kernel knows the address; `rated` ones need drift rates."""
+    """Laws of a structure, with their steps, which the kernel knows by address; `rated` ones depend on drift rates."""
 
     steppers: tuple[Startable, ...]
     stretches: tuple[tuple[tuple[int, int], ...], ...]
@@ -337,9 +337,7 @@ class AssembledStructure:
         return len(self.elements) if signal in OF_ELEMENTS else self.n_nodes
 
     def periods(self) -> FloatArray:
-        """Periods (n,) [s] of small motions at the start, longest first, inf if free; ValueError for negative
-        stiffness.
-        """
+        """Periods (n,) [s] of small motions at the start, longest first, inf if free; ValueError if one is unstable."""
         squares = eigh(self.initial_stiffness, self.mass_matrix, eigvals_only=True)
         if squares[0] < -1e-9 * np.abs(squares).max():
             raise ValueError("the stiffness at the start is negative: small motions have no periods")

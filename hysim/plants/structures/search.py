@@ -320,7 +320,7 @@ class SearchedStructure(MovingStructure, Identifiable):
         return max(1, math.ceil(sample_time * self.fastest_rate / _PHASE))
 
     def as_records(self, records: Any) -> Any:
-        """Records of several sensors as such of one output, others as they are; ValueError if columns do not fit."""
+        """Records of several sensors as records of one output, others unchanged; ValueError if columns do not fit."""
         several = [records] if isinstance(records, Record | StructureRecord) else records
         if not isinstance(several, Sequence) or not any(isinstance(each, StructureRecord) for each in several):
             return records

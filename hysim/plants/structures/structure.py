@@ -317,25 +317,14 @@ class Structure(SearchedStructure):
         self.matrices  # noqa: B018  # raises what its parts raise
 
     def assemble(self, parameters: Mapping[str, float]) -> "Structure":
-        """The structure with some numbers exchanged.
+        """The structure with some numbers exchanged, by their names in `scalars`.
 
-        Parameters
-        ----------
-        parameters : mapping
-            Names in `scalars` to numbers. ``"mass"``, ``"stiffness"`` and ``"damping"`` are the number itself, where
-            the argument is one or a `ModalDamping` of one ratio, and else a factor of the whole, 1 as it is; there
-            are ``"mass[0]"``, ``"damping[1]"`` of several, too, and ``"damping.mass"`` of a `Rayleigh`. The numbers
-            of laws have the laws' own names, ``"elements.0.thresholds[1]"``, those of sums the parts' labels,
-            ``"elements.0.bouc_wen.beta"``; ``"elements.*.beta"`` is one number for all elements with this name.
-
-        Returns
-        -------
-        Structure
-
-        Raises
-        ------
-        ValueError
-            If a name is unknown, or a constructor refuses a number.
+        ``"mass"``, ``"stiffness"`` and ``"damping"`` are the number itself, where the argument is one or a
+        `ModalDamping` of one ratio, and else a factor of the whole, 1 as it is; there are ``"mass[0]"``,
+        ``"damping[1]"`` of several, too, and ``"damping.mass"`` of a `Rayleigh`. The numbers of laws have the laws' own
+        names, ``"elements.0.thresholds[1]"``, those of sums the parts' labels, ``"elements.0.bouc_wen.beta"``;
+        ``"elements.*.beta"`` is one number for all elements with this name. A ValueError is raised if a name is
+        unknown, or a constructor refuses a number.
 
         Examples
         --------
