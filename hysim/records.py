@@ -163,8 +163,7 @@ class Record:
     def reversals(self, tolerance: float = 0.0) -> npt.NDArray[np.intp]:
         """Samples (n_reversals,) at which the input turns, the middle one of a plateau, without the record's ends.
 
-        Reversals up to the fraction `tolerance` of the input's span are ignored; a ValueError unless it is from 0 to
-        below 0.5.
+        Reversals up to the fraction `tolerance` of the input's span are ignored; ValueError unless in [0, 0.5).
 
         Examples
         --------
@@ -293,8 +292,7 @@ class Record:
         """Cut the record in two or more parts without common samples, such as one to identify from and one to test on.
 
         The `places` increase: each is the number of the next part's first sample, or a fraction of the samples between
-        0 and 1; anything else is a TypeError. A ValueError is raised without a place, or if a part has fewer than 2
-        samples.
+        0 and 1; anything else is a TypeError. ValueError without a place, or if a part has fewer than 2 samples.
 
         Examples
         --------

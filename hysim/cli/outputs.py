@@ -28,8 +28,7 @@ _LOOPS_IN_A_ROW = 3
 def check(files: Sequence[tuple[str, str]], *, prints: bool) -> None:
     """Raise a ValueError for results that cannot be written, before anything is computed.
 
-    `files` are paths and their roles, of which no two may be one place, nor an input; `prints` is whether a document is
-    printed.
+    `files` are paths and their roles, no two of which may be equal; `prints` is whether a document is printed.
     """
     results = [(path, role) for path, role in files if role != INPUT]
     for path, role in results:

@@ -18,8 +18,7 @@ which need no such assumption,
 If d is as often positive as negative, and as large, T has about Student's distribution. With fewer than 5 independent
 samples no difference could be shown, however large; a model whose median error is 10 times that of the best one is
 worse all the same. Differences below a thousandth of the typical error count as none. Several models are compared with
-the best one by Holm's correction. The best one was chosen by the same errors, which makes a small probability less
-remarkable.
+the best one by Holm's correction. That was chosen by the same errors, which makes a small probability less remarkable.
 
 A mean of squared errors with 3 to 6 lags (Diebold and Mariano 1995) fails where one error is huge.
 

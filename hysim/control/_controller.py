@@ -136,8 +136,7 @@ class SampledController(ABC):
         return begun(self, sample_time, u, y)
 
     def step(self, state: CompiledController, reference: float, measurement: float) -> tuple[float, CompiledController]:
-        """Command for one sample, with the same bits as in a loop, and the state after it; `state` itself does not
-        change.
+        """Command for one sample, the same bits as in a loop, and the state after it; `state` does not change.
 
         `state` is from `initial` or the step before; the reference, `ahead` of its time where the controller has
         preview, and the measurement are in [unit of y]. One that is not finite, or beyond 1e100, is replaced by the
@@ -193,8 +192,7 @@ class PID(SampledController):
     setpoint_weight : float
         b, the weight of the reference in the proportional action.
     derivative_weight : float
-        c, the weight of the reference in the derivative: 0 avoids a kick at a step of the reference, 1 differentiates
-        the error.
+        c, the weight of the reference in the derivative: 0 avoids a kick at a step of the reference, 1 takes the error.
 
     Raises
     ------

@@ -115,8 +115,7 @@ class DampingLoop(_Filter):
     frequency : float
         Corner of the filter, positive [rad/s].
     damping_ratio : float, optional
-        Positive, for a filter of second order (positive position feedback); None for first order (integral resonant
-        control).
+        Positive, for second order (positive position feedback); None for first order (integral resonant control).
 
     Raises
     ------

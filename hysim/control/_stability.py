@@ -378,8 +378,7 @@ def bandwidth(
     Returns
     -------
     float
-        [rad/s]; zero if the loop does not follow at the lowest frequency, infinite if it follows up to 2.5 samples a
-        period.
+        [rad/s]; zero if the loop does not follow at the lowest frequency, infinite if up to 2.5 samples a period.
 
     Raises
     ------

@@ -72,8 +72,7 @@ class Scores(NamedTuple):
 class Trial:
     """Scores of the law and its competitors by name, and what was left out at a time.
 
-    `together` is the rmse of plays fitted to all samples, `noise` that of white noise, `stroke` the range of the
-    outputs.
+    `together` is the rmse of plays fitted to all samples, `noise` that of white noise, `stroke` the outputs' range.
     """
 
     scores: Mapping[str, Scores]

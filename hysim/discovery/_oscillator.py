@@ -436,8 +436,8 @@ def discover_oscillator(
         If a record has no even time, is too short, has a constant signal or is not that of a mass on springs, or an
         option is unknown.
     TypeError
-        If the first argument is not a record or a sequence of them, `structure` is not one, or a part of the plant is
-        no number.
+        If the first argument is not a record or a sequence of them, `structure` is none, or a part of the plant no
+        number.
 
     Examples
     --------

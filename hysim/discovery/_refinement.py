@@ -281,8 +281,7 @@ class FreeRun:
     def refine(
         self, structure: S, starts: FloatArray, *, tolerance: float = RANKING, hopeless: float = math.inf
     ) -> Candidate[S] | None:
-        """Optimum from the best of `starts` (n_starts, size + n_records); None if all diverge; `hopeless` as in
-        `descend`."""
+        """Optimum from the best of `starts` (n_starts, size + n_records); None if all diverge. See `descend`."""
         units = self.units(structure)
         lower, upper = self._bounds(structure, units)
         starts, before = np.clip(starts, lower, upper), self.work.done

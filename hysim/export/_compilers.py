@@ -1,7 +1,6 @@
 """Shared libraries and WebAssembly from C: the compiler of this machine, or zig's, which compiles for all.
 
-A WebAssembly module for pages in the browser holds one step, for parameters and states of any size; it imports nothing
-and exports
+A WebAssembly module for pages holds one step, for parameters and states of any size; it imports nothing and exports
 
     memory, __heap_base                                                               room begins behind the base
     begin(parameters, n_parameters, state, n_state, u0)                               completes a state

@@ -403,8 +403,7 @@ def check_unit(unit: str | None) -> None:
 def stated_unit(header: str) -> str | None:
     """The unit that the text above some numbers states, None if it states none; ValueError if it is not understood.
 
-    First the word behind "unit", then what is in brackets or behind "in", then words that can be nothing else, such as
-    cm/sec2.
+    First the word behind "unit", then what is in brackets or behind "in", then words such as cm/sec2.
     """
     behind = [match.strip(".") for match in _STATED.findall(header)]
     words = [word.strip("().:") for word in re.split(r"[\s,;]+", header)]

@@ -35,8 +35,7 @@ def save_record(record: Record, path: str | Path) -> None:
       ``# channels:``;
     - ``.npz``: arrays `t`, `u`, `y`, `resolution`, and texts `name`, `channels`, ``u_units`` and so on;
     - ``.mat``: the same as variables, numbers in columns, compressed; version 5, which MATLAB and Octave load;
-    - ``.h5``, ``.hdf5``: datasets with an attribute `units`; attributes `resolution`, `name` and `channels` of the
-      file.
+    - ``.h5``, ``.hdf5``: datasets with an attribute `units`; `resolution`, `name` and `channels` of the file.
 
     A channel that varies is a column or array of its own; one that is constant stands as a number among the channels.
 

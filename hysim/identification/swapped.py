@@ -1,7 +1,6 @@
 """Whether the input and the output of a record were swapped.
 
-**By the columns.** The output is a waveform of a generator, a triangle of equal steps or one sine, and the input is
-none.
+**By the columns.** The output is a generator's waveform, a triangle of equal steps or one sine, and the input is none.
 
 **By a family.** An actuator's loop runs counterclockwise, and clockwise where the columns were swapped; but so does a
 force that follows from a displacement. A clockwise record is doubted only where the same family fits well from y to u

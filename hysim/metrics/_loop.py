@@ -39,8 +39,7 @@ and of the initial curve, where the record begins demagnetised at H = B = 0:
     initial_permeability    B / (mu_0 H) at its first sample with a field
     maximum_permeability    largest B / (mu_0 H) of its samples
 
-The branches are those of `hysim.loop_metrics`, linear between their samples. Source: IEC 60050-121 and 60404-4 for the
-terms.
+The branches are those of `hysim.loop_metrics`. Source of the terms: IEC 60050-121 and 60404-4.
 """
 
 import math

@@ -192,8 +192,7 @@ class Cascade(Composite):
     """Models one behind the other; ``first >> second`` is short for it.
 
     A law in front of linear dynamics is Hammerstein's structure, linear dynamics in front of a law are Wiener's. The
-    input of a stage at the samples is the output of the stage before, and each stage takes it between them as it takes
-    any input.
+    input of a stage at the samples is the output of the stage before, and is between them as for any input.
 
     Parameters
     ----------

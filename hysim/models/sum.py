@@ -301,8 +301,7 @@ class SumStructure(Identifiable, Composable):
 class Sum(Composite):
     """Models side by side, whose outputs are added; ``first + second`` is short for it.
 
-    Magnetorheological dampers are a Bouc-Wen law, a dashpot and a spring (B. F. Spencer et al., J. Eng. Mech. 123,
-    1997).
+    Magnetorheological dampers are a Bouc-Wen law, a dashpot and a spring (Spencer et al., J. Eng. Mech. 123, 1997).
 
     Parameters
     ----------

@@ -6,8 +6,7 @@ A polynomial is known by its values at some places of the channel:
 
 The values p_k are parameters of the same kind as p, in the same unit and the same box, and are well determined together
 where coefficients of powers are not: those of 1 and T at 20 to 60 degC are correlated by 0.96. Of degree 1 the places
-are the ends of the identified range; of higher degrees those of Chebyshev and Lobatto, which keep a polynomial near its
-values.
+are the ends of the identified range; of higher degrees those of Chebyshev and Lobatto, against oscillation.
 
 Along a record on which a channel varies, each branch between two samples has the parameters of the sample at its end,
 and so has the output there; the memory is kept where they change. More samples of a channel that goes on steadily are

@@ -125,8 +125,7 @@ class Actuator:
 
     @classmethod
     def of(cls, fit: Any, record: Record | None = None) -> "Actuator":
-        """The actuator of a fit, or of a law or plant that `hysim.close_loop` takes, kept within the inputs of its
-        record.
+        """The actuator of a fit, a law or a plant (see `hysim.close_loop`), kept within the inputs of its record.
 
         Its amplifier stops at the lowest and the highest voltage of the `record`, and its sensor reads in steps of the
         record's resolution, unless the model's own amplifier and sensor have limits and a quantum. By default the range
@@ -203,8 +202,7 @@ class Actuator:
             Whether all records have one offset of the law, or each its own.
         start : Actuator or MultiInputActuator, optional
             Of the same inputs and as many modes: the search begins with its modes and its delay beside the starts of
-            the laws, no part is searched alone, and no mode is left out: so several laws are tried before the same
-            modes.
+            the laws, no part is searched alone, and no mode is left out.
 
         Returns
         -------

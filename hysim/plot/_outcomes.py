@@ -54,8 +54,8 @@ def selection(discovery: Discovery | OscillatorDiscovery, axes: Sequence[Axes] |
 def trade_off(tuning: Tuning, ax: Axes | None = None) -> Axes:
     """Draw the objective of a tuning against the maximum sensitivity: all trials, the best of them, and the chosen one.
 
-    `tuning` is a result of `hysim.tune`. Trials that are 30 times worse than the chosen one, or twice as sensitive, are
-    left out.
+    `tuning` is a result of `hysim.tune`. Trials 30 times worse than the chosen one, or twice as sensitive, are left
+    out.
 
     Examples
     --------

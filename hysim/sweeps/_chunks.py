@@ -1,8 +1,7 @@
 """Chunks of tasks: how they are computed, the table of the rows that are done, and the seeds of tasks.
 
 A chunk is computed task by task, or through their batch form; failures are kept as rows. The values of a chunk are
-returned by their layout, the names and shapes of the tasks' outputs. A worker does not know which layout is that of the
-study.
+returned by their layout, the names and shapes of the tasks' outputs. A worker does not know that of the study.
 
 **Rows that are done.** The first task that succeeds, in the order of the study and not of time, sets the names and
 shapes of a row. A task that returns others has failed.

@@ -8,8 +8,8 @@ Sigma points: mean and covariance of (theta, z) are carried by 2 n points at +- 
 by the step (the cubature rule; I. Arasaratnam and S. Haykin, IEEE Trans. Autom. Control 54 (2009) 1254). Where the
 errors of the last samples are too large for the noise, a number has jumped: the filter goes back to the first of them,
 raises the variances there, and comes again.
-Particles: many copies, weighted by how well they predict, and drawn anew from these weights; a few of them jump at each
-sample.
+
+Particles: many copies, weighted by how well they predict, and drawn anew by weight; a few of them jump at each sample.
 """
 
 import math

@@ -59,8 +59,7 @@ class Element:
     TypeError
         If the law cannot be stepped, or a node is not a whole number.
     ValueError
-        If not exactly one of `between` and `direction` is given, the nodes are the same or negative, or the direction
-        is zero.
+        If not exactly one of `between` and `direction` is given, nodes are equal or negative, or it is zero.
 
     Examples
     --------
