@@ -245,10 +245,7 @@ def models_on(thing: Any, records: Sequence[Record]) -> list[Any]:
 
 
 def free_run(thing: Any, record: Record, units: Mapping[str, str] | None = None) -> Simulation:
-    """The simulation of a model, or of a result's model, on the input of a record as it was measured.
-
-    All verbs that judge or draw a model use it: readings of the model's sensor, if any, without noise and steps.
-    """
+    """The free run of a model on the input of a record, as every verb judges and draws it: without sensor noise."""
     (model,) = models_on(thing, [record])
     plant = model.as_read if isinstance(model, _Read) else model
     run = simulate(plant, record.t, record.u, units=record.units if units is None else units)

@@ -1,8 +1,4 @@
-"""Frozen values: dataclasses that are compared, hashed, copied and pickled by what they hold.
-
-`frozen` makes keyword-only dataclasses whose arrays are read-only float64, also after unpickling and
-copying. `checked` is the stricter form for specifications (models, records): every number must be finite.
-"""
+"""Frozen dataclasses, compared and copied by value: `frozen` has read-only arrays, `checked` finite numbers, too."""
 
 import dataclasses
 import functools

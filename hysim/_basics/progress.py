@@ -1,8 +1,4 @@
-"""Progress of long calls, which the outermost verb reports: by default in one line on the standard error.
-
-A verb that is decorated by `reports` passes its callable to what it calls; verbs inside it, on its threads and in its
-processes too, report nothing by themselves.
-"""
+"""Progress of long calls, reported by the outermost verb only, by default in one line on the standard error."""
 
 import contextlib
 import functools

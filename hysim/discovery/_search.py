@@ -73,10 +73,7 @@ class Library:
 
 @dataclass(frozen=True)
 class Options:
-    """Signs of coefficients, and arguments of `discover`; `enough` is the rmse that makes a full search worth while.
-
-    `report` is called with the share of a search that is done.
-    """
+    """Signs of coefficients, arguments of `discover`, the rmse that is `enough`, and where to `report` progress."""
 
     signs: Mapping[Term, int] = field(default_factory=dict)
     optimizer: str = "STLSQ"

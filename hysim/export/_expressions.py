@@ -1,8 +1,4 @@
-"""Expressions of the portable subset in C99.
-
-The text of an expression carries its type and how strongly its last operator binds, so that brackets stand where C
-needs them and nowhere else, and operations keep the order that they have in Python.
-"""
+"""Expressions of the portable subset in C99, in Python's order of operations, with brackets only where C needs them."""
 
 import ast
 import builtins

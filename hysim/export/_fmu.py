@@ -1,8 +1,4 @@
-"""The verb `to_fmu`: a model as a functional mock-up unit for co-simulation.
-
-A unit is a zip file of a description in XML, C sources and shared libraries. Nothing in it depends on the time or the
-place at which it is written. Its C source is a program, its numbers, and the functions of FMI around it.
-"""
+"""The verb `to_fmu`: a model as a functional mock-up unit, whose bytes depend on the arguments alone."""
 
 import hashlib
 import io

@@ -56,10 +56,7 @@ class Control(NamedTuple):
 
 
 def controls_of(law: Law, free: tuple[str, ...], u: FloatArray, names: Sequence[str] | None = None) -> list[Control]:
-    """A slider for each number in `free`, names as in `law.scalars`; long tuples share one, initial tuples have none.
-
-    Places are those among `names`, by default all numbers of the law.
-    """
+    """A slider for each number in `free`: long tuples share one, initial tuples have none; `names` says the places."""
     names = list(law.scalars) if names is None else names
     groups: dict[str, list[str]] = {}
     for name in free:

@@ -30,10 +30,7 @@ def presets() -> dict[str, Shown]:
 
 
 def explorer(path: str | Path) -> Path:
-    """Write the page with a choice of families and devices to an ``.html`` file, and return its path.
-
-    A ValueError is raised for another ending of the path, an OSError if the file cannot be written.
-    """
+    """Write the page with a choice of families to an ``.html`` file, and return its path; else a ValueError."""
     page = checked_path(path)
     write_text(page, _text())
     return page

@@ -1,8 +1,4 @@
-"""Arithmetic that is recorded while it runs, and written down in C99 and in JavaScript.
-
-A `Tape` holds the operations that were done on symbols, each once, in an order in which they can be computed. The
-operations are those of numpy; a symbol stands for a number or for a truth value.
-"""
+"""Arithmetic on symbols, recorded on a `Tape` while it runs, each operation once, and written in C99 and JavaScript."""
 
 import math
 import re

@@ -1,8 +1,4 @@
-"""Models side by side under one input, such as a law with a dashpot beside it, and the base class of compositions.
-
-The search for the parameters of a sum has the parts' own spaces side by side. What is linear in a part is linear in the
-sum. A part that cannot be identified adds an output that is known.
-"""
+"""Models side by side under one input, and the base class of compositions; the parts' search spaces are joined."""
 
 import math
 from abc import abstractmethod
@@ -92,10 +88,7 @@ class Composite(ByStructure, Composable):
     def advance(
         self, u: npt.ArrayLike, state: State | None = None, *, sample_time: float | None = None
     ) -> tuple[FloatArray, State]:
-        """As `response`, continued from `state`, the states of the members, and the state after the last sample.
-
-        The bits are those of one uncut input. Raises TypeError if a member cannot be continued.
-        """
+        """As `response`, continued from the members' `state`, and the state after it; TypeError if one cannot be."""
 
     @abstractmethod
     def compiled(self, u0: float = 0.0, *, sample_time: float | None = None) -> CompiledLaw:
