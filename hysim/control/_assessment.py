@@ -411,23 +411,10 @@ def assess_hysteresis(
 def open_loop(plant: Any, reference: npt.ArrayLike, sample_time: float, samples_per_cycle: int) -> OpenLoop:
     """Drive a plant along a periodic reference by the voltage reference / secant gain.
 
-    Parameters
-    ----------
-    plant : Actuator, law or linear plant
-        At rest at no voltage before the first sample.
-    reference : array, shape (n,)
-        Whole cycles, and the sample at which the last one ends [unit of y].
-    sample_time, samples_per_cycle
-        Sample time [s] and length of a cycle.
-
-    Returns
-    -------
-    OpenLoop
-
-    Raises
-    ------
-    SimulationError, ValueError
-        If the plant diverges or has no gain, or the reference does not hold whole cycles.
+    `plant` is an Actuator, a law or a linear plant, at rest at no voltage before the first sample. `reference` (n,)
+    [unit of y] holds whole cycles of `samples_per_cycle`, and the sample at which the last one ends, each `sample_time`
+    apart [s]. Raises SimulationError if the plant diverges; ValueError if it has no gain, or the reference does not
+    hold whole cycles.
 
     Examples
     --------
