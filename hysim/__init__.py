@@ -1,8 +1,4 @@
-"""hysim: simulate, identify, discover, compensate and compare hysteretic actuators.
-
-The public names are listed in ``__init__.pyi``, which type checkers read too. Each is imported when it is first used:
-the bare import costs the standard library only.
-"""
+"""hysim: simulate, identify, discover, compensate and compare hysteretic actuators; ``__init__.pyi`` has the names."""
 
 import importlib
 from typing import Any

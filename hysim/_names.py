@@ -1,7 +1,4 @@
-"""The public names in reading order, and the modules that hold them, as the stub of the front door lists them.
-
-Beside them the one helper that finds the name which was meant.
-"""
+"""The public names in reading order, the modules that hold them, and the nearest name to a misspelt one."""
 
 from collections.abc import Iterable
 from pathlib import Path
@@ -33,7 +30,6 @@ def meant(name: object, known: Iterable[object]) -> str:
 
 
 def among(name: object, known: Iterable[object]) -> str:
-    """The known names in a row, the first ones of hundreds, and the one that may have been meant by an unknown one."""
     names = [*map(str, known)]
     shown = names if len(names) <= _MANY else [*names[:_FIRST], f"{len(names) - _FIRST} others"]
     return f"{', '.join(shown)}{meant(name, names)}"

@@ -30,20 +30,8 @@ SQUARE_WAVE_FREQUENCY = 1.01626
 def table1(dwell: float = 1.0) -> Record:
     """Table 1: a staircase of 52 voltages from 0 to 125 V and back, and the displacements at them.
 
-    Parameters
-    ----------
-    dwell : float
-        Time from one sample to the next [s]; the paper prints none.
-
-    Returns
-    -------
-    Record
-        Voltage [V], displacement [um] and time `dwell * k` [s]; the resolution is one camera pixel.
-
-    Raises
-    ------
-    ValueError
-        If the dwell is not positive and finite.
+    The record has voltage [V], displacement [um], one camera pixel as resolution, and time `dwell * k` [s]: the paper
+    prints no times. A ValueError is raised if the dwell is not positive and finite.
 
     Examples
     --------

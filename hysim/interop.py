@@ -1,9 +1,8 @@
 """Tables of other libraries: pandas, polars, Arrow and xarray, read and made without depending on any of them.
 
-They are known by what they offer, so that no library is imported. A frame has `columns` and `shape` (pandas, polars,
-cuDF, modin), a table of Arrow `column_names`, a dataset of xarray `data_vars`. Whatever else hands its columns out as
-an Arrow stream (DuckDB, Ibis) is read by pyarrow. The interchange protocol ``__dataframe__`` is not used: pandas
-deprecates it, and polars 2 has removed it.
+They are recognised by their attributes, so that no library is imported: a frame (pandas, polars, cuDF, modin) has
+`columns` and `shape`, a table of Arrow `column_names`, a dataset of xarray `data_vars`. Anything else that offers an
+Arrow stream (DuckDB, Ibis) is read by pyarrow. pandas deprecates ``__dataframe__``: it is not used.
 
 A missing value, such as None, NA, NaT or an Arrow null, is nan. Dates and time spans become seconds from the first one.
 """
@@ -117,7 +116,6 @@ class ForeignTable:
 
 
 def table_in(value: Any) -> ForeignTable | None:
-    """The table that a value is; None if it is none."""
     kind = type(value).__name__
     if isinstance(value, type):
         return None
@@ -174,10 +172,7 @@ def channels_of(table: ForeignTable) -> dict[str, Any]:
 
 
 def told_by(u: Any, y: Any, t: Any, units: Mapping[str, str]) -> tuple[Any, dict[str, str]]:
-    """Times and units of two columns, Series or DataArrays: those given, or else those that the columns state.
-
-    Raises ValueError if both columns state times, and these differ.
-    """
+    """Times and units of two columns, given or as the columns state them; ValueError if the stated times differ."""
     columns = {"u": u, "y": y}
     stated = {name: unit for name, column in columns.items() if (unit := _unit_of(column)) is not None}
     times = [known for column in columns.values() if (known := _times_of(column)) is not None] if t is None else []
@@ -280,8 +275,7 @@ def frame(
 ) -> Any:
     """A `pandas.DataFrame`; ImportError without pandas.
 
-    `index` is a name and its values. The notes of the frame, `attrs`, hold `units` by name, where there are any, and
-    the `notes` that are neither None, nor empty, nor infinite or nan; they can be written as JSON.
+    `index` is a name and its values. `attrs` holds the `units` and those `notes` that can be written as JSON.
     """
     pandas = optional("pandas", "to_frame", "tables")
     rows = None if index is None else pandas.Index(index[1], name=index[0])
@@ -292,7 +286,6 @@ def frame(
 
 
 def _is_empty(value: Any) -> bool:
-    """Whether a note says nothing, or is a number that JSON cannot hold."""
     return value is None or value in ("", {}) or (isinstance(value, float) and not math.isfinite(value))
 
 
@@ -303,10 +296,7 @@ def dataset(
     units: Mapping[str, str],
     notes: Mapping[str, Any] | None = None,
 ) -> Any:
-    """An `xarray.Dataset` of signals with the names of their axes; ImportError without xarray.
-
-    Each variable and coordinate has its unit in ``attrs["units"]``, where xarray's plots read it.
-    """
+    """An `xarray.Dataset` of signals by axes, units in ``attrs["units"]`` for its plots; ImportError without xarray."""
     xarray = optional("xarray", "to_xarray", "tables")
     made = xarray.Dataset(
         {name: (tuple(axes), values) for name, (axes, values) in signals.items()},

@@ -1,8 +1,4 @@
-"""Results as notebooks show them: their printed text as a table, and a small figure.
-
-Two blanks divide the cells of a line. A figure is an image of its own, so that neither its styles nor its ids meet
-those of other cells; its white ground makes it readable on a dark page, too.
-"""
+"""Results in notebooks: the printed text as a table, and a small figure as an image with its own ids and styles."""
 
 import base64
 import html
@@ -42,7 +38,6 @@ def _table(text: str) -> str:
 
 
 def _figure(result: Any, alternative: str, draw: Callable[[Any, Any], object]) -> str:
-    """Picture that a function draws on new Axes, with a text in its place for those who cannot see it."""
     with plot.house_style():
         canvas = plot.figure(*_SIZE)
         axes = canvas.add_subplot()

@@ -95,10 +95,7 @@ class Simulation:
         return {label: column for columns in named.values() for label, column in columns.items()}
 
     def to_frame(self) -> Any:
-        """The `columns` as a `pandas.DataFrame`, with the time as index; ImportError without pandas.
-
-        ``attrs["units"]`` holds the unit of each column.
-        """
+        """The `columns` as a `pandas.DataFrame` over time, with ``attrs["units"]``; ImportError without pandas."""
         return frame_of_signals(self.columns, self.units)
 
     def to_xarray(self) -> Any:
@@ -136,13 +133,11 @@ def _second_axis(name: str) -> str:
 
 
 def _unit_of(label: str, units: Mapping[str, str]) -> str | None:
-    """The unit of a column: that of its own name, or of the signal that it is one column of."""
     signal, _, number = label.rpartition("_")
     return units.get(label, units.get(signal) if number.isdigit() else None)
 
 
 def columns_of(name: str, values: FloatArray) -> dict[str, FloatArray]:
-    """A signal as columns by their names, one of its own name if it has one axis."""
     if values.ndim == 1:
         return {name: values}
     first = 1 if name.removeprefix(_PEAK) in _BY_NODE else 0
@@ -150,7 +145,6 @@ def columns_of(name: str, values: FloatArray) -> dict[str, FloatArray]:
 
 
 def has_elements(result: Simulation) -> bool:
-    """Whether a simulation has drifts and forces of at least one element."""
     drift, force = result.signals.get("drift"), result.signals.get("force")
     return drift is not None and force is not None and drift.ndim == 2 and drift.shape == force.shape and drift.size > 0
 
@@ -251,11 +245,7 @@ def models_on(thing: Any, records: Sequence[Record]) -> list[Any]:
 
 
 def free_run(thing: Any, record: Record, units: Mapping[str, str] | None = None) -> Simulation:
-    """The simulation of a model, or of a result's model, on the input of a record as it was measured.
-
-    Every verb that judges or draws a model beside a record takes its output from here: what the model's sensor, if it
-    has one, reads without noise and steps.
-    """
+    """The free run of a model on the input of a record, as every verb judges and draws it: without sensor noise."""
     (model,) = models_on(thing, [record])
     plant = model.as_read if isinstance(model, _Read) else model
     run = simulate(plant, record.t, record.u, units=record.units if units is None else units)
@@ -263,7 +253,6 @@ def free_run(thing: Any, record: Record, units: Mapping[str, str] | None = None)
 
 
 def _signals(plant: Responding, u: FloatArray, times: FloatArray | None) -> Mapping[str, FloatArray]:
-    """The plant's own signals, at least its output."""
     time: tuple[float, ...] = ()
     if needs_time(plant):
         if times is None:

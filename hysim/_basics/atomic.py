@@ -18,10 +18,7 @@ def write_text(path: str | Path, text: str) -> None:
 
 
 def write_all(contents: Mapping[str | Path, str | bytes]) -> None:
-    """Write texts and bytes as `write_text` does, and rename no file before all are written.
-
-    A signal during the renaming is handled afterwards.
-    """
+    """Write texts and bytes as `write_text` does: all are written before one is renamed, and signals wait meanwhile."""
     with ExitStack() as last, ExitStack() as files:
         for path, content in contents.items():
             data = content.encode() if isinstance(content, str) else content

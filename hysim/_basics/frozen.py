@@ -1,8 +1,4 @@
-"""Frozen values: dataclasses that are compared, hashed, copied and pickled by what they hold.
-
-`frozen` makes keyword-only dataclasses whose arrays are read-only float64, also after unpickling and
-copying. `checked` is the stricter form for specifications (models, records): every number must be finite.
-"""
+"""Frozen dataclasses, compared and copied by value: `frozen` has read-only arrays, `checked` finite numbers, too."""
 
 import dataclasses
 import functools
@@ -76,7 +72,6 @@ def read_only(
 
 
 def wrong_axes(name: str, array: npt.NDArray[Any]) -> str:
-    """Message for an array in place of a vector, with what to do where it has rows and columns."""
     mend = "np.ravel makes it flat" if 1 in array.shape else f"take one column, {name}[:, 0]"
     return f"{name} must have 1 axis, got shape {array.shape}{f': {mend}' if array.ndim == 2 else ''}"
 
@@ -93,13 +88,11 @@ def vectors(**values: npt.ArrayLike) -> list[FloatArray]:
 
 
 def check_choice(name: str, value: object, choices: Iterable[object]) -> None:
-    """Raise a ValueError if the argument of this name is not one of the choices."""
     if value not in (known := tuple(choices)):
         raise ValueError(f"{name} must be one of {', '.join(map(str, known))}, got {value!r}{meant(value, known)}")
 
 
 def check_count(name: str, value: object) -> None:
-    """Raise a ValueError if the argument of this name is not an integer of at least 1."""
     if isinstance(value, bool) or not isinstance(value, int) or value < 1:
         raise ValueError(f"{name} must be an integer of at least 1, got {value!r}")
 
@@ -276,7 +269,6 @@ def whole_substeps(count: float) -> int:
 
 
 def items(value: Any) -> dict[str, Any]:
-    """Fields of a frozen value by name."""
     values = vars(value)
     return {name: values[name] for name in _field_names(type(value))[0]}  # type: ignore[arg-type]
 
@@ -293,13 +285,11 @@ def given_items(value: Any) -> dict[str, Any]:
 
 
 def last_names(cls: Any) -> tuple[str, ...]:
-    """Names of the fields that are `LAST`."""
     return _field_names(cls)[2]
 
 
 @functools.cache
 def _field_names(cls: Any) -> tuple[tuple[str, ...], ...]:
-    """Names of all fields, of those that count in comparisons, and of those that are `LAST`."""
     fields = sorted(dataclasses.fields(cls), key=lambda field: "last" in field.metadata)
     return (
         tuple(field.name for field in fields),

@@ -42,7 +42,6 @@ def optional(library: str, purpose: str, extra: str, error: type[Exception] = Im
 
 
 def is_installed(library: str) -> bool:
-    """Whether a library can be imported, without importing it."""
     return importlib.util.find_spec(library) is not None
 
 

@@ -40,7 +40,6 @@ _most: ContextVar[int | None] = ContextVar("most threads", default=None)
 
 
 def cores() -> int:
-    """Number of processor cores that this process may use."""
     return len(os.sched_getaffinity(0)) if sys.platform == "linux" else os.cpu_count() or 1
 
 
@@ -99,10 +98,7 @@ def _piece_by_piece(work: Callable[[int, int], None], start: int, stop: int, siz
 def map_on_threads(
     work: Callable[[int], T], n_items: int, *, workers: int | None = None, progress: Progress | None = None
 ) -> list[T]:
-    """The results of `work(k)` for k in `range(n_items)`, in order, on one thread for each core or `workers` threads.
-
-    `in_chunks` inside `work` uses one thread. `progress(done, total)` is called after each item.
-    """
+    """Results of `work(k)` for k in `range(n_items)`, in order; `in_chunks` inside `work` uses one thread."""
     _check(workers)
     n_threads = min(workers or _most.get() or cores(), n_items)
     context = copy_context()  # which contains numpy's error state
@@ -137,10 +133,7 @@ def _check(workers: int | None) -> None:
 
 
 def awaited(future: Future[T]) -> T:
-    """The result of a future; during the wait an interrupt is handled within `GLANCE`.
-
-    In a wait without an end, Python would not handle an interrupt that arrives just before the wait begins.
-    """
+    """The result of a future; the wait is cut into pieces of `GLANCE`, since an endless one can miss an interrupt."""
     while not future.done():
         with contextlib.suppress(TimeoutError):
             future.exception(timeout=GLANCE)
@@ -164,10 +157,7 @@ class _Stopped(BaseException):
 
 
 class _Threads(Executor):
-    """A pool of threads that can be stopped during their work.
-
-    The interpreter waits for threads of `concurrent.futures` to finish all of their work before it ends.
-    """
+    """A pool of threads that can be stopped: the interpreter waits at its end for those of `concurrent.futures`."""
 
     def __init__(self, number: int) -> None:
         self._work: queue.SimpleQueue[tuple[Future[Any], Callable[[], Any]] | None] = queue.SimpleQueue()
@@ -230,10 +220,7 @@ class _Threads(Executor):
 
 @contextmanager
 def second_process() -> Iterator[Executor]:
-    """An executor of one further process, forked from this one; on one core, or without fork, one that works at once.
-
-    Only the parent handles interrupts. The process cannot print: the standard output is the parent's.
-    """
+    """An executor of one forked process, which cannot print; on one core or without fork, one that works at once."""
     if not sys.platform.startswith("linux") or cores() < 2:
         yield _AtOnce()
         return
@@ -312,7 +299,6 @@ def _begin(begin: Callable[..., None], arguments: tuple[Any, ...]) -> None:
 
 
 def _end_with_parent() -> None:
-    """Wait until the parent has ended."""
     parent = multiprocessing.parent_process()
     if parent is not None:
         multiprocessing.connection.wait([parent.sentinel])
@@ -327,8 +313,6 @@ def _print_to_nowhere() -> None:
 
 
 class _AtOnce(Executor):
-    """Runs a function in `submit`."""
-
     def submit(self, function: Callable[..., Any], /, *args: Any, **options: Any) -> Future[Any]:
         future: Future[Any] = Future()
         try:

@@ -1,7 +1,4 @@
-"""Printed results: the important numbers in at most ten lines of at most a hundred letters.
-
-The text is the ``__str__`` of a result, its first line the ``repr``; notebooks show all of it. No array is listed.
-"""
+"""Printed results: ``str`` has at most ten lines of a hundred letters and no array, ``repr`` is its first line."""
 
 import csv
 import importlib
@@ -57,7 +54,6 @@ def bic_in_words(bic: float) -> str:
 
 
 def summary_text(lines: Iterable[str], rows: Mapping[str, str] | None = None) -> str:
-    """Lines, and rows of a name and a text, up to the largest number of lines."""
     width = max(map(len, rows or {}), default=0)
     named = [_cut(f"  {name:<{width}}  ", text) for name, text in (rows or {}).items() if text]
     all_lines = [part for line in [*lines, *named] for part in line.splitlines()]
@@ -112,7 +108,6 @@ def _is_number(text: str) -> bool:
 
 
 def text_in_cell(cell: str) -> str:
-    """The text that `csv_text` has written to a cell."""
     return cell[1:] if cell.startswith("'") and _FORMULA.match(cell, 1) else cell
 
 
@@ -122,12 +117,10 @@ def listed(names: Sequence[str]) -> str:
 
 
 def quantity(value: float, unit: str = "") -> str:
-    """A number with its unit."""
     return f"{value:.4g} {unit}".rstrip()
 
 
 def extent(values: npt.ArrayLike, unit: str = "") -> str:
-    """The least and the largest of some values."""
     array = np.asarray(values)
     if not array.size:
         return "no values"
@@ -136,7 +129,6 @@ def extent(values: npt.ArrayLike, unit: str = "") -> str:
 
 
 def value_in_words(value: Any) -> str:
-    """The value of a parameter; an array by its shape and extent."""
     if isinstance(value, np.ndarray):
         size = " x ".join(map(str, value.shape)) or "1"
         return f"{size} values, {extent(value)}"
@@ -150,7 +142,6 @@ def value_in_words(value: Any) -> str:
 
 
 def _cut(name: str, text: str) -> str:
-    """A row over at most two lines."""
     indent = " " * len(name)
     lines = textwrap.wrap(
         text, LETTERS, initial_indent=name, subsequent_indent=indent, max_lines=2, placeholder=" ...",

@@ -1,8 +1,4 @@
-"""Progress of long calls, which the outermost verb reports: by default in one line on the standard error.
-
-A verb that is decorated by `reports` passes its callable to what it calls; verbs inside it, on its threads and in its
-processes too, report nothing by themselves.
-"""
+"""Progress of long calls, reported by the outermost verb only, by default in one line on the standard error."""
 
 import contextlib
 import functools
@@ -71,7 +67,6 @@ def along(progress: Reports) -> Iterator[None]:
 
 
 def followed(done: int, total: int) -> None:
-    """Report how many samples have been followed, if `along` asks for it."""
     if (progress := _along.get()) is not None:
         progress(done, total)
 
@@ -120,11 +115,9 @@ class Line:
         self._show(self.counted)
 
     def warn(self, warning: str) -> None:
-        """Write a warning on a line of its own, above the next report."""
         self.warning = warning
 
     def announce(self, subject: str) -> None:
-        """Name what is at work from now on."""
         self.subject = subject
         self._show(self.counted)
 
@@ -150,8 +143,6 @@ class Line:
 
 
 def _listener(event: Any, line: Line) -> Any:
-    """What numba tells about each compilation that begins."""
-
     class Listener(event.Listener):  # type: ignore[misc]
         def on_start(self, _: Any) -> None:
             line.compiling()

@@ -14,13 +14,7 @@ class Result(Protocol):
 
 
 def model_of(thing: Any) -> Any:
-    """The model of a result, which every verb takes in place of a model; anything else as it is.
-
-    Raises
-    ------
-    ValueError
-        If the result has no model, as that of `discover_oscillator` for a law that hysim lacks.
-    """
+    """The model of a result, or a value that is no result as it is; ValueError if a result has no model."""
     if not isinstance(thing, Result):
         return thing
     if thing.model is None:

@@ -15,11 +15,7 @@ _SIGNALS = ("t", "u", "y")
 
 
 def checked_channels(channels: Channels, n: int) -> dict[str, Any]:
-    """The channels of a record of `n` samples: floats and read-only arrays of shape (n,).
-
-    Raises ValueError if a name is no text or that of a signal, a value is not finite, or an array has another shape;
-    TypeError if a value is no number.
-    """
+    """Channels of a record of `n` samples as floats and read-only arrays (n,); ValueError or TypeError for others."""
     return {name: _values(name, values, n) for name, values in channels.items() if _checked_name(name)}
 
 
@@ -39,12 +35,10 @@ def _values(name: str, values: Any, n: int) -> Any:
 
 
 def along(channels: Channels) -> dict[str, FloatArray]:
-    """The channels with a value at each sample."""
     return {name: values for name, values in channels.items() if isinstance(values, np.ndarray)}
 
 
 def taken(channels: Channels, samples: slice | npt.NDArray[np.intp]) -> dict[str, Any]:
-    """The channels at some samples."""
     return {**channels, **{name: values[samples] for name, values in along(channels).items()}}
 
 

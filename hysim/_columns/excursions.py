@@ -50,7 +50,6 @@ class Loops(NamedTuple):
         return inserted
 
     def first_sample(self, cycle: Cycle) -> int:
-        """The record's sample at which a cycle begins, or the next one."""
         return cycle.path.start if self.places is None else int(np.ceil(self.places[cycle.path.start]))
 
 
@@ -64,7 +63,6 @@ class Protocol(NamedTuple):
 
     @property
     def slices(self) -> list[slice]:
-        """The fewest samples that contain each cycle."""
         return [slice(int(np.floor(begin)), int(np.ceil(end)) + 1) for begin, end in self.spans]
 
 
@@ -76,10 +74,7 @@ class _Excursion(NamedTuple):
 
 
 def measured_cycles(u: FloatArray, cycles: int, tolerance: float) -> Loops:
-    """The last complete cycles between the record's extremes, or else of full amplitude about a level, latest first.
-
-    A ValueError is raised if the record has too few of both kinds, or an argument is out of its range.
-    """
+    """The last cycles between the extremes, else of full amplitude about a level, latest first; else a ValueError."""
     if cycles < 1:
         raise ValueError(f"cycles must be at least 1, got {cycles}")
     between_extremes = complete_cycles(u, tolerance)
@@ -120,10 +115,7 @@ def protocol(u: FloatArray, tolerance: float, level: float | None = None) -> Pro
 
 
 def _candidates(levels: FloatArray, first: float, reach: float) -> list[float]:
-    """The first input, and the middle of the levels that most of the branches' length reaches if it is not one of them.
-
-    The record's first and last branch, which may be incomplete, are not counted.
-    """
+    """The first input, and the middle of the levels that the branches reach most, the first and the last left out."""
     ends = np.sort(np.column_stack([levels[1:-2], levels[2:-1]]), axis=1)
     if not ends.size:
         return [first]

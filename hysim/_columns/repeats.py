@@ -20,10 +20,7 @@ _CLOSING = 2.0  # largest steps of the input, by which a record may end before i
 
 
 def repeated_cycle(u: FloatArray, tolerance: float | None = None) -> int | None:
-    """Number of samples of the cycle with which the input `u` (n,) begins; None if it does not repeat itself.
-
-    `tolerance` is the largest reversal that is ignored, as a fraction of the span, by default that of noise.
-    """
+    """Number of samples of the cycle with which `u` (n,) begins, or None; `tolerance` is a share of the span."""
     span = float(np.ptp(u))
     if span == 0.0:
         return None

@@ -33,10 +33,7 @@ _SMALLEST = 1e-280  # span: below it numbers lose digits
 
 
 def output_quantum(values: FloatArray) -> float | None:
-    """The greatest step of which all values are whole multiples up to a constant, None if there is none.
-
-    It is rounded to the digits that its standard error allows.
-    """
+    """The greatest step of which all values are multiples up to a constant, rounded to its certain digits; or None."""
     levels = np.unique(values)
     with np.errstate(over="ignore"):
         span = float(np.ptp(levels)) if levels.size else 0.0
@@ -87,6 +84,5 @@ def _log_chance(n_levels: int, farthest: FloatArray, n_steps: FloatArray) -> Flo
 
 
 def _shortest(value: float, error: float) -> float:
-    """The number with the fewest digits within the error."""
     rounded = (float(f"{value:.{digits}g}") for digits in range(1, 18))
     return next(short for short in rounded if abs(short - value) <= error or short == value)

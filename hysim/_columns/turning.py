@@ -80,7 +80,6 @@ def settled(u: FloatArray) -> npt.NDArray[np.intp]:
 
 
 def too_few(u: FloatArray, tolerance: float, wanted: int, present: int) -> str:
-    """The message for a record with too few cycles."""
     levels = u[[first for first, _ in turns(u, tolerance).plateaus]]
     shown = ", ".join(f"{level:.6g}" for level in levels[:8]) + (", ..." if levels.size > 8 else "")
     return (
@@ -92,10 +91,7 @@ def too_few(u: FloatArray, tolerance: float, wanted: int, present: int) -> str:
 
 
 def _turning_points(u: FloatArray, threshold: float) -> list[tuple[int, int]]:
-    """First and last sample of each extreme from which the input retreats by more than the threshold.
-
-    The first and the last one are the record's ends, or the extremes that lie within the threshold of them.
-    """
+    """First and last sample of each extreme from which the input retreats by more than the threshold, ends included."""
     begins = np.flatnonzero(np.append(True, np.abs(np.diff(u)) > ROUNDING * np.ptp(u)))
     ends = np.append(begins[1:], u.size) - 1
     rises = np.diff(u[begins]) > 0

@@ -50,13 +50,11 @@ class Command(click.Command):
         super().__init__(name, params=params, context_settings=_SETTINGS, short_help=summary)
 
     def format_help_text(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
-        """Write the first part of the function's docstring."""
         formatter.write("\n")
         paragraphs = self.sections[""].split("\n\n")
         formatter.write_text("\n\n".join(f"\b\n{text}" if text.startswith("  ") else text for text in paragraphs))
 
     def format_options(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
-        """Write arguments and options in their groups."""
         groups: dict[str, list[tuple[str, str]]] = {}
         for each in self.declared:
             own = (str(each.click.metavar), each.help)  # since click helps with options only
@@ -68,7 +66,6 @@ class Command(click.Command):
                 formatter.write_dl(rows)
 
     def format_epilog(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
-        """Write what the values of options say at the end, and the examples."""
         for note in {each.value.note for each in self.declared if each.value.note is not None}:
             formatter.write("\n")
             formatter.write_text(note())
@@ -98,7 +95,6 @@ class Hysim(click.Group):
     """All commands, each loaded when it is named."""
 
     def list_commands(self, ctx: click.Context) -> list[str]:
-        """Names of the commands."""
         return [*COMMANDS]
 
     def get_command(self, ctx: click.Context, cmd_name: str) -> Command:
@@ -109,7 +105,6 @@ class Hysim(click.Group):
         return Command(cmd_name)
 
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
-        """Write a paragraph for each group of commands."""
         for title, commands in GROUPS.items():
             with formatter.section(title):
                 formatter.write_dl([(name, str(self.get_command(ctx, name).short_help)) for name in commands])
@@ -129,7 +124,6 @@ HYSIM = click.version_option(__version__, message="hysim %(version)s")(
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run one command and return its exit code."""
     try:
         try:
             with signals.handled():
@@ -174,7 +168,6 @@ def _ended(request: "KeyboardInterrupt | signals.Ended") -> int:
 
 
 def _failed(code: int, text: str) -> int:
-    """Print in one line what happened, over a line of progress if there is one."""
     start = "\r\x1b[K" if sys.stderr.isatty() else ""
     print(f"{start}hysim: {text}", file=sys.stderr)
     try:
@@ -191,7 +184,6 @@ def _discard(code: int) -> int:
 
 
 def _advice(error: click.UsageError) -> str:
-    """Message of an error, with the option that may be meant by an unknown one."""
     if not isinstance(error, click.NoSuchOption) or error.ctx is None:
         return error.format_message()
     word = error.option_name

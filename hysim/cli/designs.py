@@ -54,7 +54,6 @@ class Task(NamedTuple):
 
     @property
     def samples_per_cycle(self) -> int:
-        """Samples of a cycle of the triangle."""
         return round(self.period / self.sample_time)
 
 
@@ -75,7 +74,6 @@ class Design(NamedTuple):
 
     @property
     def last_cycle(self) -> slice:
-        """Samples of the triangle's last cycle."""
         return slice(-self.task.samples_per_cycle - 1, None)
 
     @property
@@ -128,7 +126,6 @@ def designed(path: str, options: DesignOptions, exported: Callable[[Any], object
 
 
 def plant(model: Any, options: DesignOptions) -> hs.Actuator:
-    """The model as an actuator, with the stages that the options add or replace."""
     actuator = as_actuator(model)
     stages: dict[str, Any] = {}
     if options.mode is not None:
@@ -143,7 +140,6 @@ def plant(model: Any, options: DesignOptions) -> hs.Actuator:
 
 
 def variations(actuator: hs.Actuator, percent: float | None) -> list[hs.Actuator]:
-    """The plant with its only mode at a lower and at a higher frequency."""
     if percent is None:
         return []
     if not 0.0 < percent < 100.0:
@@ -209,10 +205,7 @@ def in_units(record: hs.Record, units: Mapping[str, str], source: str) -> hs.Rec
 
 
 def reference(task: Task, rest: float, kind: str, unit: str | None) -> tuple[FloatArray, float, str]:
-    """Values for the tuning, the first seconds that do not count, and the objective.
-
-    They are the triangle, the step from a displacement at rest, or the reference in a file, in the unit of the output.
-    """
+    """Triangle, step from rest or reference in a file [unit of y]; seconds that do not count; and the objective."""
     h = task.sample_time
     if kind == "step":
         return np.full(round(task.duration / h) + 1, rest + task.step), 0.0, "itae"
@@ -224,10 +217,7 @@ def reference(task: Task, rest: float, kind: str, unit: str | None) -> tuple[Flo
 
 
 def feedback(actuator: hs.Actuator, kind: str, within: Pair | None) -> hs.PID | hs.TrackingController | None:
-    """The feedback before its tuning, whose nonzero gains are free; None for the default of `tune`.
-
-    It is tuned without the inverse: the inverse knows the simulated plant exactly, and would leave it nothing to do.
-    """
+    """Feedback before its tuning, without the inverse, which knows the plant exactly; None for the default."""
     if kind == "pid":
         return None
     if kind != "notch":
@@ -238,11 +228,7 @@ def feedback(actuator: hs.Actuator, kind: str, within: Pair | None) -> hs.PID | 
 
 
 def controller(actuator: hs.Actuator, kind: str, within: Pair | None, tuned: Any, *, preview: bool) -> Any:
-    """The controller of a kind, with a tuned feedback.
-
-    A TypeError or ValueError is raised if the plant lacks the inverse or the single mode that the kind needs, or a
-    preview has no inverse to serve.
-    """
+    """The controller of a kind, with a tuned feedback; TypeError or ValueError if plant or options do not allow it."""
     if kind not in INVERTING:
         if preview:
             raise ValueError(f"--preview is for {', '.join(INVERTING)}: the controller {kind} has no inverse")
@@ -320,7 +306,6 @@ def _slowest_decay(actuator: hs.Actuator) -> float:
 
 
 def document(design: Design) -> dict[str, Any]:
-    """All results, for JSON."""
     triangle, reduction, task = design.triangle, design.step.reduction, design.task
     return {
         "plant": to_document(design.actuator),
@@ -343,7 +328,6 @@ def document(design: Design) -> dict[str, Any]:
 
 
 def text(design: Design) -> str:
-    """All results, in words."""
     lines = [*_head(design), *_triangle(design), *_step(design), *_conditions(design)]
     return "\n".join(part for line in lines for part in folded(line, indent=12 * " "))
 
@@ -367,7 +351,6 @@ def _head(design: Design) -> Iterator[str]:
 
 
 def _signal(design: Design, name: str) -> str:
-    """The quantity of the input or the output with its unit."""
     text = label(design.units, name)
     return text[0].lower() + text[1:]
 
@@ -410,7 +393,6 @@ def _row(name: str, value: str) -> str:
 
 
 def _conditions(design: Design) -> Iterator[str]:
-    """The conditions of all results, with the model as the plant."""
     conditions, u, y = design.triangle.closed.conditions, design.units.get("u", ""), design.units.get("y", "")
     limits = "none" if conditions["limits"] is None else extent(conditions["limits"], u)
     times = ", ".join(

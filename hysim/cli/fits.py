@@ -152,7 +152,6 @@ def posterior(
 
 
 def _rows(posterior: "hs.Posterior") -> list[dict[str, Any]]:
-    """Each parameter with its median, interval at 95 % and diagnostics."""
     columns: dict[str, Any] = {
         "median": posterior.median,
         "lower": {name: low for name, (low, _) in posterior.interval().items()},
@@ -242,7 +241,6 @@ def compare(
 
 
 def _subjects(name: str) -> dict[str, Any]:
-    """Subjects of the comparison for a family's name, a file or an import path."""
     from hysim.models.model import candidates_named
 
     model = models.model_or_family(name)

@@ -186,7 +186,6 @@ def _lines(study: Any) -> Iterator[str]:
 
 
 def _verdicts(claims: Sequence[Any]) -> Iterator[str]:
-    """The number of claims with each verdict, and the verdicts on the two headline figures."""
     counts = Counter(claim.verdict for claim in claims)
     yield f"{len(claims)} claims: " + ", ".join(f"{number} {verdict}" for verdict, number in counts.most_common())
     for claim in claims:

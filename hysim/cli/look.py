@@ -136,7 +136,6 @@ def _lines(loop: "hs.LoopMetrics", units: Mapping[str, str]) -> Iterator[str]:
 
 
 def _step(record: "hs.Record") -> Iterator[str]:
-    """The resolution that the outputs show, if none was given."""
     if record.resolution is None and (step := record.detect_resolution()) is not None:
         unit = record.units.get("y", "")
         yield f"the output has steps of {f'{step:.6g} {unit}'.rstrip()}: --resolution detect takes them"
@@ -151,7 +150,6 @@ class Contents(NamedTuple):
 
     @property
     def results(self) -> "list[Any]":
-        """Records, and the runs of models by their names."""
         named = zip(self.laws, self.simulated, strict=True)
         return [*self.measured, *(replace(run, name=name) for name, run in named)]
 
@@ -175,8 +173,6 @@ def _history(canvas: Any, contents: Contents) -> None:
 
 
 def _each(name: str) -> Callable[[Any, Contents], None]:
-    """A drawing of every result in a panel of its own."""
-
     def draw(canvas: Any, contents: Contents) -> None:
         for result, ax in zip(contents.results, hs.plot.panels(canvas, len(contents.results)), strict=True):
             vars(hs.plot)[name](result, ax)
@@ -344,7 +340,6 @@ def measure(
 
 
 def _table(motion: Any, log: "hs.Record | None", times: Any, on_lost: Any) -> tuple[dict[str, Any], dict[str, str]]:
-    """Columns and their units."""
     import numpy as np
 
     unit = motion.units["y"]

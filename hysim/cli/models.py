@@ -62,7 +62,6 @@ def _short(families: Iterable[str]) -> list[str]:
 
 
 def _is_family(name: str) -> bool:
-    """Whether a family has this name, short or not."""
     from hysim.models.model import family_named
 
     try:
@@ -267,10 +266,7 @@ def family(name: str) -> Any:
 
 
 def resolved(path: str) -> Any:
-    """The object at an import path, `module:name`; modules in the current folder are importable.
-
-    A ValueError is raised if there is no such module, or it does not have the name.
-    """
+    """The object at an import path, `module:name`, the current folder included; ValueError if there is none."""
     module, _, _ = path.partition(":")
     if os.getcwd() not in sys.path:
         sys.path.insert(0, os.getcwd())  # as `python -m hysim` has it
@@ -285,7 +281,6 @@ def resolved(path: str) -> Any:
 
 
 def is_import_path(text: str) -> bool:
-    """Whether a text is `module:name`, and not the path of a file."""
     return bool(re.fullmatch(r"[^\W\d]\w*(\.\w+)*:\w+(\.\w+)*", text)) and not Path(text).exists()
 
 
@@ -312,11 +307,7 @@ def model_or_family(text: str) -> Any:
 
 
 def to_identify(chosen: FitOptions) -> Any:
-    """The argument of `identify` for these options, whose `initial` becomes None where the structure takes it.
-
-    A ValueError is raised if there is no such model, an option belongs to another one, or one that this model needs is
-    missing.
-    """
+    """The argument of `identify`; `initial` becomes None where the structure takes it. ValueError on a wrong option."""
     from hysim.models.model import FAMILIES
 
     name, of_actuator, used = (chosen.model, _used(chosen, ActuatorOptions), _used(chosen, StructureOptions))
@@ -356,7 +347,6 @@ def _argument(model: Any, option: str) -> str | None:
 
 
 def _actuator(chosen: ActuatorOptions) -> Any:
-    """The structure of an actuator with these chosen."""
     return hs.Actuator.structure(
         model_or_family(chosen.law or "bouc-wen"),
         creep=chosen.creep if chosen.creep_elements is None else chosen.creep_elements,
@@ -367,10 +357,7 @@ def _actuator(chosen: ActuatorOptions) -> Any:
 
 
 def read(path: str) -> tuple[Any, dict[str, str]]:
-    """The model in a file, on the standard input, or at an import path, and its units.
-
-    A class at an import path stands for the model with its default values.
-    """
+    """The model in a file, on standard input or at an import path (a class: with its default values), and its units."""
     from hysim.models.storage import from_json
 
     if is_import_path(path):

@@ -78,7 +78,6 @@ class Value:
         raise click.BadParameter(f"expected {self.expected}, got {text!r}{near and f': {near}'}")
 
     def complete(self, _context: click.Context, _parameter: click.Parameter, begin: str) -> list[CompletionItem]:
-        """Words that begin like this, and files if there may be other values than words."""
         words = [CompletionItem(word) for word in (*self.words, *self.offers()) if word.startswith(begin)]
         return words if self.read is None else [CompletionItem(begin, type="file"), *words]
 
@@ -100,7 +99,6 @@ def parameters(function: Callable[..., int]) -> Iterator[Parameter]:
 
 
 def call(function: Callable[..., int], values: Mapping[str, Any]) -> int:
-    """Call the function of a command with the values of its options."""
     arguments = {}
     for name, hint in typing.get_type_hints(function).items():
         if dataclasses.is_dataclass(hint):
@@ -179,7 +177,6 @@ def _value(hint: Any) -> Value:
 
 
 def one_of(words: Mapping[str, str]) -> Value:
-    """Values that are one of some words, with what each stands for."""
     text = "; ".join(f"{word}: {meaning}" for word, meaning in words.items())
     return Value(f"[{'|'.join(words)}]", None, ", ".join(words), words=(*words,), help=text)
 
@@ -208,21 +205,18 @@ def matched(pattern: str, *readers: Callable[[str], Any]) -> Callable[[str], Any
 
 
 def positive(option: str, value: float) -> float:
-    """The value of an option; ValueError unless it is positive and finite."""
     if not 0.0 < value < float("inf"):
         raise ValueError(f"{option} must be positive, got {value:g}")
     return value
 
 
 def exclusive(**values: Any) -> None:
-    """ValueError if more than one of some options is used."""
     used = [flag(name) for name, value in values.items() if value not in (None, False)]
     if len(used) > 1:
         raise ValueError(f"{' and '.join(used)} exclude each other: leave one of them out")
 
 
 def column(text: str) -> str | int:
-    """A column by its name, or by its number from 0."""
     return int(text) if text.isascii() and text.isdigit() else text
 
 
@@ -231,7 +225,6 @@ Place = tuple[float, str]
 
 
 def _place(text: str) -> Place:
-    """A place in a record, such as ``100`` or ``2.5s``."""
     number, unit = matched(r"(.*?)((?:[mun]?s)?)", str, str)(text)
     return (float(number) if unit else at_least(0)(number)), unit
 
@@ -249,7 +242,6 @@ def _terms(text: str) -> str | list[str]:
 
 
 def file(name: str, role: str = RESULT, help_: str = "") -> Value:
-    """Values that name a file."""
     return Value(name, role=role, help=help_)
 
 

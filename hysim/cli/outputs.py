@@ -26,11 +26,9 @@ _LOOPS_IN_A_ROW = 3
 
 
 def check(files: Sequence[tuple[str, str]], *, prints: bool) -> None:
-    """Refuse results of a command that cannot be written, before anything is computed.
+    """Raise a ValueError for results that cannot be written, before anything is computed.
 
-    A ValueError is raised if a folder does not exist or may not be written to, the ending of a picture or a table is
-    unknown, two results would go to one place, such as the standard output, or a result would overwrite an input.
-    `files` are paths and their roles, and `prints` whether a document is printed.
+    `files` are paths and their roles, no two of which may be equal; `prints` is whether a document is printed.
     """
     results = [(path, role) for path, role in files if role != INPUT]
     for path, role in results:
@@ -80,10 +78,7 @@ def _behind(source: str) -> Iterator[os.stat_result]:
 def write(
     files: Files, text: Callable[[], str] | None = None, document: Callable[[], Mapping[str, Any]] | None = None
 ) -> None:
-    """Write a content to each path that is not None, all of the files or none, and print the result.
-
-    The result is a text, or with ``--json`` a document; it is not printed if a path is the standard output.
-    """
+    """Write all files or none, and print `text`, or `document` with ``--json``, unless a path is standard output."""
     contents = {path: _encoded(path, content()) for path, content in files.items() if path is not None}
     if text is not None and STANDARD not in contents:
         contents[STANDARD] = printed(text, document).encode()
@@ -107,7 +102,6 @@ def printed(text: Callable[[], str], document: Callable[[], Mapping[str, Any]] |
 
 
 def flags(command: click.Command) -> dict[str, str]:
-    """The options of a command by the names of their values."""
     options = [each for each in command.params if isinstance(each, click.Option)]
     return {(each.name or "").rstrip("_"): each.opts[0] for each in options}
 
@@ -126,22 +120,17 @@ def _jsonable(value: Any) -> Any:
 
 
 def scalars(result: Any) -> dict[str, Any]:
-    """The fields of a result that are numbers, words or truth values, by name."""
     from hysim._basics.frozen import items
 
     return {name: value for name, value in items(result).items() if isinstance(value, (str, int, float))}
 
 
 def fields_of(result: Any, names: Iterable[str]) -> dict[str, Any]:
-    """Some fields of a result by name."""
     return {name: attrgetter(name)(result) for name in names}
 
 
 def table(path: str, columns: Mapping[str, Any], units: Mapping[str, str]) -> bytes:
-    """Columns in the format of their path's ending; the standard output gets comma-separated text.
-
-    A ValueError is raised if the ending is unknown, or its format needs an extra.
-    """
+    """Columns in the format of the path's ending, CSV on standard output; ValueError if it is unknown."""
     from hysim.files import Notes, packed
 
     notes = Notes({name: units[name] for name in columns if name in units})
@@ -149,7 +138,6 @@ def table(path: str, columns: Mapping[str, Any], units: Mapping[str, str]) -> by
 
 
 def drawn(draw: Callable[[Any], object], width: float = 6.0, height: float = 4.0) -> Any:
-    """A figure in the house style, which a function has drawn on."""
     with hs.plot.house_style():
         canvas = hs.plot.figure(width, height)
         draw(canvas)

@@ -40,7 +40,6 @@ class TextOptions:
     encoding: str | None = None
 
     def for_load(self) -> dict[str, Any]:
-        """The options of texts, as `hysim.load` takes them."""
         others = {name: vars(self)[name] for name in ("decimal", "thousands", "skip", "encoding")}
         return {"delimiter": _DELIMITERS.get(self.delimiter or "", self.delimiter), **others}
 
@@ -114,19 +113,12 @@ class WeighedOptions(RecordOptions):
 
 
 def read(settings: InputOptions, path: str, *, uncut: bool = False) -> "hs.Record":
-    """The record that the settings describe in a file; without an output column, y is u.
-
-    With `uncut` all samples are used, whatever `--from`, `--to` and `--every` say.
-    """
+    """The record that the settings describe, y = u without an output; `uncut` ignores --from, --to and --every."""
     return _read(settings, path, source_of(path), uncut=uncut)
 
 
 def read_input(settings: InputOptions, path: str, *, of_the_ground: bool) -> "hs.Record":
-    """The input that the settings describe, as a record with y = u.
-
-    A ground motion in m/s^2 is read from an AT2 file, and with `of_the_ground` from a file that has no column u where
-    none is named.
-    """
+    """The input as a record with y = u; a ground motion [m/s^2] from AT2, or `of_the_ground` from a file without u."""
     from hysim.files import column_names, is_at2
 
     source = _repeatable(path)
@@ -147,10 +139,7 @@ def read_input(settings: InputOptions, path: str, *, of_the_ground: bool) -> "hs
 
 
 def read_with_weights(settings: WeighedOptions, path: str) -> "tuple[hs.Record, Any]":
-    """The record that the settings describe, and the column of weights that they name.
-
-    Columns of sensors are channels of the record, the first of them the output unless another one is named.
-    """
+    """The record, with columns of sensors as channels (the first is y if none is named), and the column of weights."""
     if settings.sensor and settings.y is None:
         settings.y = settings.sensor[0][1]
     settings.channel += settings.sensor
@@ -162,7 +151,6 @@ def read_with_weights(settings: WeighedOptions, path: str) -> "tuple[hs.Record, 
 
 
 def source_of(path: str) -> Any:
-    """The path, or the standard input."""
     if path != STANDARD:
         return path
     return sys.stdin.buffer if isinstance(sys.stdin, io.TextIOWrapper) else sys.stdin
@@ -186,7 +174,6 @@ def cut(record: "hs.Record", settings: InputOptions) -> "hs.Record":
 
 
 def _sample(record: "hs.Record", place: options.Place | None, option: str) -> int | None:
-    """The number of the first sample at or after a place."""
     import numpy as np
 
     if place is None:
@@ -202,10 +189,7 @@ def _sample(record: "hs.Record", place: options.Place | None, option: str) -> in
 
 
 def of_structure(structure: Any, record: "hs.Record", columns: Mapping[str, Any]) -> "hs.StructureRecord":
-    """The record of a structure, with the channels of these names as its sensors.
-
-    A ValueError is raised if the model is no structure, a name is none of its signals, or the record has no time.
-    """
+    """The record of a structure with these channels as sensors; ValueError if a name or the time is missing."""
     import numpy as np
 
     if not isinstance(structure, hs.Structure):

@@ -31,16 +31,12 @@ class Ended(BaseException):
 
 
 def message(number: int) -> str:
-    """Message for an end by a signal."""
     return "interrupted" if number == signal.SIGINT else f"ended by {signal.Signals(number).name}"
 
 
 @contextlib.contextmanager
 def handled() -> Iterator[None]:
-    """Turn signals that would end the process at once into an exception, unless they have a handler already.
-
-    This does nothing outside the main thread, where Python does not allow handlers to be set.
-    """
+    """Turn signals that would end the process into an exception where they have no handler; only in the main thread."""
     if threading.current_thread() is not threading.main_thread():
         yield
         return

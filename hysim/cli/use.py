@@ -10,8 +10,6 @@ from hysim.cli import models, options, outputs, records
 
 @runtime_checkable
 class _Shaken(Protocol):
-    """A plant that a force or its base moves."""
-
     excitation: str
 
 

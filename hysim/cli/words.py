@@ -103,7 +103,6 @@ def _pair(name: str, ends: str, content: str) -> str:
 
 
 def _typed(word: str) -> str:
-    """The word with quotes where a shell needs them."""
     return word if re.fullmatch(r"[\w@%+=:,./*\[\]^-]+", word) else shlex.quote(word)
 
 

@@ -78,8 +78,7 @@ def compare(
     workers : int, optional
         Number of threads; by default one for each core. The result does not depend on it.
     progress : callable or False, optional
-        Called as ``progress(done, total)`` after each model.
-        By default calls beyond 2 s report on the standard error; False turns this off.
+        Called as ``progress(done, total)`` after each model; see `hysim.simulate`.
     announce : callable, optional
         Called as ``announce(name)`` when a model's turn begins, on the thread that works on it.
 
@@ -159,14 +158,11 @@ class _Trial:
 
     @property
     def record(self) -> Record:
-        """The samples that are judged."""
         return self.drive[self.begin :]
 
 
 @dataclass(frozen=True)
 class _Protocol:
-    """The treatment of every model."""
-
     records: tuple[Record, ...]
     measured: LoopMetrics
     cross_validate: str | int | None
@@ -176,7 +172,6 @@ class _Protocol:
     announce: Callable[[str], None] | None
 
     def row(self, name: str, subject: Any) -> ComparisonRow | str:
-        """The row of one subject, or the reason why there is none."""
         identified_here = _is_family(subject)
         if self.announce is not None:
             self.announce(name)
@@ -240,7 +235,6 @@ class _Protocol:
         )
 
     def _test_errors(self, subject: Any, model: Any, identified_here: bool) -> tuple[float, float]:
-        """Fit and rmse on the test."""
         if self.trial is None or isinstance(subject, OneByOne):
             return math.nan, math.nan
         drive, test = self.trial.drive, self.trial.record
@@ -284,7 +278,6 @@ def _distinct(records: tuple[Record, ...], subjects: dict[str, Any]) -> tuple[tu
 
 
 def _named(models: Any) -> dict[str, Any]:
-    """Families by their names; the candidates of a family by theirs."""
     if not isinstance(models, Sequence) or not all(isinstance(each, str | type) for each in models):
         raise TypeError(
             f'compare takes a mapping of names to models, a list of families or their names, or "all", got {models!r}'
@@ -321,12 +314,10 @@ def _trial(records: Sequence[Record], test: Record | int | None) -> _Trial | Non
 
 
 def _is_family(subject: Any) -> bool:
-    """Whether the subject is a class or a structure, to be identified."""
     return isinstance(subject, type) or not isinstance(subject, Responding | Result | list | tuple)
 
 
 def _with_initial_state(record: Record, fitted: Identification, seed: int) -> Any:
-    """The identified model, with the initial state that fits another record best."""
     model = on_record(fitted.model, record)
     if not is_searched(model):
         return model
@@ -382,7 +373,6 @@ class OneByOne(NamedTuple):
 
     @property
     def model(self) -> Any:
-        """The model on the last record."""
         return self.models[-1]
 
 

@@ -33,10 +33,8 @@ class ComparisonRow:
 
     Parameters
     ----------
-    name : str
-        Name of the model.
-    model : model
-        The model itself.
+    name, model
+        Its name, and the model itself.
     n_parameters : int
         Number of its parameters that were fitted to this record.
     fit_percent, rmse : float
@@ -58,20 +56,12 @@ class ComparisonRow:
         Whether the output stays the same, to 1e-6 of its range, if the input follows the same path at half the rate.
     rate_deviation : float
         The largest change of the output in that test, as a fraction of its range.
-    y : array, shape (n,)
-        Output at the record's samples.
-    loop : LoopMetrics
-        The model's loop.
+    y, loop
+        Output at the record's samples, shape (n,), and the model's loop.
     test_fit_percent, test_rmse : float
         Fit [%] and rmse [unit of y] on the test; nan without a test.
-    success : bool
-        Whether its identification converged.
-    message : str
-        Message of the identification; empty for a model that was not identified here.
-    warnings : tuple of str
-        Warnings of the identification.
-    unsafe : str
-        Sentence where the identified law is not safe on smaller cycles; see `hysim.Identification`.
+    success, message, warnings, unsafe
+        Those of its `hysim.Identification`; the message is empty for a model that was not identified here.
     """
 
     name: str
@@ -234,7 +224,6 @@ class Comparison:
         )
 
     def __str__(self) -> str:
-        """The rows that predict best, and the verdict."""
         best = [row.name for row in self.ranked()]
         unknown = [row.name for row in self.rows if math.isnan(row.cv_rmse)]
         by_name = {row["name"]: row for row in rows(self)}
@@ -290,7 +279,6 @@ class Comparison:
         return csv_text([table, *(map(_exact, row) for row in zip(*table.values(), strict=True))])
 
     def _columns(self) -> dict[str, list[Value | None]]:
-        """Heading to values; a model that could not be compared has its name and message only."""
         failed = [{"name": name, "success": False, "message": reason} for name, reason in self.failed.items()]
         every = [*rows(self), *failed]
         return {column.heading: [row.get(column.name) for row in every] for column in columns(self)}
@@ -322,7 +310,6 @@ class Comparison:
         return f"all others are significantly worse, the nearest {nearest_in_words} {method}"
 
     def _exceptions_in_words(self) -> list[str]:
-        """Models that diverged, and those whose ranks and rmse disagree."""
         diverged = tuple(each.name for each in self.contrasts if each.diverged)
         smaller = tuple(each.name for each in self.contrasts if each.contradicts)
         sentences = [f"{_first(diverged)} diverged on samples left out."] if diverged else []
@@ -336,7 +323,6 @@ class Comparison:
 
 
 def _first(names: Sequence[str]) -> str:
-    """The names in a sentence; of many the first ones, and the number of the others."""
     return listed(names if len(names) <= _NAMED else [*names[: _NAMED - 1], f"{len(names) - _NAMED + 1} others"])
 
 
@@ -350,7 +336,6 @@ class Column(NamedTuple):
 
 
 def columns(comparison: Comparison) -> list[Column]:
-    """The columns that this comparison can fill."""
     units = comparison.record.units
     u, y = (f" [{units[name]}]" if name in units else "" for name in ("u", "y"))
     area = f" [{units['y']} {units['u']}]" if {"u", "y"} <= units.keys() else ""
@@ -402,7 +387,6 @@ def rows(comparison: Comparison) -> list[dict[str, Any]]:
 
 
 def _short(comparison: Comparison) -> list[list[str]]:
-    """Headings and printed cells of the short columns, one row a model."""
     selected = [column for column in columns(comparison) if column.short]
     body = [[_printed(row[column.name], column.digits) for column in selected] for row in rows(comparison)]
     for cells, row in zip(body, comparison.rows, strict=True):

@@ -16,14 +16,11 @@ which need no such assumption,
     T = mean(s) sqrt(N) / sqrt(mean of B_j^2),    J degrees of freedom.
 
 If d is as often positive as negative, and as large, T has about Student's distribution. With fewer than 5 independent
-samples no difference could be shown, however large;
-a model whose median error is 10 times that of the best one is worse all the same. Differences below a thousandth of the
-typical error count as none.
-Several models are compared with the best one by Holm's correction. The best one was chosen by the same errors, which
-makes a small probability less remarkable.
+samples no difference could be shown, however large; a model whose median error is 10 times that of the best one is
+worse all the same. Differences below a thousandth of the typical error count as none. Several models are compared with
+the best one by Holm's correction. That was chosen by the same errors, which makes a small probability less remarkable.
 
-`python experiments/equal_models.py` counts how often equal models are called unequal. A mean of squared errors with 3
-to 6 lags (Diebold and Mariano 1995) fails where one error is huge.
+A mean of squared errors with 3 to 6 lags (Diebold and Mariano 1995) fails where one error is huge.
 
 Sources: F. Wilcoxon, Biometrics Bull. 1 (1945) 80 for signed ranks; F. W. Zwiers and H. von Storch, J. Climate 8
 (1995) 336 for M; F. H. C. Marriott and J. A. Pope, Biometrika 41 (1954) 390 for the bias; S. Holm, Scand. J. Stat. 6
@@ -59,21 +56,10 @@ _ROUNDING = 1e-9  # of the output's range
 class Contrast:
     """A model compared with the best one, by their errors at samples that were left out of both.
 
-    Parameters
-    ----------
-    name : str
-        Name of the model.
-    rmse_ratio : float
-        Its cross-validated rmse over that of the best model.
-    typical_ratio : float
-        Its median absolute error over that of the best model; nan if errors are unknown.
-    probability : float
-        Two-sided probability of equally one-sided signed ranks if both predicted equally well, after Holm's correction
-        for the number of models; nan if errors are unknown.
-    has_larger_errors : bool
-        Whether its errors are the larger ones by their signed ranks.
-    diverged : bool
-        Whether a left-out error is not finite, or more than 10 times the range of the measured output.
+    `rmse_ratio` and `typical_ratio` are its cross-validated rmse and its median absolute error over those of the best
+    model. `probability` is the two-sided one of equally one-sided signed ranks if both predicted equally well, after
+    Holm's correction. Both are nan if errors are unknown. `has_larger_errors` is the verdict of the signed ranks;
+    `diverged` is whether an error is not finite, or more than 10 times the range of the measured output.
     """
 
     name: str

@@ -1,7 +1,4 @@
-"""Feed-forward by the inverse of a law whose numbers drift.
-
-Its equations stand in `hysim.kernels.adaptive_inverse`.
-"""
+"""Feed-forward by the inverse of a law whose numbers drift; `hysim.kernels.adaptive_inverse` has its equations."""
 
 import functools
 import math
@@ -145,13 +142,11 @@ class AdaptiveInverse(WithoutFeedback):
         return here, np.array(rates)
 
     def _packed(self, name: str, value: float) -> tuple[FloatArray, FloatArray]:
-        """Parameters and memory of the law with another number."""
         law = self.law
         parameters, memory = law.pack(law.completed(law.exchanged({name: np.array([[value]])})))
         return parameters[0], memory[0]
 
     def _begun(self, parameters: FloatArray, u0: float) -> tuple[float, FloatArray]:
-        """Output at rest at `u0` of a copy of the law, and its state."""
         front = self.law.packed[1]
         state = np.concatenate([front, np.zeros(self.law.workspace)])
         constants = read_only(parameters, finite=False)
@@ -161,5 +156,4 @@ class AdaptiveInverse(WithoutFeedback):
         return float(self.law.step(constants, state, u0)), state
 
     def _own_state(self, law: Any, u0: float) -> FloatArray:
-        """State of the law's own step at rest at `u0`."""
         return self._begun(law.parameters, u0)[1]

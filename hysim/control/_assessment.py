@@ -75,16 +75,9 @@ class LoopAssessment:
     def row(self, quantum: float | None = None) -> dict[str, float | bool | None]:
         """The columns beside a reduction in a table: numbers, None where one is infinite or unknown.
 
-        Parameters
-        ----------
-        quantum : float, optional
-            Step of the readings for ``"volts_per_quantum"`` [unit of y]; by default the sensor's own.
-
-        Returns
-        -------
-        dict
-            ``"stable"``, ``"period"``, ``"tracking_rms"``, ``"limited_percent"``, ``"max_sensitivity"``,
-            ``"max_sensitivity_with_delay"`` and ``"volts_per_quantum"``.
+        They are ``"stable"``, ``"period"``, ``"tracking_rms"``, ``"limited_percent"``, ``"max_sensitivity"``,
+        ``"max_sensitivity_with_delay"`` and ``"volts_per_quantum"``, for a step `quantum` of the readings [unit of y],
+        by default the sensor's own.
         """
         step = self.closed.conditions["sensor_quantum"] if quantum is None else quantum
         numbers = {name: vars(self)[name] for name in _IN_A_ROW} | {"volts_per_quantum": self.command_jump * step}
@@ -207,7 +200,6 @@ class OpenLoop:
         return signal[-self.samples_per_cycle - 1 :]
 
     def loop_of(self, y: FloatArray) -> LoopMetrics:
-        """Measures of a displacement against the reference in the last cycle."""
         return loop_metrics(self.cycle, self.last(y))
 
     def reduction_percent(self, y: FloatArray) -> float:
@@ -234,10 +226,8 @@ class HysteresisAssessment:
         Rms error, and displacement at the end minus at the start [unit of y].
     secant_gain : float
         Secant gain of the open loop [unit of y / unit of u].
-    open_u, open_y, closed
-        Signals of the open loop, shape (n,), and the closed loop.
-    loop : LoopAssessment
-        Stability, robustness, and share of limited samples.
+    open_u, open_y, closed, loop
+        Signals of the open loop, shape (n,); the closed loop; and its judgement.
     """
 
     hysteresis_reduction_percent: float
@@ -284,10 +274,8 @@ class StepAssessment:
     ----------
     reduction : VibrationReduction
         The three figures, nan if the loop is not stable, and the measures of both responses.
-    open_y, closed
-        Displacement in open loop, shape (n,), where the voltage steps to its final value; and the closed loop.
-    loop : LoopAssessment
-        Stability, robustness, and share of limited samples.
+    open_y, closed, loop
+        Displacement in open loop, shape (n,), where the voltage steps to its final value; closed loop; its judgement.
     """
 
     reduction: VibrationReduction
@@ -315,10 +303,8 @@ class SquareWaveAssessment:
     reduction : VibrationReduction, or None
         The step's figures over the last half period, if it lasts the open loop's t98 and five of its periods, and the
         loop is stable.
-    open_y, closed
-        Displacement in open loop, shape (n,), and the closed loop.
-    loop : LoopAssessment
-        Stability, robustness, and share of limited samples.
+    open_y, closed, loop
+        Displacement in open loop, shape (n,); the closed loop; and its judgement.
     """
 
     open_tracking_rms: float
@@ -425,23 +411,10 @@ def assess_hysteresis(
 def open_loop(plant: Any, reference: npt.ArrayLike, sample_time: float, samples_per_cycle: int) -> OpenLoop:
     """Drive a plant along a periodic reference by the voltage reference / secant gain.
 
-    Parameters
-    ----------
-    plant : Actuator, law or linear plant
-        At rest at no voltage before the first sample.
-    reference : array, shape (n,)
-        Whole cycles, and the sample at which the last one ends [unit of y].
-    sample_time, samples_per_cycle
-        Sample time [s] and length of a cycle.
-
-    Returns
-    -------
-    OpenLoop
-
-    Raises
-    ------
-    SimulationError, ValueError
-        If the plant diverges or has no gain, or the reference does not hold whole cycles.
+    `plant` is an Actuator, a law or a linear plant, at rest at no voltage before the first sample. `reference` (n,)
+    [unit of y] holds whole cycles of `samples_per_cycle`, and the sample at which the last one ends, each `sample_time`
+    apart [s]. Raises SimulationError if the plant diverges; ValueError if it has no gain, or the reference does not
+    hold whole cycles.
 
     Examples
     --------

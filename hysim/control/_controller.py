@@ -24,8 +24,6 @@ from hysim.models.protocols import CompiledController, positive_time
 
 @runtime_checkable
 class Controller(Protocol):
-    """Settings of a sampled controller."""
-
     def compiled(self, sample_time: float, u0: float, y0: float) -> CompiledController:
         """Step, parameters, and state at rest at the command `u0` and the displacement `y0`."""
         ...
@@ -67,14 +65,7 @@ def with_room(state: FloatArray, u: float, reference: float, measurement: float)
 def held_samples(state: CompiledController) -> int:
     """Number of samples at which a controller has held its last valid inputs, or its last command.
 
-    Parameters
-    ----------
-    state : CompiledController
-        From a controller's ``step``, or ``initial``.
-
-    Returns
-    -------
-    int
+    `state` is what a controller's ``step`` or ``initial`` returned.
 
     Examples
     --------
@@ -89,7 +80,6 @@ def held_samples(state: CompiledController) -> int:
 
 
 def limits_of(controller: object) -> tuple[float, ...] | None:
-    """Lowest and highest command of a controller; None for no limits."""
     return controller.limits if isinstance(controller, Limited) else None
 
 
@@ -142,34 +132,15 @@ class SampledController(ABC):
         return 0
 
     def initial(self, sample_time: float, u: float = 0.0, y: float = 0.0) -> CompiledController:
-        """State to `step` from, at rest at a command [unit of u] and a displacement [unit of y].
-
-        Raises
-        ------
-        ValueError
-            If the sample time [s] is not positive and finite.
-        """
+        """State to `step` from, at rest at a command and a displacement; ValueError for a bad sample time [s]."""
         return begun(self, sample_time, u, y)
 
     def step(self, state: CompiledController, reference: float, measurement: float) -> tuple[float, CompiledController]:
-        """Command for one sample, and the state after it; `state` itself does not change.
+        """Command for one sample, the same bits as in a loop, and the state after it; `state` does not change.
 
-        A reference or measurement that is not finite, or beyond 1e100, is replaced by the last valid one;
-        `hysim.control.held_samples` counts them.
-
-        Parameters
-        ----------
-        state : CompiledController
-            From `initial`, or from the step before.
-        reference, measurement : float
-            Reference, `ahead` of its time where the controller has preview, and measurement [unit of y].
-
-        Returns
-        -------
-        u : float
-            Within the limits, the same bits as in a loop.
-        state : CompiledController
-            To continue from.
+        `state` is from `initial` or the step before; the reference, `ahead` of its time where the controller has
+        preview, and the measurement are in [unit of y]. One that is not finite, or beyond 1e100, is replaced by the
+        last valid one; `hysim.control.held_samples` counts them.
 
         Examples
         --------
@@ -187,11 +158,9 @@ class WithoutFeedback(SampledController):
     """Controllers of which the measurement does not move the command itself."""
 
     def frequency_response(self, frequency: npt.ArrayLike, sample_time: float) -> npt.NDArray[np.complex128]:
-        """Zeros: there is no feedback."""
         return np.zeros(np.shape(frequency), dtype=complex)
 
     def linear(self, sample_time: float) -> Feedback:
-        """No feedback, a system without states."""
         return Feedback(np.zeros((0, 0)), np.zeros(0), np.zeros(0), 0.0)
 
 
@@ -223,8 +192,7 @@ class PID(SampledController):
     setpoint_weight : float
         b, the weight of the reference in the proportional action.
     derivative_weight : float
-        c, the weight of the reference in the derivative: 0 avoids a kick at a step of the reference, 1 differentiates
-        the error.
+        c, the weight of the reference in the derivative: 0 avoids a kick at a step of the reference, 1 takes the error.
 
     Raises
     ------
@@ -264,25 +232,10 @@ class PID(SampledController):
         setpoint_weight: float = 1.0,
         derivative_weight: float = 0.0,
     ) -> Self:
-        """PID in its standard form, u = Kp (e + 1/Ti integral e dt + Td de/dt).
+        """PID in its standard form, u = Kp (e + 1/Ti integral e dt + Td de/dt); other arguments as of the constructor.
 
-        Parameters
-        ----------
-        Kp : float
-            Gain [unit of u / unit of y].
-        Ti, Td : float
-            Integral time, positive and infinite for none, and derivative time [s].
-        derivative_filter, limits, tracking_time, setpoint_weight, derivative_weight
-            As in the constructor.
-
-        Returns
-        -------
-        PID
-
-        Raises
-        ------
-        ValueError
-            If Ti is not positive, or as the constructor.
+        `Kp` is the gain [unit of u / unit of y], `Ti` the integral time, infinite for none, and `Td` the derivative
+        time [s]. Raises ValueError if `Ti` is not positive, or as the constructor.
         """
         if not Ti > 0.0:
             raise ValueError(f"Ti must be positive, got {Ti}: an infinite one leaves the integral out")
@@ -304,28 +257,11 @@ class PID(SampledController):
     def advance(
         self, reference: npt.ArrayLike, measurement: npt.ArrayLike, sample_time: float, state: State | None = None
     ) -> tuple[FloatArray, State]:
-        """Voltages within the limits, the same bits as in a loop, and the state after the last sample.
+        """Voltages (n,) [unit of u] within the limits, the same bits as in a loop, and the state after the last sample.
 
-        Parameters
-        ----------
-        reference, measurement : array, shape (n,)
-            [unit of y]
-        sample_time : float
-            [s]
-        state : State, optional
-            To continue from; by default `start` at no voltage and at the first measurement.
-
-        Returns
-        -------
-        u : array, shape (n,)
-            Commands within the limits [unit of u].
-        state : tuple
-            To continue from.
-
-        Raises
-        ------
-        ValueError
-            If lengths differ, a value is not finite, the sample time is not positive, or the state has not 4 numbers.
+        `reference` and `measurement` are (n,) [unit of y], `sample_time` is in [s], and `state` is one to continue
+        from, by default `start` at no voltage and at the first measurement. A ValueError is raised if lengths differ, a
+        value is not finite, the sample time is not positive, or the state has not 4 numbers.
 
         Examples
         --------

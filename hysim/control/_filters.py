@@ -53,13 +53,11 @@ class _Filter(ABC):
         """Coefficients (b0, b1, b2, a1, a2) of the discrete form."""
 
     def frequency_response(self, frequency: npt.ArrayLike, sample_time: float) -> npt.NDArray[np.complex128]:
-        """Response of the discrete form at frequencies [rad/s], in their shape."""
         back = np.exp(-1j * np.asarray(frequency, dtype=float) * sample_time)
         b0, b1, b2, a1, a2 = self.coefficients(sample_time)
         return np.asarray((b0 + (b1 + b2 * back) * back) / (1.0 + (a1 + a2 * back) * back))
 
     def linear(self, sample_time: float) -> Feedback:
-        """The filter as a system with two states."""
         b0, b1, b2, a1, a2 = self.coefficients(sample_time)
         return Feedback(
             np.array([[-a1, 1.0], [-a2, 0.0]]), np.array([b1 - a1 * b0, b2 - a2 * b0]), np.array([1.0, 0.0]), float(b0)
@@ -117,8 +115,7 @@ class DampingLoop(_Filter):
     frequency : float
         Corner of the filter, positive [rad/s].
     damping_ratio : float, optional
-        Positive, for a filter of second order (positive position feedback); None for first order (integral resonant
-        control).
+        Positive, for second order (positive position feedback); None for first order (integral resonant control).
 
     Raises
     ------
@@ -231,25 +228,11 @@ class Shaper:
 
     @classmethod
     def ei(cls, natural_frequency: float, damping_ratio: float, tolerance: float = 0.1, zeros: int = 2) -> Self:
-        """Smallest residual of one mode whose frequency lies in a band.
+        """Smallest residual of one mode, [rad/s] and [1], whose frequency lies in a band.
 
-        Parameters
-        ----------
-        natural_frequency, damping_ratio : float
-            [rad/s], [1]
-        tolerance : float
-            Half width of the band, relative to the frequency, from 0 to below 1.
-        zeros : int
-            Number of frequencies in the band without vibration, at least 1; each takes half a period.
-
-        Returns
-        -------
-        Shaper
-
-        Raises
-        ------
-        ValueError
-            If a number is outside its range.
+        `tolerance` is the half width of the band relative to the frequency, from 0 to below 1, and `zeros` the number
+        of frequencies in it without vibration, at least 1, of which each takes half a period. A ValueError is raised if
+        a number is outside its range.
 
         Examples
         --------

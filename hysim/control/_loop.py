@@ -98,10 +98,7 @@ class ClosedLoop:
         return {label: column for columns in named for label, column in columns.items()}
 
     def to_frame(self) -> Any:
-        """The `columns` as a `pandas.DataFrame`, with the time as index; ImportError without pandas.
-
-        ``attrs["units"]`` holds the unit of each column.
-        """
+        """The `columns` as a `pandas.DataFrame` over time, with ``attrs["units"]``; ImportError without pandas."""
         return frame_of_signals(self.columns, self._signal_units)
 
     def to_xarray(self) -> Any:
@@ -116,7 +113,6 @@ class ClosedLoop:
 
     @property
     def _signal_units(self) -> dict[str, str]:
-        """Units by the signals' names."""
         like = {**dict.fromkeys(_OF_REFERENCE, "y"), **dict.fromkeys(_OF_COMMAND, "u")}
         return {name: self.units[signal] for name, signal in like.items() if signal in self.units} | dict(self.units)
 
@@ -164,8 +160,7 @@ def close_loop(
     units : mapping, optional
         Labels of the units.
     progress : callable or False, optional
-        Called as ``progress(done, total)`` with numbers of samples, in long runs.
-        By default calls beyond 2 s report on the standard error; False turns this off.
+        Called as ``progress(done, total)`` with numbers of samples, in long runs; see `hysim.simulate`.
 
     Returns
     -------
@@ -186,21 +181,6 @@ def close_loop(
     >>> run = hs.close_loop(lag, hs.PID(kp=4.0, ki=4.0), np.arange(0.0, 5.0, 0.01), np.ones(500))
     >>> round(float(run.y[-1]), 3), run.conditions["sample_time"]
     (1.0, 0.01)
-
-    An active damper in an earthquake, which reads the velocity of the floor that it pushes:
-
-    >>> column = hs.BoucWen(beta=15.0, gamma=15.0, feedthrough=20.0, gain=80.0)
-    >>> frame = hs.Structure(
-    ...     mass=1.0, elements=[hs.Element(column, between=(0, 1))], excitation="force", output="velocity"
-    ... )
-    >>> quake = hs.signals.ground_motion(4.0, duration=5.0, sample_time=0.01)
-    >>> still = np.zeros(quake.size)
-    >>> free, damped = (
-    ...     hs.close_loop(frame, hs.PID(kp=kp), 0.01 * np.arange(quake.size), still, ground_acceleration=quake)
-    ...     for kp in (0.0, 5.0)
-    ... )
-    >>> bool(damped.signals["peak_drift"][-1] < 0.7 * free.signals["peak_drift"][-1])
-    True
     """
     _check_controller(controller)
     times, r, h = sampled(t, reference)
@@ -282,7 +262,6 @@ class RestingPlant:
         self.y0 = self.chain.displacement(self.state)
 
     def quiet(self) -> "RestingPlant":
-        """The plant without the noise of its sensor."""
         if self.actuator.sensor is None:
             return self
         actuator = replace(self.actuator, sensor=replace(self.actuator.sensor, noise=0.0))
@@ -308,10 +287,7 @@ class RestingPlant:
     def attempt_each(
         self, controllers: Sequence[Controller], reference: FloatArray
     ) -> tuple[FloatArray, npt.NDArray[np.int64]]:
-        """Displacements of the loops of several controllers of one class without preview, shape (m, n).
-
-        With them the first sample of each that is not finite, -1 without one.
-        """
+        """Displacements (m, n) of the loops of controllers of one class, and the first sample that diverges, or -1."""
         compiled = [begun(each, self.sample_time, self.u0, self.y0) for each in controllers]
         return self.chain.run_each(compiled, self.state, reference)
 
@@ -330,7 +306,6 @@ class RestingPlant:
 
 
 def _ahead(controller: Controller, sample_time: float, reference: FloatArray) -> FloatArray:
-    """The reference as the controller gets it, at the end its last value."""
     samples = min(preview(controller, sample_time), reference.size)
     return read_only(np.append(reference[samples:], np.full(samples, reference[-1])))
 
@@ -344,7 +319,6 @@ def _around_structure(
     units: Mapping[str, str],
     progress: Progress | None,
 ) -> ClosedLoop:
-    """The loop around a structure."""
     compiled = begun(controller, sample_time, 0.0, plant.y0)
     run = plant.run(compiled, _ahead(controller, sample_time, reference), progress)
     if run.lost >= 0:
@@ -399,5 +373,4 @@ def sampled(t: npt.ArrayLike, reference: npt.ArrayLike) -> tuple[FloatArray, Flo
 
 
 def is_controller(value: Any) -> TypeGuard[Controller]:
-    """Whether a value closes a loop: it is compiled, and is no law."""
     return isinstance(value, Controller) and not isinstance(value, Responding)

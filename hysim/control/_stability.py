@@ -170,7 +170,6 @@ class LinearLoop:
         return math.sqrt(loop.through**2 + max(0.0, float(loop.K @ states @ loop.K)))
 
     def poles(self, controller: SampledController, slope: float = 1.0) -> npt.NDArray[np.complex128]:
-        """Poles of the loop in z with a law of this slope."""
         return np.asarray(np.linalg.eigvals(self._closed(controller.linear(self.sample_time), slope).M))
 
     def _default(self) -> FloatArray:
@@ -250,10 +249,7 @@ def later(plant: Actuator, time: float) -> Actuator:
 def judge(
     resting: RestingPlant, controller: Controller, reference: FloatArray, cycle: FloatArray, gain: float
 ) -> tuple[LinearFigures, str]:
-    """Figures of the linear loop, and in words how the loop fails to come to rest behind the reference, empty if not.
-
-    `gain` is the secant gain along `cycle`, a cycle of the reference.
-    """
+    """Figures of the linear loop along a `cycle` with this secant gain, and why the loop does not rest, or ""."""
     linear = _linear_figures(resting.actuator, controller, resting.sample_time, cycle, gain)
     if linear.max_sensitivity == math.inf:
         return linear, "is unstable"
@@ -382,8 +378,7 @@ def bandwidth(
     Returns
     -------
     float
-        [rad/s]; zero if the loop does not follow at the lowest frequency, infinite if it follows up to 2.5 samples a
-        period.
+        [rad/s]; zero if the loop does not follow at the lowest frequency, infinite if up to 2.5 samples a period.
 
     Raises
     ------

@@ -384,11 +384,9 @@ class _Search:
         return points
 
     def loops(self) -> Iterator[tuple[LinearLoop, float]]:
-        """Linear loops of every plant, at both extreme slopes of its law."""
         return ((plant.loop, slope) for plant in self.plants for slope in plant.slopes)
 
     def judge(self, controller: SampledController) -> tuple[float, float]:
-        """Maximum sensitivity and voltage noise of the worst linear loop."""
         sensitivity = 0.0
         for loop, slope in self.loops():
             sensitivity = max(sensitivity, loop.max_sensitivity(controller, slope))
@@ -422,7 +420,6 @@ class _Search:
         return value * (1.0 + _BARRIER * self.excess(sensitivity, noise))
 
     def result(self) -> Tuning:
-        """Best controller within the bounds, or the nearest to them, with its margins."""
         best, trade_off = self.chosen()
         gains, phases = np.array([loop.margins(best.controller, slope) for loop, slope in self.loops()]).T
         signals = self.resting.attempt(best.controller, self.reference)

@@ -84,7 +84,6 @@ class InputDesign:
         return summary_text([head, f"  expected standard errors for noise of {self.noise:.3g}:"], rows)
 
     def _by_part(self) -> dict[str, str]:
-        """Expected standard errors of a law, or of each part of an actuator."""
         parts: dict[str, list[str]] = {}
         for name, value in self.expected_stderr.items():
             part, _, short = name.rpartition(".")
@@ -293,7 +292,6 @@ def _stderr(subject: Subject, u: FloatArray) -> dict[str, float]:
 
 
 def _weak(subject: Subject, covariance: FloatArray) -> list[str]:
-    """Remarks on numbers that the design determines to no more than their size."""
     errors = np.sqrt(covariance.diagonal())
     return [
         f"the standard error of {name} is expected to be {error:.3g}, more than its size"

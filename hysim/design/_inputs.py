@@ -86,10 +86,7 @@ _SPEEDS = (1.0, 0.3, 0.1, 0.03, 0.01)  # of usual inputs, in parts of the full s
 
 
 def through(strokes: FloatArray, limits: InputLimits) -> FloatArray:
-    """The input (samples,) from the centre to each turning point in turn, held there for its time.
-
-    What comes after the end of the record is cut off; before it the last level is held.
-    """
+    """The input (samples,) through the turning points, each held for its time, cut off at the end of the record."""
     levels, holds, speeds = strokes.T
     times = np.abs(np.diff(levels, prepend=0.0)) / (limits.slew * speeds)
     places = np.concatenate([[0.0], np.cumsum(np.column_stack([times, holds]).ravel())])
@@ -110,10 +107,7 @@ def usual(limits: InputLimits) -> dict[str, list[FloatArray]]:
 
 
 def usual_of_many_speeds(limits: InputLimits, highest: float, rng: np.random.Generator) -> dict[str, list[FloatArray]]:
-    """As `usual`, the triangles at several speeds, and random-phase multisines with every tone up to `highest` [Hz].
-
-    The tones of the first multisine are of one size, those of the second fall with the frequency.
-    """
+    """As `usual` at several speeds, and random-phase multisines up to `highest` [Hz], of equal and of falling tones."""
     return {
         "triangle": [through(each, limits) for each in triangles(limits)],
         "fading triangle": [through(each, limits) for each in triangles(limits, fading=True)],
@@ -150,10 +144,7 @@ def _multisine(limits: InputLimits, highest: float, power: float, rng: np.random
 
 
 def random_strokes(limits: InputLimits, rng: np.random.Generator) -> FloatArray:
-    """Strokes at the full slew to alternate sides, to fill the record.
-
-    Some inputs have short strokes, and some hold most of their turning points.
-    """
+    """Strokes at the full slew to alternate sides that fill the record; some inputs have short ones, or many holds."""
     return _segment(limits, rng, 0.0, limits.duration, _HOLD * limits.duration)
 
 

@@ -1,7 +1,4 @@
-"""Subjects of a design: numbers of a law or of a whole actuator, and the information that an input gives on them.
-
-The problem of a whole actuator is that of `hysim.identify`, at known parameters.
-"""
+"""Numbers of a law or of an actuator (the problem of `hysim.identify`), and the information of an input on them."""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -28,10 +25,7 @@ _TAKES_PART = 1e-3  # share of a number in such a direction, from which on it is
 
 
 def merit(matrix: FloatArray, criterion: Criterion) -> float:
-    """Measure to maximise, a number that is proportional to the number of samples; zero if a direction is not seen.
-
-    D is the root of the determinant, A the harmonic mean of the eigenvalues, E the smallest one.
-    """
+    """Criterion to maximise: D root of the determinant, A harmonic mean of eigenvalues, E the least; 0 if singular."""
     size = np.sqrt(np.maximum(matrix.diagonal(), 0.0))
     if not (size > 0.0).all() or np.linalg.eigvalsh(matrix / np.outer(size, size))[0] < _LEAST:
         return 0.0
@@ -57,7 +51,6 @@ _DIFFERENCE = 1e-4  # of a number, or of one where that is smaller: both errors 
 
 
 def sizes_of(values: FloatArray) -> FloatArray:
-    """Units in which numbers are judged: their sizes, one for zeros."""
     return np.where(values == 0.0, 1.0, np.abs(values))
 
 
@@ -92,11 +85,9 @@ class LawAlone:
         return squared(slopes.T)
 
     def covariance(self, u: FloatArray) -> FloatArray:
-        """Expected covariance of the numbers, by extrapolated differences."""
         return np.asarray(np.linalg.inv(self.law.response_jacobian(u, self.names).information(self.noise)))
 
     def only(self, names: Sequence[str]) -> "LawAlone":
-        """The subject whose other numbers are known."""
         return replace(self, names=tuple(names))
 
 
@@ -141,7 +132,6 @@ class WholeActuator:
         return np.asarray(np.linalg.inv(scaled.T @ scaled) / np.outer(lengths, lengths))
 
     def only(self, names: Sequence[str]) -> "WholeActuator":
-        """The subject whose other numbers are known."""
         return replace(self, expected=_expected(self.structure, self.record, self.known, names))
 
 

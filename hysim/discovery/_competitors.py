@@ -63,8 +63,7 @@ _SLOW = 1e-3  # ridge of trends: the first samples of a left-out record cannot d
 class Yardstick:
     """A model that is linear in its numbers, which multiply `columns` (n_samples, n_columns), and a constant.
 
-    Each has a ridge of its own, `ridges` (n_columns,) in squared sizes. A smoothing spline of `u`, if any, is fitted
-    first.
+    Each has a ridge of its own, `ridges` (n_columns,) in squared sizes. A smoothing spline of `u`, if any, comes first.
     """
 
     columns: FloatArray

@@ -101,8 +101,7 @@ def discover(
         Seed of random restarts, and of the ensemble.
     progress : callable or False, optional
         Called as ``progress(done, total)`` about every twentieth of the search, and after each fold of the
-        cross-validation, which counts like a search.
-        By default calls beyond 2 s report on the standard error; False turns this off.
+        cross-validation, which counts like a search; see `hysim.simulate`.
 
     Returns
     -------
@@ -134,8 +133,7 @@ def discover(
 
     Examples
     --------
-    >>> import numpy as np
-    >>> import hysim as hs
+    >>> import numpy as np, hysim as hs
     >>> u = np.concatenate([np.linspace(0, 2, 41), np.linspace(2, -1, 61)[1:], np.linspace(-1, 2, 61)[1:]])
     >>> rec = hs.Record(u=u, y=hs.BoucWen(A=1.0, beta=0.6, gamma=0.3).memory(u))
     >>> dis = hs.discover(rec, route="memory")

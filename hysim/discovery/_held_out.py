@@ -72,8 +72,7 @@ class Scores(NamedTuple):
 class Trial:
     """Scores of the law and its competitors by name, and what was left out at a time.
 
-    `together` is the rmse of plays fitted to all samples, `noise` that of white noise, `stroke` the range of the
-    outputs.
+    `together` is the rmse of plays fitted to all samples, `noise` that of white noise, `stroke` the outputs' range.
     """
 
     scores: Mapping[str, Scores]
@@ -84,14 +83,10 @@ class Trial:
 
     @property
     def errors(self) -> dict[str, float]:
-        """Rmse on held-out samples by name."""
         return {name: scores.error for name, scores in self.scores.items()}
 
     def explains(self, name: str) -> bool:
-        """Whether a model predicts the held-out samples nearly as well as the fitted ones, or most of the memory.
-
-        The error of the plays may also be that of one fit to all samples: they have many parameters.
-        """
+        """Whether a model predicts held-out samples nearly as well as fitted ones; plays may also be fitted to all."""
         own, curve = self.scores[name], self.scores[CURVE]
         usual = own.fitted if self.by in ("record", "rate") else self.noise
         error = min(own.error, self.together) if name == PLAYS else own.error

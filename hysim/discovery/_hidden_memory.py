@@ -97,7 +97,6 @@ class TermRegression:
         return [self.terms.index(term) for term in terms]
 
     def squares(self, terms: Sequence[Term]) -> float:
-        """Sum of squared residuals of a structure, in units of the noise."""
         included, goal = self.triangle[:, self.places(terms)], self.triangle[:, -1]
         rest = goal - included @ np.linalg.lstsq(included, goal, rcond=None)[0]
         return float(rest @ rest)

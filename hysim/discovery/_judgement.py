@@ -113,10 +113,7 @@ class Competitors:
 
     @property
     def enough(self) -> float:
-        """The rmse that a law must reach to change the verdict [unit of y]; inf if any law may change it.
-
-        Only a law that predicts better changes the verdict that a curve or a linear model suffices.
-        """
+        """Rmse below which a law could change the verdict [unit of y]; inf if any law could."""
         verdict = _verdict(self.trial, self.linear, single_valued=False, spread=self.spread)
         if verdict == NO_STRUCTURE:
             return BETTER * _still(self.trial, self.linear)
@@ -134,10 +131,7 @@ def competitors(records: Sequence[Record]) -> Competitors:
 
 
 def judge(records: Sequence[Record], laws: Sequence[Law], refit: Refit, others: Competitors | None = None) -> Judgement:
-    """Judge a law that was fitted to records beside its competitors; `laws` has one for each record.
-
-    `refit(records, weights)` returns such laws, fitted to the samples whose weights are not zero.
-    """
+    """Judge laws fitted to records, one for each; `refit(records, weights)` fits where the weights are not zero."""
     others = others or competitors(records)
     records, linear, spread = others.records, others.linear, others.spread
     trial = held_out.law_held_out(others.trial, records, refit)
@@ -249,7 +243,6 @@ def _thinned(records: Sequence[Record]) -> list[Record]:
 
 
 def doubts(judgement: Judgement) -> tuple[str, ...]:
-    """Reasons to doubt a law, one sentence each."""
     errors = judgement.held_out
     law, plays, curve = errors[LAW], errors[PLAYS], errors[CURVE]
     linear = min((errors[name] for name in (RIVAL, RELAXATIONS) if not math.isnan(errors[name])), default=math.inf)

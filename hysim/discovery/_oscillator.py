@@ -424,8 +424,7 @@ def discover_oscillator(
     seed : int
         Seed of the resampling behind `OscillatorDiscovery.inclusion`.
     progress : callable or False, optional
-        Called as ``progress(done, total)``.
-        By default calls beyond 2 s report on the standard error; False turns this off.
+        Called as ``progress(done, total)``; see `hysim.simulate`.
 
     Returns
     -------
@@ -437,13 +436,12 @@ def discover_oscillator(
         If a record has no even time, is too short, has a constant signal or is not that of a mass on springs, or an
         option is unknown.
     TypeError
-        If the first argument is not a record or a sequence of them, `structure` is not one, or a part of the plant is
-        no number.
+        If the first argument is not a record or a sequence of them, `structure` is none, or a part of the plant no
+        number.
 
     Examples
     --------
-    >>> import numpy as np
-    >>> import hysim as hs
+    >>> import numpy as np, hysim as hs
     >>> law = hs.BoucWen(A=5e4, beta=800.0, gamma=-300.0)
     >>> plant = hs.BoucWenOscillator(mass=2.0, damping=10.0, stiffness=5e4, law=law)
     >>> t = np.arange(300) / 750

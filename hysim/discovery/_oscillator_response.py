@@ -142,7 +142,6 @@ class Response:
 
     @cached_property
     def widest(self) -> FloatArray:
-        """Displacements of the record in which they have the largest range."""
         return max((record.y for record in self.records), key=lambda y: float(np.ptp(y)))
 
     @cached_property

@@ -40,8 +40,6 @@ _MOST_STEPS = 500  # of the series from one sample to the next: laws that need m
 
 
 class Terms(NamedTuple):
-    """The law of some terms of a library."""
-
     terms: tuple[Term, ...]
     feedthrough: bool = False
     offset: bool = False
@@ -68,10 +66,7 @@ class Terms(NamedTuple):
         return np.where(wanted > 0, 0.0, -np.inf), np.where(wanted < 0, 0.0, np.inf)
 
     def run(self, u: FloatArray, numbers: FloatArray, y0: FloatArray, bound: float) -> tuple[FloatArray, int]:
-        """Outputs (n_sets, n_samples) of numbers (n_sets, size) from y0 (n_sets,), and the terms of series they take.
-
-        A law that diverges is a row of inf.
-        """
+        """Outputs (n_sets, n_samples) from y0 (n_sets,), inf where a law diverges, and the terms of series taken."""
         feedthrough, offset = shifts(self, numbers)
         coefficients = numbers[:, : len(self.terms)]
         memory = y0 - offset
@@ -221,10 +216,7 @@ def bic_of(cost: float, n_samples: int, n_parameters: int) -> float:
 
 @dataclass
 class Work:
-    """Terms of series for each sample that free runs have taken, and the `most` that a search may take.
-
-    A stiff law takes a hundred times as many as a smooth one. No clock is read: the result is always the same.
-    """
+    """Terms of series per sample that free runs have taken, and the `most` allowed; no clock is read."""
 
     most: float = math.inf
     done: float = 0.0
@@ -234,16 +226,12 @@ class Work:
         return self.done / self.most
 
     def steps(self, cost: float) -> float:
-        """How many steps of this cost remain."""
         return max(0.0, self.most - self.done) / cost if cost else math.inf
 
 
 @dataclass(frozen=True)
 class FreeRun:
-    """Least-squares problem of some records; `signs` are those that coefficients must have.
-
-    `masks`, (n_samples,) for each record, mark the visible outputs; by default all. All runs add to the `work`.
-    """
+    """Least squares over records; `signs` of coefficients, `masks` (n_samples,) of visible outputs, `work` done."""
 
     records: tuple[Record, ...]
     masks: tuple[Samples, ...] | None = None
@@ -269,12 +257,10 @@ class FreeRun:
 
     @cached_property
     def largest(self) -> Record:
-        """Record with the widest input, which sets the units."""
         return max(self.visible, key=lambda record: float(np.ptp(record.u)))
 
     @property
     def measured_starts(self) -> FloatArray:
-        """First visible output of each record."""
         return np.array([record.y[0] for record in self.visible])
 
     @property
@@ -295,11 +281,7 @@ class FreeRun:
     def refine(
         self, structure: S, starts: FloatArray, *, tolerance: float = RANKING, hopeless: float = math.inf
     ) -> Candidate[S] | None:
-        """Optimum that is reached from the best of `starts` (n_starts, size + n_records); None if all diverge.
-
-        A descent that will not come below the cost `hopeless` [squared strokes] is given up, and has few steps where
-        the work is nearly done.
-        """
+        """Optimum from the best of `starts` (n_starts, size + n_records); None if all diverge. See `descend`."""
         units = self.units(structure)
         lower, upper = self._bounds(structure, units)
         starts, before = np.clip(starts, lower, upper), self.work.done
@@ -326,7 +308,6 @@ class FreeRun:
         return Candidate(structure, unknowns, slopes(x, residual) / units, residual, self._settles(structure, unknowns))
 
     def _scaled(self, structure: Structure) -> Callable[[FloatArray], FloatArray]:
-        """The residuals as a function of the unknowns in their units."""
         units = self.units(structure)
         return lambda x: self.residuals(structure, x * units)
 

@@ -36,10 +36,7 @@ OTHERS = ("n", "feedthrough", "offset", "gain")
 
 
 class ModelledLaw(NamedTuple):
-    """A model for each record, numbers and standard errors by name, and the law as text.
-
-    `parameters` are the numbers that are no coefficients, `initial_states` the memory at the first samples.
-    """
+    """A model for each record, coefficients, other `parameters`, standard errors, first memories, and the text."""
 
     models: tuple[Any, ...]
     coefficients: dict[str, float]
@@ -50,7 +47,6 @@ class ModelledLaw(NamedTuple):
 
 
 def law_from(candidate: Candidate[Any], records: Sequence[Record], letter: str) -> ModelledLaw:
-    """The law of a structure refined on `records`, its memory called `letter`."""
     structure, unknowns = candidate.structure, candidate.unknowns
     numbers = _numbers(structure, letter)
     values = numbers(unknowns[: structure.size])

@@ -73,10 +73,7 @@ class Library:
 
 @dataclass(frozen=True)
 class Options:
-    """Signs of coefficients, and arguments of `discover`; `enough` is the rmse that makes a full search worth while.
-
-    `report` is called with the share of a search that is done.
-    """
+    """Signs of coefficients, arguments of `discover`, the rmse that is `enough`, and where to `report` progress."""
 
     signs: Mapping[Term, int] = field(default_factory=dict)
     optimizer: str = "STLSQ"
@@ -88,10 +85,7 @@ class Options:
 
 @dataclass(frozen=True)
 class Outcome:
-    """Law of one library for the records, and its search; `is_short` if only the optimizer's path was searched.
-
-    `is_cut` if the search ended at its limit of work.
-    """
+    """Law of one library and its search: `is_short` on the optimizer's path alone, `is_cut` at the limit of work."""
 
     library: Library
     candidate: Candidate[Terms]

@@ -150,7 +150,6 @@ def thinning(record: Record, most: int) -> npt.NDArray[np.intp]:
 
 
 def thinned(free_run: FreeRun) -> FreeRun:
-    """This problem on about SEARCHED samples."""
     samples = [thinning(record, SEARCHED // len(free_run.records)) for record in free_run.records]
     records = tuple(
         Record(u=r.u[included], y=r.y[included]) for r, included in zip(free_run.records, samples, strict=True)
@@ -214,7 +213,6 @@ class Search:
         return [candidate for candidate in refined if candidate.settles] or refined
 
     def followed(self, candidates: Sequence[Candidate[Terms]]) -> list[Candidate[Terms]]:
-        """Those of some candidates that are near the best one."""
         best = self.sound[0]
         return [c for c in candidates if c.bic < best.bic + HOPELESS or gap(c, best) < ALIKE]
 
@@ -226,10 +224,7 @@ class Search:
         return max(cost_of(best.bic + HOPELESS, n, d), best.cost + n * ALIKE**2)
 
     def explore(self, largest: Terms) -> bool:
-        """Steps 2 and 3: the structures inside `largest` that the linearised free run predicts to be best.
-
-        Returns whether all of them were tried before the work was done.
-        """
+        """Steps 2 and 3 about structures inside `largest`; whether all of them were tried before the work was done."""
         done: set[Terms] = set()
         for _ in range(ROUNDS):
             points = [c for c in self.sound[:_POINTS] if c.structure not in done]

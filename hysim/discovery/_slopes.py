@@ -300,10 +300,7 @@ def signs_of(terms: Sequence[Term], signs: Mapping[str, int] | None) -> dict[Ter
 
 @dataclass(frozen=True)
 class Regression:
-    """slope = features @ coefficients, scaled by the rms values `sizes` (n_terms,) and `slope_size`.
-
-    `dependent` are terms left out since their columns are combinations of those of lower degree.
-    """
+    """slope = features @ coefficients in units of `sizes` and `slope_size`; collinear terms are `dependent`."""
 
     terms: tuple[Term, ...]
     dependent: tuple[Term, ...]
@@ -389,7 +386,6 @@ def feature(term: Term, u: FloatArray, z: FloatArray, direction: FloatArray | fl
 
 
 def ridge(columns: FloatArray, target: FloatArray, weight: float) -> FloatArray:
-    """Ridge regression on columns of about unit rms."""
     normal = columns.T @ columns / len(columns) + weight * np.eye(columns.shape[1])
     return np.asarray(np.linalg.solve(normal, columns.T @ target / len(columns)))
 

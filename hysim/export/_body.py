@@ -30,17 +30,7 @@ _SIGNS = {ast.Add: "+=", ast.Sub: "-=", ast.Mult: "*=", ast.Div: "/="}
 
 
 class Body:
-    """Translates the statements of a function again and again, until the types of its names have settled.
-
-    Parameters
-    ----------
-    library : Library
-        Where the functions that it calls are collected.
-    source : Routine
-        The function.
-    arguments : dict
-        Types of its arguments.
-    """
+    """Translates the statements of a function again and again, until the types of its names have settled."""
 
     def __init__(self, library: Library, source: Routine, arguments: dict[str, Type]) -> None:
         self.source, self.arguments = source, list(arguments)
@@ -55,7 +45,6 @@ class Body:
             raise source.refusal(loop, f"{ast.unparse(loop.target)} counts a loop and has another use: rename one")
 
     def settled(self) -> str:
-        """The text of the body."""
         for _ in range(_MOST_PASSES):
             returns, self._results = self.returns, 0
             lines = self._block(self._statements, _STEP)
@@ -76,7 +65,6 @@ class Body:
         return lines
 
     def _declares(self, statement: ast.stmt) -> bool:
-        """Whether a statement can declare the names that it assigns."""
         return isinstance(statement, ast.Assign) and not set(targets(statement)) & reads(statement.value)
 
     def _is_real(self, name: str) -> bool:
@@ -84,7 +72,6 @@ class Body:
         return known is not None and not isinstance(known, Known) and self.scope.is_used(name)
 
     def _zero(self, name: str) -> str:
-        """Declaration of a name that gets its value in a block within this one."""
         type_, c_name = self.scope.types[name], self.scope.c_name(name)
         if isinstance(type_, Vector):
             sizes = [f" int {type_.length(c_name, axis)} = 0;" for axis in self.scope.axes(name)]
@@ -93,7 +80,6 @@ class Body:
         return f"{type_.c_type} {c_name} = {'0.0' if type_ is Scalar.DOUBLE else '0'};"
 
     def _constant(self, name: str) -> str:
-        """`const` for a vector that is not written to."""
         return "" if self.scope.is_written(name) else "const "
 
     # ------------------------------------------------------------------------------ statements
@@ -191,7 +177,6 @@ class Body:
         return f"{self._target(node.target, Scalar.DOUBLE)} {sign} {value.text};"
 
     def _target(self, node: ast.expr, type_: Type) -> str:
-        """A place that is assigned."""
         if isinstance(node, ast.Name):
             return self.scope.c_name(node.id)
         if not isinstance(node, ast.Subscript) or isinstance(node.slice, ast.Slice):
@@ -246,7 +231,6 @@ class Body:
         return lines
 
     def _named(self, target: ast.expr, value: Stretch, indent: str, declared: set[str]) -> list[str]:
-        """A name for a part of a vector."""
         if not isinstance(target, ast.Name):
             raise self.source.refusal(target, "a vector is copied by a loop")
         name, c_name = target.id, self.scope.c_name(target.id)
@@ -263,7 +247,6 @@ class Body:
         return lines
 
     def _room(self, target: ast.Name, node: ast.Call) -> str:
-        """A vector for work."""
         size = self.of.index(node.args[0]).text
         if not size.isdigit() or len(node.args) != 1 or node.keywords:
             raise self.source.refusal(node, "room for work has a constant size")
@@ -305,7 +288,6 @@ class Body:
         return [line, *self._several(target, together, indent, declared)]
 
     def _unpacked(self, target: ast.Tuple, node: ast.expr, declared: set[str]) -> list[str]:
-        """Results of a function."""
         if (shaped := self.of.shape(node)) is not None:
             lengths = [Value(length(), Scalar.INT, _c.SUM) for length in shaped.lengths]
             return self._numbers(list(zip(target.elts, lengths, strict=True)), declared)
@@ -346,7 +328,6 @@ def _independent(places: list[ast.expr], values: list[ast.expr]) -> bool:
 
 
 def _looks(node: ast.expr) -> bool:
-    """Whether an expression reads elements of vectors, or may."""
     return any(isinstance(each, ast.Subscript | ast.Call) for each in ast.walk(node))
 
 

@@ -93,7 +93,6 @@ def table(name: str, values: Sequence[float]) -> str:
 
 
 def is_table(value: Any) -> bool:
-    """Whether a value is a vector of doubles."""
     if isinstance(value, np.ndarray):
         return value.ndim == 1 and value.dtype == np.float64
     return isinstance(value, tuple) and bool(value) and all(isinstance(each, float) for each in value)
@@ -108,7 +107,6 @@ class Scalar(IntEnum):
 
     @property
     def c_type(self) -> str:
-        """Type in C."""
         return "double" if self is Scalar.DOUBLE else "int"
 
 
@@ -118,7 +116,6 @@ class Vector(NamedTuple):
     rank: int = 1
 
     def length(self, name: str, axis: int) -> str:
-        """Name in C of the length of an axis."""
         return f"{name}_size" if self.rank == 1 else f"{name}_shape{axis}"
 
 
@@ -135,7 +132,6 @@ class Several(NamedTuple):
 
     @property
     def c_type(self) -> str:
-        """Name of the struct in C."""
         return "several_" + "".join("d" if member is Scalar.DOUBLE else "i" for member in self.members)
 
 
@@ -166,7 +162,6 @@ class Routine(NamedTuple):
     file: str
 
     def refusal(self, node: ast.AST, reason: str) -> UntranslatableError:
-        """The error for a place in the function."""
         first = node.lineno if isinstance(node, ast.stmt | ast.expr) else 1
         line = self.function.__code__.co_firstlineno + first - 1
         return UntranslatableError(f"{self.file}:{line}: {reason}; hysim/kernels/__init__.py says what is translated")
@@ -185,13 +180,7 @@ def plain(function: Any) -> Any:
 
 @lru_cache(maxsize=1024)
 def routine(function: Callable[..., Any]) -> Routine:
-    """Read a function.
-
-    Raises
-    ------
-    UntranslatableError
-        If it is no Python function whose source can be read.
-    """
+    """Read a function; UntranslatableError if it is no Python function whose source can be read."""
     if not isinstance(function, FunctionType):
         raise UntranslatableError(f"a step must be a Python function or a kernel, got {function!r}")
     try:
@@ -230,7 +219,6 @@ class Stretch(NamedTuple):
 
     @property
     def type(self) -> Vector:
-        """Its type."""
         return Vector(len(self.lengths))
 
 
@@ -277,23 +265,8 @@ class Uses(NamedTuple):
 class Scope:
     """Names of a function while it is translated, and what was learnt about them.
 
-    Parameters
-    ----------
-    source, arguments : Routine and dict
-        The function, and the types of its arguments.
-
-    Attributes
-    ----------
-    types : dict
-        Type of each local name, as far as it is known.
-    lengths : set of (str, int)
-        Arrays and their axes whose length is used.
-    written, used : set of str
-        Arrays that are written to, and names that are read.
-    roots : dict
-        Arrays in which a local array lies.
-    before : Uses, optional
-        What the last pass has learnt.
+    `lengths` are arrays and axes whose length is used, `written` arrays that are written to, `used` names that are
+    read, `roots` the arrays in which a local one lies, and `before` what the last pass has learnt.
     """
 
     def __init__(self, source: Routine, arguments: dict[str, Type]) -> None:
@@ -313,26 +286,21 @@ class Scope:
         return not settled
 
     def is_used(self, name: str) -> bool:
-        """Whether a name was read in the last pass."""
         return self.before is None or name in self.before.used
 
     def is_written(self, name: str) -> bool:
-        """Whether an array was written to in the last pass."""
         return self.before is not None and bool((self.roots.get(name, frozenset()) | {name}) & self.before.written)
 
     def axes(self, name: str) -> tuple[int, ...]:
-        """Axes of an array whose lengths were used in the last pass."""
         return () if self.before is None else tuple(sorted(axis for each, axis in self.before.lengths if each == name))
 
     def assign(self, name: str, type_: Type, node: ast.AST) -> None:
-        """Note that a name gets a value of this type."""
         known = joined(self.types.get(name), type_)
         if known is None:
             raise self.source.refusal(node, f"{name} cannot be both {self.types[name]} and {type_}")
         self.types[name] = known
 
     def write(self, name: str) -> None:
-        """Note that a vector is written to."""
         self.written |= {name} | self.roots.get(name, frozenset())
 
     def c_name(self, name: str) -> str:
@@ -353,7 +321,6 @@ def homes(body: list[ast.stmt], arguments: Iterable[str]) -> Mapping[Place, list
 
 
 def assignments(body: list[ast.stmt]) -> Mapping[str, int]:
-    """The number of statements that assign each name."""
     counts: dict[str, int] = {}
     for node in (node for statement in body for node in ast.walk(statement)):
         if isinstance(node, ast.Name) and isinstance(node.ctx, ast.Store):
@@ -374,7 +341,6 @@ def counters_used_elsewhere(body: list[ast.stmt]) -> list[ast.For]:
 
 
 def targets(statement: ast.stmt) -> list[str]:
-    """Names that a statement assigns, if it is a plain assignment."""
     if not isinstance(statement, ast.Assign):
         return []
     each = [
@@ -417,7 +383,6 @@ def _blocks(statement: ast.stmt) -> list[list[ast.stmt]]:
 
 
 def _headed(statement: ast.stmt) -> set[str]:
-    """Names in the head of a compound statement."""
     if isinstance(statement, ast.For):
         return set(_mentioned(statement.iter))
     return set(_mentioned(statement.test)) if isinstance(statement, ast.If | ast.While) else set()

@@ -116,8 +116,6 @@ def to_c(
     >>> code = hs.to_c(hs.PID(kp=2.0, ki=100.0, limits=(0.0, 5.0)), sample_time=1e-3, name="axis")
     >>> "double axis_step(axis_state *state, double reference, double measurement);" in code.header
     True
-    >>> hs.to_c(hs.BoucWen(), name="stack").state_size
-    2
     """
     if reason := _refusal(name):
         raise ValueError(f"name must be letters, digits and underscores after a letter, got {name!r}: {reason}")
@@ -142,7 +140,6 @@ def _refusal(name: str) -> str:
 
 
 def _texts(program: Program, name: str, what: str, u0: float, y0: float) -> dict[str, str]:
-    """Parts of the files by the names in their templates."""
     timed = math.isfinite(program.sample_time)
     is_model = program.inputs == ("u",)
     defines = [f"#define {name.upper()}_SAMPLE_TIME {program.sample_time!r} /* s */\n"] * timed
@@ -188,7 +185,6 @@ def _result(program: Program, name: str, is_model: bool) -> str:
 
 
 def _init(state: FloatArray, has_start: bool) -> str:
-    """Statements that fill the state."""
     places = np.flatnonzero((state != 0.0) | np.signbit(state))
     loop = f"    for (int k = 0; k < {state.size}; k++)\n        state->x[k] = "
     if places.size <= _FEW:

@@ -1,7 +1,6 @@
 """Shared libraries and WebAssembly from C: the compiler of this machine, or zig's, which compiles for all.
 
-A WebAssembly module for pages in the browser holds one step, for parameters and states of any size; it imports nothing
-and exports
+A WebAssembly module for pages holds one step, for parameters and states of any size; it imports nothing and exports
 
     memory, __heap_base                                                               room begins behind the base
     begin(parameters, n_parameters, state, n_state, u0)                               completes a state
@@ -58,7 +57,6 @@ class Target(NamedTuple):
 
     @property
     def is_host(self) -> bool:
-        """Whether this machine is one."""
         return self.name == host()
 
 
@@ -85,10 +83,7 @@ def host() -> str:
 
 
 def compiler(target: Target) -> tuple[str, ...] | None:
-    """The beginning of a command that compiles for a target; None where there is no compiler.
-
-    A compiler of this machine comes first, for this machine.
-    """
+    """Beginning of a command that compiles for a target, by this machine's own compiler first; None without one."""
     own = shutil.which("gcc") or shutil.which("clang") if target.is_host else None
     if own is not None:
         return (own,)
@@ -98,34 +93,19 @@ def compiler(target: Target) -> tuple[str, ...] | None:
 
 
 def shared_library(source: str, name: str, target: Target, command: Sequence[str]) -> bytes:
-    """The shared library of a C source; `command` is what `compiler` returned.
-
-    Raises
-    ------
-    OSError
-        If it cannot be compiled; the message has the compiler's first error.
-    """
+    """The shared library of a C source by a `compiler`; OSError with the compiler's first error."""
     libraries = () if target.name.endswith("windows") else ("-lm",)
     return _built(source, f"{name}{target.ending}", (*command, *OPTIONS), libraries, target.name)
 
 
 def web_module(source: str) -> bytes:
-    """The WebAssembly module of a C source, by ziglang.
-
-    Raises
-    ------
-    ImportError
-        If ziglang is not installed.
-    OSError
-        If it cannot be compiled; the message has the compiler's first error.
-    """
+    """WebAssembly module of a C source; ImportError without ziglang, OSError with the compiler's first error."""
     optional("ziglang", "a page for a step that is not hysim's own", "export")
     command = (sys.executable, "-m", "ziglang", "cc", "-target", _WEB, *_WEB_OPTIONS)
     return _built(source, "step.wasm", command, ("-lm",), _WEB)
 
 
 def _built(source: str, result: str, command: Sequence[str], libraries: Sequence[str], target: str) -> bytes:
-    """The file that a compiler makes of a C source."""
     with tempfile.TemporaryDirectory() as folder:
         name = f"{Path(result).stem}.c"
         Path(folder, name).write_text(source, encoding="utf-8")
@@ -164,30 +144,11 @@ class Kernels(NamedTuple):
 
 
 def kernels_of(law: Law) -> Kernels:
-    """The step of a law, and how it starts."""
     return Kernels(plain(law.step), plain(law.start))
 
 
 def module_of(kernels: Kernels) -> bytes:
-    """The module of a step, compressed: from the package, or for another step than hysim's compiled now.
-
-    Parameters
-    ----------
-    kernels : Kernels
-        The step.
-
-    Returns
-    -------
-    bytes
-        In the format of gzip.
-
-    Raises
-    ------
-    ImportError
-        If the module must be compiled and the extra `export` is missing.
-    UntranslatableError
-        If the step is not in the portable subset of Python.
-    """
+    """Compressed module of a step, from the package or compiled now; ImportError or UntranslatableError if it fails."""
     own = files("hysim.export").joinpath(f"{FOLDER}/{kernels.name}.wasm.gz")
     if kernels.step.__module__.startswith("hysim.") and own.is_file():
         return own.read_bytes()
@@ -200,7 +161,6 @@ def compressed(module: bytes) -> bytes:
 
 
 def c_source(kernels: Kernels) -> str:
-    """C99 text of a module."""
     text, has_start = entries(kernels.step, kernels.start)
     wrapper = files("hysim.export").joinpath("page/module.c").read_text(encoding="utf-8")
     return f"#include <math.h>\n{text}{'' if has_start else _NO_START}\n{wrapper}"

@@ -1,8 +1,4 @@
-"""Expressions of the portable subset in C99.
-
-The text of an expression carries its type and how strongly its last operator binds, so that brackets stand where C
-needs them and nowhere else, and operations keep the order that they have in Python.
-"""
+"""Expressions of the portable subset in C99, in Python's order of operations, with brackets only where C needs them."""
 
 import ast
 import builtins
@@ -46,8 +42,6 @@ _COMPARED = MappingProxyType(
 
 
 class Expressions:
-    """Translates the expressions of one function."""
-
     def __init__(self, library: Library, scope: Scope) -> None:
         self.library, self.scope = library, scope
 
@@ -61,7 +55,6 @@ class Expressions:
         return result
 
     def condition(self, node: ast.expr) -> Value:
-        """A truth value."""
         result = self.value(node)
         if result.type is Scalar.BOOL:
             return result
@@ -158,7 +151,6 @@ class Expressions:
         return result
 
     def _vector(self, node: ast.expr, *, quietly: bool = False) -> Stretch:
-        """An array of one axis."""
         result = self.quietly(node) if quietly else self.stretch(node)
         if len(result.lengths) != 1:
             raise self._refusal(node, "an array of one axis is expected here")
@@ -284,14 +276,12 @@ class Expressions:
         return Stretch(f"{whole.text} + {offset.within(_c.SUM + 1)}", lengths, whole.roots, _c.SUM)
 
     def _member(self, node: ast.Subscript, several: Value) -> Value:
-        """One of the numbers that a function returns together."""
         place = node.slice.value if isinstance(node.slice, ast.Constant) else None
         if not isinstance(several.type, Several) or not isinstance(place, int):
             raise self._refusal(node, "an array, or one of the results of a function, is expected here")
         return Value(f"{several.text}.at{place}", several.type.members[place])
 
     def place(self, node: ast.Subscript, whole: Stretch) -> str:
-        """The index of an element, in brackets."""
         index = node.slice
         parts = index.elts if isinstance(index, ast.Tuple) else [index]
         if len(parts) != len(whole.lengths):
@@ -338,7 +328,6 @@ class Expressions:
         raise self._refusal(node, f"{ast.unparse(node)} is no function that is known beforehand")
 
     def _reshaped(self, node: ast.Call, of: ast.expr) -> Stretch:
-        """A vector as an array of more axes."""
         if len(node.args) != 1 or not isinstance(node.args[0], ast.Tuple):
             raise self._refusal(node, "reshape takes a tuple of lengths")
         whole, lengths = self._vector(of), node.args[0].elts
@@ -408,11 +397,9 @@ class Expressions:
         return [*[stretch.text] * parameter.is_used, *(stretch.lengths[axis]() for axis in parameter.axes)]
 
     def writes(self, node: ast.expr) -> bool:
-        """Whether an expression writes to an array."""
         return bool(self._tried(node)[1])
 
     def _type(self, node: ast.expr) -> Type:
-        """Type of an expression, which is not used yet."""
         return self._tried(node)[0]
 
     def _tried(self, node: ast.expr) -> tuple[Type, set[str]]:

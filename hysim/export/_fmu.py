@@ -1,8 +1,4 @@
-"""The verb `to_fmu`: a model as a functional mock-up unit for co-simulation.
-
-A unit is a zip file of a description in XML, C sources and shared libraries. Nothing in it depends on the time or the
-place at which it is written. Its C source is a program, its numbers, and the functions of FMI around it.
-"""
+"""The verb `to_fmu`: a model as a functional mock-up unit, whose bytes depend on the arguments alone."""
 
 import hashlib
 import io
@@ -45,7 +41,6 @@ def token_of(*contents: str) -> str:
 
 
 def source_of(program: Program, variables: Sequence[Variable], version: str, token: str) -> str:
-    """The text of the one C file of a unit."""
     parts = [
         f"/* {', '.join(program.inputs)} to {program.output}; written by hysim {__version__}. */",
         "\n".join(f"#include <{header}>" for header in _HEADERS),
@@ -58,7 +53,6 @@ def source_of(program: Program, variables: Sequence[Variable], version: str, tok
 
 
 def _numbers(program: Program, variables: Sequence[Variable], token: str) -> str:
-    """Sizes, tables, and the calls of the program's functions."""
     inputs = [each for each in variables if each.causality == "input"]
     fields = list(variables[len(variables) - len(program.fields) :]) if program.fields else []
     sizes = {
@@ -96,8 +90,6 @@ def _numbers(program: Program, variables: Sequence[Variable], token: str) -> str
 
 
 class Options(NamedTuple):
-    """Options of a unit: its name, version of FMI, platforms and units, and the input at which it starts."""
-
     name: str
     version: str
     platforms: tuple[str, ...] | None
@@ -210,12 +202,7 @@ def _with_units(program: Program, thing: Any) -> Program:
 
 
 def field_unit(law: Law, name: str) -> str:
-    """The unit of one number of a law, as in ``"y/u"``; empty where it is not known.
-
-    >>> import hysim as hs
-    >>> field_unit(hs.Dahl(), "stiffness")
-    'y/u'
-    """
+    """Unit of one number of a law, as in ``"y/u"``; empty where it is not known."""
     searched = {each.name: each.unit for each in law.searched if each.unit != "1"}
     return {**searched, **law.units}.get(name.partition("[")[0], "")
 
@@ -238,7 +225,6 @@ def _checked_name(name: str) -> str:
 
 
 def archive(program: Program, options: Options) -> bytes:
-    """The bytes of a unit."""
     version, name = options.version, options.name
     variables = variables_of(program, options.units, options.u0)
     blank = description(program, variables, name, version, ""), source_of(program, variables, version, "")
@@ -254,13 +240,7 @@ def archive(program: Program, options: Options) -> bytes:
 
 
 def libraries(source: str, options: Options) -> dict[str, bytes]:
-    """Shared libraries by their places in the unit.
-
-    Raises
-    ------
-    ImportError
-        If a platform is asked for by name and no compiler can compile for it.
-    """
+    """Shared libraries by their places in the unit; ImportError if no compiler serves a platform asked for by name."""
     compiled = {
         target: shared_library(source, options.name, target, command)
         for target, command in _commands(options.platforms, options.version).items()

@@ -105,7 +105,6 @@ class Variable(NamedTuple):
         return {name: value for name, value in named.items() if value}
 
     def numbers(self) -> dict[str, str]:
-        """Unit, start value and limits."""
         limits = {"min": self.lower, "max": self.upper}
         finite = {name: repr(value) for name, value in limits.items() if math.isfinite(value)}
         start = {} if self.start is None else {"start": repr(self.start)}
@@ -118,18 +117,11 @@ def is_tunable(program: Program) -> bool:
 
 
 def start_name(program: Program) -> str:
-    """Name of the input at the start."""
     return f"{program.inputs[0]}0"
 
 
 def variables_of(program: Program, units: Mapping[str, str], u0: float) -> list[Variable]:
-    """The variables of a program in the order of their value references.
-
-    Raises
-    ------
-    ValueError
-        If two of them have one name.
-    """
+    """Variables in the order of their value references; ValueError if two have one name."""
     output = 1 + len(program.inputs)
     first = label(program.inputs[0], units)
     variables = [
@@ -158,7 +150,6 @@ def variables_of(program: Program, units: Mapping[str, str], u0: float) -> list[
 
 
 def description(program: Program, variables: list[Variable], name: str, version: str, token: str) -> str:
-    """The text of ``modelDescription.xml``."""
     sampled, is_2 = math.isfinite(program.sample_time), version == "2.0"
     step = repr(program.sample_time)
     common = {"modelIdentifier": name, "canHandleVariableCommunicationStepSize": "true"}
@@ -189,7 +180,6 @@ def description(program: Program, variables: list[Variable], name: str, version:
 
 
 def _sentences(program: Program) -> str:
-    """The delay of the output, and how far ahead the reference is."""
     if math.isnan(program.sample_time):
         return DELAY
     ahead = f" The reference is that of {program.ahead} samples later." if program.ahead else ""

@@ -22,16 +22,8 @@ _MANY = 8  # equal numbers in a row
 class Packing:
     """Parameters and first memory of a law's step, as expressions of its numbers.
 
-    Parameters
-    ----------
-    fields : tuple of str
-        Names of the numbers that may be changed, in the order of the law's `scalars`.
-    parameters : tuple
-        Parameters of the step: floats, and symbols that depend on the fields.
-    memory : tuple
-        Front of the state before the first sample, likewise; its first place is that of the last input, zero.
-    tape : Tape
-        The operations.
+    `fields` are the numbers that may be changed, in the order of the law's `scalars`. `parameters` and `memory` are
+    floats, and symbols on the `tape` that depend on the fields; `memory` begins with the last input, zero.
     """
 
     def __init__(
@@ -40,18 +32,7 @@ class Packing:
         self.fields, self.parameters, self.memory, self._tape = fields, parameters, memory, tape
 
     def evaluate(self, values: Sequence[float]) -> tuple[FloatArray, FloatArray]:
-        """Parameters and memory for `values` of the fields.
-
-        Parameters
-        ----------
-        values : sequence of float, length n_fields
-            In the order of `fields`.
-
-        Returns
-        -------
-        parameters, memory : array
-            As `Law.packed` of the law with these values has them.
-        """
+        """Parameters and memory for `values` of the fields, in their order, as `Law.packed` has them."""
         if len(values) != len(self.fields):
             raise ValueError(f"expected {len(self.fields)} values, got {len(values)}")
         numbers = self._tape.evaluate((*self.parameters, *self.memory), values)
@@ -59,23 +40,7 @@ class Packing:
         return np.array(numbers[:size]), np.array(numbers[size:])
 
     def to_c(self, name: str) -> str:
-        """A function ``static void name(const double *fields, double *parameters, double *state)`` in C99.
-
-        It needs ``math.h`` alone. Compile it with ``-ffp-contract=off``.
-
-        Examples
-        --------
-        >>> import hysim as hs
-        >>> from hysim.export._packing import packing
-        >>> print(packing(hs.Line(offset=0.5, slope=2.0), free=("slope",)).to_c("pack"))
-        static void pack(const double *fields, double *parameters, double *state)
-        {
-            parameters[0] = 0.5;
-            parameters[1] = fields[0];
-            state[0] = 0.0;
-        }
-        <BLANKLINE>
-        """
+        """C99 text of ``static void name(const double *fields, double *parameters, double *state)``."""
         function, helpers = self._function(name)
         return "\n".join((*(helper(each, "c") for each in helpers), function)).replace("@", f"{name}_")
 
@@ -86,7 +51,6 @@ class Packing:
         return "\n".join(texts).replace("@", f"{name}_")
 
     def _function(self, name: str) -> tuple[str, list[str]]:
-        """The function in C, and the names of the helpers that it calls."""
         locals_, texts = self._tape.texts((*self.parameters, *self.memory))
         truths, size = self._tape.truth_values(), len(self.parameters)
         lines = [
@@ -100,32 +64,10 @@ class Packing:
 
 
 def packing(law: Law, free: Iterable[str] | None = None) -> Packing:
-    """The parameters of a law's step as expressions of its numbers.
+    """Parameters of a law's step as expressions of its numbers.
 
-    Parameters
-    ----------
-    law : Law
-        A law.
-    free : iterable of str, optional
-        Names, as in `law.scalars`, of the numbers that may be changed; by default all but those in `law.structural`.
-        The others are constants.
-
-    Returns
-    -------
-    Packing
-
-    Raises
-    ------
-    ValueError
-        If a name is unknown, or the step or its parameters cannot be computed from it by arithmetic alone.
-
-    Examples
-    --------
-    >>> import hysim as hs
-    >>> from hysim.export._packing import packing
-    >>> dahl = packing(hs.Dahl(), free=("stiffness", "coulomb"))
-    >>> dahl.evaluate([2.0, 4.0])[0].tolist()
-    [2.0, 0.5, 0.0, 1.0, 1.0, 0.0, 0.0]
+    `free` names the numbers that may be changed, by default all `law.scalars` but `law.structural`; others are
+    constants. A ValueError is raised if a name is unknown, or the step cannot be computed from it by arithmetic alone.
     """
     scalars, family = law.scalars, type(law).__name__
     names = [name for name in scalars if name not in law.structural] if free is None else list(free)
@@ -147,7 +89,6 @@ def packing(law: Law, free: Iterable[str] | None = None) -> Packing:
 
 
 def _row(table: FloatArray) -> tuple[Number, ...]:
-    """The numbers of one law."""
     return tuple(number if isinstance(number, Symbol) else float(number) for number in table[0].tolist())
 
 
@@ -209,7 +150,6 @@ class Traced(np.ndarray[Any, np.dtype[np.object_]]):
         return any(isinstance(number, Symbol) or bool(number) for number in self.ravel().tolist())
 
     def astype(self, dtype: Any, *_: Any, **__: Any) -> Any:
-        """Rounded as numbers of this type."""
         kind = np.dtype(dtype)
         if not _has_symbols(self):
             return _plain(self).astype(kind)
@@ -308,7 +248,6 @@ def _plain(values: Any) -> Any:
 
 
 def _names(inputs: Sequence[Any]) -> tuple[str, ...]:
-    """The fields on which arrays depend."""
     symbols = [
         number
         for each in inputs

@@ -98,8 +98,7 @@ def to_page(
 
     Examples
     --------
-    >>> import tempfile, pathlib
-    >>> import hysim as hs
+    >>> import tempfile, pathlib, hysim as hs
     >>> with tempfile.TemporaryDirectory() as folder:
     ...     page = hs.to_page(hs.Dahl(coulomb=0.5), pathlib.Path(folder, "dahl.html"), units={"u": "mm", "y": "N"})
     ...     page.read_text()[:15]
@@ -180,7 +179,6 @@ def _model(name: str, shown: Shown, parts: Parts, record: Record | None) -> dict
 
 
 def _inputs(amplitude: float, middle: float, timed: bool) -> list[dict[str, Any]]:
-    """Sliders of the input."""
     sides = {"lower": _short(middle - 2.0 * amplitude), "upper": _short(middle + 2.0 * amplitude)}
     sliders: list[dict[str, Any]] = [
         {"name": "amplitude", "value": amplitude, "lower": _short(amplitude / 20.0), "upper": _short(2.0 * amplitude)},
@@ -211,7 +209,6 @@ def _stack(controls: list[dict[str, Any]], law: Any) -> list[dict[str, Any]]:
 
 
 def _between(thing: Any, record: Record | None) -> tuple[float, float]:
-    """Lowest and highest input at the start."""
     if record is not None:
         return float(record.u.min()), float(record.u.max())
     fields = {name: np.asarray(value) for name, value in items(thing).items() if isinstance(value, tuple) and value}
@@ -223,7 +220,6 @@ def _between(thing: Any, record: Record | None) -> tuple[float, float]:
 
 
 def _record(record: Record) -> dict[str, Any]:
-    """A record as the page takes it, with the cycle that is measured."""
     try:
         loops = measured_cycles(record.u, 1, TOLERANCE)
     except ValueError:
@@ -256,7 +252,6 @@ def _packed(values: FloatArray) -> str:
 
 
 def _expression(function: str, place: int) -> str:
-    """A function that packs, with its helpers, as one expression of the script."""
     return f"(() => {{\n{function.strip()}\nreturn pack{place};\n}})()"
 
 

@@ -50,17 +50,13 @@ class Control(NamedTuple):
     scale: bool = False
 
     def to_json(self, first: int, prefix: str = "") -> dict[str, Any]:
-        """As the page takes it, for a law whose numbers begin at the place `first`."""
         described = {"name": prefix + self.name, "value": self.value, "lower": self.lower, "upper": self.upper}
         flags = {name: True for name, is_on in (("log", self.log), ("scale", self.scale)) if is_on}
         return {**described, **flags, "places": [first + place for place in self.places]}
 
 
 def controls_of(law: Law, free: tuple[str, ...], u: FloatArray, names: Sequence[str] | None = None) -> list[Control]:
-    """A slider for each number in `free`, names as in `law.scalars`; long tuples share one, initial tuples have none.
-
-    Places are those among `names`, by default all numbers of the law.
-    """
+    """A slider for each number in `free`: long tuples share one, initial tuples have none; `names` says the places."""
     names = list(law.scalars) if names is None else names
     groups: dict[str, list[str]] = {}
     for name in free:
@@ -95,7 +91,6 @@ class _Reach:
         self.boxes = _boxes(law, Record(u=self.u, y=self.y))
 
     def control(self, name: str, place: int) -> Control:
-        """The slider of a number."""
         value = self.law.scalars[name]
         low, high = self.boxes.get(name, (-math.inf, math.inf))
         if value > 0.0 and self._with(name, 0.0) is None:
@@ -147,7 +142,6 @@ class _Reach:
 
 
 def _boxes(law: Law, record: Record) -> dict[str, tuple[float, float]]:
-    """Sides of the search box for the numbers that are searched as they are."""
     try:
         space = law.search_space(record)
     except ValueError:
@@ -172,10 +166,7 @@ def _rounded(value: float) -> float:
 
 @dataclass
 class Parts:
-    """Parts of the models of a page: modules by name, functions that pack, numbers and sliders.
-
-    `sample_time` is that of the input on which the ends of sliders are found [s].
-    """
+    """Modules, packing functions, numbers and sliders of a page's models; `sample_time` [s] is that of their input."""
 
     modules: dict[str, bytes] = field(default_factory=dict)
     packs: list[str] = field(default_factory=list)
@@ -186,13 +177,7 @@ class Parts:
 
 
 def node_of(thing: Any, u: FloatArray, parts: Parts, prefix: str = "") -> dict[str, Any]:
-    """A model as the page takes it; what it consists of goes into `parts`.
-
-    Raises
-    ------
-    TypeError
-        If it is no law, no sum and no cascade of laws.
-    """
+    """A model as the page takes it, its contents put into `parts`; TypeError if it consists of other than laws."""
     if isinstance(thing, Sum):
         return {"sum": _members(thing.parts, u, parts, prefix)}
     if isinstance(thing, Cascade):
@@ -228,7 +213,6 @@ def _members(members: tuple[Any, ...], u: FloatArray, parts: Parts, prefix: str)
 
 
 def _law(law: Law, parts: Parts, first: int) -> dict[str, Any]:
-    """A law by its module and the function that packs its numbers."""
     general = _general(law)
     packed = packing(general)
     kernels, state = kernels_of(general), general.startable().state
@@ -254,8 +238,7 @@ def _law(law: Law, parts: Parts, first: int) -> dict[str, Any]:
 
 
 def _plays(law: Law, step: Callable[..., float]) -> dict[str, Any]:
-    """Place of the first threshold among the parameters of plays, whose weights follow; `cone` is whether each play
-    lies between u - r and u + r."""
+    """Place of the first threshold of plays, before their weights; `cone`: plays lie between u - r and u + r."""
     coefficients = int(law.packed[0][0]) if step is plain(clamps.bent_step) else 0
     first = {
         plain(clamps.step): clamps.N_OUTPUT,
@@ -267,7 +250,6 @@ def _plays(law: Law, step: Callable[..., float]) -> dict[str, Any]:
 
 
 def steps_of(thing: Any) -> list[Kernels]:
-    """The steps that a page for a model needs."""
     if isinstance(thing, (Sum, Cascade)):
         members = thing.parts if isinstance(thing, Sum) else thing.stages
         return [kernels for member in members for kernels in steps_of(member)]
@@ -301,7 +283,6 @@ def _printed(law: Law, first: int) -> dict[str, Any]:
 
 
 def _in_python(law: Law) -> str:
-    """The law's constructor with all its arguments."""
     plain = {name: np.asarray(value).tolist() for name, value in law.arguments.items()}
     return f"{_name(type(law))}({', '.join(f'{name}={value!r}' for name, value in plain.items())})"
 
@@ -353,7 +334,6 @@ def _name(family: type) -> str:
 
 
 def about(thing: Any) -> tuple[str, str]:
-    """First sentences about a model's family as markup, and its equation."""
     if isinstance(thing, (Sum, Cascade)):
         members = thing.parts if isinstance(thing, Sum) else thing.stages
         word = "Sum" if isinstance(thing, Sum) else "Cascade"
@@ -373,7 +353,6 @@ def output_of(family: type) -> str:
 
 
 def heading(thing: Any) -> str:
-    """The family of a model in a few words."""
     if isinstance(thing, (Sum, Cascade)):
         return about(thing)[0].rstrip(".")
     words = re.split(r"[,;:.`]", getdoc(type(thing)) or "")[0].strip()

@@ -23,7 +23,6 @@ _DAMPER = {"u": "mm", "y": "kN"}
 
 
 def presets() -> dict[str, Shown]:
-    """Names to models, in the order in which the page lists them."""
     examples = {family.example.title: _shown(family) for family in families().values() if family.example.title}
     every = {**examples, **_sums_and_materials()}
     groups = (*_GROUPS.values(), _DEVICES)
@@ -31,33 +30,7 @@ def presets() -> dict[str, Shown]:
 
 
 def explorer(path: str | Path) -> Path:
-    """Write the page with a choice of families and devices.
-
-    Parameters
-    ----------
-    path : path
-        The file to write, which ends in ``.html`` or ``.htm``.
-
-    Returns
-    -------
-    Path
-        The file.
-
-    Raises
-    ------
-    OSError
-        If it cannot be written.
-    ValueError
-        For another ending of the path.
-
-    Examples
-    --------
-    >>> import tempfile, pathlib
-    >>> from hysim.export import explorer
-    >>> with tempfile.TemporaryDirectory() as folder:
-    ...     "Loop explorer" in explorer(pathlib.Path(folder, "explorer.html")).read_text()
-    True
-    """
+    """Write the page with a choice of families to an ``.html`` file, and return its path; else a ValueError."""
     page = checked_path(path)
     write_text(page, _text())
     return page
@@ -69,7 +42,6 @@ def _text() -> str:
 
 
 def _shown(family: type[Any]) -> Shown:
-    """The example of a family as the page takes it."""
     fields, between, _, group, units, kind, stack = family.example
     folder = family.__module__.split(".")[-2]
     return Shown(family(**fields), between, units, stack, group or _GROUPS[folder], kind)

@@ -49,13 +49,7 @@ class Translation:
     _names: set[str] = field(default_factory=set)
 
     def function(self, of: Callable[..., Any], types: tuple[Type, ...]) -> Function:
-        """The C function of a kernel for arguments of these types; it is translated where it is not yet.
-
-        Raises
-        ------
-        UntranslatableError
-            If the function, or one that it calls, is outside the subset.
-        """
+        """C function of a kernel for these argument types, translated once; UntranslatableError outside the subset."""
         source = routine(plain(of))
         arguments = _arguments(source, len(types))
         annotated = tuple(_as_annotated(argument, type_) for argument, type_ in zip(arguments, types, strict=True))
@@ -67,13 +61,11 @@ class Translation:
         return self.functions[key]
 
     def table(self, name: str, values: Any) -> str:
-        """Name of a constant vector in C."""
         if id(values) not in self._tables:
             self._tables[id(values)] = self._free(f"table_{name.strip('_').lower()}"), values
         return self._tables[id(values)][0]
 
     def text(self) -> str:
-        """Everything that was translated."""
         structs = [
             f"typedef struct {{ {' '.join(f'{m.c_type} at{i};' for i, m in enumerate(each.members))} }} {each.c_type};"
             for each in sorted(self._structs, key=lambda each: each.c_type)
@@ -112,7 +104,6 @@ class Translation:
 
 
 def _declared(parameter: Parameter, name: str) -> list[str]:
-    """An argument in C, and its length."""
     if isinstance(parameter.type, Vector):
         pointer = f"{'' if parameter.is_written else 'const '}double *{name}"
         lengths = [f"int {parameter.type.length(name, axis)}" for axis in parameter.axes]
@@ -141,10 +132,7 @@ def _as_annotated(argument: ast.arg, type_: Type) -> Type:
 
 
 class Field(NamedTuple):
-    """A number of a model that may still be changed where the program runs.
-
-    `lower` and `upper` are the box of a slider or of a tunable parameter; `log` says that its scale is logarithmic.
-    """
+    """A number that may be changed where the program runs; `lower` to `upper` is its box, `log` its scale."""
 
     name: str
     value: float
@@ -213,37 +201,10 @@ def program_of(
 ) -> Program:
     """The step of a law, a plant or a controller in C99.
 
-    Parameters
-    ----------
-    thing : model or controller
-        A law, plant, sum or cascade that can be stepped, or a sampled controller.
-    sample_time : float, optional
-        Time between two samples [s]; a law that does not depend on time needs none.
-    u0, y0 : float, optional
-        Command and displacement at which a controller starts, at rest; by default as `start_of` has them.
-    tunable : bool
-        Whether the numbers of a law may still be changed in the program.
-
-    Returns
-    -------
-    Program
-
-    Raises
-    ------
-    TypeError
-        If the thing cannot be stepped.
-    ValueError
-        If no sample time is given where one is needed, or `u0` or `y0` is not finite.
-    UntranslatableError
-        If a step is outside the subset of Python that is translated.
-
-    Examples
-    --------
-    >>> import hysim as hs
-    >>> from hysim.export import program_of
-    >>> program = program_of(hs.Play(threshold=0.5))
-    >>> program.inputs, program.parameters.tolist()
-    (('u',), [0.0, 0.0, 0.0, 0.5, 1.0])
+    A law that does not depend on time needs no `sample_time` [s]. A controller starts at rest at `u0` and `y0`, by
+    default those of `start_of`. If `tunable`, the numbers of a law may still be changed in the program. A TypeError is
+    raised if the thing cannot be stepped, a ValueError if a sample time is missing or a start is not finite, and an
+    UntranslatableError if a step is outside the subset of Python that is translated.
     """
     if sample_time is not None and not 0.0 < sample_time < math.inf:
         raise ValueError(f"sample_time must be positive and finite, got {sample_time}")
@@ -281,11 +242,7 @@ def program_of(
 
 
 def start_of(thing: Any, sample_time: float, u0: float | None, y0: float | None) -> tuple[float, float]:
-    """Command and displacement at which a controller starts, as in `hysim.close_loop`.
-
-    By default they are the command at which the memory of its law holds and the displacement of its model there; 0 for
-    a law that has no such command.
-    """
+    """Command and displacement of a controller at its start, by default at rest as in `hysim.close_loop`, else 0."""
     command = standing(thing, u0)
     if y0 is not None or u0 is not None or not isinstance(thing, InverseFeedforward | TrackingController):
         return command, y0 or 0.0
@@ -332,24 +289,8 @@ def _of_controller(controller: Controller, sample_time: float, u0: float, y0: fl
 def entries(step: Step, start: Start, sizes: tuple[int, int] | None = None) -> tuple[str, bool]:
     """C99 text with the functions `step` and `start` of a model, and whether there is a `start`.
 
-    Parameters
-    ----------
-    step, start : function
-        Kernels, or functions in their subset of Python.
-    sizes : (int, int), optional
-        Numbers of the parameters and of the state. By default they are arguments of both functions, ``step(parameters,
-        n_parameters, state, n_state, u)``, so that one program serves every law of a family.
-
-    Returns
-    -------
-    text : str
-    has_start : bool
-        Whether the state depends on the first input.
-
-    Raises
-    ------
-    UntranslatableError
-        If a function is outside the subset of Python that is translated.
+    `sizes` are the numbers of parameters and of the state, by default arguments of both functions, so that one program
+    serves every law of a family. An UntranslatableError is raised for Python outside the subset.
     """
     translation, types = Translation(), (*_VECTORS, Scalar.DOUBLE)
     function = translation.function(step, types)
@@ -364,10 +305,7 @@ def entries(step: Step, start: Start, sizes: tuple[int, int] | None = None) -> t
 def _entry(
     name: str, function: Function, inputs: tuple[str, ...], sizes: tuple[int, int] | None, every: tuple[str, ...]
 ) -> str:
-    """A function of parameters, state and inputs that calls a translated one with what this uses.
-
-    `every` are the names of its own inputs, of which `inputs` are taken.
-    """
+    """A C function of parameters, state and inputs (`every`, of which it uses `inputs`) around a translated one."""
     lengths = ("n_parameters", "n_state") if sizes is None else tuple(map(str, sizes))
     given: list[str] = []
     names = ("parameters", "state", *every)

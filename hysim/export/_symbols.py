@@ -1,8 +1,4 @@
-"""Arithmetic that is recorded while it runs, and written down in C99 and in JavaScript.
-
-A `Tape` holds the operations that were done on symbols, each once, in an order in which they can be computed. The
-operations are those of numpy; a symbol stands for a number or for a truth value.
-"""
+"""Arithmetic on symbols, recorded on a `Tape` while it runs, each operation once, and written in C99 and JavaScript."""
 
 import math
 import re
@@ -86,13 +82,7 @@ class Symbol:
 
 
 class Tape:
-    """Operations on fields, in an order in which they can be computed.
-
-    Parameters
-    ----------
-    names : tuple of str
-        The fields.
-    """
+    """Operations on the fields `names`, in an order in which they can be computed."""
 
     def __init__(self, names: tuple[str, ...]) -> None:
         self.names = names
@@ -100,11 +90,9 @@ class Tape:
         self._places: dict[Any, int] = {}
 
     def field(self, k: int) -> Symbol:
-        """The field number `k`."""
         return Symbol(self, k)
 
     def record(self, operation: str, *operands: Number) -> Symbol:
-        """The result of an operation."""
         key = operation, *(_key(operand) for operand in operands)
         if key not in self._places:
             self._places[key] = len(self._entries)
@@ -112,7 +100,6 @@ class Tape:
         return Symbol(self, self._places[key])
 
     def needed(self, numbers: Iterable[Number]) -> list[int]:
-        """Places of the operations that lead to these numbers, in their order."""
         seen: set[int] = set()
         waiting = [number.place for number in numbers if isinstance(number, Symbol)]
         while waiting:
@@ -123,11 +110,9 @@ class Tape:
         return sorted(seen)
 
     def fields_of(self, number: Number) -> tuple[str, ...]:
-        """Names of the fields on which a number depends."""
         return tuple(self.names[place] for place in self.needed((number,)) if place < len(self.names))
 
     def evaluate(self, numbers: Sequence[Number], values: Sequence[float]) -> list[float]:
-        """The numbers for these values of the fields."""
         results: dict[int, Any] = {}
 
         def value(number: Number) -> Any:
@@ -143,10 +128,7 @@ class Tape:
         return [float(value(number)) for number in numbers]
 
     def texts(self, numbers: Sequence[Number]) -> tuple[list[tuple[str, str]], list[str]]:
-        """Names and texts of what occurs more than once, in an order to compute them in, and the texts of the numbers.
-
-        Names of helping functions begin with ``@``.
-        """
+        """Names and texts of what occurs more than once, in order, and texts of the numbers; ``@`` marks helpers."""
         places = self.needed(numbers)
         uses = dict.fromkeys(places, 0)
         for number in (*numbers, *(operand for place in places for operand in self._operands(place))):
@@ -171,7 +153,6 @@ class Tape:
         return locals_, [text(number) for number in numbers]
 
     def truth_values(self) -> frozenset[str]:
-        """Names in `texts` of what is true or false."""
         return frozenset(f"t{k}" for k, (operation, _) in enumerate(self._entries) if operation in TRUTH_VALUES)
 
     def _operands(self, place: int) -> tuple[Number, ...]:
@@ -286,7 +267,6 @@ _IN_JS = (
 
 
 def helper(name: str, language: str) -> str:
-    """Text of a function that operations call, in C99 or in JavaScript."""
     if language == "c":
         return HELPERS[name]
     return _JS_HELPERS.get(name) or in_javascript(HELPERS[name])

@@ -73,7 +73,6 @@ class Array:
 
     @property
     def size(self) -> int:
-        """Number of elements."""
         return math.prod(self.shape)
 
     @property
@@ -83,7 +82,6 @@ class Array:
 
     @property
     def description(self) -> str:
-        """Name and shape, or the kind of the content where that is no number."""
         shape = " x ".join(map(str, self.shape)) if self.shape else "one value"
         return f"{listed([self.label])} ({shape if self.kind == NUMBERS else self.kind})"
 
@@ -105,7 +103,6 @@ class Array:
         return Column((self, index), f"{self.label}[{text}]", self.unit or "")
 
     def numbers(self) -> FloatArray:
-        """All numbers, as one column if there is one long axis."""
         values = np.asarray(self.read())
         kind = KINDS.get(values.dtype.kind, "no numbers")
         require(kind == NUMBERS, f"array {shown(self.label)} holds {kind}: a column must hold real numbers")
@@ -124,7 +121,6 @@ class Arrays:
 
     @property
     def labels(self) -> Sequence[str]:
-        """Names of the arrays."""
         return [array.label for array in self.arrays]
 
     def column(self, key: str | int) -> Column:
@@ -143,7 +139,6 @@ class Arrays:
         return array.column(index)
 
     def values(self, columns: list[Column]) -> FloatArray:
-        """The numbers of the columns, shape (n_columns, n_samples), nan where one is missing."""
         with damaged(self.format):
             numbers = {id(array): array.numbers() for array in {id(c.place[0]): c.place[0] for c in columns}.values()}
         values = [numbers[id(array)][(slice(None), *index)] for array, index in (column.place for column in columns)]
@@ -188,7 +183,6 @@ def with_notes(arrays: list[Array], form: str, attributes: Mapping[str, Any] | N
 
 
 def _short_value(array: Array) -> str | float | None:
-    """The text or the number in an array that holds a short one."""
     if array.size * array.item_bytes > _LONGEST_TEXT:
         return None
     if array.kind == TEXT:
@@ -201,7 +195,6 @@ def _path(name: str) -> str:
 
 
 def npz(file: BinaryIO) -> Arrays:
-    """The arrays of a zip archive as NumPy saves it."""
     archive = zipfile.ZipFile(file)
     entries = [entry for entry in archive.infolist() if entry.filename.endswith(_ENDING)]
     names = shown(", ".join(archive.namelist()[:3]))
@@ -211,8 +204,6 @@ def npz(file: BinaryIO) -> Arrays:
 
 
 def npy(file: BinaryIO) -> Arrays:
-    """The one array of a file as NumPy saves it."""
-
     def rewound() -> AbstractContextManager[IO[bytes]]:
         file.seek(0)
         return nullcontext(file)
@@ -274,7 +265,6 @@ class _MatReader:
         self.head = _MAT_TITLE + version
 
     def variables(self) -> Iterator[Array]:
-        """The arrays of all variables."""
         end, at = self.file.seek(0, 2), _MAT_HEAD
         while at < end:
             self.file.seek(at)
@@ -306,7 +296,6 @@ class _MatReader:
         return tag + inside
 
     def arrays(self, matrix: Callable[..., bytes | memoryview], struct: str = "", depth: int = 0) -> Iterator[Array]:
-        """The array in a matrix, or those in a struct."""
         from scipy.io import whosmat
 
         beginning = matrix(most=_BEGINNING)
@@ -344,7 +333,6 @@ class _MatReader:
                 yield str(names[k * step : (k + 1) * step], "latin-1").rstrip("\0"), matrix
 
     def value(self, matrix: Callable[..., bytes | memoryview]) -> npt.NDArray[Any] | str:
-        """The numbers of a matrix, or its text."""
         from scipy.io import loadmat
 
         with warnings.catch_warnings(action="error"):  # SciPy warns of what it cannot read

@@ -107,7 +107,6 @@ class Text(NamedTuple):
                 stream.detach()
 
     def samples(self) -> Iterator[Lines]:
-        """The lines that are neither blank nor comments."""
         for numbers, texts in self.lines():
             begins = {line[:1] for line in texts}
             if not any(sign in ("", *COMMENTS) or sign.isspace() for sign in begins):
@@ -117,7 +116,6 @@ class Text(NamedTuple):
             yield Lines([numbers[k] for k in kept], [texts[k] for k in kept])
 
     def whole(self) -> str:
-        """All of the text."""
         return "\n".join(line for lines in self.lines() for line in lines.texts)
 
     def _no_text(self, encoding: str, reason: str) -> str:
@@ -135,7 +133,6 @@ class Signs(NamedTuple):
     thousands: str | None = None
 
     def number(self, cell: str) -> float | None:
-        """The number in a cell, or None if it holds none."""
         cell = cell.strip().replace("\u2212", "-")  # the minus sign of typesetters
         grouped = _GROUPED.fullmatch(cell)
         if grouped and grouped["mark"] != self.decimal and grouped["point"] in (None, self.decimal):
@@ -150,7 +147,6 @@ class Signs(NamedTuple):
             return None
 
     def kind(self, cell: str) -> str:
-        """Whether a cell is "missing", a "number", or "text"."""
         return "missing" if cell.strip().lower() in MISSING else "text" if self.number(cell) is None else "number"
 
     def cells(self, line: str, *, strict: bool = False) -> list[str]:
@@ -237,7 +233,6 @@ class Delimited:
 
     @property
     def labels(self) -> Sequence[str]:
-        """Names of the columns."""
         return [column.label for column in self.columns]
 
     def column(self, key: str | int) -> Column:
@@ -245,7 +240,6 @@ class Delimited:
         return column_of(key, self.columns)
 
     def values(self, columns: list[Column]) -> FloatArray:
-        """The numbers of the columns, shape (n_columns, n_samples), nan where one is missing."""
         result, at = np.empty((len(columns), self.n_samples)), 0
         for lines in self._samples():
             values = plain_numbers(lines.texts, [column.place for column in columns], self.signs)
@@ -259,12 +253,10 @@ class Delimited:
         return result
 
     def place(self, sample: int) -> str:
-        """The sample's line."""
         numbers = itertools.chain.from_iterable(lines.numbers for lines in self._samples())
         return f"line {next(itertools.islice(numbers, sample, None))}"
 
     def _samples(self) -> Iterator[Lines]:
-        """The lines of the samples, which are those below the header, some at a time."""
         head = self.head
         for lines in self.text.samples():
             if head < len(lines.texts):
@@ -364,7 +356,6 @@ def _signs(lines: list[str], delimiter: str | None, decimal: str | None, thousan
 
 
 def _heads(rows: list[list[str]], below: list[list[str]], line: int, signs: Signs) -> tuple[bool, bool]:
-    """Whether the first line is a header, and whether the second one holds units."""
     width = len(below[0]) if below else len(rows[0])
     columns = [[signs.kind(row[place]) for row in below] for place in range(width)]
     numeric = {place for place, kinds in enumerate(columns) if kinds.count("number") >= max(1, kinds.count("text"))}

@@ -125,15 +125,9 @@ def load_ground_motion(
         even, a value is missing, a unit is unknown, or the file is damaged. The message is one line that names the
         file, the line and what to do.
 
-    References
-    ----------
-    PEER Strong Motion Database, "Time history" files: four header lines, the last of which states NPTS and DT; the
-    values are read line by line.
-
     Examples
     --------
-    >>> import io
-    >>> import hysim as hs
+    >>> import io, hysim as hs
     >>> header = "RECORD\\nSITE, 180\\nACCELERATION TIME SERIES IN UNITS OF G\\nNPTS=  3, DT= .0050 SEC\\n"
     >>> t, acceleration = hs.load_ground_motion(io.StringIO(header + " 0. .1E+00-.2E+00\\n"))
     >>> t.tolist(), acceleration.round(6).tolist()
@@ -166,7 +160,6 @@ def is_at2(path: Source, encoding: str | None = None) -> bool:
 
 
 def column_names(path: Source, **for_text: Any) -> tuple[str, ...]:
-    """Names of the columns of a file, with the options for texts and the errors of `hysim.load`."""
     for_text = {**dict.fromkeys(("delimiter", "decimal", "encoding")), **for_text, "skip": for_text.get("skip") or None}
     with opened(path) as source, table_of(source, for_text) as table:
         return tuple(table.labels)
@@ -209,7 +202,6 @@ def _of_text(text: str, choice: _Choice, skip: int, delimiter: str | None, decim
 
 
 def _table_below_titles(text: str, delimiter: str | None, decimal: str | None) -> Table:
-    """The table in a text, below any number of lines of text."""
     lines, errors = text.split("\n"), list[ValueError]()
     titles = _titles(lines)
     for kept in (len(titles), 2, 1, 0):  # all, names and units, names, or none
@@ -404,7 +396,6 @@ def in_si(values: FloatArray, unit: str) -> FloatArray:
 
 
 def check_unit(unit: str | None) -> None:
-    """Raise a ValueError if a unit is given that is none of acceleration."""
     if unit is not None and _name(unit) is None:
         raise ValueError(f"units must be a unit of acceleration: {_KNOWN}, got {unit!r}")
 
@@ -412,8 +403,7 @@ def check_unit(unit: str | None) -> None:
 def stated_unit(header: str) -> str | None:
     """The unit that the text above some numbers states, None if it states none; ValueError if it is not understood.
 
-    First the word behind "unit", then what is in brackets or behind "in", then words that can be nothing else, such as
-    cm/sec2.
+    First the word behind "unit", then what is in brackets or behind "in", then words such as cm/sec2.
     """
     behind = [match.strip(".") for match in _STATED.findall(header)]
     words = [word.strip("().:") for word in re.split(r"[\s,;]+", header)]

@@ -75,7 +75,6 @@ class _Reader(NamedTuple):
                 yield path.replace("/", ".") if self.matlab else path, item
 
     def array(self, label: str, dataset: Any) -> Array:
-        """The properties of a dataset."""
         shape = tuple(map(int, dataset.shape[::-1] if self.matlab else dataset.shape))
         shape = (0,) if "MATLAB_empty" in dataset.attrs else shape
         kind, unit = self.kind(dataset, shape), self.attribute(dataset, "units")
@@ -83,7 +82,6 @@ class _Reader(NamedTuple):
         return Array(label, shape, kind, dataset.dtype.itemsize, read, unit if isinstance(unit, str) else None)
 
     def kind(self, dataset: Any, shape: tuple[int, ...]) -> str:
-        """The kind of a dataset's content."""
         matlab_class, size = self.attribute(dataset, "MATLAB_class"), math.prod(shape)
         if dataset.is_virtual or dataset.external:
             return "values that lie in another file"
@@ -94,12 +92,10 @@ class _Reader(NamedTuple):
         return "references or texts" if dataset.dtype.kind == "O" else KINDS.get(dataset.dtype.kind, "no numbers")
 
     def is_text(self, dtype: np.dtype) -> bool:
-        """Whether a type is that of texts which can be read."""
         text = self.h5py.check_string_dtype(dtype)
         return text is not None and (self.texts or text.length is not None)
 
     def attribute(self, item: Any, name: str) -> str | float | None:
-        """The short text or the number in an attribute."""
         if name not in item.attrs:
             return None
         shape, dtype = item.attrs.get_id(name).shape, item.attrs.get_id(name).dtype
@@ -111,7 +107,6 @@ class _Reader(NamedTuple):
         return float(plain) if is_number else _decoded(plain)
 
     def values(self, dataset: Any, shape: tuple[int, ...], kind: str) -> npt.NDArray[Any] | str:
-        """The numbers or the text of a dataset."""
         if not math.prod(shape):
             return "" if kind == TEXT else np.empty(shape)
         _check_chunks(dataset)

@@ -94,8 +94,8 @@ def load(
 
     In the other formats a column is an array by its name: a variable, a field of a struct (``rec.u``), a dataset
     (``group/displacement``). Samples run along the first axis; a column of an array with several axes is ``x[2]`` or
-    ``x[0,1]``. Its unit is an attribute `units` in HDF5, or a text beside it called ``u_units``. A missing value is
-    nan. HDF5, and MATLAB's ``-v7.3``, need h5py. A file of `hysim.save_record` needs no further arguments.
+    ``x[0,1]``. Its unit is an attribute `units` in HDF5, or a text ``u_units``. A missing value is nan. HDF5, and
+    MATLAB's ``-v7.3``, need h5py. A file of `hysim.save_record` needs no further arguments.
 
     A table in memory is a frame of pandas, polars or the like, a table of Arrow or a dataset of xarray. Its columns are
     taken by name; ``voltage [V]`` is a name with a unit here, too, and ``attrs["units"]`` of pandas and xarray holds
@@ -160,8 +160,7 @@ def load(
 
     Examples
     --------
-    >>> import io
-    >>> import hysim as hs
+    >>> import io, hysim as hs
     >>> text = io.StringIO("voltage [V], displacement [um]\\n0, 0.0\\n5, 0.079\\n10, 0.152\\n")
     >>> rec = hs.load(text, u="voltage", y="displacement")
     >>> rec.u.tolist(), dict(rec.units)
@@ -217,10 +216,7 @@ def options_of_a_text(
 
 
 class Opened(NamedTuple):
-    """Name, format and content of a source, its path if it is a file with one, and its encoding if that is known.
-
-    The content of a DataFrame or the like is its table.
-    """
+    """Name, format, content (of a DataFrame its table) of a source, and its path and encoding if known."""
 
     name: str
     format: str
@@ -241,10 +237,7 @@ class _Named(Protocol):
 
 @contextmanager
 def opened(source: Source) -> Iterator[Opened]:
-    """Open a source to read from, and make every message about it one line that begins with its name.
-
-    OSError, TypeError or ValueError if it cannot be read or is too large.
-    """
+    """Open a source to read from, and begin every message about it with its name; OSError, TypeError or ValueError."""
     with ExitStack() as stack:
         if isinstance(source, (str, os.PathLike)):
             path = Path(source)
@@ -311,7 +304,6 @@ def _check_size(name: str, size: int) -> None:
 
 @contextmanager
 def table_of(source: Opened, for_text: Mapping[str, Any], progress: Progress | None = None) -> Iterator[Table]:
-    """The table that a source holds, open to be read from."""
     if source.format == "text":
         encoding = source.encoding or for_text["encoding"]
         reading = _reading(progress, _TIMES * source.content.seek(0, 2))
@@ -366,7 +358,6 @@ def _columns(table: Table, keys: Mapping[str, str | int | None]) -> dict[str, Co
 def _parts(
     table: Table, columns: Mapping[str, Column], values: FloatArray, on_missing: str
 ) -> list[npt.NDArray[np.intp]]:
-    """Places of the samples of each record."""
     is_missing = np.isnan(values)
     if on_missing == "error" and is_missing.any():
         k, j = np.argwhere(is_missing.T)[0]
@@ -402,7 +393,6 @@ def _channels(
 
 
 def _units(table: Table, columns: Mapping[str, Column], constants: Iterable[str]) -> dict[str, str]:
-    """Units of the signals and channels where the file states them."""
     units = {signal: table.notes.units.get(c.label, c.unit or None) for signal, c in columns.items()}
     units |= {label: table.notes.units.get(label) for label in constants}
     if "t" not in columns and "t" not in table.labels:
@@ -458,8 +448,7 @@ def list_columns(
 
     Examples
     --------
-    >>> import io
-    >>> import hysim as hs
+    >>> import io, hysim as hs
     >>> text = io.StringIO("t [s], voltage [V], note\\n0, 0.0, a\\n1, 5.0, b\\n")
     >>> [(each.name, each.unit, each.highest) for each in hs.list_columns(text)]
     [('t', 's', 1.0), ('voltage', 'V', 5.0), ('note', '', nan)]

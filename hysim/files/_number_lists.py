@@ -79,14 +79,12 @@ def cosmos_blocks(text: str, skip: int) -> list[StatedValues]:
 
 
 def block_below(text: str, line: int) -> str:
-    """A text as far as the numbers below a line go."""
     lines = text.split("\n")
     end = next((k for k in range(line, len(lines)) if not _NUMBERS_ONLY.fullmatch(lines[k])), len(lines))
     return "\n".join(lines[:end])
 
 
 def check_quantity(header: str) -> None:
-    """Refuse the velocities and displacements that are published beside accelerations."""
     words = {word.upper() for word in re.findall(r"[A-Za-z]+", header)}
     other = next((word for word in ("VELOCITY", "DISPLACEMENT") if word in words), None)
     require(
@@ -115,10 +113,7 @@ class NumberList(NamedTuple):
 
 
 def number_list(text: str, decimal: str | None, skip: int = 0) -> NumberList:
-    """All numbers of a text from the line after `skip`, or from the first line of numbers on.
-
-    A ValueError names the first line below that holds something else.
-    """
+    """All numbers of a text after `skip` lines, or from the first line of numbers on; ValueError for anything else."""
     lines = text.split("\n")
     if (decimal or _decimal_sign(lines[skip:])) == ",":
         lines = [line.replace(",", ".") for line in lines]
@@ -131,10 +126,7 @@ def number_list(text: str, decimal: str | None, skip: int = 0) -> NumberList:
 
 
 def _from_numbers_on(lines: list[str], samples: list[int]) -> list[int]:
-    """The samples from the first line on that holds nothing but numbers.
-
-    A line above it that is rather a line of numbers with a fault in it is refused.
-    """
+    """The samples from the first line of numbers on; a line above that looks like one with a fault in it is refused."""
     above = ""
     for at, place in enumerate(samples):
         try:

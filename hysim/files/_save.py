@@ -35,8 +35,7 @@ def save_record(record: Record, path: str | Path) -> None:
       ``# channels:``;
     - ``.npz``: arrays `t`, `u`, `y`, `resolution`, and texts `name`, `channels`, ``u_units`` and so on;
     - ``.mat``: the same as variables, numbers in columns, compressed; version 5, which MATLAB and Octave load;
-    - ``.h5``, ``.hdf5``: datasets with an attribute `units`; attributes `resolution`, `name` and `channels` of the
-      file.
+    - ``.h5``, ``.hdf5``: datasets with an attribute `units`; `resolution`, `name` and `channels` of the file.
 
     A channel that varies is a column or array of its own; one that is constant stands as a number among the channels.
 
@@ -59,8 +58,7 @@ def save_record(record: Record, path: str | Path) -> None:
     Examples
     --------
     >>> import tempfile
-    >>> from pathlib import Path
-    >>> import hysim as hs
+    >>> import tempfile, hysim as hs
     >>> rec = hs.datasets.table1()
     >>> with tempfile.TemporaryDirectory() as folder:
     ...     path = Path(folder) / "table1.npz"
@@ -91,8 +89,6 @@ class _InputOutput(Protocol):
 
 @runtime_checkable
 class _Responding(Protocol):
-    """A model."""
-
     def response(self, u: Any, /) -> Any: ...
 
 
@@ -144,7 +140,6 @@ def _text(columns: Mapping[str, FloatArray], notes: Notes, *, delimiter: str) ->
 
 
 def _arrays(columns: Mapping[str, FloatArray], notes: Notes) -> dict[str, Any]:
-    """The columns, and the notes beside them, by the names that they have in a file."""
     others: dict[str, Any] = {f"{label}_units": unit for label, unit in notes.units.items()}
     if notes.name is not None:
         others["name"] = notes.name

@@ -30,10 +30,7 @@ class Column(NamedTuple):
 
 @dataclass(frozen=True)
 class Notes:
-    """Units, resolution, name and channels of a record, as a file states them.
-
-    `channels` are names to columns, or to the numbers of those that are constant.
-    """
+    """Units, resolution, name and channels of a record as a file states them; channels are columns or numbers."""
 
     units: Mapping[str, str] = field(default_factory=dict)
     resolution: float | None = None
@@ -70,7 +67,6 @@ class Frame:
 
     @property
     def notes(self) -> Notes:
-        """Units, resolution, name and channels in the notes of the frame."""
         return notes_in(self.table.notes, self.table.units)
 
     @property
@@ -86,7 +82,6 @@ class Frame:
         return Column(values, label, unit)
 
     def values(self, columns: list[Column]) -> FloatArray:
-        """The numbers of the columns, shape (n_columns, n_samples), nan where one is missing."""
         return np.stack([column.place for column in columns])
 
     def place(self, sample: int) -> str:
@@ -119,10 +114,7 @@ def damaged(form: str) -> Iterator[None]:
 
 
 def number_of(key: str, kind: str, *names: Sequence[str]) -> int | None:
-    """Number of the one column with this name, from the first list of names that has it; None if there is none.
-
-    If there are several in a list, a ValueError calls them by the plural `kind`.
-    """
+    """Number of the one column of this name in the first of the lists that has it, or None; ValueError for several."""
     for labels in names:
         matches = [k for k, label in enumerate(labels) if label == key]
         if len(matches) > 1:
@@ -151,7 +143,6 @@ def shown(text: str, longest: int = 40) -> str:
 
 
 def listed(names: Sequence[str], most: int = 20) -> str:
-    """Names from a file, in one line."""
     plain = [name if name.isprintable() and len(name) <= 80 else shown(name, 80) for name in names[:most]]
     return ", ".join(plain) + (f" and {len(names) - most} more" if len(names) > most else "")
 
@@ -172,7 +163,6 @@ def notes_in(stated: Mapping[str, Any], units: Mapping[Any, Any]) -> Notes:
 
 
 def json_value(text: str) -> Any:
-    """The value that a text in JSON holds; None if it is none."""
     try:
         return json.loads(text)
     except (ValueError, RecursionError):

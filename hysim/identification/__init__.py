@@ -1,8 +1,4 @@
-"""Parameters from records: `identify` and its result, and `select` among several candidates.
-
-The model is simulated in free run, and the sum of squared output residuals is minimised over the box that
-the model's family declares (`SearchSpace`). Nothing here knows a family.
-"""
+"""Parameters from records: `identify` and its result, and `select` among several candidates; no family is named."""
 
 from hysim.identification._channel import ParameterCurve, estimate_channel, parameter_curve
 from hysim.identification._diagnostics import folds

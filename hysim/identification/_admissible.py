@@ -85,10 +85,7 @@ class Choice(NamedTuple):
 
 
 def excursion(models: Sequence[Any], records: Sequence[Record]) -> Excursion | None:
-    """That of the models, one for each record, on the record of the widest input.
-
-    It is None where a model depends on time or on a channel that varies, or no input turns back.
-    """
+    """Largest excursion on the record of the widest input; None if time or a channel matters, or nothing turns."""
     k = max(range(len(records)), key=lambda k: float(np.ptp(records[k].u)))
     model, record = models[k], records[k]
     turning = record.reversals(tolerance=_TURN)
@@ -178,7 +175,6 @@ def _by_region(search: Search, best: LocalOptimum) -> dict[str, tuple[Search, li
 
 
 def _inside(search: Search, lower: FloatArray, upper: FloatArray) -> Search:
-    """The same search in a part of its box."""
     return replace(search, problem=replace(search.problem, space=_part(search.problem.space, lower, upper), ends=None))
 
 
@@ -311,6 +307,5 @@ def _trials(past: FloatArray) -> Iterator[tuple[str, FloatArray]]:
 
 
 def _sampled(corners: FloatArray) -> FloatArray:
-    """A path through these corners with some samples on each branch."""
     places = np.arange((corners.size - 1) * _POINTS + 1) / _POINTS
     return np.interp(places, np.arange(corners.size), corners)

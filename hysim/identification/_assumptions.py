@@ -53,10 +53,7 @@ _STATES = {
 
 
 class Decision(NamedTuple):
-    """The problems to be searched, and a sentence on what was chosen and why.
-
-    There are several, the simplest first, where the family's search has stages.
-    """
+    """The problems to be searched, the simplest first if there are stages, and a sentence on the choice."""
 
     problems: Sequence[Problem]
     sentence: str = ""
@@ -78,7 +75,6 @@ class _Trial(NamedTuple):
 
     @property
     def names(self) -> tuple[str, ...]:
-        """Names of the coordinates."""
         return self.problem.space.coordinates
 
 
@@ -148,10 +144,7 @@ def _left_out(family: Any, setting: Setting, paths: Sequence[Record], quiet: Seq
 
 
 def quiet_rmse(family: Any, setting: Setting, treatment: Treated) -> float:
-    """Error of a short fit along the quiet paths, with what their noise adds through the slope of the record.
-
-    It is infinite where there is no noise, or such a fit.
-    """
+    """Error of a short fit along the quiet paths, with what noise adds through the record's slope; else infinite."""
     if not treatment.noises or isinstance(family, PartByPart):
         return math.inf
     try:
@@ -259,7 +252,6 @@ def _longer(variant: Variant, times: int) -> Variant:
 
 
 def _possible(family: Undecided, records: Sequence[Record]) -> list[str]:
-    """The states that these records can have, in the order of the first of them."""
     named = [family.assumed_states(record) for record in records]
     return [
         state
@@ -284,10 +276,7 @@ def _tried(attempt: Problem, state: _State, variant: Variant, before: Sequence[_
 
 
 def _starts_beside(space: SearchSpace, before: Sequence[_Trial]) -> FloatArray:
-    """The starts of a space, and those that hold the end of a search with coordinates of the state alone.
-
-    The numbers of a shorter state keep their order: what is new stands before them, between them or behind them.
-    """
+    """The starts of a space, and the end of a search with coordinates of the state alone, in their order."""
     starts, coordinates = [space.starts], space.coordinates
     for each in before:
         if each.names and {*each.names, *coordinates} <= {*space.state}:
@@ -313,7 +302,6 @@ def _bic(attempt: Problem, x: FloatArray, cost: float) -> float:
 
 
 def _best(choices: Sequence[int], bic: Callable[[int], float]) -> int:
-    """The first choice, or a later one that is clearly better than it and all before."""
     best = choices[0]
     for k in choices[1:]:
         if bic(k) < bic(best) - _STRONG:

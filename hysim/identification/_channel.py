@@ -1,7 +1,6 @@
 """Laws that depend on a channel: the curve of a parameter against it, and the value of a channel on a record.
 
-**The value of a channel.** The law is what it was identified to be; only the channel, and the state at the first
-sample, are searched. The standard error is that of the noise of this record: the law's own uncertainty is not in it.
+A search for that value keeps the law: the standard error is that of the noise of this record alone.
 """
 
 from collections.abc import Mapping
@@ -69,10 +68,7 @@ class ParameterCurve(Stored):
         return _roots(weights(self.polynomial.at, channel), self.covariance)
 
     def band(self, channel: npt.ArrayLike) -> tuple[FloatArray, FloatArray]:
-        """Ends of the interval at 95 % at values of the channel, of the same shape each; it holds at each value alone.
-
-        Outside the identified range the band is that of the polynomial, which is all that it knows.
-        """
+        """Ends of the interval at 95 % at values of the channel, in their shape; it holds at each value alone."""
         middle, half = self.value(channel), self.reach * self.stderr(channel)
         return middle - half, middle + half
 
@@ -231,7 +227,6 @@ class _UnknownChannel(Identifiable):
     state: tuple[str, ...]  # the law's numbers that are searched beside the channel
 
     def search_space(self, record: Record, freedom: Freedom = ALL_FREE) -> SearchSpace:
-        """The channel's range, and the law's box of the state."""
         law = self.model.law
         fixed = {name: value for name, value in law.scalars.items() if name not in self.state}
         own = law.search_space(record, replace(freedom, fixed=fixed))
@@ -263,7 +258,6 @@ class _UnknownChannel(Identifiable):
         return joint
 
     def regressors(self, parameters: Parameters, record: Record) -> FloatArray:
-        """The output itself, shape (n_sets, n_samples, 1)."""
         numbers = {**self.model.law.scalars, **self._numbers(parameters)}
         columns = np.asarray(self.model.law.regressors(numbers, record))
         output = columns[..., -1]
@@ -272,7 +266,6 @@ class _UnknownChannel(Identifiable):
         return np.asarray(output)[..., np.newaxis]
 
     def steady(self, parameters: Parameters, record: Record) -> dict[str, Any]:
-        """The parameters with the law's state in the steady cycle."""
         own = self._numbers(parameters)
         state = self.model.law.steady({**self.model.law.scalars, **own}, record)
         return {**parameters, **{name: state[name] for name in self.state}}
@@ -284,6 +277,5 @@ class _UnknownChannel(Identifiable):
         return values | {each.parameter: each.value(channels[each.channel]) for each in self.model.polynomials}
 
     def assemble(self, parameters: Mapping[str, float]) -> Any:
-        """The ordinary law at a value of the channel."""
         law = self.model.constant({**self.others, self.channel: parameters[self.channel]})
         return law.with_scalars({name: parameters[name] for name in self.state})

@@ -1,7 +1,4 @@
-"""Measures of a fit, whether its residuals are white, how uncertain the loop width is, and cross-validation.
-
-Searches on other data, with samples left out or records drawn anew, begin at the optima of the whole record.
-"""
+"""Measures of a fit, whiteness of residuals, error of the loop width, cross-validation from the optima of all data."""
 
 from collections.abc import Sequence
 from typing import Any, TypedDict
@@ -106,10 +103,7 @@ def loop_widths(descent: Descent, theta: FloatArray) -> FloatArray:
 
 
 def width_stderr(problem: Problem, theta: FloatArray, of_theta: FloatArray, slopes: FloatArray | None = None) -> float:
-    """Standard error of the largest width, by the linearised model; nan where there is no loop.
-
-    `slopes` are those of the output by theta, where they are known.
-    """
+    """Standard error of the largest width by the linearised model, nan without a loop; `slopes` are dy/dtheta."""
     record = problem.parts[0].record
     slopes = (output_slopes(problem, theta) if slopes is None else slopes)[: len(record)]
     output = problem.model(theta[np.newaxis])[0, : len(record)]

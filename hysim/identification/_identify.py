@@ -1,7 +1,7 @@
 """The verb `identify`: declare, search, describe.
 
-A family that is fitted in one step (`hysim.models.protocols.Direct`) is not searched. Its number of parameters is that
-of its degrees of freedom, rounded; it has none by name, and no standard errors.
+A family that is fitted in one step (`hysim.models.protocols.Direct`) is not searched. Its number of parameters is its
+degrees of freedom, rounded; it has none by name.
 """
 
 import inspect
@@ -122,8 +122,7 @@ def identify(
     workers : int, optional
         Number of threads; by default one for each core.
     progress : callable or False, optional
-        Called as ``progress(done, total)``.
-        By default calls beyond 2 s report on the standard error; False turns this off.
+        Called as ``progress(done, total)``; see `hysim.simulate`.
 
     Returns
     -------
@@ -247,7 +246,6 @@ def _searched(
 
 
 def _weights(weights: Any, records: Sequence[Record]) -> list[FloatArray] | None:
-    """One array of weights for each record."""
     if weights is None:
         return None
     single = len(records) == 1 and np.ndim(weights[0]) == 0

@@ -1,7 +1,4 @@
-"""The model as it is returned: behind the filter of its input, standing where its record began, with its own residual.
-
-What a result says is computed from the model that it holds, on the records as they were measured.
-"""
+"""The model as it is returned: behind the filter of its input, from its record's start, with its own residual."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
@@ -105,7 +102,6 @@ def _behind(front: ReversalFilter | None, model: Any) -> Any:
 
 
 def _alone(model: Any) -> Any:
-    """A model without the filter that `_behind` has put there."""
     return _with_law(model, lambda law: law.behind_filter)
 
 

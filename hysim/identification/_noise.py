@@ -181,7 +181,6 @@ def density(noise: str, quantum: float | None = None, floor: float = 0.0) -> Noi
 
 
 def _by_set(sigma: Scale) -> FloatArray:
-    """The scale of each set, for all its samples."""
     return np.asarray(sigma)[..., np.newaxis]
 
 

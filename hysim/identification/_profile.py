@@ -26,16 +26,8 @@ _BETTER = 0.02  # of the deviance: below minus this, an optimum is another
 class Profile:
     """Likelihood's profile of one parameter.
 
-    Parameters
-    ----------
-    lower, upper : float
-        Interval at 95 %, infinite where the profile stays inside the limit.
-    at_box : (bool, bool)
-        Whether the box ends it, on either side.
-    values, deviance : array, shape (n_points,)
-        Values of the parameter, and the fall of twice the logarithm of the likelihood there.
-    limit : float
-        Deviance at the ends of the interval.
+    `lower` and `upper` are the interval at 95 %, infinite where the profile stays inside the `limit` of the deviance;
+    `at_box` says whether the box ends it. `deviance` (n_points,) is twice the fall of the log-likelihood at `values`.
     """
 
     lower: float

@@ -102,8 +102,7 @@ class Identification(Stored):
         Sentences on a search that did not converge, a constant output, unknown standard errors, correlated residuals,
         input and output that may be swapped, or a response off the record that leaves the measured range by far.
     unsafe : str
-        First line of the summary where the law is not safe on smaller cycles within the range of its record; else
-        empty.
+        First line of the summary where the law is not safe on smaller cycles within its record's range; else empty.
     """
 
     json_name = "identification"

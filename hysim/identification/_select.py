@@ -19,12 +19,11 @@ CRITERIA = ("bic", "aic", "fpe", "cv_rmse")
 @printed
 @frozen
 class Selection:
-    """Candidates identified on the same records, ranked.
+    """Candidates identified on the same records, ranked by a criterion.
 
     Parameters
     ----------
     criterion : {"bic", "aic", "fpe", "cv_rmse"}
-        Criterion of the ranking.
     name : str
         Name of the best candidate.
     fits : mapping
@@ -100,8 +99,7 @@ def select(
     initial, noise, cross_validate, max_evaluations, seed, workers
         As in `identify`, the same for all. A fit that ends by `max_evaluations` is marked as partial.
     progress : callable or False, optional
-        Called as ``progress(done, total)`` after each candidate.
-        By default calls beyond 2 s report on the standard error; False turns this off.
+        Called as ``progress(done, total)`` after each candidate; see `hysim.simulate`.
     announce : callable, optional
         Called as ``announce(name)`` before each candidate.
 

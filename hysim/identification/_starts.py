@@ -75,7 +75,6 @@ class _End(NamedTuple):
     ends: FloatArray
 
     def criterion(self) -> float:
-        """Bayesian information criterion."""
         n = self.whole.n_samples
         return information(max(float(self.whole.costs(self.ends)[0]), 1e-300) / n, n, len(self.whole.space.names))
 
@@ -121,7 +120,6 @@ def _searched(plant: Any, setting: Setting) -> _End:
 
 
 def _gone_on(end: _End) -> _End:
-    """The best end of descents that begin about an end."""
     points = end.plant.beyond(end.whole.space, end.ends)
     return end._replace(ends=_descended(end.whole, points, exact=False)[:1]) if len(points) > 1 else end
 
@@ -196,7 +194,6 @@ def _grown(plant: Any, law: Any, setting: Setting) -> tuple[Any, list[Coordinate
 
 
 def _found(attempt: Problem, plant: Any, known: Sequence[Coordinates]) -> FloatArray:
-    """Ends of descents from the best points on the fastest record, the best first."""
     space = attempt.space
     points = plant.points(space, known)
     best = apart(space, points, attempt.costs(points), _APART, _BEST)
@@ -265,7 +262,6 @@ def _excess(stderr: float, largest: float) -> float:
 
 
 def _stderr(whole: Problem, theta: FloatArray) -> dict[str, float]:
-    """Standard errors by name at `theta`."""
     residual = whole.y - whole.model(theta[np.newaxis])[0]
     variance = float(np.average(residual**2, weights=whole.weights)) or 1e-300
     covariance = uncertainty(whole, theta, np.full(residual.size, 1.0 / variance)).covariance
@@ -286,7 +282,6 @@ def _descended(attempt: Problem, points: FloatArray, *, exact: bool) -> FloatArr
 
 
 def _parts_only(attempt: Problem, ends: FloatArray) -> list[Coordinates]:
-    """Coordinates by name, without those of the law."""
     names, plant = attempt.space.coordinates, attempt.family
     known: list[Coordinates] = [
         {name: value for name, value in zip(names, row, strict=True) if not name.startswith("hysteresis.")}
@@ -302,10 +297,7 @@ _MOST_GROUPS = 12
 
 
 def begun(structure: DependentStructure, setting: Setting) -> DependentStructure:
-    """The structure with starts where short searches of its law end; itself where nothing searched depends.
-
-    All of them together simulate half of the user's `max_evaluations` parameter sets at most.
-    """
+    """The structure with starts where short searches of its law end; they take half of `max_evaluations` at most."""
     if all(name in structure.columns for name in structure.at):
         return structure
     records, most = setting.records, setting.max_evaluations
@@ -325,7 +317,6 @@ def begun(structure: DependentStructure, setting: Setting) -> DependentStructure
 
 
 def _short_search(law: Any, setting: Setting) -> dict[str, float] | None:
-    """The parameters of the law where a short search ends; None if it finds nothing."""
     try:
         attempt = setting.problem(law)
         x, cost = brief_optimum(attempt)

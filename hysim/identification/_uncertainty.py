@@ -52,8 +52,7 @@ class Uncertainty:
     def with_disturbances(self, disturbances: FloatArray, curvature: FloatArray) -> "Uncertainty":
         """The covariance with what disturbances of the output (n_draws, n_samples) add to the estimates.
 
-        Each moves the optimum by (J^T W J)^-1 J^T W d, to first order; the `curvature` W is (n_samples,). Their mean is
-        a bias, and counts as a part of the error.
+        Each moves the optimum by (J^T W J)^-1 J^T W d to first order, `curvature` being W; their mean is a bias.
         """
         if self.slopes is None:
             return self
@@ -196,10 +195,7 @@ def _in_words(names: tuple[str, ...], groups: tuple[tuple[str, ...], ...]) -> st
 def _bounds_in_words(
     problem: Problem, theta: FloatArray, way_back: FloatArray, at_side: Flags
 ) -> tuple[tuple[str, ...], list[str]]:
-    """Sides of the box at which the search has stopped, and other bounds at which parameters stand.
-
-    A coordinate that is no parameter of the user stands for those that it moves.
-    """
+    """Sides of the box where the search stopped, and other bounds, in terms of the user's parameters."""
     space, x = problem.space, theta[: problem.n_x]
     values = dict(zip(space.names, problem.named(theta[np.newaxis])[0].tolist(), strict=True))
     is_open = np.logical_or(*space.open_sides(x))
@@ -219,14 +215,12 @@ def _bounds_in_words(
 
 
 def _at(names: Sequence[str], values: Mapping[str, float], verb: str, bound: str) -> str:
-    """Parameters at a bound; the values of a few."""
     if len(names) > _MOST_NAMES:
         return f"{_shortened(names)} {verb.replace('is', 'are')} their {bound}s"
     return ", ".join(f"{name} {verb} its {bound} {values[name]:.4g}" for name in names)
 
 
 def _shortened(names: Sequence[str]) -> str:
-    """The names, of many the first ones."""
     if len(names) <= _MOST_NAMES:
         return ", ".join(names)
     return f"{', '.join(names[: _MOST_NAMES - 1])} and {len(names) - _MOST_NAMES + 1} others"

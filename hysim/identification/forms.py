@@ -1,7 +1,4 @@
-"""Results to plain JSON values and back, and warnings for users of a result.
-
-In JSON nan is null, an infinity its name, a model its family and parameters.
-"""
+"""Results to plain JSON values and back (nan is null, an infinity its name), and warnings for users of a result."""
 
 import json
 import math
@@ -62,7 +59,6 @@ def to_plain(value: Any) -> Any:
 
 
 def from_plain(value: Any, kinds: Sequence[type]) -> Any:
-    """The value that `to_plain` wrote, of results that are one of `kinds`."""
     if isinstance(value, dict) and value.keys() == {"result", "fields"}:
         kind = {each.__name__: each for each in kinds}[value["result"]]
         hints = typing.get_type_hints(kind)

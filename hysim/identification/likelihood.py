@@ -1,8 +1,4 @@
-"""The problem that `identify` has solved, put together again from its result, and that of a record not measured yet.
-
-The derivatives of its output by parameters that are known are those of the residual that `hysim.identify` makes small,
-by the same code. `density` makes the noise of this name, with its likelihood.
-"""
+"""The problem that `identify` has solved, put together again from its result, and that of a record not yet measured."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -48,10 +44,7 @@ def again(fit: Identification, records: Sequence[Record], bounds: Bounds, initia
 
 
 def optima(fit: Identification, known: Problem, bounds: Bounds, initial: Initial) -> FloatArray:
-    """Coordinates (n_optima, n_x) of the fit and of its rivals, the best first, in the problem that `again` has made.
-
-    Several records have the state of the first one.
-    """
+    """Coordinates (n_optima, n_x) of the fit and its rivals, best first, in the problem of `again`."""
     paths = [part.record for part in known.parts]
     freedom, initial = _freedom(fit, known.family, paths, initial)
     freedom = replace(freedom, bounds=_inner(bounds, known))
@@ -60,7 +53,6 @@ def optima(fit: Identification, known: Problem, bounds: Bounds, initial: Initial
 
 
 def _inner(bounds: Bounds, known: Problem) -> dict[str, tuple[float, float]]:
-    """Bounds of parameters that are not linear."""
     return {name: pair for name, pair in bounds.items() if name not in known.own.columns}
 
 
@@ -100,8 +92,7 @@ _CLOSE = 1e-6  # relative distance of a parameter and what its coordinates stand
 class Expected:
     """A model at known parameters, as `identify` would search them on a record.
 
-    `theta` (n_theta,) are its coordinates and linear parameters, and `way_there` (n_theta, n_names) their derivatives
-    by the free parameters.
+    `theta` (n_theta,) are its coordinates and linear parameters, `way_there` (n_theta, n_names) their derivatives.
     """
 
     problem: Problem
@@ -117,10 +108,7 @@ class Expected:
         coordinates: Mapping[str, float],
         values: Mapping[str, float],
     ) -> Self:
-        """The model with these `values` of its parameters, which lie at these coordinates by name.
-
-        A ValueError is raised if a value lies outside the box that is searched on such a record.
-        """
+        """The model with these `values`, at these coordinates by name; ValueError for a value outside the box."""
         attempt = problem(family, [record], freedom, None)
         x = [coordinates[name] for name in attempt.space.coordinates]
         theta = np.array([*x, *(values[name] for name in attempt.space.linear)], dtype=float)
@@ -135,14 +123,9 @@ class Expected:
 
     @property
     def names(self) -> tuple[str, ...]:
-        """The free parameters."""
         return self.problem.space.names
 
     def jacobian(self, record: Record, *, refined: bool = False) -> FloatArray:
-        """Derivatives of the output by the free parameters, (n_samples, n_names), at the input of a record.
-
-        Refined ones are those from which `identify` computes standard errors: where the output bends within the step of
-        a difference, the step is made shorter.
-        """
+        """dy/d(free parameters) (n_samples, n_names) on a record; `refined` as for standard errors of `identify`."""
         own = replace(self.problem, parts=(replace(self.problem.parts[0], record=record),))
         return np.asarray(output_slopes(own, self.theta, refined=refined) @ self.way_there)

@@ -44,10 +44,7 @@ class Settled:
 
 
 def triangle(columns: FloatArray, target: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Columns (n_sets, n_rows, n_linear) and target (n_sets, n_rows) of the same regression with few rows.
-
-    There is one row more than there are columns: the last one holds what no parameters explain.
-    """
+    """The same regression with one row more than it has columns: the last one holds what no parameters explain."""
     both = np.asarray(np.linalg.qr(np.concatenate([columns, target[..., np.newaxis]], axis=2), mode="r"))
     return both[..., :-1], both[..., -1]
 
@@ -58,7 +55,6 @@ def least_squares(columns: FloatArray, target: FloatArray) -> FloatArray:
 
 
 def _by_singular_values(columns: FloatArray, target: FloatArray) -> FloatArray:
-    """`least_squares` by singular values."""
     basis, singular, right = np.linalg.svd(columns, full_matrices=False)
     inverse = np.where(singular > _RANK, 1.0 / np.maximum(singular, _RANK), 0.0)
     projected = inverse[..., np.newaxis] * (basis.transpose(0, 2, 1) @ target[..., np.newaxis])
@@ -66,7 +62,6 @@ def _by_singular_values(columns: FloatArray, target: FloatArray) -> FloatArray:
 
 
 def _by_triangle(columns: FloatArray, target: FloatArray) -> FloatArray:
-    """`least_squares` by triangles, where they have full rank."""
     rows, goal = triangle(columns, target)
     n = columns.shape[2]
     solutions = np.empty((len(columns), n))
@@ -93,11 +88,7 @@ _ONE_SIDED = 1e-7  # those of a one-sided one near 1e-7, at half the cost
 
 @dataclass(frozen=True)
 class Schedule:
-    """Damping: each trial has the set's times one of `factors`; a set ends beyond `most`.
-
-    After a step that lowers the loss it is that of the best trial times `success`, otherwise the last one times
-    `failure`.
-    """
+    """Damping after a step: times `success` or `failure`; trials multiply it by `factors`; a set ends beyond `most`."""
 
     factors: tuple[float, ...] = (1.0,)
     success: float = 0.1
@@ -126,10 +117,7 @@ class Problem(Protocol):
     """A loss to minimise; `sets` (n,) says which set each point belongs to."""
 
     def evaluate(self, x: FloatArray, sets: Sets) -> tuple[FloatArray, tuple[FloatArray, ...]]:
-        """Losses (n,) at points `x` (n, n_x), inf where it diverges, and arrays of n rows for `linearised`.
-
-        Numbers that follow from the others may be changed in `x`, in place.
-        """
+        """Losses (n,) at points `x` (n, n_x), which it may change in place, and arrays that `linearised` needs."""
         ...
 
     def linearised(
@@ -258,10 +246,10 @@ def _regressed(jacobian: FloatArray, goal: FloatArray, damping: FloatArray, n_da
 
 @dataclass(frozen=True)
 class SumOfSquares:
-    """Problem of one set: the sum of squared residuals between bounds.
+    """Sum of squared residuals between bounds, for one set.
 
-    `residuals` maps points (n, n_x) to residuals (n, n_samples); `slopes` one point (n_x,) and its residual to
-    derivatives (n_samples, n_x); `sizes`, if given, one point to D (n_x,).
+    `residuals` maps points (n, n_x) to residuals (n, n_samples), `slopes` a point and its residual to derivatives
+    (n_samples, n_x), and `sizes`, if given, a point to the scales D (n_x,).
     """
 
     residuals: Callable[[FloatArray], FloatArray]

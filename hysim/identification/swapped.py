@@ -1,7 +1,6 @@
 """Whether the input and the output of a record were swapped.
 
-**By the columns.** The output is a waveform of a generator, a triangle of equal steps or one sine, and the input is
-none.
+**By the columns.** The output is a generator's waveform, a triangle of equal steps or one sine, and the input is none.
 
 **By a family.** An actuator's loop runs counterclockwise, and clockwise where the columns were swapped; but so does a
 force that follows from a displacement. A clockwise record is doubted only where the same family fits well from y to u
@@ -60,10 +59,7 @@ def _is_generated(signal: FloatArray) -> bool:
 
 
 def swapped_for(family: Identifiable, setting: Setting, error: float) -> str:
-    """A sentence where the family fits the first record better from y to u; else the empty text.
-
-    `error` is the rms of the forward residual over the standard deviation of the output.
-    """
+    """A sentence if the family fits the first record better from y to u; `error` is relative to the spread of y."""
     record = setting.records[0]
     if len(setting.records) > 1 or not error > _PERFECT or not _is_clockwise(record):
         return ""

@@ -43,7 +43,6 @@ class _Column:
     in_text: bool = True
 
     def cell(self, value: float | int) -> str:
-        """A number in the text."""
         if isinstance(value, int):
             return f"{value}"
         if math.isnan(value):
@@ -87,12 +86,9 @@ class CycleMetrics:
 
     Parameters
     ----------
-    start, stop : array of int
-        ``u[start:stop]`` are the fewest samples that hold the cycle.
-    amplitude, mean_input : array
-        Half of the input's span, and its middle [unit of u].
-    lowest_input, highest_input : array
-        The input's extremes [unit of u].
+    start, stop, amplitude, mean_input, lowest_input, highest_input : array
+        ``u[start:stop]`` are the fewest samples that hold the cycle; half of the input's span, its middle and extremes
+        [unit of u].
     max_width, stroke : array
         Largest width of the loop, and largest minus smallest output [unit of y].
     area : array

@@ -39,8 +39,7 @@ and of the initial curve, where the record begins demagnetised at H = B = 0:
     initial_permeability    B / (mu_0 H) at its first sample with a field
     maximum_permeability    largest B / (mu_0 H) of its samples
 
-The branches are those of `hysim.loop_metrics`, linear between their samples. Source: IEC 60050-121 and 60404-4 for the
-terms.
+The branches are those of `hysim.loop_metrics`. Source of the terms: IEC 60050-121 and 60404-4.
 """
 
 import math
@@ -261,7 +260,6 @@ def loop_metrics(u: npt.ArrayLike, y: npt.ArrayLike, *, cycles: int = 1, toleran
 
 
 def measure(inputs: FloatArray, outputs: FloatArray, cycles: list[Cycle]) -> LoopMetrics:
-    """The measures of one cycle, or of the mean of several."""
     loadings = [_curve(inputs[cycle.loading], outputs[cycle.loading]) for cycle in cycles]
     unloadings = [_curve(inputs[cycle.unloading], outputs[cycle.unloading]) for cycle in cycles]
     grid = common_inputs([x for x, _ in loadings + unloadings])

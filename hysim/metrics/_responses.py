@@ -229,24 +229,9 @@ def vibration_reduction(
 ) -> VibrationReduction:
     """Compare the responses of a plant in open and in closed loop to a step at the first sample.
 
-    Parameters
-    ----------
-    t : array, shape (n,)
-        Evenly spaced times [s].
-    y_open, y_closed : array, shape (n,)
-        Displacements.
-    decay_rate : float
-        Damping ratio times natural frequency of the open loop's least damped mode [1/s].
-
-    Returns
-    -------
-    VibrationReduction
-        The residual's figure is nan if the record ends before its window does.
-
-    Raises
-    ------
-    ValueError
-        As `step_metrics`.
+    `t` (n,) are evenly spaced times [s], `y_open` and `y_closed` (n,) the displacements, and `decay_rate` is the
+    damping ratio times the natural frequency of the open loop's least damped mode [1/s]. The residual's figure is nan
+    if the record ends before its window does. Errors are those of `step_metrics`.
 
     Examples
     --------

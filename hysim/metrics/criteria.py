@@ -1,7 +1,6 @@
 """The measures of a fit.
 
-With the residual e = y - y_model of N samples, V = mean(e^2) and d fitted parameters (the noise level is not
-counted):
+With the residual e = y - y_model of N samples, V = mean(e^2) and d fitted parameters (without the noise level):
 
     rmse = sqrt(V),    nrmse = rmse / (max y - min y),    fit = 100 (1 - ||e|| / ||y - mean(y)||) %
     FPE = V (1 + d/N) / (1 - d/N),    AIC = N ln V + 2 d,    BIC = N ln V + d ln N
@@ -60,8 +59,7 @@ def nrmse(y: npt.ArrayLike, y_model: npt.ArrayLike) -> float:
 def fit_percent(y: npt.ArrayLike, y_model: npt.ArrayLike) -> float:
     """Fit 100 (1 - ||y - y_model|| / ||y - mean(y)||) [%]; nan for a constant y.
 
-    100 is a perfect model, 0 is as good as the mean of y, and a worse one is negative. Arguments and errors are those
-    of `rmse`.
+    100 is a perfect model, 0 is as good as the mean of y, a worse one is negative. Arguments and errors: `rmse`.
 
     Examples
     --------

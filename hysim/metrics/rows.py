@@ -1,8 +1,4 @@
-"""Measures of many loops that share their input, to the same definitions and in the same arithmetic as `loop_metrics`.
-
-The input determines the cycle and the order of its samples, which are computed once. `hysim.metrics._loop` has the
-definitions.
-"""
+"""Measures of many loops that share their input, by the definitions and the arithmetic of `hysim.metrics._loop`."""
 
 from dataclasses import dataclass
 
@@ -25,10 +21,7 @@ class LoopRows:
         return np.asarray(np.abs(self._widths(y)).max(axis=1))
 
     def max_width_slopes(self, y: FloatArray, slopes: FloatArray) -> FloatArray:
-        """Derivatives (n,) of the largest width of the one output `y` (n_samples,), for those of y, (n, n_samples).
-
-        Widths are linear in the output: the derivative is that of the width at the input where it is largest.
-        """
+        """Derivatives (n,) of the largest width of `y` (n_samples,): those of the width where it is largest."""
         widths = self._widths(np.concatenate([y[np.newaxis], slopes]))
         largest = int(np.argmax(np.abs(widths[0])))
         return np.asarray(np.sign(widths[0, largest]) * widths[1:, largest])

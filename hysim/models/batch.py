@@ -32,9 +32,8 @@ _BLOCK = 32_768  # samples: a quarter of a megabyte
 class Batch(NamedTuple):
     """Laws by what computes them, and their inputs (1 or n_sets, n_samples).
 
-    `compute(sets, u, y)` fills `y`, shape (n, n_samples), with the outputs of n sets for the inputs `u`, shape
-    (1 or n, n_samples); a law that diverges is a row of inf. `order`, shape (n_sets,), is the order in which
-    neighbours share work; None is that of the sets. `samples_a_thread` is that of `hysim.models.law.Law`.
+    `compute(sets, u, y)` fills `y` (n, n_samples) for inputs `u` (1 or n, n_samples); a law that diverges is a row of
+    inf. `order` (n_sets,), None for that of the sets, lets neighbours share work; `samples_a_thread` as in `hysim.Law`.
     """
 
     compute: Callable[[Sets, FloatArray, FloatArray], None]
@@ -44,7 +43,6 @@ class Batch(NamedTuple):
     samples_a_thread: int | None = None
 
     def result(self, reduce: Reduction | None, target: npt.ArrayLike | None, workers: int | None) -> FloatArray:
-        """Rows, or one number of each where `reduce` names it."""
         return self.rows(workers) if reduce is None else self.reduced(reduce, target, workers)
 
     def rows(self, workers: int | None) -> FloatArray:
@@ -98,7 +96,6 @@ class Batch(NamedTuple):
         )
 
     def _in_blocks(self, keep: Callable[[Sets, FloatArray], None], workers: int | None) -> None:
-        """Call `keep(sets, y)` for blocks of sets that stand together in the order."""
         n_samples = self.u.shape[1]
         size = max(1, _BLOCK // max(1, n_samples))
 

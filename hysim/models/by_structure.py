@@ -20,42 +20,33 @@ class ByStructure(ABC):
         """The structure that is searched, beginning with this model."""
 
     def search_space(self, record: Record, freedom: Freedom = ALL_FREE) -> SearchSpace:
-        """Search box of the structure."""
         return self.as_structure().search_space(record, freedom)
 
     def regressors(self, parameters: Parameters, record: Record) -> FloatArray:
-        """Columns of the structure in which the output is affine, (n_sets, n_samples, n_columns + 1)."""
         return self.as_structure().regressors(parameters, record)
 
     def steady(self, parameters: Parameters, record: Record) -> dict[str, Any]:
-        """Initial memory with which a periodic record ends as it began."""
         return self.as_structure().steady(parameters, record)
 
     def assemble(self, parameters: Mapping[str, float]) -> Any:
-        """The model with these parameters."""
         return self.as_structure().assemble(parameters)
 
     def notes(self, record: Record, model: Any) -> tuple[str, ...]:
-        """Remarks on the identified model."""
         return self.as_structure().notes(record, model)
 
     def assumed_states(self, record: Record) -> tuple[str, ...]:
-        """Values of `initial` that the record decides."""
         structure = self.as_structure()
         return structure.assumed_states(record) if isinstance(structure, Undecided) else ()
 
     def variants(self) -> tuple[Variant, ...]:
-        """Further choices that the record decides."""
         structure = self.as_structure()
         return structure.variants() if isinstance(structure, Undecided) else ()
 
     def longer_past(self) -> Any | None:
-        """The structure with one number more for a free state."""
         structure = self.as_structure()
         return structure.longer_past() if isinstance(structure, LongerPast) else None
 
     def forgotten(self, record: Record, space: SearchSpace) -> int:
-        """The first sample from which on no coordinate and no state before it has an effect."""
         structure = self.as_structure()
         return structure.forgotten(record, space) if isinstance(structure, Forgetting) else len(record)
 
@@ -72,26 +63,21 @@ class Holding(ByStructure):
 
     @property
     def scalars(self) -> Mapping[str, float]:
-        """Every parameter of a staged structure by name, with the values that are held."""
         return {**self.structure.scalars, **self.values} if isinstance(self.structure, Staged) else self.values
 
     @property
     def stages(self) -> tuple[Stage, ...]:
-        """The stages of the structure."""
         return self.structure.stages if isinstance(self.structure, Staged) else ()
 
     def simpler(self) -> Simpler | None:
-        """The structure's simpler family, with the same parameters held."""
         simple = self.structure.simpler() if isinstance(self.structure, Staged) else None
         return simple and simple._replace(family=Holding(simple.family, simple.carried(self.values)))
 
     def rough(self) -> Identifiable:
-        """The structure's rough law, with the same parameters held; itself where there is none."""
         rough = self.structure.rough() if isinstance(self.structure, Staged) else self.structure
         return self if rough is self.structure else replace(self, structure=rough)
 
     def close(self) -> Identifiable:
-        """The structure's close law, with the same parameters held; itself where there is none."""
         close = self.structure.close() if isinstance(self.structure, Staged) else self.structure
         return self if close is self.structure else replace(self, structure=close)
 

@@ -71,14 +71,12 @@ class CascadeStructure(Identifiable, Composable):
 
     @property
     def carrier(self) -> int:
-        """Which stage carries the gain."""
         linear = [isinstance(stage, LinearStage | LinearStructure) for stage in self.stages]
         if not all(linear):
             return len(linear) - 1 - linear[::-1].index(False)
         return next((k for k, stage in enumerate(self.stages) if isinstance(stage, LinearStructure)), 0)
 
     def search_space(self, record: Record, freedom: Freedom = ALL_FREE) -> SearchSpace:
-        """The stages' spaces side by side."""
         names = labels(self.stages)
         before = names[: self.carrier]
         spaces = declared(
@@ -112,11 +110,9 @@ class CascadeStructure(Identifiable, Composable):
         return columns
 
     def assemble(self, parameters: Mapping[str, float]) -> Any:
-        """The cascade with these parameters."""
         return Cascade(stages=assembled(self.stages, self._searched, parameters))
 
     def notes(self, record: Record, model: Any) -> tuple[str, ...]:
-        """Remarks of the law that carries the gain."""
         carrier, law = self.stages[self.carrier], model.stages[self.carrier]
         if needs_time(law):
             return ()
@@ -128,7 +124,6 @@ class CascadeStructure(Identifiable, Composable):
         return tuple(state for state in common_states(self._with_state, seen) if state != "periodic")
 
     def variants(self) -> tuple[Variant, ...]:
-        """The choices of the carrier."""
         carrier = {labels(self.stages)[self.carrier]: self.stages[self.carrier]}
         return combined_variants(carrier, lambda others: replace(self, stages=exchanged(self.stages, others)))
 
@@ -197,8 +192,7 @@ class Cascade(Composite):
     """Models one behind the other; ``first >> second`` is short for it.
 
     A law in front of linear dynamics is Hammerstein's structure, linear dynamics in front of a law are Wiener's. The
-    input of a stage at the samples is the output of the stage before, and each stage takes it between them as it takes
-    any input.
+    input of a stage at the samples is the output of the stage before, and is between them as for any input.
 
     Parameters
     ----------
@@ -228,8 +222,7 @@ class Cascade(Composite):
     def structure(cls, *stages: Any) -> CascadeStructure:
         """Stages in their order for `hysim.identify` and `hysim.compare`: classes, structures, and models as starts.
 
-        The last stage that is not a transfer function carries the gain; see `hysim.models.cascade` for which
-        others are identified.
+        The last stage that is not a transfer function carries the gain; see `hysim.models.cascade`.
 
         Examples
         --------

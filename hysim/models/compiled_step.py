@@ -12,44 +12,14 @@ from hysim.models.protocols import Startable, Stepwise
 
 
 def startable(thing: Any, sample_time: float | None = None) -> Startable:
-    """A law or a plant as a step, with the start that its state needs.
-
-    Parameters
-    ----------
-    thing : model
-        A law, a plant, or a sum or cascade of them.
-    sample_time : float, optional
-        Time between two samples [s]; a law that does not depend on time needs none.
-
-    Returns
-    -------
-    Startable
-
-    Raises
-    ------
-    TypeError
-        If the model cannot be stepped.
-    ValueError
-        If no time is given where one is needed.
-
-    Examples
-    --------
-    >>> import hysim as hs
-    >>> from hysim.models.compiled_step import startable
-    >>> step, parameters, state = startable(hs.Duhem.from_terms({"u'": 1.0, "|u'| y": -1.0})).started(0.5)
-    >>> [round(step(parameters, state, u), 6) for u in (0.5, 1.5)]
-    [0.0, 0.632121]
-    """
+    """A law or a plant as a `Startable`; TypeError if it cannot be stepped, ValueError without a needed time [s]."""
     if not isinstance(thing, Stepwise):
         raise TypeError(f"a {type(thing).__name__} cannot be stepped: it has no compiled step")
     return thing.startable(sample_time)
 
 
 def compiled_step(function: Callable[[Any, Any, float], float]) -> Step:
-    """The step of a family: a kernel of hysim, or a function that numba compiles for the loops' own types.
-
-    Raises TypeError if it is no function of (parameters, state, u), or does not compile to one number.
-    """
+    """The step of a family, compiled by numba if it is no kernel; TypeError unless it returns one number."""
     return function if _is_kernel(function) else _compiled(function, compile_step, "step(parameters, state, u) -> y")
 
 

@@ -48,19 +48,15 @@ class Composable:
     units: ClassVar[Mapping[str, str]] = MappingProxyType({})
 
     def __add__(self, other: "Composable") -> Any:
-        """Sum of the outputs; a sum among the operands adds its own parts."""
         return _joined(self, other, _KINDS["+"])
 
     def __radd__(self, other: Any) -> Any:
-        """Sum of a result's model and this."""
         return _joined(other, self, _KINDS["+"])
 
     def __rshift__(self, other: "Composable") -> Any:
-        """`other` behind this; a cascade among the operands adds its own stages."""
         return _joined(self, other, _KINDS[">>"])
 
     def __rrshift__(self, other: Any) -> Any:
-        """This behind a result's model."""
         return _joined(other, self, _KINDS[">>"])
 
 
@@ -88,7 +84,6 @@ class Placed(Composable):
 
     @property
     def arguments(self) -> dict[str, Any]:
-        """The fields of the family by name."""
         return own_items(self)
 
     def placed(self, u0: float | None, u_range: tuple[float, ...] | None = None) -> Self:

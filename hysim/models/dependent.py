@@ -1,8 +1,4 @@
-"""A law whose parameters are polynomials of channels, such as a temperature or a supply.
-
-At one value of each channel it is an ordinary law, `Dependent.at`. Along an input on which a channel varies the
-parameters change from sample to sample (`hysim.models.varying`).
-"""
+"""A law whose parameters are polynomials of channels; where these vary, the parameters change sample by sample."""
 
 import warnings
 from collections.abc import Mapping
@@ -143,22 +139,8 @@ class Dependent:
     def at(self, **channels: float) -> Any:
         """The ordinary law at one value of each channel.
 
-        A value outside the identified range of a channel is an extrapolation, and warned of.
-
-        Parameters
-        ----------
-        **channels : float
-            Values of the channels by name.
-
-        Returns
-        -------
-        law
-            Of the class of `law`, with the parameters there.
-
-        Raises
-        ------
-        ValueError
-            If a channel is missing or unknown, or the polynomials there make no law.
+        A value outside the identified range of a channel is an extrapolation, and warned of. Raises ValueError if a
+        channel is missing or unknown, or the polynomials there make no law.
 
         Examples
         --------
@@ -179,31 +161,12 @@ class Dependent:
     def response(
         self, u: npt.ArrayLike, sample_time: float | None = None, *, channels: Channels | None = None
     ) -> FloatArray:
-        """Output at the samples of an input; `sample_time` [s] where the law depends on time.
+        """Output (n,) [unit of y] at the samples of an input `u` (n,); `sample_time` [s] where the law depends on time.
 
-        Where a channel varies, each branch between two samples has the parameters of the sample at its end, and the
-        memory is kept from sample to sample.
-
-        Parameters
-        ----------
-        u : array, shape (n,)
-            Input [unit of u].
-        sample_time : float, optional
-            Time between two samples [s].
-        channels : mapping
-            Name of each channel to one number, or to values of shape (n,); further channels are ignored.
-
-        Returns
-        -------
-        array, shape (n,)
-            [unit of y].
-
-        Raises
-        ------
-        ValueError
-            If a channel is missing, not finite, or has another length, or the polynomials make no law there.
-        TypeError
-            If a channel varies and the parameters that depend on it cannot change from sample to sample.
+        `channels` are names to one number, or to values (n,); further ones are ignored. Where a channel varies, each
+        branch between two samples has the parameters of the sample at its end, and the memory is kept. Raises
+        ValueError if a channel is missing, not finite or of another length, or the polynomials make no law there;
+        TypeError if a parameter that depends on a varying channel cannot change from sample to sample.
         """
         inputs = read_only(u, "u", ndim=1)
         given = checked_channels(channels or {}, inputs.size)
@@ -214,10 +177,7 @@ class Dependent:
         return self._along(inputs, sample_time, values)
 
     def on(self, record: Record) -> Any:
-        """The law with the channels of a record: an ordinary one where they are constant, else an `AlongRecord`.
-
-        Raises ValueError if the record has not all channels.
-        """
+        """The law on the channels of a record, an `AlongRecord` where they vary; ValueError if the record lacks one."""
         values = {name: value_in(record.channels, name, "the record") for name in self.channels}
         if not any(isinstance(value, np.ndarray) for value in values.values()):
             return self.at(**values)
@@ -259,7 +219,6 @@ class Dependent:
         return ", ".join(map(repr, self.channels)) or "no channel"
 
     def _along(self, u: FloatArray, sample_time: float | None, values: Mapping[str, Any]) -> FloatArray:
-        """Output where a channel varies."""
         series = {each.parameter: each.value(values[each.channel]) for each in self.polynomials}
         for name, each in series.items():
             for value in (float(each.min()), float(each.max())):
@@ -270,29 +229,22 @@ class Dependent:
 
 @runtime_checkable
 class _OnChannels(Protocol):
-    """A model whose output depends on the channels of a record."""
-
     def on(self, record: Record) -> Any: ...
 
 
 def on_record(model: Any, record: Record) -> Any:
-    """A model as it is on a record, at the channels of this if it depends on such."""
     return model.on(record) if isinstance(model, _OnChannels) else model
 
 
 @dataclass(frozen=True)
 class AlongRecord:
-    """A law, or an actuator of several inputs, on the channels of a record, which vary along it.
-
-    Each branch of the record, also one that is cut into several here, has the parameters of the sample at its end.
-    """
+    """A law, or an actuator of several inputs, on varying channels; each branch takes the parameters at its end."""
 
     model: Any
     record: Record
 
     @property
     def dynamic(self) -> bool:
-        """Whether the law depends on time."""
         return bool(self.model.dynamic)
 
     def response(self, u: npt.ArrayLike, sample_time: float | None = None) -> FloatArray:

@@ -39,10 +39,7 @@ _GRID = 33  # values of the channel at which a polynomial is looked at
 def expanded(
     space: SearchSpace, names: Mapping[str, tuple[str, ...]], starts: Sequence[Mapping[str, float]] = ()
 ) -> SearchSpace:
-    """The space with the `names` of values in place of parameters, each in the box of the parameter.
-
-    `starts` are further points: the law's constant parameters and the values by name.
-    """
+    """The space with `names` of values in place of parameters, each in the parameter's box, and further `starts`."""
     if not names:
         return space
     own = [(k, name) for k, each in enumerate(space.coordinates) for name in names.get(each, (each,))]
@@ -161,11 +158,7 @@ class DependentStructure(Identifiable):
                 raise ValueError(f"the degree must be a whole number from 0 on, got {pair[1]!r} for {name!r}")
 
     def over(self, records: Sequence[Record]) -> "DependentStructure":
-        """The structure for these records, whose channels say where the polynomials have their places.
-
-        Raises ValueError if a parameter or a channel is unknown, or a channel has fewer different values than a
-        polynomial has coefficients.
-        """
+        """The structure with places for the channels of these records; ValueError for unknown names or few values."""
         space = self.law.search_space(max(records, key=lambda record: float(np.ptp(record.u))))
         spans = {}
         for name, (channel, degree) in self.depends.items():
@@ -193,12 +186,10 @@ class DependentStructure(Identifiable):
 
     @cached_property
     def at(self) -> Places:
-        """Places of the polynomials of degree 1 and more."""
         return {name: places(*self.spans[name], degree) for name, (_, degree) in self.depends.items() if degree}
 
     @cached_property
     def names(self) -> Mapping[str, tuple[str, ...]]:
-        """Names of the values at the places, by parameter."""
         return {name: names_of(name, self.depends[name][0], at) for name, at in self.at.items()}
 
     def search_space(self, record: Record, freedom: Freedom = ALL_FREE) -> SearchSpace:
@@ -271,10 +262,7 @@ class DependentStructure(Identifiable):
         return np.atleast_2d(weights(self.at[name], self._channel(name, record)))
 
     def steady(self, parameters: Parameters, record: Record) -> dict[str, Any]:
-        """The parameters with the law's state in the steady cycle at the record's channels.
-
-        Raises ValueError if a channel varies along the record.
-        """
+        """The parameters with the law's state in the steady cycle of a record; ValueError if a channel varies."""
         constant, varying, _ = self._of_record(parameters, record)
         if varying:
             raise ValueError(f'{next(iter(varying))} varies along the record, which has no steady cycle: use "free"')
@@ -282,7 +270,6 @@ class DependentStructure(Identifiable):
         return {**parameters, **{name: value for name, value in state.items() if name not in self.at}}
 
     def assemble(self, parameters: Mapping[str, float]) -> Any:
-        """The law with its polynomials."""
         polynomials, rest = [], dict(parameters)
         for name, (channel, _) in self.depends.items():
             at = self.at.get(name, places(*self.spans[name], 0))
@@ -301,7 +288,6 @@ class DependentStructure(Identifiable):
 
     @property
     def scalars(self) -> Mapping[str, float]:
-        """Every parameter of the law by name, as the search begins."""
         return dict(self.law.scalars) if isinstance(self.law, Staged) else {}
 
     @property
@@ -310,23 +296,18 @@ class DependentStructure(Identifiable):
         return self.law.stages if isinstance(self.law, Staged) and not self.at else ()
 
     def simpler(self) -> Simpler | None:
-        """The law's simpler family, where nothing depends on a channel."""
         return self.law.simpler() if isinstance(self.law, Staged) and not self.at else None
 
     def rough(self) -> "DependentStructure":
-        """The structure of the law's rough law; itself where there is none."""
         return self._with(self.law.rough()) if isinstance(self.law, Staged) else self
 
     def close(self) -> "DependentStructure":
-        """The structure of the law's close law; itself where there is none."""
         return self._with(self.law.close()) if isinstance(self.law, Staged) else self
 
     def assumed_states(self, record: Record) -> tuple[str, ...]:
-        """Values of `initial` that the record decides."""
         return self.law.assumed_states(record) if isinstance(self.law, Undecided) else ()
 
     def variants(self) -> tuple[Variant, ...]:
-        """The law's choices."""
         variants = self.law.variants() if isinstance(self.law, Undecided) else ()
         return tuple(each._replace(family=self._with(each.family)) for each in variants)
 

@@ -76,7 +76,6 @@ def inverse_response(inverse: CompiledLaw, y: FloatArray, unreached: Unreached |
 
 
 def not_reached(sample: int, y: float, inverse: CompiledLaw) -> str:
-    """Message for an output that has no input."""
     return (
         f"the law has no inverse at sample {sample} (y = {y:g}): from u = {inverse.state[0]:g} on the output "
         "does not reach it, or turns on the way"
@@ -90,7 +89,6 @@ def inverse_at_rest(law: Any, y: float, u0: float | None) -> CompiledLaw:
 
 
 def first_input(law: Any, y: float) -> float:
-    """The first input whose output is `y`, found from zero."""
     from scipy.optimize import brentq
 
     def error(u: float) -> float:
@@ -134,19 +132,7 @@ def _slope(output: Callable[[float], float], here: float) -> float:
 
 
 def inverse_step(law: Any, u0: float, limits: Limits = UNLIMITED, sample_time: float = math.inf) -> CompiledLaw:
-    """The inverse of a law at rest at `u0`, as a step; see `hysim.Law.compiled_inverse`.
-
-    Raises TypeError if the law cannot be stepped, and ValueError if it has no inverse.
-
-    Examples
-    --------
-    >>> import hysim as hs
-    >>> from hysim.models.inverse_search import inverse_step
-    >>> law = hs.Dahl() + hs.Line(slope=1.0)
-    >>> step, parameters, state = inverse_step(law, 0.0)
-    >>> [round(step(parameters, state, y), 9) for y in law.response([0.0, 0.5, 0.2]).tolist()]
-    [0.0, 0.5, 0.2]
-    """
+    """The inverse of a law at rest at `u0`, as a step; TypeError or ValueError if it has none."""
     if isinstance(law, StepwiseInvertible):
         return law.compiled_inverse(u0, limits, sample_time)
     return searched_inverse(law, CompiledLaw(*law.compiled(u0)), limits=limits)

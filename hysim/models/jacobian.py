@@ -81,7 +81,6 @@ class Jacobian:
 
 
 def response_jacobian(law: Any, u: Any, names: Iterable[str] | None = None) -> Jacobian:
-    """See `hysim.Law.response_jacobian`."""
     inputs = read_only(u, "u", ndim=1)
     if isinstance(names, str):
         raise TypeError(f"names must be a sequence of names, got the string {names!r}")
@@ -126,7 +125,6 @@ def _sides(law: Any, name: str, step: float) -> tuple[float, ...]:
 
 
 def _column(law: Any, name: str, u: FloatArray, y: FloatArray, step: float, sides: tuple[float, ...]) -> FloatArray:
-    """The derivative by one number, (n_samples,)."""
     value, rounding = law.scalars[name], np.finfo(float).eps * np.abs(y).max()
     extent = np.ptp(y) or np.abs(y).max() or 1.0
     for _ in range(_MOST_TRIALS):

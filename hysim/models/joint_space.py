@@ -124,10 +124,7 @@ def without_repetition(
 
 
 def columns_beside(blocks: Sequence[FloatArray], known: FloatArray | float = 0.0) -> FloatArray:
-    """Blocks (n_sets or 1, n_samples, n_columns + 1) of columns and an output beside them, as one block.
-
-    `known` (1, n_samples, 1) is an output without columns.
-    """
+    """Blocks (n_sets or 1, n_samples, n_columns + 1) of columns and an output as one; `known` is an output alone."""
     n_sets = max([len(block) for block in blocks], default=1)
     joint = [np.broadcast_to(block, (n_sets, *block.shape[1:])) for block in blocks]
     beside = sum((block[..., -1:] for block in joint), known)
@@ -159,10 +156,7 @@ def _starts(spaces: Sequence[SearchSpace]) -> FloatArray:
 
 
 def common_states(parts: Mapping[str, Any], record: Record) -> tuple[str, ...]:
-    """Values of `initial` that every part with a state leaves to the record, in the order of the first part.
-
-    None if a part with a state leaves nothing open: it would be asked for a state that is not its default.
-    """
+    """Values of `initial` that every part with a state leaves to the record; empty if one leaves nothing open."""
     offered = [
         part.assumed_states(record) if isinstance(part, Undecided) else ()
         for part in parts.values()

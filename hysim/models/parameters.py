@@ -71,10 +71,7 @@ class Coordinate(NamedTuple):
         return self._replace(lower=min(self.lower, value), upper=max(self.upper, value))
 
     def limited(self, limits: Mapping[str, tuple[float, float]]) -> "Coordinate":
-        """The coordinate in the user's bounds.
-
-        Raises ValueError if a side is not finite, or not positive on a log scale.
-        """
+        """The coordinate in the user's bounds; ValueError if one is not finite, or not positive on a log scale."""
         lower, upper = limits.get(self.name, (self.lower, self.upper))
         positive = " positive and" if self.log else ""
         if not (lower < upper and np.isfinite([lower, upper]).all()) or (self.log and not lower > 0.0):
@@ -147,11 +144,7 @@ def space_of(
     points: Sequence[Mapping[str, float]] = ({},),
     **others: Any,
 ) -> SearchSpace:
-    """The space of the coordinates that are not held, started at `points`: names to values, `defaults` for the rest.
-
-    `columns` are the parameters in which the output is affine, `limits` the user's bounds; `others` are fields of
-    `SearchSpace`.
-    """
+    """The space of the coordinates that are not held, with starts at `points` and the user's `limits`."""
     searched = [each.limited(limits) for each in coordinates if each.name not in held]
     names = tuple(each.name for each in searched)
     lower = np.array([each.encode(each.lower) for each in searched])
@@ -188,16 +181,12 @@ def spans(record: Record) -> dict[str, float]:
 
 
 def rate_spans(record: Record) -> dict[str, float]:
-    """As `spans`, and ``"v"``, the highest speed of the input, and ``"r"``, the speed of an output that follows it.
-
-    Raises ValueError also if the record has no time, or uneven steps.
-    """
+    """`spans`, with the highest speeds ``"v"`` of the input and ``"r"`` of the output; ValueError without time."""
     units, time = spans(record), record.sample_time
     speed = float(np.abs(np.diff(record.u)).max()) / time
     return {**units, "v": speed, "r": units["y"] / units["u"] * speed}
 
 
 def unit_of(unit: str, units: Mapping[str, float]) -> float:
-    """Value of a unit such as ``"y/u"`` on a record with these spans."""
     numerator, _, denominator = unit.partition("/")
     return units[numerator] / units[denominator or "1"]

@@ -19,7 +19,6 @@ def labels(parts: Sequence[Any]) -> tuple[str, ...]:
 
 
 def exchanged(parts: Sequence[Any], others: Mapping[str, Any]) -> tuple[Any, ...]:
-    """The parts, those with a label in `others` exchanged."""
     return tuple(others.get(label, part) for label, part in zip(labels(parts), parts, strict=True))
 
 
@@ -30,7 +29,6 @@ def _label(part: Any) -> str:
 
 
 def check_parts(parts: Any, what: str) -> tuple[Any, ...]:
-    """The parts as a tuple, each with a response."""
     members = checked_tuple(parts, what)
     for member in members:
         if isinstance(member, type) or not isinstance(member, Responding):
@@ -42,7 +40,6 @@ def check_parts(parts: Any, what: str) -> tuple[Any, ...]:
 
 
 def checked_tuple(parts: Any, what: str) -> tuple[Any, ...]:
-    """The parts as a tuple that is not empty."""
     if not isinstance(parts, (tuple, list)):
         raise TypeError(f"{what} must be a tuple of models, got {type(parts).__name__}")
     if not parts:
@@ -51,12 +48,10 @@ def checked_tuple(parts: Any, what: str) -> tuple[Any, ...]:
 
 
 def response_of(part: Any, u: FloatArray, sample_time: float | None) -> FloatArray:
-    """Output of a part from its first sample on."""
     return np.asarray(part.response(u, needed_time(part, sample_time)) if needs_time(part) else part.response(u))
 
 
 def compiled_pair(join: Callable[[Step, Step], Step], first: CompiledLaw, second: CompiledLaw) -> CompiledLaw:
-    """Two laws as one, joined by a function of `hysim.kernels.stepping`."""
     sizes = [float(first.parameters.size), float(first.state.size)]
     return CompiledLaw(
         _joined(join, first.step, second.step),
@@ -88,7 +83,6 @@ def _joined(join: Callable[[Any, Any], _Kernel], first: Step | Start, second: St
 
 
 def compiled_law(part: Any, u0: float, sample_time: float | None) -> CompiledLaw:
-    """A part as compiled loops take it."""
     if not isinstance(part, Steppable):
         raise TypeError(f"a {type(part).__name__} cannot be stepped as a law: it has no compiled step")
     time = {"sample_time": needed_time(part, sample_time)} if needs_time(part) else {}
@@ -96,5 +90,4 @@ def compiled_law(part: Any, u0: float, sample_time: float | None) -> CompiledLaw
 
 
 def own(parameters: Mapping[str, Any], label: str) -> dict[str, Any]:
-    """The parameters of one part, under the names that it gives them."""
     return {name[len(label) + 1 :]: value for name, value in parameters.items() if name.startswith(f"{label}.")}

@@ -149,8 +149,7 @@ class SearchSpace:
 class Freedom:
     """The user's wishes about the parameters; see `hysim.identify` for the meaning.
 
-    A search that `starts_anew` takes numbers that a family has by default in units of the record, so that it does not
-    depend on the record's scale. Else the first start is the law itself, and the box holds it.
+    A search that `starts_anew` takes default numbers in units of the record; else it begins at the law itself.
     """
 
     fixed: Mapping[str, float] = field(default_factory=dict)
@@ -172,12 +171,9 @@ class Freedom:
         redundant: tuple[tuple[str, ...], ...] = (),
         at_rest: Iterable[str] = (),
     ) -> dict[str, float]:
-        """The parameters that are not free, and their values.
+        """The parameters that are not free, and their values: fixed ones, zeros `at_rest`, one of each redundant group.
 
-        They are the fixed ones, those that are zero `at_rest`, and the first of each redundant group that
-        has none of them; a name in `free` is taken out of the last two.
-
-        Raises ValueError if a name is unknown, or both fixed and free.
+        A name in `free` is not among the last two kinds. ValueError if a name is unknown, or both fixed and free.
         """
         for argument, names in (("fixed", tuple(self.fixed)), ("free", self.free)):
             for name in names:
@@ -194,10 +190,7 @@ class Freedom:
         return held
 
     def limits(self, defaults: Mapping[str, float], held: Mapping[str, float]) -> dict[str, tuple[float, float]]:
-        """The bounds as floats.
-
-        Raises ValueError if a name is unknown or held, or a lower bound is not below its upper one.
-        """
+        """The bounds as floats; ValueError if a name is unknown or held, or a lower bound is not below the upper."""
         for name, pair in self.bounds.items():
             if name not in defaults or name in held:
                 raise ValueError(f"bounds name {name!r}, which is not free; the parameters are {among(name, defaults)}")

@@ -28,10 +28,7 @@ _STILL = 1e-13  # of the largest memory met: a change by a pass that is rounding
 
 
 def fixed_point(passes: PassOf, before: FloatArray, coarse: PassOf | None = None) -> FloatArray:
-    """Memory that one pass does not change, from `before` on, nan where it diverges.
-
-    `coarse` are passes through the turning points.
-    """
+    """Memory that a pass does not change, from `before` on, nan if it diverges; `coarse` passes take turning points."""
     z = before
     if coarse is not None:
         z = _secant(coarse, before, _COARSE)

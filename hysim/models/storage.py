@@ -1,7 +1,4 @@
-"""Models to and from JSON: the version of hysim, the family, the parameters, the units.
-
-A model inside another, such as the law of an actuator, is a family with its parameters in its place.
-"""
+"""Models to and from JSON: version of hysim, family, parameters (also of a model in a model), and units."""
 
 import importlib
 import json
@@ -57,7 +54,6 @@ def save(model: Any, path: str | Path, *, units: Mapping[str, str] | None = None
 
 
 def to_json(model: Any, *, units: Mapping[str, str] | None = None) -> str:
-    """The text that `save` writes."""
     model = model_of(model)
     if not is_model(model):
         raise TypeError(f"save takes a model of hysim, got {type(model).__name__}{_advice(model)}")
@@ -82,11 +78,7 @@ def _advice(value: Any) -> str:
 
 
 def load_model(path: str | Path) -> Any:
-    """Read a model that `save` wrote.
-
-    Raises ValueError if the file does not hold a model; the message names the file and what is wrong. Raises OSError if
-    it cannot be read.
-    """
+    """Read a model that `save` wrote; ValueError names what is wrong in the file, OSError if it cannot be read."""
     return from_json(Path(path).read_bytes(), path)[0]
 
 
@@ -107,7 +99,6 @@ def from_json(text: str | bytes, source: str | Path) -> tuple[Any, dict[str, str
 
 
 def _units(document: Any) -> dict[str, str]:
-    """The units of a document, whose outer form is checked."""
     if not isinstance(document, dict):
         raise ValueError(f'expected a mapping with "family" and "parameters", got {_shown(document)}')
     if missing := [name for name in ("family", "parameters") if name not in document]:
@@ -134,7 +125,6 @@ def _each_name_once(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
 
 
 def _check_depth(document: Any) -> None:
-    """Refuse values nested so deeply that neither Python nor NumPy would take them."""
     layer = [document]
     for _ in range(_DEEPEST):
         layer = [item for each in layer for item in _members(each)]
@@ -172,7 +162,6 @@ def from_document(document: Mapping[str, Any], path: str | Path) -> Any:
 
 
 def _value(value: Any, path: str | Path) -> Any:
-    """A parameter's value from its plain form."""
     if isinstance(value, list):
         return [_value(each, path) for each in value]
     return from_document(value, path) if is_document(value) else value
@@ -189,17 +178,14 @@ def _shown(value: Any) -> str:
 
 
 def is_model(value: Any) -> bool:
-    """Whether a value is a model of a known family."""
     return FAMILIES.get(type(value).__name__) is type(value)
 
 
 def is_document(value: Any) -> bool:
-    """Whether a value read from JSON is what `to_document` makes of a model."""
     return isinstance(value, dict) and value.keys() == {"family", "parameters"}
 
 
 def to_document(value: Any) -> Any:
-    """The plain form of a model, or of a value inside one."""
     if is_model(value):
         parameters = {name: to_document(item) for name, item in given_items(value).items()}
         return {"family": type(value).__name__, "parameters": parameters}

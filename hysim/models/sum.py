@@ -1,8 +1,4 @@
-"""Models side by side under one input, such as a law with a dashpot beside it, and the base class of compositions.
-
-The search for the parameters of a sum has the parts' own spaces side by side. What is linear in a part is linear in the
-sum. A part that cannot be identified adds an output that is known.
-"""
+"""Models side by side under one input, and the base class of compositions; the parts' search spaces are joined."""
 
 import math
 from abc import abstractmethod
@@ -77,7 +73,6 @@ class Composite(ByStructure, Composable):
 
     @property
     def members(self) -> tuple[Any, ...]:
-        """The models."""
         members: tuple[Any, ...] = vars(self)[self.members_are]
         return members
 
@@ -93,10 +88,7 @@ class Composite(ByStructure, Composable):
     def advance(
         self, u: npt.ArrayLike, state: State | None = None, *, sample_time: float | None = None
     ) -> tuple[FloatArray, State]:
-        """As `response`, continued from `state`, the states of the members, and the state after the last sample.
-
-        The bits are those of one uncut input. Raises TypeError if a member cannot be continued.
-        """
+        """As `response`, continued from the members' `state`, and the state after it; TypeError if one cannot be."""
 
     @abstractmethod
     def compiled(self, u0: float = 0.0, *, sample_time: float | None = None) -> CompiledLaw:
@@ -211,12 +203,10 @@ def started(parts: Any, what: str) -> tuple[Any, ...]:
 
 
 def time_of(part: Any, record: Record) -> float | None:
-    """The sample time where the part needs one."""
     return record.sample_time if needs_time(part) else None
 
 
 def assembled(members: Sequence[Any], searched: Mapping[str, Any], parameters: Parameters) -> tuple[Any, ...]:
-    """The models of the members, those that are searched by their labels with their parameters."""
     parts = zip(labels(members), members, strict=True)
     return tuple(
         searched[label].assemble(own(parameters, label)) if label in searched else part for label, part in parts
@@ -248,7 +238,6 @@ class SumStructure(Identifiable, Composable):
         )
 
     def regressors(self, parameters: Parameters, record: Record) -> FloatArray:
-        """The parts' columns one after the other, and the sum of what is known."""
         found = self._identified
         known = [part for part in self.parts if not isinstance(part, Identifiable)]
         fixed = sum((response_of(part, record.u, time_of(part, record)) for part in known), np.zeros(len(record)))
@@ -256,7 +245,6 @@ class SumStructure(Identifiable, Composable):
         return columns_beside(blocks, fixed[np.newaxis, :, np.newaxis])
 
     def steady(self, parameters: Parameters, record: Record) -> dict[str, Any]:
-        """The parameters with the parts' states in the steady cycle of which `record` is one period or more."""
         states: dict[str, Any] = {}
         moving = record if np.ptp(record.u) else replace(record, u=record.u + np.arange(len(record)))
         for label, part in self._identified.items():
@@ -269,11 +257,9 @@ class SumStructure(Identifiable, Composable):
         return {**parameters, **states}
 
     def assemble(self, parameters: Mapping[str, float]) -> Any:
-        """The sum with these parameters."""
         return Sum(parts=assembled(self.parts, self._identified, parameters))
 
     def notes(self, record: Record, model: Any) -> tuple[str, ...]:
-        """Remarks of the laws among the parts."""
         return tuple(
             f"{label}: {note}"
             for label, part, found in zip(labels(self.parts), self.parts, model.parts, strict=True)
@@ -282,11 +268,9 @@ class SumStructure(Identifiable, Composable):
         )
 
     def assumed_states(self, record: Record) -> tuple[str, ...]:
-        """The states that all parts with a memory leave to the record."""
         return common_states(self._identified, record)
 
     def variants(self) -> tuple[Variant, ...]:
-        """The choices of the parts, in every combination."""
         return combined_variants(self._identified, lambda others: replace(self, parts=exchanged(self.parts, others)))
 
     @property
@@ -298,7 +282,6 @@ class SumStructure(Identifiable, Composable):
         }
 
     def _values(self, columns: Sequence[str]) -> dict[str, float]:
-        """The numbers that models have for linear parameters of theirs."""
         return {
             f"{label}.{name}": value
             for label, part in self._identified.items()
@@ -311,8 +294,7 @@ class SumStructure(Identifiable, Composable):
 class Sum(Composite):
     """Models side by side, whose outputs are added; ``first + second`` is short for it.
 
-    Magnetorheological dampers are a Bouc-Wen law, a dashpot and a spring (B. F. Spencer et al., J. Eng. Mech. 123,
-    1997).
+    Magnetorheological dampers are a Bouc-Wen law, a dashpot and a spring (Spencer et al., J. Eng. Mech. 123, 1997).
 
     Parameters
     ----------
@@ -332,9 +314,6 @@ class Sum(Composite):
     >>> damper = hs.BoucWen() + hs.Dashpot(c=2.0)
     >>> damper.response([0.0, 1.0, 1.0], sample_time=0.5).round(6).tolist()
     [0.0, 4.632121, 0.632121]
-    >>> twice = hs.Play(threshold=0.25) + hs.Line(slope=1.0)
-    >>> twice.inverse_response(twice.response([0.0, 1.0, 0.75, 0.0])).round(9).tolist()
-    [0.0, 1.0, 0.75, 0.0]
     """
 
     parts: tuple[Any, ...]

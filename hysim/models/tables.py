@@ -16,7 +16,6 @@ Tables = Mapping[str, FloatArray]
 
 
 def scalars_of(values: Mapping[str, Any]) -> dict[str, float]:
-    """One number for each name, those of a tuple as ``name[k]``."""
     numbers: dict[str, float] = {}
     for name, value in values.items():
         if isinstance(value, tuple):
@@ -27,7 +26,6 @@ def scalars_of(values: Mapping[str, Any]) -> dict[str, float]:
 
 
 def arguments_of(scalars: Mapping[str, float]) -> dict[str, Any]:
-    """The constructor's arguments, those named ``name[k]`` as one tuple."""
     arguments: dict[str, Any] = {}
     for name, value in scalars.items():
         whole, bracket, _ = name.partition("[")
@@ -51,9 +49,8 @@ def tables_of(
 ) -> tuple[dict[str, FloatArray], FloatArray]:
     """Every field over sets, (n_sets, ...), and the inputs (1 or n_sets, n_samples).
 
-    A parameter is a field, or an element ``name[k]`` of a tuple; None is the default.
-
-    Raises TypeError if a name is unknown, and ValueError if a value has too many axes, or lengths do not fit.
+    A parameter is a field or an element ``name[k]`` of a tuple; None is the default. Raises TypeError if a name is
+    unknown, and ValueError if a value has too many axes, or lengths do not fit.
     """
     inputs = np.atleast_2d(read_only(u, "u"))
     if inputs.ndim != 2:

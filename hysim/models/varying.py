@@ -6,8 +6,7 @@ A polynomial is known by its values at some places of the channel:
 
 The values p_k are parameters of the same kind as p, in the same unit and the same box, and are well determined together
 where coefficients of powers are not: those of 1 and T at 20 to 60 degC are correlated by 0.96. Of degree 1 the places
-are the ends of the identified range; of higher degrees those of Chebyshev and Lobatto, which keep a polynomial near its
-values.
+are the ends of the identified range; of higher degrees those of Chebyshev and Lobatto, against oscillation.
 
 Along a record on which a channel varies, each branch between two samples has the parameters of the sample at its end,
 and so has the output there; the memory is kept where they change. More samples of a channel that goes on steadily are
@@ -116,7 +115,6 @@ class ChannelPolynomial:
 
 
 def names_of(parameter: str, channel: str, at: tuple[float, ...]) -> tuple[str, ...]:
-    """Name of the value at each place."""
     return tuple(f"{parameter}({channel}={label(place, at)})" for place in at) if len(at) > 1 else (parameter,)
 
 
@@ -153,11 +151,7 @@ def power_coefficients(at: tuple[float, ...]) -> FloatArray:
 def columns_along(
     subject: Any, parameters: Parameters, varying: Mapping[str, FloatArray], record: Record
 ) -> FloatArray:
-    """As `Identifiable.regressors`, of parameters `varying` along the record, (n_sets, n_samples) each.
-
-    Those in which the output is affine are not among them: their columns are multiplied by their values. Raises
-    TypeError if a model has no parameters that could change from sample to sample.
-    """
+    """As `Identifiable.regressors`, with `varying` parameters (n_sets, n_samples), none affine; else TypeError."""
     if not varying:
         return np.asarray(subject.regressors(parameters, record))
     if isinstance(subject, Sum):
@@ -175,11 +169,7 @@ def columns_along(
 def response_along(
     model: Any, series: Mapping[str, FloatArray], u: FloatArray, sample_time: float | None = None
 ) -> FloatArray:
-    """Output (n_samples,) of a model some of whose numbers, by name, are a `series` of one for each sample.
-
-    Raises SimulationError if the output diverges, and TypeError if the model's numbers cannot change from sample to
-    sample.
-    """
+    """Output (n_samples,) of a model with a `series` of some numbers; TypeError if such a number cannot vary."""
     if not series:
         return response_of(model, u, sample_time)
     if isinstance(model, Sum):
@@ -212,7 +202,6 @@ def _cannot_vary(names: Iterable[str], model: Any) -> TypeError:
 def _of_sum(
     structure: SumStructure, parameters: Parameters, varying: Mapping[str, FloatArray], record: Record
 ) -> FloatArray:
-    """The parts' columns one after the other, and the sum of what is known."""
     known = tuple(part for part in structure.parts if not isinstance(part, Identifiable))
     blocks = [
         columns_along(part, own(parameters, name), own(varying, name), record)
@@ -223,11 +212,7 @@ def _of_sum(
 
 
 def paths(law: Law, parameters: Parameters, u: FloatArray) -> FloatArray:
-    """Outputs (n_sets, n_samples) of laws with these numbers by name; inf where one diverges.
-
-    A number has the shape (n_sets, n_samples), (n_sets,) or (). Raises ValueError if the law's state holds what depends
-    on a number that varies.
-    """
+    """Outputs (n_sets, n_samples) for numbers of this shape, (n_sets,) or (); inf for laws that diverge."""
     from hysim.kernels.varying import drive_varying  # compiled where it is needed
 
     if law.u0 is not None:

@@ -163,7 +163,6 @@ def denominators(x: FloatArray, poles: int) -> FloatArray:
 
 
 def _times(polynomials: FloatArray, factor: list[FloatArray]) -> FloatArray:
-    """Products of rows of polynomials with one factor for each row."""
     product = np.zeros((len(polynomials), polynomials.shape[1] + len(factor) - 1))
     for k, coefficient in enumerate(factor):
         product[:, k : k + polynomials.shape[1]] += coefficient[:, np.newaxis] * polynomials
@@ -178,7 +177,6 @@ class UnitGain:
 
     @property
     def shape(self) -> tuple[str, ...]:
-        """Names of the coefficients that say where the zeros are."""
         return tuple(f"num[{k}]" for k in range(self.structure.zeros))
 
     def search_space(self, record: Record, freedom: Freedom = ALL_FREE) -> SearchSpace:
@@ -232,7 +230,6 @@ class UnitGain:
         return affine_columns(monic, record.u, record.sample_time, zeros=0, hold=hold, sample=sample)[..., 1:-1]
 
     def assemble(self, parameters: Mapping[str, float]) -> Any:
-        """The transfer function with these parameters."""
         return self.structure.assemble(parameters)
 
     def _parameters(self, found: dict[str, FloatArray], shape: FloatArray) -> dict[str, FloatArray]:

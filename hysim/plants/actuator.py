@@ -125,26 +125,12 @@ class Actuator:
 
     @classmethod
     def of(cls, fit: Any, record: Record | None = None) -> "Actuator":
-        """The actuator of a fit, kept within the inputs of its record.
+        """The actuator of a fit, a law or a plant (see `hysim.close_loop`), kept within the inputs of its record.
 
-        Parameters
-        ----------
-        fit : Identification, Discovery or model
-            A law, or a plant that `hysim.close_loop` takes.
-        record : Record, optional
-            The record of the fit; by default the range is the one that the model was identified on, ``u_range``, and
-            the resolution that of the fit.
-
-        Returns
-        -------
-        Actuator
-            Its amplifier stops at the lowest and the highest voltage of the record, and its sensor reads in steps of
-            the record's resolution, unless the model's own amplifier and sensor have limits and a quantum.
-
-        Raises
-        ------
-        ValueError
-            If the range is not known.
+        Its amplifier stops at the lowest and the highest voltage of the `record`, and its sensor reads in steps of the
+        record's resolution, unless the model's own amplifier and sensor have limits and a quantum. By default the range
+        is the one that the model was identified on, ``u_range``, and the resolution that of the fit; ValueError if the
+        range is not known.
 
         Examples
         --------
@@ -216,8 +202,7 @@ class Actuator:
             Whether all records have one offset of the law, or each its own.
         start : Actuator or MultiInputActuator, optional
             Of the same inputs and as many modes: the search begins with its modes and its delay beside the starts of
-            the laws, no part is searched alone, and no mode is left out: so several laws are tried before the same
-            modes.
+            the laws, no part is searched alone, and no mode is left out.
 
         Returns
         -------
@@ -239,8 +224,7 @@ class Actuator:
 
         Examples
         --------
-        >>> import numpy as np
-        >>> import hysim as hs
+        >>> import numpy as np, hysim as hs
         >>> stage = hs.Actuator(hysteresis=hs.Play(threshold=0.2), vibration=hs.mode(300.0, 0.05, delay=0.4e-3))
         >>> slow, fast = np.sin(np.linspace(0.0, 9.0, 90)), np.repeat([0.0, 1.0, -0.5, 0.5], 40)
         >>> recs = [
@@ -286,29 +270,13 @@ class Actuator:
     def response(
         self, u: npt.ArrayLike, sample_time: float | None = None, *, substeps: int | None = None
     ) -> FloatArray:
-        """True displacement at the samples of a command that is held between them.
+        """True displacement (n,) at the samples of a command `u` (n,) that is held between them.
 
-        Parameters
-        ----------
-        u : array, shape (n,)
-            Command. At its first sample the law has its initial memory and everything is at rest, creep included.
-        sample_time : float, optional
-            Time between two samples [s]; an actuator that is not `dynamic` needs none.
-        substeps : int, optional
-            Sub-steps of a sample behind an amplifier that takes time, by default 4 to 64 of a quarter of its time
-            constant.
-
-        Returns
-        -------
-        array, shape (n,)
-
-        Raises
-        ------
-        SimulationError
-            If a stage diverges.
-        ValueError
-            If `u` is not finite or has not one axis, no time is given where one is needed, or the vibration cannot
-            rest at the first sample because it integrates.
+        At the first sample the law has its initial memory and everything is at rest, creep included. Only a `dynamic`
+        actuator needs the `sample_time` [s]. `substeps` are those of a sample behind an amplifier that takes time, by
+        default 4 to 64 of a quarter of its time constant. Raises SimulationError if a stage diverges; ValueError if `u`
+        is not finite or has not one axis, no time is given where one is needed, or the vibration cannot rest at the
+        first sample because it integrates.
         """
         inputs = read_only(u, "u", ndim=1)
         if not self._moves or not inputs.size:
@@ -323,10 +291,7 @@ class Actuator:
         sample_time: float | None = None,
         substeps: int | None = None,
     ) -> tuple[FloatArray, ChainState]:
-        """As `response`, continued from `state` (by default rest), and the state after the last sample.
-
-        The bits are those of one uncut command. Raises ValueError also if there is neither a state nor a sample.
-        """
+        """As `response`, continued from `state` (by default rest) with the same bits, and the state at the end."""
         inputs = read_only(u, "u", ndim=1)
         chain = self.chain(self._any_time(sample_time), substeps)
         if state is None and not inputs.size:
@@ -353,11 +318,7 @@ class Actuator:
         return self.sensor.measure(self.as_read.response(u, sample_time, substeps=substeps))
 
     def startable(self, sample_time: float | None = None, *, substeps: int | None = None) -> Startable:
-        """The actuator as a step from the command to what `measured` reads without noise, for exports.
-
-        An actuator that is not `dynamic` needs no `sample_time` [s]. Raises ValueError if one is needed, and TypeError
-        if the law has no start.
-        """
+        """A step from the command to what `measured` reads without noise; ValueError without a needed time [s]."""
         whole = self.as_read
         at_end = isinstance(whole.vibration, TransferFunction) and whole.vibration.sample == "end"
         return whole.chain(self._any_time(sample_time), substeps).startable(at_end=at_end)
@@ -365,7 +326,6 @@ class Actuator:
     def compiled(
         self, u0: float = 0.0, *, sample_time: float | None = None, substeps: int | None = None
     ) -> CompiledLaw:
-        """The step of `startable` at rest at the command `u0`; ValueError also if the actuator cannot rest there."""
         self.chain(self._any_time(sample_time), substeps).rest(u0)
         return self.startable(sample_time, substeps=substeps).started(u0)
 
@@ -394,7 +354,6 @@ class Actuator:
     def memory(
         self, u: npt.ArrayLike, sample_time: float | None = None, *, substeps: int | None = None
     ) -> FloatArray | None:
-        """Memory of the law at the samples of `u`, shape (n,); None for a law without one. See `response`."""
         if not isinstance(self.hysteresis, Remembering):
             return None
         inputs = read_only(u, "u", ndim=1)
@@ -425,7 +384,6 @@ class Actuator:
 
     @property
     def _moves(self) -> bool:
-        """Whether the true displacement depends on time."""
         slow = self._drive_takes_time or needs_time(self.hysteresis)
         return slow or self.creep is not None or self.vibration is not None
 
@@ -465,9 +423,6 @@ def as_actuator(plant: Any) -> Actuator:
     >>> import hysim as hs
     >>> hs.control.as_actuator(hs.Line(slope=2.0)) == hs.Actuator(hysteresis=hs.Line(slope=2.0))
     True
-    >>> mode = hs.mode(2.0, 0.1)
-    >>> hs.control.as_actuator(hs.Line(slope=2.0) >> mode) == hs.Actuator(hysteresis=hs.Line(slope=2.0), vibration=mode)
-    True
     """
     warn_unsafe(plant)
     plant = model_of(plant)
@@ -495,15 +450,5 @@ def _hammerstein(stages: tuple[Any, ...]) -> Actuator:
 
 
 def as_stepwise(plant: Any) -> Stepwise:
-    """A model as one that runs sample by sample: itself where it does, else as an actuator; TypeError if neither.
-
-    Examples
-    --------
-    >>> import hysim as hs
-    >>> from hysim.plants.actuator import as_stepwise
-    >>> creep = hs.Creep(time_constants=(1.0,), weights=(0.1,))
-    >>> step, parameters, state = as_stepwise(creep).startable(0.5).started(0.0)
-    >>> [round(step(parameters, state, u), 6) for u in (0.0, 1.0, 1.0)]
-    [0.0, 1.0, 1.039347]
-    """
+    """A model as one that runs sample by sample: itself where it does, else as an actuator; TypeError if neither."""
     return plant if isinstance(plant, Stepwise) else as_actuator(plant)

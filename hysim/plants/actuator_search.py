@@ -91,7 +91,6 @@ def _pass(chain: Chain, w: FloatArray, out: FloatArray) -> None:
 
 
 def _distinct(parameters: Parameters, n_sets: int) -> tuple[list[dict[str, float]], Rows]:
-    """The sets that differ, by name, and which of them each set is."""
     names = list(parameters)
     if not names:
         return [{}], np.zeros(n_sets, dtype=np.intp)
@@ -107,7 +106,6 @@ def _chain(stages: Stages, step: float) -> Chain:
 
 
 def _voltage(chain: Chain, u: FloatArray) -> FloatArray:
-    """The voltage at the law, at the end of each sub-step."""
     amplifier: Amplifier = chain.amplifier
     if not amplifier.dynamic:
         return amplifier.voltage(u)
@@ -115,17 +113,14 @@ def _voltage(chain: Chain, u: FloatArray) -> FloatArray:
 
 
 def _times(drive: FloatArray, record: Record) -> FloatArray:
-    """Times of the ends of sub-steps."""
     return record.sample_time * len(record) / drive.size * np.arange(float(drive.size))
 
 
 def _first_of_equal(drives: list[FloatArray]) -> list[int]:
-    """For each voltage the first one that is equal to it."""
     return [next(j for j, other in enumerate(drives) if np.array_equal(drive, other)) for drive in drives]
 
 
 def _by_drive(drives: list[FloatArray], of_law: Rows, of_parts: Rows) -> list[tuple[int, list[int]]]:
-    """Each different voltage, and the laws that see it."""
     first = np.array(_first_of_equal(drives))
     pairs = {(int(drive), int(k)) for drive, k in zip(first[of_parts], of_law, strict=True)}
     return [(drive, sorted(k for d, k in pairs if d == drive)) for drive in sorted({drive for drive, _ in pairs})]
@@ -174,10 +169,7 @@ def finer(space: SearchSpace, modes: int, best: FloatArray) -> FloatArray:
 
 
 def between_samples(space: SearchSpace, end: FloatArray) -> FloatArray:
-    """The end (1, n_x) of a descent, and points with delays in the middle of the samples about its own.
-
-    Slopes by the delay jump at whole samples, where a descent may rest that should go on.
-    """
+    """The end (1, n_x) of a descent, and points between whole samples of delay, where slopes jump."""
     if _DELAY not in space.coordinates:
         return end
     whole = np.round(end[0, space.coordinates.index(_DELAY)])

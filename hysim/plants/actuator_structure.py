@@ -127,7 +127,6 @@ class ActuatorStructure(Identifiable):
     # ------------------------------------------------------------------------------ as `identify` sees it
 
     def search_space(self, record: Record, freedom: Freedom = ALL_FREE) -> SearchSpace:
-        """The law's box and that of the other parts, side by side; ValueError without even times."""
         if self.offsets == "own" and freedom.initial not in (None, "free"):
             raise ValueError('offsets="own" needs initial="free"; fix the memory by fixed={"hysteresis.z0": 0}')
         parts = self.parts([record])
@@ -143,7 +142,6 @@ class ActuatorStructure(Identifiable):
         return replace(space, starts=points, screened=0, regions={}, state=state)
 
     def regressors(self, parameters: Parameters, record: Record) -> FloatArray:
-        """The law's columns through the parts behind it, (n_sets, n_samples, n_columns + 1)."""
         late = 0.0 if self.sensor is None else self.sensor.delay
         parts = self.parts([record])
         others = {name: value for name, value in parameters.items() if not name.startswith(f"{_LAW}.")}
@@ -163,7 +161,6 @@ class ActuatorStructure(Identifiable):
         return {f"{_LAW}.{name}": value for name, value in found.items()}
 
     def assemble(self, parameters: Mapping[str, float]) -> Any:
-        """The actuator with these parameters."""
         parts, law = self.parts([]), self.law.assemble(own(parameters, _LAW))
         if not isinstance(law, InputSum):
             stages = parts.stages(parameters)._replace(hysteresis=law, sensor=self.sensor)
@@ -199,7 +196,6 @@ class ActuatorStructure(Identifiable):
 
     @property
     def noise(self) -> str:
-        """Noise of a sensor that rounds, or the normal one."""
         return "quantised" if self.sensor is not None and self.sensor.quantum else "gaussian"
 
     @property
@@ -209,7 +205,6 @@ class ActuatorStructure(Identifiable):
 
     @property
     def fastest(self) -> int:
-        """The record with the shortest sample time."""
         return 0 if self.survey is None else int(self.survey.fastest)
 
     def static(self, record: Record) -> Record:
@@ -220,7 +215,6 @@ class ActuatorStructure(Identifiable):
         return replace(record, u=self.amplifier.voltage(record.u), channels={**record.channels, **others})
 
     def with_law(self, law: Any) -> "ActuatorStructure":
-        """The structure with this law, or this start of it."""
         return replace(self, law=law)
 
     def behind(self, law: Any) -> "ActuatorStructure":
@@ -241,7 +235,6 @@ class ActuatorStructure(Identifiable):
 
     @property
     def names(self) -> frozenset[str]:
-        """Names of the parameters of the parts beside the law."""
         boxes = {} if self.survey is None else self.parts([]).boxes()
         return frozenset(f"{part}.{each.name}" for part, (box, _) in boxes.items() for each in box)
 
@@ -252,15 +245,12 @@ class ActuatorStructure(Identifiable):
         return [replace(self, modes=k, creep=creep, known=known) for k in range(self.modes + 1)]
 
     def points(self, space: SearchSpace, known: Sequence[Mapping[str, float]]) -> FloatArray:
-        """Points of a space of this structure, spread over its last mode and its delay."""
         return points(space, self.modes, known)
 
     def finer(self, space: SearchSpace, best: FloatArray) -> FloatArray:
-        """Points about the best of `points`, and these."""
         return finer(space, self.modes, best)
 
     def beyond(self, space: SearchSpace, end: FloatArray) -> FloatArray:
-        """The end of a descent, and points of other delays."""
         return between_samples(space, end)
 
     def trials(self) -> Sequence["ActuatorStructure"]:
@@ -272,7 +262,6 @@ class ActuatorStructure(Identifiable):
         return [self._delayed(k, self.survey.shortest) for k in range(MOST_LATE)]
 
     def begun(self, starting: Sequence[Mapping[str, float]]) -> "ActuatorStructure":
-        """The structure with a search that begins at these coordinates by name."""
         return replace(self, starting=tuple(dict(each) for each in starting))
 
     def smaller(self, freedom: Freedom) -> tuple["ActuatorStructure", str] | None:
@@ -334,7 +323,6 @@ class ActuatorStructure(Identifiable):
         return replace(self, remarks=(*self.remarks, remark), **changes)
 
     def parts(self, records: Sequence[Record]) -> LinearParts:
-        """The parts beside the law, for the records that the structure is for or else for these."""
         survey = self.survey if self.survey is not None or not records else Survey.of(records)
         bank: Any = self.creep
         if survey is not None:
@@ -343,7 +331,6 @@ class ActuatorStructure(Identifiable):
         return LinearParts(self.amplifier, bank, self.modes, self.delay, survey, self.inputs, gains)
 
     def _laws(self, parameters: Parameters, record: Record) -> list[tuple[str, Any, Parameters, Record]]:
-        """Each input, its law, the law's parameters, and the record as the law sees it."""
         if not isinstance(self.law, InputSum):
             return [(MAIN, self.law, parameters, record)]
         return [(name, law, own(parameters, name), seen_by(record, name)) for name, law in self.law.laws.items()]
@@ -360,7 +347,6 @@ class ActuatorStructure(Identifiable):
         return np.concatenate([*(block[..., :1] for block in blocks), blocks[0][..., 1:]], axis=-1)
 
     def _offsets(self, linear: Sequence[str]) -> list[str]:
-        """The offsets of the laws that are free."""
         names = [_OFFSET] if len(self.inputs) == 1 else [f"{_LAW}.{name}.offset" for name in self.inputs]
         return [name for name in names if name in linear]
 

@@ -1,7 +1,4 @@
-"""An actuator at one sample time, as `hysim.kernels.loop` steps it: constants, a state of rest, and runs.
-
-Every loop and every response goes through here. A response is a loop whose controller passes its reference on.
-"""
+"""An actuator at one sample time, as `hysim.kernels.loop` steps it; every loop and every response goes through here."""
 
 import functools
 import math
@@ -67,10 +64,7 @@ class ChainState(NamedTuple):
 
 
 class Signals(NamedTuple):
-    """Signals of a run at every sample, and at every sub-step the voltage `v` at the law and its output `w`.
-
-    `lost` is the first sample that is not finite, or -1; `held` counts those at which the controller has held.
-    """
+    """Signals at samples, `v` and `w` of the law at sub-steps, first `lost` sample or -1, number of `held` ones."""
 
     command: FloatArray
     drive: FloatArray
@@ -106,15 +100,11 @@ class Chain:
 
     @property
     def linear_block(self) -> FloatArray:
-        """The linear stage as one block of numbers; see `hysim.kernels.loop`."""
         stage = self.stage
         return np.concatenate([np.ravel(part) for part in (stage.decline, stage.A, stage.B, self.outputs)])
 
     def rest(self, u0: float) -> ChainState:
-        """At rest at the command `u0`.
-
-        Raises ValueError if u0 is not finite, or a plant that integrates is to rest at an output other than zero.
-        """
+        """At rest at the command `u0`; ValueError if it is not finite, or a plant that integrates cannot rest there."""
         if not math.isfinite(u0):
             raise ValueError(f"u0 must be finite, got {u0}")
         voltages = self.amplifier.compiled(self.step, u0).state
@@ -181,10 +171,7 @@ class Chain:
     def run_each(
         self, controllers: Sequence[CompiledController], state: ChainState, reference: FloatArray
     ) -> tuple[FloatArray, npt.NDArray[np.int64]]:
-        """Displacements of several controllers of one kind, shape (m, n), and their first samples that are not finite.
-
-        Each runs from the state `state` of the chain; the second result is -1 where all are finite.
-        """
+        """Displacements (m, n) of controllers of one kind from `state`, and the first sample that diverges, or -1."""
         n, m = reference.size, len(controllers)
         parameters = np.stack([each.parameters for each in controllers])
         states = np.stack([each.state for each in controllers])
@@ -201,14 +188,10 @@ class Chain:
         return read_only(np.stack([reference, noise]), finite=False)
 
     def driven(self, u: FloatArray, state: ChainState) -> tuple[Signals, ChainState]:
-        """Run the commands `u` themselves."""
         return self.run(CompiledController(controllers.through, read_only([]), np.zeros(1)), state, u)
 
     def startable(self, *, at_end: bool = False) -> Startable:
-        """The chain without noise as a step from the command to the reading just after it, or before the next one.
-
-        The delay of the sensor is no part of it: it may be one of the vibration.
-        """
+        """A step from the command to the reading after it, or before the next, without noise and the sensor's delay."""
         law, stage = startable(self.hysteresis), self.stage
         row = stage.output if at_end else self.output_row
         order = stage.rest.size
@@ -232,13 +215,11 @@ class Chain:
 
     @property
     def _jumps(self) -> bool:
-        """Whether the displacement jumps with the command."""
         takes_time = self.amplifier.dynamic or whole_and_part(self.delay / self.step)[1]
         return bool(not takes_time and self.linear.D)
 
     @functools.cached_property
     def _parameters(self) -> FloatArray:
-        """The stages apart from the law, as `hysim.kernels.loop` takes them."""
         stage = self.stage
         head = [
             stage.decline.size, stage.rest.size, stage.lag, self.samples_late,
@@ -253,7 +234,6 @@ class Chain:
 
 
 def linear_stage(creep: Creep | None, vibration: Vibration | None, step: float) -> Stage:
-    """The linear stage behind the law."""
     first = gain(1.0) if creep is None else creep_stage(creep)
     return first if vibration is None else first.then(vibration_stage(vibration, step))
 

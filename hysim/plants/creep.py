@@ -91,8 +91,7 @@ class Creep:
         Raises
         ------
         ValueError
-            If the band does not rise from a positive time, the reference time is not positive, or there is no
-            element.
+            If the band does not rise from a positive time, or another number is not positive.
 
         Examples
         --------

@@ -79,7 +79,6 @@ def checked_plant(mass: float, damping: float, stiffness: float) -> Linear:
 
 
 def regression(columns: FloatArray, target: FloatArray) -> list[float]:
-    """Least-squares coefficients of `columns` (n, n_columns) of any sizes."""
     size = np.linalg.norm(columns, axis=0)
     solution: list[float] = (np.linalg.lstsq(columns / size, target, rcond=None)[0] / size).tolist()
     return solution

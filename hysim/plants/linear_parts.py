@@ -68,21 +68,18 @@ class CreepBank:
 
     @property
     def coordinates(self) -> tuple[Coordinate, ...]:
-        """Coordinates that are searched."""
         if self.unit is None:
             return tuple(Coordinate(f"weights[{k}]", -1.0, 4.0) for k in range(len(self.time_constants)))
         return (_PERCENT, _SLOPE) if self.sloped else (_PERCENT,)
 
     @property
     def defaults(self) -> dict[str, float]:
-        """Starts of the search."""
         if self.unit is None:
             idle = {f"weights[{k}]": 0.0 for k in self.idle}
             return {each.name: _START_OF_WEIGHTS for each in self.coordinates} | idle
         return {each.name: value for each, value in zip(self.coordinates, (_START, 0.0), strict=False)}
 
     def made(self, values: Mapping[str, float]) -> Creep:
-        """The creep with these values."""
         taus = np.array(self.time_constants)
         if self.unit is None:
             weights = np.array([values[each.name] for each in self.coordinates])
@@ -198,7 +195,6 @@ class LinearParts:
     gains: bool = True  # whether gains of modes are coordinates
 
     def spaces(self, freedom: Mapping[str, Freedom]) -> dict[str, SearchSpace]:
-        """The search space of each part by its name."""
         spaces = {}
         for name, (box, defaults) in self.boxes().items():
             wish = freedom.get(name, Freedom())
@@ -207,7 +203,6 @@ class LinearParts:
         return spaces
 
     def boxes(self) -> dict[str, tuple[tuple[Coordinate, ...], dict[str, float]]]:
-        """Coordinates and defaults of each part that has something to be searched."""
         survey = self.survey
         boxes: dict[str, tuple[tuple[Coordinate, ...], dict[str, float]]] = {}
         if self.amplifier == "first-order":
@@ -237,22 +232,18 @@ class LinearParts:
         return Stages(amplifier, creep=creep, vibration=vibration)
 
     def one_mode(self, values: Mapping[str, float], k: int) -> Stages:
-        """The stages with one of the modes, of the gain one."""
         vibration = self._modes(values, [k], (1.0,), values["vibration.delay"] if self.delay else 0.0)
         return replace(self, modes=0).stages(values)._replace(vibration=vibration)
 
     def of_input(self, values: Parameters, name: str) -> Parameters:
-        """The parameters but the gains of the other inputs."""
         others = {self.gain_of(k, other) for k in range(self.modes) for other in self.inputs if other != name}
         return {each: value for each, value in values.items() if each.removeprefix("vibration.") not in others}
 
     def of_mode(self, values: Parameters, k: int) -> Parameters:
-        """The parameters but those of the other modes."""
         others = {f"vibration.{each}[{j}]" for each in (FREQUENCY, DAMPING) for j in range(self.modes) if j != k}
         return {each: value for each, value in values.items() if each not in others}
 
     def gain_of(self, k: int, name: str) -> str:
-        """Name of the gain of a mode for an input."""
         return f"{GAIN}[{k}]" if len(self.inputs) == 1 else f"{GAIN}[{k}].{name}"
 
     def coordinates_of(self, vibrations: Mapping[str, Any]) -> dict[str, float]:

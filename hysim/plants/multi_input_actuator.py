@@ -103,27 +103,11 @@ class MultiInputActuator:
     def response(
         self, u: npt.ArrayLike, sample_time: float | None = None, *, channels: Channels | None = None
     ) -> FloatArray:
-        """Displacement at the samples of the inputs, each at rest at its first one.
+        """Displacement (n,) at the samples of the inputs, each at rest at its first one.
 
-        Parameters
-        ----------
-        u : array, shape (n,)
-            The input ``"u"``.
-        sample_time : float, optional
-            Time between two samples [s]; actuators that do not depend on time need none.
-        channels : mapping
-            The other inputs by their names, each one number or of shape (n,); further channels are ignored.
-
-        Returns
-        -------
-        array, shape (n,)
-
-        Raises
-        ------
-        ValueError
-            If an input is missing, not finite or of another length, or no time is given where one is needed.
-        SimulationError
-            If an actuator diverges.
+        `u` (n,) is the input ``"u"``, `channels` are the others by name, each one number or (n,); further ones are
+        ignored. Actuators that depend on time need the `sample_time` [s]. Raises ValueError if an input is missing, not
+        finite or of another length, or no time is given where one is needed; SimulationError if an actuator diverges.
         """
         return np.asarray(np.sum([*self.contributions(u, sample_time, channels=channels).values()], axis=0))
 
@@ -179,13 +163,11 @@ class InputSum(Identifiable):
         return without_repetition(joint, lambda x: self.regressors(joint.parameters(x), record)[..., :-1], {}, freedom)
 
     def regressors(self, parameters: Parameters, record: Record) -> FloatArray:
-        """The laws' columns one after the other, (n_sets, n_samples, n_columns + 1)."""
         return columns_beside(
             [law.regressors(own(parameters, name), seen_by(record, name)) for name, law in self.laws.items()]
         )
 
     def assemble(self, parameters: Mapping[str, float]) -> "InputSum":
-        """The laws with these parameters."""
         return InputSum({name: law.assemble(own(parameters, name)) for name, law in self.laws.items()})
 
     def steady(self, parameters: Parameters, record: Record) -> dict[str, Any]:
@@ -210,7 +192,6 @@ class ModalGains(Identifiable):
     modes: int
 
     def search_space(self, record: Record, freedom: Freedom = ALL_FREE) -> SearchSpace:
-        """No coordinates: all parameters are linear."""
         columns = (*(self._name(k, name) for k in range(max(self.modes, 1)) for name in self.inputs), "offset")
         return SearchSpace.without_coordinates(columns)
 
@@ -228,7 +209,6 @@ class ModalGains(Identifiable):
         return np.stack([record.u, np.ones(len(record)), np.zeros(len(record))], axis=-1)[np.newaxis]
 
     def assemble(self, parameters: Mapping[str, float]) -> InputSum:
-        """Lines in place of the laws."""
         return InputSum({name: Line(slope=1.0) for name in self.inputs})
 
     def _name(self, k: int, name: str) -> str:
@@ -271,7 +251,6 @@ class Scaled(Identifiable):
     law: Any
 
     def search_space(self, record: Record, freedom: Freedom = ALL_FREE) -> SearchSpace:
-        """No coordinates: both parameters are linear."""
         return SearchSpace.without_coordinates(("gain", "offset"))
 
     def regressors(self, parameters: Parameters, record: Record) -> FloatArray:
@@ -283,5 +262,4 @@ class Scaled(Identifiable):
         return np.stack([y, np.ones_like(y), np.zeros_like(y)], axis=-1)[np.newaxis]
 
     def assemble(self, parameters: Mapping[str, float]) -> Any:
-        """The law itself."""
         return self.law

@@ -175,8 +175,7 @@ class BoucWenOscillator:
 
     Examples
     --------
-    >>> import numpy as np
-    >>> import hysim as hs
+    >>> import numpy as np, hysim as hs
     >>> law = hs.BoucWen(A=5e4, beta=800.0, gamma=-1100.0)
     >>> plant = hs.BoucWenOscillator(mass=2.0, damping=10.0, stiffness=5e4, law=law)
     >>> t = np.arange(751) / 750
@@ -222,25 +221,10 @@ class BoucWenOscillator:
         return np.polynomial.Polynomial([self.law.offset, self.stiffness + slope, *curve])
 
     def response(self, u: npt.ArrayLike, sample_time: float) -> FloatArray:
-        """Displacement at the samples of `u`.
+        """Displacement (n,) [m] at the samples of `u` (n,) [N, or m/s^2], from the initial state at the first of them.
 
-        Parameters
-        ----------
-        u : array, shape (n,) [N, or m/s^2]
-            Input; at its first sample the plant has the initial state.
-        sample_time : float
-            Time between two samples [s].
-
-        Returns
-        -------
-        array, shape (n,) [m]
-
-        Raises
-        ------
-        SimulationError
-            If the motion diverges; it names the time.
-        ValueError
-            If u is not finite or has not one axis, or the sample time is not positive.
+        The samples are `sample_time` apart [s]. Raises SimulationError if the motion diverges, with the time;
+        ValueError if `u` is not finite or has not one axis, or the sample time is not positive.
         """
         return self._states(u, sample_time, None, None)[1][:, 0].copy()
 
@@ -257,8 +241,7 @@ class BoucWenOscillator:
 
         Examples
         --------
-        >>> import numpy as np
-        >>> import hysim as hs
+        >>> import numpy as np, hysim as hs
         >>> plant = hs.benchmarks.noel_schoukens_plant()
         >>> u = 40 * np.sin(2 * np.pi * np.arange(500) / 500)
         >>> y = plant.periodic_response(u, 1 / 15000)
@@ -313,11 +296,7 @@ class BoucWenOscillator:
         sample_time: float | None = None,
         progress: Callable[[int, int], None] | None = None,
     ) -> tuple[dict[str, FloatArray], OscillatorState]:
-        """As `signals`, continued from `state` (by default the initial one), and the state after the last sample.
-
-        The bits are those of one uncut input, which goes on from the state's, one sample before the first.
-        ``progress(done, total)`` is called now and then.
-        """
+        """As `signals`, continued from `state` with the bits of one input, and the state after the last sample."""
         inputs, states = self._states(u, needed_time(self, sample_time), state, progress)
         y, velocity, z, input_work, damping_loss, memory_work = states.T.copy()
         law, start = self.law, self._start(0.0)
@@ -387,8 +366,7 @@ class BoucWenOscillator:
 
         Examples
         --------
-        >>> import numpy as np
-        >>> import hysim as hs
+        >>> import numpy as np, hysim as hs
         >>> law = hs.BoucWen(A=5e4, beta=800.0, gamma=-300.0)
         >>> plant = hs.BoucWenOscillator(mass=2.0, damping=10.0, stiffness=5e4, law=law)
         >>> t = np.arange(300) / 750

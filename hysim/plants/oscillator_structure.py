@@ -147,7 +147,6 @@ class _Equation:
         return np.where(np.isfinite(errors), errors, np.inf)
 
     def parameters(self, x: FloatArray) -> dict[str, float]:
-        """The user's parameters at one point (n_x,)."""
         columns = np.column_stack([self.known, self.memories(x[np.newaxis])[0]])
         mass, damping, stiffness, A = regression(columns, self.target)
         law = {name: float(value[0]) for name, value in self.laws.parameters(x[np.newaxis]).items()}
@@ -213,7 +212,6 @@ class OscillatorStructure(Identifiable):
             raise ValueError('initial="periodic" takes a period in samples, and nothing else does')
 
     def search_space(self, record: Record, freedom: Freedom = ALL_FREE) -> SearchSpace:
-        """The box around the plant of small motions, and where the equation of motion says to begin."""
         if freedom.initial is not None:
             raise ValueError("the structure says how the record begins: BoucWenOscillator.structure(initial=...)")
         motion = self.motion(record)
@@ -300,7 +298,6 @@ class OscillatorStructure(Identifiable):
         return np.asarray(signal[:whole].reshape(-1, self.period).mean(axis=0))
 
     def fine_input(self, u: FloatArray) -> FloatArray:
-        """Inputs at the ends of the steps: of one period, or of the whole record."""
         u, factor = self._mean_period(u), self.oversampling
         if self.hold == "band-limited":
             return interpolated(u, factor) if self.period else interpolated_record(u, factor)
@@ -310,7 +307,6 @@ class OscillatorStructure(Identifiable):
         return np.asarray(np.interp(places, np.arange(u.size + 1), np.append(u, u[0])))
 
     def sampled(self, y: FloatArray) -> FloatArray:
-        """The record's samples of an output at the ends of the steps."""
         if self.decimation:
             return decimated(y, self.decimation, periodic=self.period is not None)
         return y[:: self.oversampling]
@@ -325,7 +321,6 @@ class _Box(NamedTuple):
 
     @property
     def plant(self) -> tuple[str, ...]:
-        """Free parameters of the plant."""
         return tuple(name for name in _PLANT if name not in self.held)
 
     def side(self, which: int) -> FloatArray:
@@ -336,7 +331,6 @@ class _Box(NamedTuple):
         return np.array([math.log(values[name]) if name == "mass" else values[name] for name in self.plant])
 
     def laws(self, values: Mapping[str, float]) -> SearchSpace:
-        """The law's part, with `values` as its start."""
         fixed = {name: value for name, value in self.held.items() if name in _LAW}
         bounds = {name: pair for name, pair in self.limits.items() if name in _LAW}
         defaults = {name: values[name] for name in _LAW} | _REST_OF_LAW
@@ -396,7 +390,6 @@ def _factor(values: Mapping[str, float], held: Mapping[str, float]) -> float:
 
 
 def _scaled(values: Mapping[str, float], factor: float) -> dict[str, float]:
-    """The plant with all forces multiplied by `factor`."""
     scaled = {name: value * factor if name in _SCALED else value for name, value in values.items()}
     unit = factor ** (1.0 - values["n"])
     return scaled | {"beta": values["beta"] * unit, "gamma": values["gamma"] * unit}

@@ -41,7 +41,6 @@ class Stage(NamedTuple):
 
     @property
     def dc_gain(self) -> float:
-        """Output under a constant input of one."""
         return float(self.C @ self.rest) + self.D
 
     def then(self, other: Self) -> "Stage":

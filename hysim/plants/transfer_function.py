@@ -138,10 +138,7 @@ class TransferFunction(Composable):
     def advance(
         self, u: npt.ArrayLike, state: LinearState | None = None, *, sample_time: float | None = None
     ) -> tuple[FloatArray, LinearState]:
-        """As `response`, continued from `state`, by default the initial one, and the state after the last sample.
-
-        The bits are those of one uncut input.
-        """
+        """As `response`, continued from `state` (by default the initial one), and the state at the end; same bits."""
         inputs = read_only(u, "u", ndim=1)
         time = positive_time(needed_time(self, sample_time))
         with np.errstate(all="ignore"):
@@ -161,18 +158,12 @@ class TransferFunction(Composable):
         return y, end
 
     def startable(self, sample_time: float | None = None) -> Startable:
-        """The plant at a sample time [s] as a step with the bits of `response`, for exports.
-
-        As there, the input is zero before the first sample, whatever that is.
-        """
+        """A step with the bits of `response` at a sample time [s]; the input is zero before its first sample."""
         plant = self._plant(positive_time(needed_time(self, sample_time)))
         return plant.startable(self.initial_state, hold=self.hold, sample=self.sample)
 
     def compiled(self, u0: float = 0.0, *, sample_time: float | None = None) -> CompiledLaw:
-        """The plant as compiled loops take it, at rest at the input `u0`, beside the free response.
-
-        Raises ValueError without a sample time [s], or if a plant that integrates is to rest elsewhere than at zero.
-        """
+        """The plant at rest at `u0`, beside the free response; ValueError without a sample time [s] or such a rest."""
         law = self.startable(sample_time).law
         if u0:
             if self.order and not self.den[-1]:
@@ -319,7 +310,6 @@ class TransferFunctionStructure(Identifiable, Composable):
 
     @property
     def columns(self) -> tuple[str, ...]:
-        """The names in which the output is affine: numerator, initial state."""
         return (*(f"num[{k}]" for k in range(self.zeros + 1)), *(f"x0[{k}]" for k in range(self.poles)))
 
     @property
@@ -329,11 +319,9 @@ class TransferFunctionStructure(Identifiable, Composable):
 
     @property
     def free_delay(self) -> tuple[str, ...]:
-        """The delay's name where it is searched."""
         return ("delay",) if self.delay is None else ()
 
     def search_space(self, record: Record, freedom: Freedom = ALL_FREE) -> SearchSpace:
-        """The box of the sections, and of the delay where it is free."""
         sample_time = record.sample_time
         if np.ptp(record.u) == 0.0 and record.u[0] == 0.0:
             raise ValueError("the input is zero throughout: nothing can be identified from it")
@@ -378,7 +366,6 @@ class TransferFunctionStructure(Identifiable, Composable):
         )
 
     def regressors(self, parameters: Parameters, record: Record) -> FloatArray:
-        """Columns of the numerator and of the initial state, and zero, (n_sets, n_samples, n_columns + 1)."""
         delay = parameters["delay"] if self.delay is None else self.delay
         options = {"hold": self.hold, "sample": self.sample}
         return affine_columns(self.monic(parameters), record.u, record.sample_time, delay, zeros=self.zeros, **options)
@@ -396,7 +383,6 @@ class TransferFunctionStructure(Identifiable, Composable):
         return ("rest",) if begins_at_zero else ("rest", "free")
 
     def variants(self) -> tuple[Variant, ...]:
-        """None."""
         return ()
 
     def with_unit_gain(self) -> UnitGain:
@@ -404,7 +390,6 @@ class TransferFunctionStructure(Identifiable, Composable):
         return UnitGain(self)
 
     def assemble(self, parameters: Mapping[str, float]) -> TransferFunction:
-        """The transfer function with these parameters."""
         initial_state = tuple(parameters[f"x0[{k}]"] for k in range(self.poles))
         return TransferFunction(
             num=tuple(parameters[f"num[{k}]"] for k in range(self.zeros + 1)),
@@ -416,7 +401,6 @@ class TransferFunctionStructure(Identifiable, Composable):
         )
 
     def notes(self, record: Record, model: TransferFunction) -> tuple[str, ...]:
-        """Whether a curve without memory fits as well, and whether the record shows more than one rate."""
         n_parameters = self.poles + self.zeros + 1 + len(self.free_delay)
         return notes(record, model.response(record.u, record.sample_time), n_parameters)
 
@@ -441,7 +425,6 @@ class TransferFunctionStructure(Identifiable, Composable):
         return np.append(sections(guess.poles, sample_time), guess.delay / sample_time)
 
     def _searched(self, x: FloatArray, sample_time: float, delay: float | None) -> dict[str, FloatArray]:
-        """The denominators, and the delay where it is not the structure's own."""
         columns = denominators(x, self.poles).T
         results = {name: columns[k] / sample_time**k for k, name in enumerate(self.denominator, 1)}
         late = x[:, -1] * sample_time if delay is None else np.full(len(x), delay)

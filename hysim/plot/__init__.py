@@ -1,13 +1,8 @@
 """Pictures of results: functions of a result and, optionally, of the Axes to draw on.
 
-All functions have in common
-
-- the argument `ax`, or `axes` for several: the Axes to draw on. They keep their look, and pyplot is not imported.
-Without
-  them, a picture is a new pyplot figure in the house style. Too few Axes are a ValueError.
-- the result: the Axes that were drawn on, or an array of them; `animate` returns the animation. Nothing is shown.
-
-Nothing here changes matplotlib's settings outside its own calls.
+All functions take `ax`, or `axes` for several: the Axes to draw on, which keep their look. Without them a picture is a
+new pyplot figure in the house style; too few Axes are a ValueError. They return the Axes, or an array of them;
+`animate` returns the animation. Nothing is shown, and matplotlib's settings outside the calls are not changed.
 """
 
 from matplotlib.axes import Axes

@@ -123,10 +123,10 @@ def identification(
 
     `record` is the Record, or the sequence of them, from which `fit` was identified; another one is a ValueError. The
     band is two standard errors of the model's output to each side, and the model's line its free run on the measured
-    input. Residuals are counted in quanta of the sensor if its
-    resolution is known, with lines at one quantum. A profile is the signed root of the deviance over the distance from
-    the estimate in standard errors, on the diagonal for a normal distribution; the interval at 95 % lies between the
-    horizontal lines. The result has shape (2,), or (3,) with profiles.
+    input. Residuals are counted in quanta of the sensor if its resolution is known, with lines at one quantum. A
+    profile is the signed root of the deviance over the distance from the estimate in standard errors, on the diagonal
+    for a normal distribution; the interval at 95 % lies between the horizontal lines. The result has shape (2,), or
+    (3,) with profiles.
 
     Examples
     --------
@@ -181,7 +181,6 @@ def _draw_fit(
 
 
 def _draw_measured(ax: Axes, u: FloatArray, y: FloatArray, parts: list[NDArray[np.intp]]) -> None:
-    """Measured samples of some records: dots, or broad lines where there are many."""
     if u.size <= MANY:
         ax.plot(u, y, label="measured", color=POINTS, **scattered(u.size, **_FILLED))
         return
@@ -205,7 +204,6 @@ def _draw_profiles(ax: Axes, fit: Identification) -> None:
 
 
 def _draw_guides(ax: Axes, sizes: dict[float, str]) -> None:
-    """Lines at zero, and at both signs of some sizes."""
     ax.axhline(0.0, color=GUIDE, linewidth=0.8)
     for size, dashes in sizes.items():
         for height in (size, -size):
@@ -237,7 +235,6 @@ def _draw_residual(ax: Axes, comparison: Comparison, row: ComparisonRow, quanta:
 
 
 def _draw_width(ax: Axes, comparison: Comparison) -> None:
-    """The measured width, under the lines of the models."""
     units, loop = comparison.record.units, comparison.loop
     style = scattered(loop.u.size, **_FILLED) if loop.u.size <= MANY else {"linewidth": 1.8}
     ax.plot(loop.u, loop.width, color=MEASURED, label="measured", zorder=3 if loop.u.size <= MANY else 1, **style)
@@ -245,7 +242,6 @@ def _draw_width(ax: Axes, comparison: Comparison) -> None:
 
 
 def _quantum(record: Record, quanta: str) -> tuple[float, str]:
-    """The divisor of residuals, and their unit after the division."""
     return (record.resolution, quanta) if record.resolution else (1.0, printed(record.units.get("y", "")))
 
 

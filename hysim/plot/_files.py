@@ -66,8 +66,7 @@ def save_svg(figure: Figure, path: str | Path, *, name: str | None = None) -> No
 def to_bytes(figure: Figure, form: str, *, name: str = "figure") -> bytes:
     """Write a figure as the content of a file, the same bytes each time.
 
-    `form` is ``"svg"``, ``"png"``, with 200 dots per inch, or ``"pdf"``; another word is a ValueError. `name` is as in
-    `to_svg`.
+    `form` is ``"svg"``, ``"png"``, with 200 dots per inch, or ``"pdf"``; else a ValueError. `name` is as in `to_svg`.
 
     Examples
     --------

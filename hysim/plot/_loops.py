@@ -166,10 +166,7 @@ def animate(
 
 
 def _cycles_up_and_down(u: FloatArray, tolerance: float) -> dict[tuple[int, int], float]:
-    """First sample and stop of each rising branch with the falling one after it, and half of the fall of the input.
-
-    A falling branch at the beginning is a cycle of its own; a rising one at the end belongs to the last cycle.
-    """
+    """First sample and stop of each rising branch with the falling one after it, and half the fall of the input."""
     branches = turns(u, tolerance).branches
     rises = [float(u[branch.stop - 1] - u[branch.start]) for branch in branches]
     begins = [k for k, rise in enumerate(rises) if k == 0 or (rise > 0.0 and k + 1 < len(rises))]

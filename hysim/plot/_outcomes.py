@@ -27,11 +27,10 @@ _BAND = 2.0  # standard errors
 def selection(discovery: Discovery | OscillatorDiscovery, axes: Sequence[Axes] | AxesArray | None = None) -> AxesArray:
     """Draw the fit and the BIC of the free run of a discovery against the number of terms, on two Axes.
 
-    `discovery` is a result of `hysim.discover` or `hysim.discover_oscillator`.
-
-    The structures on the path of thresholds are circles, and the chosen
-    law is a diamond, which need not be on the path: the search removes further terms from it. A structure that fits
-    5 % worse than the best, or whose free run diverges, is a cross on the edge. The result has shape (2,).
+    `discovery` is a result of `hysim.discover` or `hysim.discover_oscillator`. The structures on the path of thresholds
+    are circles, and the chosen law is a diamond, which need not be on the path: the search removes further terms from
+    it. A structure that fits 5 % worse than the best, or whose free run diverges, is a cross on the edge. The result
+    has shape (2,).
     """
     n_terms, fits, scores = discovery.path_n_terms, discovery.path_fit_percent, discovery.scores
     shown = fits >= fits.max(initial=scores["fit_percent"]) - _WORST_FIT
@@ -55,8 +54,8 @@ def selection(discovery: Discovery | OscillatorDiscovery, axes: Sequence[Axes] |
 def trade_off(tuning: Tuning, ax: Axes | None = None) -> Axes:
     """Draw the objective of a tuning against the maximum sensitivity: all trials, the best of them, and the chosen one.
 
-    `tuning` is a result of `hysim.tune`. Trials that are 30 times worse than the chosen one, or twice as sensitive, are
-    left out.
+    `tuning` is a result of `hysim.tune`. Trials 30 times worse than the chosen one, or twice as sensitive, are left
+    out.
 
     Examples
     --------
@@ -165,29 +164,11 @@ def parameter(
 ) -> Axes:
     """Draw a parameter against its channel, with its band at 95 %.
 
-    Parameters
-    ----------
-    fit : Identification or ParameterCurve
-        A result of `hysim.identify` with `depends`, or of `hysim.parameter_curve`.
-    name : str, optional
-        The parameter of the fit; not for a curve.
-    ax : Axes, optional
-        To draw on.
-    one_by_one : sequence of Identification, optional
-        Fits of the law without a dependence to records of one value of the channel each, drawn with their intervals.
-    records : sequence of Record, optional
-        The records of these fits, one for each.
-    unit : str
-        Unit of the parameter on the axis; that of the channel is the first record's.
-
-    Returns
-    -------
-    Axes
-
-    Raises
-    ------
-    ValueError
-        If the parameter depends on no channel, the fits are not as many as the records, or a channel varies along one.
+    `fit` is a result of `hysim.identify` with `depends`, with the `name` of the parameter, or one of
+    `hysim.parameter_curve`. `one_by_one` are fits of the law without a dependence to `records` of one value of the
+    channel each, drawn with their intervals. `unit` is that of the parameter on the axis; that of the channel is the
+    first record's. A ValueError is raised if the parameter depends on no channel, the fits are not as many as the
+    records, or a channel varies along one.
 
     Examples
     --------
@@ -219,7 +200,6 @@ def parameter(
 
 
 def _draw_alone(ax: Axes, fit: Identification, parameter: str, place: Any, is_first: bool) -> None:
-    """One fit at one value of the channel, with its interval."""
     if np.ndim(place):
         raise ValueError("a channel varies along a record of these fits: a fit stands at one value of it")
     value, (low, high) = fit.estimates[parameter], fit.intervals.get(parameter, (np.nan, np.nan))
@@ -239,29 +219,9 @@ def track(
 ) -> Axes:
     """Draw the path of a number of a law with its band at 95 %.
 
-    Parameters
-    ----------
-    result : ParameterTrack
-        A result of `hysim.track_parameters`.
-    name : str, optional
-        The number; by default the first one that is free.
-    ax : Axes, optional
-        To draw on.
-    t : array, shape (n_samples,), optional
-        Times of the samples; by default their numbers [s].
-    truth : array, shape (n_samples,), optional
-        What is known of it otherwise.
-    units : mapping, optional
-        Label of the unit of the number, by its name.
-
-    Returns
-    -------
-    Axes
-
-    Raises
-    ------
-    KeyError
-        If the number is not free.
+    `result` is one of `hysim.track_parameters`, and `name` that of the number, by default the first one that is free;
+    another one is a KeyError. `t` (n_samples,) are times of the samples, by default their numbers [s], `truth`
+    (n_samples,) is what is known of the number otherwise, and `units` has a label of its unit by its name.
 
     Examples
     --------

@@ -170,7 +170,6 @@ def _shown(draws: FloatArray) -> tuple[float, float]:
 
 
 def _label(ax: Axes, below: str, beside: str) -> None:
-    """Names at the outer panels only, and few ticks."""
     ax.locator_params(nbins=3)
     ax.tick_params(labelsize=6, labelbottom=bool(below), labelleft=bool(beside), axis="both")
     ax.tick_params(axis="x", rotation=45)

@@ -22,10 +22,7 @@ _ARROW = 0.03  # its length along the input, of the span
 
 
 class InputOutput(Protocol):
-    """A result that can be drawn as a loop: a Record, a Simulation or anything with `u` and `y`.
-
-    Its `units`, `name`, times `t` and memory `z` are used if it has them.
-    """
+    """A Record, a Simulation or anything with `u` and `y`, and perhaps `units`, `name`, times `t` and memory `z`."""
 
     @property
     def u(self) -> FloatArray: ...
@@ -54,7 +51,6 @@ class _WithMemory(Protocol):
 
 
 def times_of(result: InputOutput) -> FloatArray | None:
-    """The times of a result, if it has any."""
     return result.t if isinstance(result, _WithTime) else None
 
 
@@ -66,10 +62,7 @@ def names_of(results: Sequence[Any]) -> list[str]:
 
 
 def drawable(results: Sequence[Any], verb: str) -> tuple[Any, ...]:
-    """Records, tables as records, simulations; each model, or result of a fit, as its run on the record before it.
-
-    A ValueError is raised for a model before which there is no record.
-    """
+    """Records (tables too) and simulations; models and fits run on the record before them, ValueError without one."""
     drawn: list[Any] = []
     record: Record | None = None
     for each in results:
@@ -210,8 +203,7 @@ def element_loops(result: Simulation, axes: Sequence[Axes] | AxesArray | None = 
 
     Examples
     --------
-    >>> import numpy as np
-    >>> import hysim as hs
+    >>> import numpy as np, hysim as hs
     >>> u = np.sin(np.linspace(0.0, 10.0, 50))
     >>> loops = {"drift": np.stack([u, 2.0 * u], axis=1), "force": np.stack([u**3, u], axis=1)}
     >>> panels = hs.plot.element_loops(hs.Simulation(u=u, y=u, signals=loops), hs.plot.figure().subplots(2))

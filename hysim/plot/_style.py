@@ -1,7 +1,4 @@
-"""The house style: thin spines, a light grid, and lines that differ in dashes and lightness as well as in colour.
-
-The colours are those of M. Okabe and K. Ito (2008), chosen for the colour-blind.
-"""
+"""The house style: thin spines, a light grid, colours of M. Okabe and K. Ito (2008) for the colour-blind, dashes."""
 
 import math
 from collections.abc import Iterator, Sequence
@@ -145,7 +142,6 @@ def upright(ax: Axes, text: str) -> None:
 
 
 def line(k: int) -> dict[str, Any]:
-    """Colour and dashes of the line with the number `k`."""
     colour, dashes = _LINES[k % len(_LINES)]
     return {"color": colour, "linestyle": dashes}
 

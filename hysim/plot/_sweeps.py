@@ -231,8 +231,7 @@ def forc(
     The density is the weight of the relays in a cell over its area; from reversal curves, half the mixed second
     difference of the output, as `hysim.Preisach.from_reversal_curves` computes it on the turning points, without
     smoothing; a picture finer than the curves is that of ``hysim.Preisach.smoothed(record)``. Grey is zero, lighter is
-    more, darker is less. The cells along the diagonal, of relays that switch up and down at one input, are
-    triangles.
+    more, darker is less. The cells along the diagonal, whose relays switch at one input, are triangles.
 
     `source` is a Preisach, a PreisachRelays, or a Record of curves such as `hysim.signals.reversal_curves`, whose
     reversals up to the fraction `tolerance` of its span are ignored. `coordinates` are ``"thresholds"``, the upper one

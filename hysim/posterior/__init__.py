@@ -1,7 +1,4 @@
-"""Distributions in place of optima: `sample_posterior`, and which model the data prefer, `compare_evidence`.
-
-Both stand on the problem that `identify` solves, with its box, its noise and its batches.
-"""
+"""Distributions in place of optima: `sample_posterior`, and `compare_evidence` of models on the same records."""
 
 from hysim.posterior._evidence import FACTORS, Evidence, EvidenceRow, compare_evidence, log_evidence
 from hysim.posterior._sample import Posterior, Prediction, sample_posterior

@@ -132,14 +132,12 @@ class Evidence:
 
     @property
     def _reason(self) -> str:
-        """Why the data do not decide between several models."""
         lost = [_quoted(row.name) for row in self.rows if not np.isfinite(row.error).all()]
         if lost:
             return f"the evidence of {listed(lost)} was not found"
         return "it depends on the boxes" if len(set(self.best)) > 1 else "their odds are too near to 1 : 1"
 
     def _behind(self, others: Sequence[str]) -> str:
-        """The odds of the models that are not in question."""
         if not others:
             return ""
         values = np.array([row.log_evidence for row in self.rows])
@@ -220,8 +218,7 @@ def compare_evidence(
     seed : int
         The same seed gives the same evidences to the last bit.
     progress : callable or False, optional
-        Called as ``progress(done, total)`` after each evidence.
-        By default calls beyond 2 s report on the standard error; False turns this off.
+        Called as ``progress(done, total)`` after each evidence; see `hysim.simulate`.
 
     Returns
     -------
@@ -281,10 +278,7 @@ def log_evidence(
     live_points: int = 500,
     seed: int = 0,
 ) -> LogEvidence:
-    """ln Z of one fit, its standard error, and the number of simulated sets, with boxes enlarged by `factor`.
-
-    The arguments are those of `compare_evidence`, and `priors` are those of this model.
-    """
+    """ln Z of one fit with boxes enlarged by `factor`; arguments as of `compare_evidence`, `priors` of this model."""
     records = several(record_or_records, "log_evidence")
     check_choice("method", method, ("nested", "bridge"))
     check_count("live_points", live_points)

@@ -127,7 +127,6 @@ class _Pool:
         self.walk, self.size = walk, size
 
     def map(self, function: Callable[[Any], Any], items: Iterable[Any]) -> list[Any]:
-        """Results for the items."""
         if function is self.walk.sample:
             return list(self.walk.walk_all(list(items)))
         return [function(item) for item in items]

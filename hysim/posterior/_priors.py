@@ -65,7 +65,6 @@ class Given:
         return np.asarray(np.where(inside, self.distribution.logpdf(values), -np.inf))
 
     def quantile(self, share: FloatArray) -> FloatArray:
-        """Values below which this share of the prior lies."""
         if self.distribution is None:
             return self.low + share * (self.high - self.low)
         return np.asarray(np.clip(self.distribution.ppf(share), self.low, self.high))
@@ -157,15 +156,12 @@ class Scale:
     is_log: bool
 
     def value(self, x: FloatArray) -> FloatArray:
-        """Parameter at the coordinate."""
         return self.unit * np.exp(x) if self.is_log else self.origin + self.unit * x
 
     def coordinate(self, value: FloatArray) -> FloatArray:
-        """Coordinate of the parameter."""
         return np.log(value / self.unit) if self.is_log else (value - self.origin) / self.unit
 
     def log_slope(self, x: FloatArray) -> FloatArray | float:
-        """Logarithm of the slope of the parameter."""
         return math.log(abs(self.unit)) + (x if self.is_log else 0.0)
 
 
@@ -265,7 +261,6 @@ class Linear:
 
 
 def linear(problem: Problem, priors: Mapping[str, Given], factor: float = 1.0) -> Linear:
-    """Prior of the linear parameters of a problem, the flat ones enlarged by `factor`."""
     names = problem.space.linear
     own = {k: priors[key].scaled(factor) for k, name in enumerate(names) if (key := _key(name, priors)) is not None}
     span = float(np.ptp(problem.y)) or problem.scale

@@ -95,7 +95,6 @@ class Proposal:
         return _power(1.0 / (1.0 + squares / self.freedom), (self.freedom + n_v) // 2) * scale, squares
 
     def beside(self, other: "Proposal", share_of_other: float) -> "Proposal":
-        """This proposal with another one that has a small share."""
         share = np.concatenate([(1.0 - share_of_other) * self.share, share_of_other * other.share])
         centres, roots = np.concatenate([self.centres, other.centres]), np.concatenate([self.roots, other.roots])
         return Proposal(centres, roots, share, self.n_x, self.n_linear)
@@ -221,7 +220,6 @@ def _log_density(target: Target, v: FloatArray) -> FloatArray:
 
 
 def _density(parts: Proposal, v: FloatArray) -> FloatArray:
-    """Density times the number of points that were drawn."""
     return np.asarray(_EACH * len(parts.centres) * parts.densities(v)[0].sum(axis=1))
 
 
@@ -327,7 +325,6 @@ def _distinct(v: FloatArray) -> int:
 
 
 def _fewest(target: Target) -> int:
-    """Number of distinct particles that can shape a mixture."""
     return FEWEST_EACH * (target.n_x + 2)
 
 
@@ -338,10 +335,7 @@ def _even(log_weight: FloatArray) -> float:
 
 
 def particles(target: Target, rng: np.random.Generator) -> tuple[FloatArray, FloatArray]:
-    """Particles (n, n_v) of about the posterior of v, drawn from the prior, and those at a lower power on the way.
-
-    The latter reach farther: parts of the proposal with their shape keep the weights of rare draws bounded.
-    """
+    """Particles (n, n_v) of about the posterior of v, and those at a lower power, which reach farther."""
     v = target.prior_draws(min(_PARTICLES, _PARTICLES_EACH * (target.n_x + 1)), rng)
     value, prior = target.marginal(v)
     power, early = 0.0, np.empty((0, v.shape[1]))

@@ -169,10 +169,7 @@ class Posterior:
         return self.samples[name].reshape(-1, self.n_walkers)
 
     def interval(self, level: float = 0.95) -> dict[str, tuple[float, float]]:
-        """Name to the central interval that holds a parameter with the probability `level`; both tails are equal.
-
-        A ValueError is raised unless `level` is between 0 and 1.
-        """
+        """Name to the central interval of probability `level`, with equal tails; ValueError unless 0 < level < 1."""
         tails = _tails(level)
         ends = {name: np.quantile(draws, tails).tolist() for name, draws in self.samples.items()}
         return {name: (low, high) for name, (low, high) in ends.items()}
@@ -186,24 +183,11 @@ class Posterior:
         level: float = 0.95,
         seed: int = 0,
     ) -> Prediction:
-        """Bands of the output, and of the loop width, for an input.
+        """Bands of the output, and of the loop width, for an input `u` (n_samples,) [unit of u].
 
-        Parameters
-        ----------
-        u : array, shape (n_samples,) [unit of u]
-            The model starts from the state that each draw has at the first sample of the first record.
-        t : array, shape (n_samples,), optional [s]
-            Times, for models that depend on them.
-        n : int
-            Number of draws, at most as many as there are.
-        level : float
-            Probability of the bands.
-        seed : int
-            Seed of the choice of the draws, and of the noise.
-
-        Returns
-        -------
-        Prediction
+        The model starts from the state that each draw has at the first sample of the first record. Models that depend
+        on time need the times `t` (n_samples,) [s]. `n` is the number of draws, at most as many as there are, `level`
+        the probability of the bands, and `seed` that of the choice of the draws and of the noise.
         """
         inputs, tails = read_only(u, "u", ndim=1), _tails(level)
         check_count("n", n)
@@ -370,8 +354,7 @@ def sample_posterior(
     seed : int
         The same seed gives the same draws to the last bit.
     progress : callable or False, optional
-        Called as ``progress(done, total)`` with effective samples.
-        By default calls beyond 2 s report on the standard error; False turns this off.
+        Called as ``progress(done, total)`` with effective samples; see `hysim.simulate`.
 
     Returns
     -------
@@ -446,7 +429,6 @@ def walkers_of(n_dim: int, walkers: int | None, samples: int) -> int:
 
 
 def described(fit: Identification, posterior: Target, chains: Chains, samples: int, seed: int) -> Posterior:
-    """The result."""
     n_walkers = chains.q.shape[1]
     table = chains.parameters.reshape(-1, len(posterior.names))
     paths = {name: chains.parameters[..., k] for k, name in enumerate(posterior.names)}

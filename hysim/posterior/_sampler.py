@@ -84,7 +84,6 @@ def _ranked(chains: FloatArray) -> FloatArray:
 
 
 def _variances(chains: FloatArray) -> tuple[float, float]:
-    """Variance within the chains, and that of all draws from both parts."""
     n, m = chains.shape
     within = float(chains.var(axis=0, ddof=1).mean())
     between = float(chains.mean(axis=0).var(ddof=1)) if m > 1 else 0.0
@@ -209,8 +208,6 @@ def sampled(
 
 
 class _Ensemble:
-    """Walkers of emcee on a target, with a proposal close to it."""
-
     def __init__(self, emcee: Any, target: Target, walkers: int, proposal: Proposal, reaching: Proposal) -> None:
         self.target, self.proposal, self.reaching = target, proposal, reaching
         self.walkers, self.acceptance = walkers, float("nan")
@@ -266,7 +263,6 @@ def _some(q: FloatArray, rng: np.random.Generator) -> FloatArray:
 
 
 def _first(target: Target, proposal: Proposal, walkers: int, rng: np.random.Generator) -> FloatArray:
-    """Points of finite density from the proposal, the better of many."""
     drawn = proposal.draw(_TRIED * walkers, rng)
     weight = target.log_posterior(drawn) - proposal.log_density(drawn)
     finite = np.flatnonzero(np.isfinite(weight))

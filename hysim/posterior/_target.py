@@ -40,11 +40,7 @@ _FAR = 9.0  # from which on an end cuts off nothing that is seen in 64 bits
 def solved_within(
     triangle: FloatArray, best: FloatArray, e: FloatArray, low: FloatArray, high: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
-    """The w with R w - best normal between the ends low <= w <= high, and ln |dw/de|.
-
-    `triangle` are the R (n_sets, n, n), of which no diagonal is zero; the others are (n_sets, n), and e is standard
-    normal. From the last number up each has its ends given those below.
-    """
+    """The w with R w - best normal between low and high, and ln |dw/de|; no diagonal of R (n_sets, n, n) is zero."""
     w, log_volume = np.empty_like(e), np.zeros(len(e))
     for k in reversed(range(e.shape[1])):
         scale = triangle[:, k, k]
@@ -86,10 +82,7 @@ class Columns(NamedTuple):
 
 @dataclass
 class Target:
-    """Posterior of a problem with a noise and priors.
-
-    `evaluations` counts the sets that were simulated; `optima` are points v (n_optima, n_x + 1), the best first.
-    """
+    """Posterior of a problem with noise and priors; `evaluations` counts sets, `optima` are v (n_optima, n_x + 1)."""
 
     problem: Problem
     noise: Noise
@@ -102,26 +95,21 @@ class Target:
 
     @property
     def n_x(self) -> int:
-        """Number of coordinates of the search."""
         return self.problem.n_x
 
     @property
     def n_linear(self) -> int:
-        """Number of linear parameters."""
         return len(self.problem.space.linear)
 
     @property
     def n_dim(self) -> int:
-        """Length of a point."""
         return self.n_x + self.n_linear + 1
 
     @property
     def names(self) -> tuple[str, ...]:
-        """The user's parameters, and sigma."""
         return (*self.problem.space.names, SIGMA)
 
     def priors_in_words(self) -> dict[str, str]:
-        """Name of each coordinate and linear parameter, and of sigma, to its prior."""
         space, ends = self.problem.space, zip(self.x_prior.lower.tolist(), self.x_prior.upper.tolist(), strict=True)
         words = {
             name: f"flat from {low:.4g} to {high:.4g} in the coordinate of the search"
@@ -210,7 +198,6 @@ class Target:
         return np.asarray(ndtri(np.clip(share, _EDGE, 1.0 - _EDGE)))
 
     def _log_prior(self, x_normal: FloatArray, normal: FloatArray, x: FloatArray, log_sigma: FloatArray) -> FloatArray:
-        """ln of the prior of v at these coordinates."""
         low, high = self.sigma_ends
         every = np.column_stack([x_normal, normal])
         slopes = -0.5 * every**2 - 0.5 * _LOG_2PI  # of Phi

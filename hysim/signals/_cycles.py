@@ -11,26 +11,10 @@ from hysim.signals._parts import checked_count, checked_span, unit_sine
 def staircase(low: float, high: float, step: float, *, cycles: int = 1, samples_per_step: int = 1) -> FloatArray:
     """Steps from low to high and back.
 
-    Every level of the rise occurs again on the fall, so that both extremes occur twice in a row:
-    0, 5, ..., 125, 125, ..., 5, 0.
-
-    Parameters
-    ----------
-    low, high, step : float
-        Extremes, and height of a step, which divides the span [unit of u].
-    cycles : int
-        Number of rises and falls.
-    samples_per_step : int
-        Number of samples at each level.
-
-    Returns
-    -------
-    array, shape (2 * cycles * levels * samples_per_step,) [unit of u]
-
-    Raises
-    ------
-    ValueError
-        If high is not above low, the step does not divide the span, or a count is below 1.
+    Every level of the rise occurs again on the fall, so that both extremes occur twice in a row: 0, 5, ..., 125, 125,
+    ..., 5, 0. `step` is the height of a step [unit of u], which divides the span. The result has shape (2 * cycles *
+    levels * samples_per_step,) [unit of u]. A ValueError is raised if high is not above low, the step does not divide
+    the span, or a count is below 1.
 
     Examples
     --------
@@ -52,24 +36,9 @@ def staircase(low: float, high: float, step: float, *, cycles: int = 1, samples_
 def triangle(low: float, high: float, *, cycles: int, samples_per_cycle: int) -> FloatArray:
     """Straight lines from low to high and back, sampled evenly.
 
-    Parameters
-    ----------
-    low, high : float
-        Extremes, both hit exactly [unit of u].
-    cycles : int
-        Number of rises and falls.
-    samples_per_cycle : int
-        Even number of samples of a cycle.
-
-    Returns
-    -------
-    array, shape (cycles * samples_per_cycle + 1,) [unit of u]
-        Starts and ends at low.
-
-    Raises
-    ------
-    ValueError
-        If high is not above low, `cycles` is below 1, or `samples_per_cycle` is odd or below 2.
+    `low` and `high` are both hit exactly [unit of u]. The result has shape (cycles * samples_per_cycle + 1,) [unit of
+    u], and starts and ends at low. A ValueError is raised if high is not above low, `cycles` is below 1, or
+    `samples_per_cycle` is odd or below 2.
 
     Examples
     --------

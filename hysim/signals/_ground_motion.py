@@ -101,8 +101,7 @@ def ground_motion(
 
     Examples
     --------
-    >>> import numpy as np
-    >>> import hysim as hs
+    >>> import numpy as np, hysim as hs
     >>> a = hs.signals.ground_motion(3.0, duration=20.0, sample_time=0.01, seed=1)
     >>> a.size, float(np.abs(a).max()), bool(abs(np.trapezoid(a, dx=0.01)) < 1e-12)
     (2001, 3.0, True)
@@ -168,11 +167,7 @@ def _envelope(name: str, time: FloatArray, rise: float, plateau: float, end: flo
 
 
 def _soil_motion(noise: FloatArray, sample_time: float, frequency: float, damping: float) -> FloatArray:
-    """Noise behind the filter of Kanai and Tajimi.
-
-    The response of the filter multiplies the spectrum of the noise: a recursion would bend it towards half the sampling
-    rate, where soil still moves.
-    """
+    """Noise behind the filter of Kanai and Tajimi, by its spectrum: a recursion would bend it at high frequencies."""
     from scipy.signal import freqs  # loading it takes longer than all other signals together
 
     viscous = 2.0 * damping * frequency

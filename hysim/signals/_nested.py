@@ -122,8 +122,6 @@ def extremes(
     >>> import hysim as hs
     >>> hs.signals.extremes([0.0, 1.0, 0.5], samples_per_line=2).tolist()
     [0.0, 0.5, 1.0, 0.75, 0.5]
-    >>> hs.signals.extremes([0.0, 1.0, 0.5], max_step=0.5).tolist()
-    [0.0, 0.5, 1.0, 0.5]
     """
     turns = read_only(levels, "levels", ndim=1)
     if turns.size < 2:

@@ -22,7 +22,6 @@ def checked_span(low: float, high: float) -> float:
 
 
 def checked_count(name: str, value: int) -> int:
-    """A whole number that is at least 1."""
     if operator.index(value) < 1:
         raise ValueError(f"{name} must be at least 1, got {value}")
     return value

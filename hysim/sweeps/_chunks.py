@@ -1,8 +1,7 @@
 """Chunks of tasks: how they are computed, the table of the rows that are done, and the seeds of tasks.
 
 A chunk is computed task by task, or through their batch form; failures are kept as rows. The values of a chunk are
-returned by their layout, the names and shapes of the tasks' outputs. A worker does not know which layout is that of the
-study.
+returned by their layout, the names and shapes of the tasks' outputs. A worker does not know that of the study.
 
 **Rows that are done.** The first task that succeeds, in the order of the study and not of time, sets the names and
 shapes of a row. A task that returns others has failed.
@@ -110,7 +109,6 @@ def _together(batch: Task, chunk: Chunk) -> Outcome:
 
 
 def part_of(chunk: Chunk, part: Any) -> Chunk:
-    """Some of the tasks of a chunk, by a slice or by numbers."""
     columns = {name: values[part] for name, values in chunk.columns.items()}
     return Chunk(chunk.places[part], columns, None if chunk.seeds is None else chunk.seeds[part])
 
@@ -125,7 +123,6 @@ def _joined(parts: list[Outcome]) -> Outcome:
 
 
 def _row(returned: Any) -> tuple[Layout, list[Any]]:
-    """Layout and values of what one task returned."""
     values = {name: value if type(value) is float else _numbers(name, value) for name, value in _named(returned)}
     layout = tuple((name, () if isinstance(value, float) else value.shape) for name, value in values.items())
     return layout, [*values.values()]
@@ -175,10 +172,7 @@ class Table:
         self._other_names = (*OWN_NAMES, *parameters)
 
     def judge(self, outcome: Outcome) -> Outcome:
-        """The outcome with the values of the study's layout, and an error for every task that returned another.
-
-        Until a task has succeeded, outcomes must be passed in the order of their places.
-        """
+        """The outcome in the study's layout, with an error for each task whose values have another layout."""
         if self.layout is None and outcome.groups:
             self.begin(min(outcome.groups, key=lambda group: int(group.places.min())).layout)
         errors, groups = dict(outcome.errors), []
@@ -198,13 +192,11 @@ class Table:
         self.layout = layout
 
     def restore(self, layout: Layout | None, outcome: Outcome) -> None:
-        """Enter the rows of a store."""
         if layout:
             self.begin(layout)
         self.enter(outcome)
 
     def enter(self, outcome: Outcome) -> None:
-        """Enter an outcome of `judge`."""
         for group in outcome.groups:
             for (name, _), column in zip(group.layout, group.columns, strict=True):
                 self.values[name][group.places] = column

@@ -142,24 +142,9 @@ class Sweep:
 
 
 def load_sweep(path: str | Path) -> Sweep:
-    """Read the store of a study that is finished, interrupted or still running.
+    """Read the rows in the `store` of a study by `sweep` that is finished, interrupted or still running.
 
-    Parameters
-    ----------
-    path : path
-        The argument `store` of `sweep`.
-
-    Returns
-    -------
-    Sweep
-        The rows that are in the store.
-
-    Raises
-    ------
-    OSError
-        If the store cannot be read.
-    ValueError
-        If the file is not a store.
+    Raises OSError if the store cannot be read, and ValueError if the file is not a store.
 
     Examples
     --------

@@ -37,7 +37,6 @@ class Space(NamedTuple):
 
     @property
     def n_tasks(self) -> int:
-        """Number of tasks."""
         return len(next(iter(self.columns.values())))
 
 

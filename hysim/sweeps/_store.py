@@ -74,7 +74,6 @@ class Study(NamedTuple):
 
     @property
     def columns(self) -> list[str]:
-        """Columns of parameters and of the outputs that are numbers."""
         outputs = [output.column for output in self.layout or () if not output.shape]
         return [*self.parameters.values(), *outputs]
 
@@ -166,7 +165,6 @@ class Store:
         self._tasks: list[Column] = []  # seeds and parameters of all tasks
 
     def begin(self, identity: Mapping[str, str], space: Space, seeds: Column, on_change: OnChange) -> None:
-        """Prepare the store for writing rows of this study, or refuse it."""
         self._tasks = [seeds, *space.columns.values()]
         self._database.execute("BEGIN IMMEDIATE")
         before = self._read()
@@ -180,7 +178,6 @@ class Store:
             self._remove_shards_without_rows(study)
 
     def space(self) -> Space:
-        """Parameters of the finished rows, and axes of the study."""
         study = self._study
         with damage_named(self.path):
             axes = {name: _as_column(values, study.kinds[name]) for name, values in study.axes or ()} or None
@@ -191,12 +188,10 @@ class Store:
 
     @property
     def n_tasks(self) -> int:
-        """Number of tasks that the study has, finished or not."""
         return self._study.n_tasks
 
     @property
     def seed(self) -> int:
-        """Seed of the study."""
         return int(self._study.identity["seed"])
 
     def layout(self) -> Layout | None:
@@ -204,7 +199,6 @@ class Store:
         return tuple((output.name, output.shape) for output in self._study.layout or ()) or None
 
     def finished(self) -> Outcome:
-        """All finished rows, in the order of the tasks."""
         with damage_named(self.path):
             places = np.array(self._column("task"), dtype=np.int64)
             if places.size and not 0 <= places[0] <= places[-1] < self.n_tasks:
@@ -267,7 +261,6 @@ class Store:
         return facts
 
     def _read(self) -> Study | None:
-        """The study that the store holds; None if it is new."""
         tables = [name for (name,) in self._database.execute("SELECT name FROM sqlite_master WHERE type = 'table'")]
         if not tables:
             return None
@@ -282,7 +275,6 @@ class Store:
         return facts
 
     def _is_continued(self, before: Mapping[str, str], now: Mapping[str, str], on_change: OnChange) -> bool:
-        """Whether the finished rows are kept."""
         changes = _changes(before, now)
         if not changes or on_change == "restart":
             return not changes
@@ -384,7 +376,6 @@ class Store:
 
     @staticmethod
     def _is_shard(name: str, study: Study) -> bool:
-        """Whether a file of this name is a shard of the study."""
         return re.fullmatch(rf"{study.shards}-[0-9]{{9,18}}\.npz", name) is not None
 
     def _refuse_arrays_of_others(self, before: Study | None) -> None:
@@ -404,15 +395,7 @@ class Store:
 
 @contextmanager
 def opened(path: str | Path, *, to_read: bool = False) -> Iterator[Store]:
-    """The store in a file, which is created if it is missing and to be written.
-
-    Raises
-    ------
-    OSError
-        If it cannot be opened, read or written, with the reason.
-    ValueError
-        If the file is not a store.
-    """
+    """The store in a file, created if missing and to be written; OSError with the reason, ValueError if it is none."""
     path = Path(path)
     if to_read and not path.is_file():
         raise FileNotFoundError(errno.ENOENT, os.strerror(errno.ENOENT), str(path))
@@ -441,7 +424,6 @@ def _built_in_errors(path: Path) -> Iterator[None]:
 
 
 def _changes(before: Mapping[str, str], now: Mapping[str, str]) -> dict[str, str]:
-    """Descriptions of the differences."""
     words = {name: f"the {name} was {before.get(name)} and is {value}" for name, value in now.items()}
     words["task"] = "the task's source or a value bound to it has changed"
     tasks = now["space"].rpartition(" (")[0]  # without the digest of the values
@@ -461,7 +443,6 @@ def _distinct(names: Iterable[str], taken: tuple[str, ...]) -> dict[str, str]:
 
 
 def _quoted(columns: Iterable[str]) -> str:
-    """Names in SQL's quotes, so that they may have any characters."""
     return ", ".join('"' + column.replace('"', '""') + '"' for column in columns)
 
 

@@ -217,8 +217,7 @@ def sweep(
         If the store holds a study with another task, space, seed or version of hysim: raise; keep the finished rows if
         space and seed are the same; or start again.
     progress : callable or False, optional
-        Called as ``progress(done, total)`` when rows are finished and written.
-        By default calls beyond 2 s report on the standard error; False turns this off.
+        Called as ``progress(done, total)`` when rows are finished and written; see `hysim.simulate`.
 
     Returns
     -------
@@ -286,7 +285,6 @@ class _Run:
         self.sent, self.largest, self.seconds_a_task = 0, 0, 0.0
 
     def run(self) -> None:
-        """Compute the remaining tasks, a bounded number of chunks at a time."""
         self._report()
         try:
             while self._send() or self.running:
@@ -319,7 +317,6 @@ class _Run:
             return lost
 
     def _size(self, remaining: int, number: int) -> int:
-        """Number of tasks in the next chunk."""
         if not self.largest:
             return 1
         has_arrays = any(shape for _, shape in self.table.layout or ())
@@ -374,7 +371,6 @@ class _Run:
         ) from error
 
     def _end(self, patience: float) -> None:
-        """Cancel chunks that have not begun, and wait so many seconds for the others."""
         for future in list(self.running):
             if future.cancel():
                 del self.running[future]

@@ -110,7 +110,6 @@ class StructureTask:
     measures: tuple[Any, ...]
 
     def __call__(self, **parameters: float) -> dict[str, Any]:
-        """The measures for one set of parameters."""
         return {name: values[0] for name, values in self.batch(**{k: [v] for k, v in parameters.items()}).items()}
 
     def batch(self, **parameters: npt.ArrayLike) -> dict[str, FloatArray]:

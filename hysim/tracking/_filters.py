@@ -8,8 +8,8 @@ Sigma points: mean and covariance of (theta, z) are carried by 2 n points at +- 
 by the step (the cubature rule; I. Arasaratnam and S. Haykin, IEEE Trans. Autom. Control 54 (2009) 1254). Where the
 errors of the last samples are too large for the noise, a number has jumped: the filter goes back to the first of them,
 raises the variances there, and comes again.
-Particles: many copies, weighted by how well they predict, and drawn anew from these weights; a few of them jump at each
-sample.
+
+Particles: many copies, weighted by how well they predict, and drawn anew by weight; a few of them jump at each sample.
 """
 
 import math
@@ -43,7 +43,6 @@ class Coordinates(NamedTuple):
         return np.where(self.log, np.exp(np.where(self.log, x, 0.0)), x)
 
     def spread(self, changes: FloatArray) -> FloatArray:
-        """Standard deviations of the coordinates for those of the values."""
         return np.where(self.log, changes / np.where(self.log, self.values, 1.0), changes)
 
 
@@ -71,21 +70,12 @@ def _must_be_positive(law: Law, name: str) -> bool:
 
 
 def _place(name: str) -> tuple[str, int]:
-    """Field of a number, and its place there."""
     field, _, place = name.partition("[")
     return field, int(place[:-1]) if place else 0
 
 
 class Copies:
-    """Copies of a law with other numbers, moved sample by sample.
-
-    Parameters
-    ----------
-    law : Law
-        The law; numbers that are not tracked are its own.
-    coordinates : Coordinates
-        The numbers that differ from copy to copy.
-    """
+    """Copies of a law, moved sample by sample, that differ in the numbers of their `coordinates`."""
 
     def __init__(self, law: Law, coordinates: Coordinates) -> None:
         self._law, self._coordinates = law, coordinates
@@ -97,7 +87,6 @@ class Copies:
         self._places = [_place(name) for name in coordinates.names]
 
     def begun(self, u0: float) -> FloatArray:
-        """The memory before a first sample at `u0`."""
         return np.array(self._law.state_at(u0))
 
     def moved(self, x: FloatArray, memory: FloatArray, before: float, u: float) -> FloatArray:

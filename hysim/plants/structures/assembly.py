@@ -27,10 +27,7 @@ OUTPUTS = (*OF_NODES, *OF_ELEMENTS)
 
 
 class Laws(NamedTuple):
-    """The laws of a structure; their steps are held here, since the kernel knows the addresses only.
-
-    Those that are `rated` depend on the rate of the drift.
-    """
+    """Laws of a structure, with their steps, which the kernel knows by address; `rated` ones depend on drift rates."""
 
     steppers: tuple[Startable, ...]
     stretches: tuple[tuple[tuple[int, int], ...], ...]
@@ -43,17 +40,14 @@ class Laws(NamedTuple):
 
     @property
     def parameters(self) -> FloatArray:
-        """Parameters of all laws, one behind the other."""
         return read_only(joined([each.parameters for each in self.steppers]), finite=False)
 
     @property
     def states(self) -> FloatArray:
-        """States of all laws before their start."""
         return read_only(joined([each.state for each in self.steppers]), finite=False)
 
     @property
     def starts(self) -> Any:
-        """Addresses of the starts."""
         return addresses([each.start for each in self.steppers], START)
 
     def slopes(self, parameters: FloatArray, states: FloatArray) -> FloatArray:
@@ -92,7 +86,6 @@ class Matrices(NamedTuple):
 
 
 def laws_of(models: Sequence[Any]) -> Laws:
-    """Steps and memories of laws."""
     rated = tuple(isinstance(model, Rated) for model in models)
     steppers = tuple(model.rated() if isinstance(model, Rated) else startable(model) for model in models)
     stretches = tuple(
@@ -103,7 +96,6 @@ def laws_of(models: Sequence[Any]) -> Laws:
 
 
 def elements_of(laws: Laws, rows: FloatArray, slopes: FloatArray) -> Elements:
-    """The elements as the kernel takes them."""
     nodes = [np.flatnonzero(row) for row in rows]
     begins = zip(laws.stretches, laws.state_ends, strict=False)
     stretches = [np.array([(begin + a, n) for a, n in each], dtype=np.int64).reshape(-1, 2) for each, begin in begins]
@@ -123,12 +115,10 @@ def elements_of(laws: Laws, rows: FloatArray, slopes: FloatArray) -> Elements:
 
 
 def joined(parts: Sequence[Any], kind: Any = np.float64) -> Any:
-    """Vectors one behind the other."""
     return np.concatenate([np.zeros(0, dtype=kind), *parts]).astype(kind)
 
 
 def ends(sizes: Sequence[int]) -> Any:
-    """Places at which parts of these sizes begin, and the end of the last one."""
     return np.concatenate([[0], np.cumsum(np.array(sizes, dtype=np.int64))]).astype(np.int64)
 
 
@@ -164,7 +154,6 @@ def steps_of(rate: float, sample_time: float, substeps: int | None, tolerance: f
 
 
 def empty_flows(halvings: int, m: int, n_loads: int, n_elements: int) -> tuple[FloatArray, FloatArray, Flows]:
-    """Room for `fill_structure`: two tables of its own, and the flows."""
     n_levels, n_free = halvings + 2, m + 2 * n_loads
     return (
         np.empty((n_levels, m, m)),
@@ -179,7 +168,6 @@ def empty_flows(halvings: int, m: int, n_loads: int, n_elements: int) -> tuple[F
 
 
 def flows_of(elements: Elements, plant: Plant, steps: Steps) -> Flows:
-    """The flows over the base step and its parts."""
     n_elements = elements.k0.size
     E, P, flows = empty_flows(steps.halvings, len(plant.A), len(plant.loads) - n_elements, n_elements)
     fill_structure(elements, plant.A, plant.loads, steps.rate, steps.sample_time / steps.base, E, P, flows)
@@ -187,7 +175,6 @@ def flows_of(elements: Elements, plant: Plant, steps: Steps) -> Flows:
 
 
 def empty_motion(m: int, n_state: int, n_elements: int, n_loads: int = 1, *, with_accelerations: bool = True) -> Motion:
-    """Room for what moves."""
     return Motion(
         x=np.zeros(m),
         laws=np.zeros(n_state),
@@ -200,18 +187,15 @@ def empty_motion(m: int, n_state: int, n_elements: int, n_loads: int = 1, *, wit
 
 
 def empty_tracks(n: int, motion: Motion, *, with_laws: bool = False) -> Tracks:
-    """Room for `n` samples."""
     x, carry, peaks, work = (np.empty((n, *part.shape)) for part in (motion.x, motion.carry, motion.peaks, motion.work))
     return Tracks(x, carry, peaks, work, np.empty((n if with_laws else 0, motion.laws.size)))
 
 
 def room_for(motion: Motion) -> Room:
-    """Room for the work of the kernel."""
     return make_room(motion.carry.shape[1], motion.x.size, motion.laws.size, motion.loads.size)
 
 
 def motion_at(elements: Elements, laws: Laws, x: FloatArray, n_loads: int) -> Motion:
-    """The motion at its start, every law at its first sample."""
     motion = empty_motion(len(x), laws.states.size, len(laws.steppers), n_loads)
     with np.errstate(all="ignore"):
         start_motion(elements, laws.starts, laws.states, read_only(x), motion)
@@ -321,7 +305,6 @@ class AssembledStructure:
 
     @cached_property
     def kernel_elements(self) -> Elements:
-        """The elements as the kernel takes them."""
         return elements_of(self.laws, self.drift_matrix, self.elastic_slopes)
 
     @property
@@ -354,10 +337,7 @@ class AssembledStructure:
         return len(self.elements) if signal in OF_ELEMENTS else self.n_nodes
 
     def periods(self) -> FloatArray:
-        """Periods of small motions at the start, the longest first, shape (n,) [s]; inf for a mass that is free.
-
-        Raises ValueError if the stiffness at the start is negative.
-        """
+        """Periods (n,) [s] of small motions at the start, longest first, inf if free; ValueError if one is unstable."""
         squares = eigh(self.initial_stiffness, self.mass_matrix, eigvals_only=True)
         if squares[0] < -1e-9 * np.abs(squares).max():
             raise ValueError("the stiffness at the start is negative: small motions have no periods")
@@ -365,10 +345,7 @@ class AssembledStructure:
             return np.asarray(2.0 * np.pi / np.sqrt(np.maximum(squares, 0.0)))
 
     def modes(self) -> FloatArray:
-        """Shapes of small motions at the start, one a column, in the order of `periods`, shape (n, n).
-
-        They have modal masses of one; the largest displacement of each is positive.
-        """
+        """Shapes (n, n) of small motions, one a column in the order of `periods`, with modal masses of one."""
         shapes = eigh(self.initial_stiffness, self.mass_matrix)[1]
         largest = shapes[np.abs(shapes).argmax(axis=0), np.arange(self.n_nodes)]
         return np.asarray(shapes * np.sign(largest))

@@ -82,7 +82,6 @@ def _values(structure: Any, given: Mapping[str, npt.ArrayLike] | npt.ArrayLike) 
 def _reduced(
     structure: Any, values: Mapping[str, FloatArray], u: FloatArray, n_sets: int, sample_time: float, reduce: Reduction
 ) -> FloatArray:
-    """The measure of each set, a row each."""
     laws, parameters, states, slopes, matrices = _stacked(structure, values, n_sets)
     A, loads, rates = assembly.linear_parts(matrices)
     n_elements, n = len(structure.elements), structure.n_nodes
@@ -160,7 +159,6 @@ def _matrices(structure: Any, numbers: Mapping[str, FloatArray], slopes: FloatAr
     one, rows, damping = np.eye(structure.n_nodes), structure.drift_matrix, structure.damping
 
     def scaled(name: str, value: FloatArray, matrix: FloatArray) -> FloatArray:
-        """A matrix for each set: by its number, or by a factor of the whole."""
         numbers_of = numbers.get(name)
         if numbers_of is None:
             return np.broadcast_to(matrix, (n_sets, *matrix.shape))

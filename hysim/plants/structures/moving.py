@@ -1,7 +1,4 @@
-"""The motion of a structure: the kernel's tables of its samples, and the signals that follow from them.
-
-In a loop the force is a controller's, held between samples.
-"""
+"""The motion of a structure: tables of its samples and the signals that follow; the force of a loop is held."""
 
 from collections.abc import Callable, Sequence
 from functools import cached_property
@@ -39,26 +36,12 @@ class MovingStructure(AssembledStructure):
     """A structure that moves sample by sample."""
 
     def response(self, u: npt.ArrayLike, sample_time: float) -> FloatArray:
-        """Output y at the samples of an input that is linear between them.
+        """Output (n_samples,) that `output` names, at the samples of an input that is linear between them.
 
-        Parameters
-        ----------
-        u : array, shape (n_samples,)
-            Acceleration of the base [m/s^2] or force [N]; at its first sample the structure has the initial state.
-        sample_time : float
-            Time between two samples [s].
-
-        Returns
-        -------
-        array, shape (n_samples,)
-            The signal that `output` names.
-
-        Raises
-        ------
-        SimulationError
-            If the motion diverges, or cannot be resolved; it names the time.
-        ValueError
-            If u is not finite or has not one axis, or the sample time is not positive.
+        `u` (n_samples,) is the acceleration of the base [m/s^2] or a force [N], whose samples are `sample_time` apart
+        [s]; at the first one the structure has its initial state. Raises SimulationError if the motion diverges or
+        cannot be resolved, with the time; ValueError if `u` is not finite or has not one axis, or the sample time is
+        not positive.
         """
         return self.signals(u, sample_time)["y"]
 
@@ -80,19 +63,7 @@ class MovingStructure(AssembledStructure):
         return self.advance(u, sample_time=sample_time)[0]
 
     def memories(self, u: npt.ArrayLike, sample_time: float) -> tuple[FloatArray, ...]:
-        """State of each element's law at the samples of `u`, its last input and its memory.
-
-        Parameters
-        ----------
-        u : array, shape (n_samples,)
-            As of `response`.
-        sample_time : float
-            [s]
-
-        Returns
-        -------
-        tuple of arrays, shape (n_samples, n_numbers)
-        """
+        """State of each element's law at the samples of `u`, (n_samples, n_numbers) each: last input and memory."""
         states = self._followed(read_only(u, "u", ndim=1), sample_time, None, None, with_laws=True)[1].laws
         ends = np.cumsum([each.state.size for each in self.laws.steppers])[:-1]
         parts = np.split(states, ends, axis=1) if self.elements else []
@@ -112,11 +83,7 @@ class MovingStructure(AssembledStructure):
         sample_time: float | None = None,
         progress: Callable[[int, int], None] | None = None,
     ) -> tuple[dict[str, FloatArray], StructureState]:
-        """As `signals`, continued from `state`, by default the initial one, and the state after the last sample.
-
-        The bits are those of one uncut input, which goes on from the state's, one sample before the first.
-        ``progress(done, total)`` is called now and then.
-        """
+        """As `signals`, continued from `state` with the bits of one input, and the state after the last sample."""
         inputs = read_only(u, "u", ndim=1)
         begun, tracks = self._followed(inputs, needed_time(self, sample_time), state, progress, with_laws=False)
         return self.signals_of(inputs, begun, tracks), begun
@@ -125,7 +92,6 @@ class MovingStructure(AssembledStructure):
         self, u: FloatArray, sample_time: float, state: StructureState | None,
         progress: Callable[[int, int], None] | None, *, with_laws: bool,
     ) -> tuple[StructureState, Tracks]:  # fmt: skip
-        """The state after the samples, and all of them."""
         positive_time(sample_time)
         before = state or self.start()
         motion = Motion(*(part.copy() for part in before.motion))
@@ -233,11 +199,7 @@ def moved(
 
 
 class Controlled(NamedTuple):
-    """Command before and after the controller's limits, output, each (n,), and all signals of the structure.
-
-    They are those just before each new command. `lost` is the first sample that is not finite, or -1; the signals are
-    empty then.
-    """
+    """Command before and after limits, output (n,), signals just before each new command; first `lost` sample or -1."""
 
     command: FloatArray
     drive: FloatArray
@@ -267,12 +229,10 @@ class ControlledStructure:
 
     @property
     def y0(self) -> float:
-        """The output at the start."""
         motion = self.begin.motion
         return float(self.weights @ np.concatenate([motion.x, motion.carry[0], [0.0]]))
 
     def run(self, controller: CompiledController, reference: FloatArray, progress: Progress | None) -> Controlled:
-        """The loop with a controller, whose state moves along."""
         n, motion = reference.size, Motion(*(part.copy() for part in self.begin.motion))
         (address,), follow = addresses([controller.step], CONTROLLER), assembly.follow_address()
         inputs = np.column_stack([reference] if self.ground is None else [reference, self.ground])

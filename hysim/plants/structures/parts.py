@@ -59,8 +59,7 @@ class Element:
     TypeError
         If the law cannot be stepped, or a node is not a whole number.
     ValueError
-        If not exactly one of `between` and `direction` is given, the nodes are the same or negative, or the direction
-        is zero.
+        If not exactly one of `between` and `direction` is given, nodes are equal or negative, or it is zero.
 
     Examples
     --------
@@ -174,24 +173,7 @@ class Rayleigh:
 
     @classmethod
     def at(cls, ratio: float, periods: tuple[float, float]) -> Self:
-        """Damping with a given ratio of modes at two periods.
-
-        Parameters
-        ----------
-        ratio : float
-            Share of the critical damping at both periods.
-        periods : (float, float)
-            [s]
-
-        Returns
-        -------
-        Rayleigh
-
-        Raises
-        ------
-        ValueError
-            If the ratio is negative, or the periods are not two positive and different ones.
-        """
+        """Damping with one ratio at two periods [s]; ValueError unless these are positive and different."""
         check_not_negative(ratio=ratio)
         if len(periods) != 2 or periods[0] == periods[1]:
             raise ValueError(f"periods must be two different ones, got {periods}")
@@ -233,10 +215,7 @@ class ModalDamping:
         object.__setattr__(self, "ratio", tuple(ratios.tolist()) if ratios.ndim else float(ratios))
 
     def matrix(self, mass: FloatArray, stiffness: FloatArray) -> FloatArray:
-        """The damping matrix, shape (n_nodes, n_nodes), or many of them for stacks of matrices.
-
-        Raises ValueError if the number of ratios is not that of the modes, or the stiffness is negative.
-        """
+        """The damping matrix (n_nodes, n_nodes), or a stack; ValueError for a wrong number of ratios."""
         if np.ndim(self.ratio) and len(self.ratio) != mass.shape[-1]:
             raise ValueError(f"ratio must hold one number for each of {mass.shape[-1]} modes, got {len(self.ratio)}")
         return modal_damping(np.asarray(self.ratio), mass, stiffness)
@@ -255,7 +234,6 @@ def modal_damping(ratios: FloatArray, mass: FloatArray, stiffness: FloatArray) -
 
 
 def scalars_of(structure: Any) -> dict[str, float]:
-    """Every number of a structure by name."""
     numbers: dict[str, float] = {}
     for name in MATRICES:
         numbers |= _numbers(name, vars(structure)[name])
@@ -268,10 +246,7 @@ def scalars_of(structure: Any) -> dict[str, float]:
 
 
 def assembled(structure: Any, parameters: Mapping[str, float]) -> Any:
-    """The structure with some numbers exchanged.
-
-    Raises ValueError if a name is unknown, or a constructor refuses a number.
-    """
+    """The structure with some numbers exchanged; ValueError if a name is unknown, or a constructor refuses a number."""
     others = expanded(structure.scalars, parameters)
     changes: dict[str, Any] = {}
     for name in MATRICES:
@@ -302,7 +277,6 @@ def expanded(scalars: Mapping[str, float], parameters: Mapping[str, float]) -> d
 
 
 def is_shared(name: str) -> bool:
-    """Whether a name is that of all elements."""
     return name.startswith(f"{_ELEMENTS}.{_ALL}.")
 
 
@@ -316,7 +290,6 @@ def sharing(scalars: Mapping[str, float], name: str) -> list[str]:
 
 
 def unknown(scalars: Mapping[str, float], name: str) -> ValueError:
-    """The error for a name that no number has."""
     return ValueError(f"the structure has no parameter {name!r}; its parameters are {_listed(scalars)}")
 
 
@@ -337,7 +310,6 @@ def _listed(scalars: Iterable[str]) -> str:
 
 
 def _numbers(name: str, value: Any) -> dict[str, float]:
-    """Numbers of the mass, the stiffness or the damping: itself or its factor, and those in it that have a name."""
     if isinstance(value, Rayleigh):
         return {name: 1.0, f"{name}.mass": value.mass, f"{name}.stiffness": value.stiffness}
     several = np.asarray(value.ratio if isinstance(value, ModalDamping) else value)
@@ -347,7 +319,6 @@ def _numbers(name: str, value: Any) -> dict[str, float]:
 
 
 def _changed(name: str, value: Any, numbers: Mapping[str, float]) -> Any:
-    """The mass, the stiffness or the damping with other numbers."""
     whole = numbers.get(name)
     if isinstance(value, Rayleigh):
         own = [numbers.get(f"{name}.{part}", vars(value)[part]) for part in ("mass", "stiffness")]

@@ -77,8 +77,7 @@ class StructureRecord:
 
     Examples
     --------
-    >>> import numpy as np
-    >>> import hysim as hs
+    >>> import numpy as np, hysim as hs
     >>> t = 0.01 * np.arange(100)
     >>> top = np.column_stack([np.full(100, np.nan), np.sin(t)])
     >>> hs.StructureRecord(t=t, u=np.cos(t), acceleration=top).sensors
@@ -154,7 +153,6 @@ class SensorRecord(Record):
 
     @property
     def input(self) -> FloatArray:
-        """The input once."""
         return self.u[: self.u.size // len(self.sensors)]
 
     def noise(self, residual: FloatArray) -> FloatArray:
@@ -170,12 +168,7 @@ class SensorRecord(Record):
 
 
 def laid(record: Record | StructureRecord, widths: Mapping[str, int], output: Sensor) -> SensorRecord:
-    """One output of all sensors, each in units of its rms.
-
-    `widths` are the numbers of columns that signals must have, `output` is the sensor of a plain record.
-
-    Raises ValueError if a signal has another number of columns.
-    """
+    """One output of all sensors, each in units of its rms; ValueError unless signals have `widths` columns."""
     if isinstance(record, Record):
         outputs: list[FloatArray] = [record.y]
         sensors: tuple[Sensor, ...] = (output,)
@@ -215,11 +208,7 @@ class SearchedStructure(MovingStructure, Identifiable):
         return {}
 
     def search_space(self, record: Record, freedom: Freedom = ALL_FREE) -> SearchSpace:
-        """The box around the numbers that are free, and where parts of the record say to begin.
-
-        Raises ValueError if no number is free, a name is unknown, the record has no time, or a number that is zero at
-        the start has no bounds.
-        """
+        """The box around the free numbers, and where parts of the record say to begin; ValueError if there is none."""
         if freedom.initial not in (None, "rest"):
             raise ValueError("a structure begins with its initial_state: leave initial out")
         if np.ptp(record.u) == 0.0:
@@ -326,16 +315,12 @@ class SearchedStructure(MovingStructure, Identifiable):
         return outputs
 
     def search_substeps(self, sample_time: float) -> int:
-        """Substeps of the simulations of a search."""
         if self.substeps is not None:
             return self.substeps
         return max(1, math.ceil(sample_time * self.fastest_rate / _PHASE))
 
     def as_records(self, records: Any) -> Any:
-        """Records of several sensors as such of one output; what is none is returned as it is.
-
-        Raises ValueError if a record has not the columns of this structure.
-        """
+        """Records of several sensors as records of one output, others unchanged; ValueError if columns do not fit."""
         several = [records] if isinstance(records, Record | StructureRecord) else records
         if not isinstance(several, Sequence) or not any(isinstance(each, StructureRecord) for each in several):
             return records

@@ -110,17 +110,14 @@ class _Columns:
         self.keep(drifts)
 
     def force(self, e: int, drift: float) -> float:
-        """Force of an element after a stroke from the last equilibrium."""
         law = self.members[e]
         law.state[self.places[e]] = self.saved[e]
         return float(law.step(law.parameters, law.state, drift))
 
     def forces(self, drifts: FloatArray) -> FloatArray:
-        """Forces of all elements."""
         return np.array([self.force(e, float(d)) for e, d in enumerate(drifts)])
 
     def tangents(self, drifts: FloatArray) -> FloatArray:
-        """Slopes of the forces at the end of strokes."""
         slopes = self.slopes.copy()
         for e, (drift, begin) in enumerate(zip(drifts, self.drifts, strict=True)):
             d = _DIFFERENCE * abs(drift - begin)
@@ -129,15 +126,12 @@ class _Columns:
         return slopes
 
     def keep(self, drifts: FloatArray) -> None:
-        """Move all laws to an equilibrium."""
         self.drifts = drifts
         self.forces(drifts)
         self.saved = [law.state[place] for law, place in zip(self.members, self.places, strict=True)]
 
 
 class _Push:
-    """A structure that is pushed along."""
-
     def __init__(self, structure: AssembledStructure, x: FloatArray, pattern: FloatArray, row: FloatArray) -> None:
         self.stiffness, self.rows = structure.stiffness_matrix, structure.drift_matrix
         self.slopes, self.pattern, self.row = structure.elastic_slopes, pattern, row
@@ -148,7 +142,6 @@ class _Push:
         self.now = self.balance(x, 0.0)
 
     def balance(self, x: FloatArray, factor: float) -> _Equilibrium:
-        """Displacements and loads with the forces, and how far these are from balance."""
         at = _Equilibrium(x, factor, self.columns.forces(self.rows @ x), 0.0)
         size = self.size(at)
         return at._replace(residual=float(np.abs(self.out_of_balance(at)).max()) / size) if size else at
@@ -159,7 +152,6 @@ class _Push:
         return max(self.largest, *(float(np.abs(part).max(initial=0.0)) for part in parts))
 
     def allowed(self, at: _Equilibrium) -> float:
-        """Largest residual of an equilibrium."""
         rounding, size = _ROUNDING * self.unit * float(np.abs(at.x).max()), self.size(at)
         return min(max(_ENOUGH, rounding / size), _WORST) if size else _ENOUGH
 
@@ -325,25 +317,14 @@ class Structure(SearchedStructure):
         self.matrices  # noqa: B018  # raises what its parts raise
 
     def assemble(self, parameters: Mapping[str, float]) -> "Structure":
-        """The structure with some numbers exchanged.
+        """The structure with some numbers exchanged, by their names in `scalars`.
 
-        Parameters
-        ----------
-        parameters : mapping
-            Names in `scalars` to numbers. ``"mass"``, ``"stiffness"`` and ``"damping"`` are the number itself, where
-            the argument is one or a `ModalDamping` of one ratio, and else a factor of the whole, 1 as it is; there
-            are ``"mass[0]"``, ``"damping[1]"`` of several, too, and ``"damping.mass"`` of a `Rayleigh`. The numbers
-            of laws have the laws' own names, ``"elements.0.thresholds[1]"``, those of sums the parts' labels,
-            ``"elements.0.bouc_wen.beta"``; ``"elements.*.beta"`` is one number for all elements with this name.
-
-        Returns
-        -------
-        Structure
-
-        Raises
-        ------
-        ValueError
-            If a name is unknown, or a constructor refuses a number.
+        ``"mass"``, ``"stiffness"`` and ``"damping"`` are the number itself, where the argument is one or a
+        `ModalDamping` of one ratio, and else a factor of the whole, 1 as it is; there are ``"mass[0]"``,
+        ``"damping[1]"`` of several, too, and ``"damping.mass"`` of a `Rayleigh`. The numbers of laws have the laws' own
+        names, ``"elements.0.thresholds[1]"``, those of sums the parts' labels, ``"elements.0.bouc_wen.beta"``;
+        ``"elements.*.beta"`` is one number for all elements with this name. A ValueError is raised if a name is
+        unknown, or a constructor refuses a number.
 
         Examples
         --------
@@ -487,7 +468,6 @@ class Structure(SearchedStructure):
         return self._pushed(pattern, at, lambda begin: strokes(turns, begin, steps))
 
     def _pushed(self, pattern: npt.ArrayLike | None, at: str, control: Callable[[float], FloatArray]) -> StaticResponse:
-        """Equilibria at the values of ``control(begin)``."""
         row = self._controlled(at)
         loads = row if pattern is None else read_only(pattern, "pattern", ndim=1)
         n, n_elements = self.n_nodes, len(self.elements)
@@ -526,7 +506,6 @@ class Structure(SearchedStructure):
 
 
 def _elements(values: Any) -> tuple[Element, ...]:
-    """The elements as a tuple."""
     members = (values,) if isinstance(values, Element) else tuple(values)
     for each in members:
         if not isinstance(each, Element):
