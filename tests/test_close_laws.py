@@ -1,4 +1,4 @@
-"""The laws that a search takes in place of two families: near zero by quadrature, with the same outputs."""
+"""The laws that a search takes in place of integrated ones: with the same outputs, at looser tolerances."""
 
 import numpy as np
 import pytest
@@ -37,16 +37,16 @@ def strokes():
 
 
 @pytest.mark.parametrize("of", LAWS)
-def test_near_zero_the_close_law_has_the_output_of_the_law(of):
+def test_the_close_law_has_the_output_of_the_law(of):
     law, sets = LAWS[of]
     y, close = (type(each).responses(sets, strokes(), workers=1) for each in (law, law.close()))
     is_finite = np.isfinite(y).all(axis=1)
     assert np.array_equal(np.isfinite(close).all(axis=1), is_finite)
     assert is_finite.sum() > N_LAWS // 2
     error = np.abs(close[is_finite] - y[is_finite]).max(axis=1) / np.ptp(y[is_finite], axis=1)
-    # Each stretch is good to 1e-9, of which a law that pinches and grows keeps some hundreds.
-    assert 0.0 < error.max() < 1e-6
-    assert np.median(error) < 1e-8
+    # Each step leaves out 1e-8, of which a law that pinches and grows keeps some hundreds.
+    assert 0.0 < error.max() < 1e-5
+    assert np.median(error) < 1e-7
 
 
 def test_the_rough_law_with_a_ramp_is_near_the_law():
@@ -55,7 +55,7 @@ def test_the_rough_law_with_a_ramp_is_near_the_law():
     both = np.isfinite(y).all(axis=1) & np.isfinite(rough).all(axis=1)
     assert both.sum() > N_LAWS // 2
     error = np.abs(rough[both] - y[both]).max(axis=1) / np.ptp(y[both], axis=1)
-    # third-order steps of a quarter of the yield memory: a hundredth of it where most strokes cross zero
+    # steps that leave out 1e-4 of the memory
     assert 0.0 < np.median(error) < 0.03
 
 

@@ -161,13 +161,13 @@ def test_a_polish_takes_the_law_itself_only_for_the_costs_of_its_ends(monkeypatc
     pack, taken = hs.BoucWenBaberNoori.pack.__func__, Counter()
 
     def counted(cls, tables):
-        taken[cls.__name__] += len(tables["n"])
+        taken[cls.tolerance] += len(tables["n"])
         return pack(cls, tables)
 
     monkeypatch.setattr(hs.BoucWenBaberNoori, "pack", classmethod(counted))
     assert len(polish(worn, starts)) == len(starts)
-    assert taken["BoucWenBaberNoori"] == len(starts)
-    assert min(taken["_CloseBaberNoori"], taken["_RoughBaberNoori"]) > 10 * len(starts)
+    assert taken[hs.BoucWenBaberNoori.tolerance] == len(starts)
+    assert min(taken[1e-8], taken[1e-4]) > 10 * len(starts)
 
 
 def test_the_close_law_of_a_search_has_the_output_of_the_law():
@@ -176,8 +176,8 @@ def test_the_close_law_of_a_search_has_the_output_of_the_law():
         for n in (0.5, 1.0, 2.0, 1.4):
             law = hs.BoucWenBaberNoori(beta=0.4, gamma=0.3, n=n, **own)
             y = law.response(u)
-            # series that leave out 1e-9 of the memory, some hundreds of times
-            assert 0.0 < np.abs(law.close().response(u) - y).max() <= 1e-7 * np.ptp(y)
+            # steps that leave out 1e-8 of the memory, some hundreds of times
+            assert 0.0 < np.abs(law.close().response(u) - y).max() <= 1e-5 * np.ptp(y)
     held = next(iter(hs.BoucWenBaberNoori.candidates().values()))
     assert held.close().close() == held.close() != held
     assert hs.BoucWen().close() == hs.BoucWen()
@@ -193,5 +193,5 @@ def test_the_rough_law_of_a_search_is_near_the_law():
         for n in (1.0, 2.0, 1.4):
             law = hs.BoucWenBaberNoori(beta=0.4, gamma=0.3, n=n, **own)
             y = law.response(u)
-            # frozen energy and third-order steps of a quarter of the yield memory: a few parts in a thousand
+            # steps that leave out 1e-4 of the memory, some hundreds of times
             assert np.abs(law.rough().response(u) - y).max() <= 0.02 * np.ptp(y)

@@ -20,8 +20,7 @@ from typing import Any, NamedTuple, Protocol
 import numpy as np
 from numba.core.dispatcher import Dispatcher
 
-from hysim.kernels._compile import sources
-from hysim.kernels.stepping import Addressed
+from hysim.kernels.stepping import Addressed, sources
 
 HELPERS = MappingProxyType(
     {

@@ -21,6 +21,9 @@ from hysim.kernels._compile import Addressed as Addressed
 from hysim.kernels._compile import borrowed as borrowed
 from hysim.kernels._compile import by_address as by_address
 from hysim.kernels._compile import closure, signed_closure, signed_kernel
+from hysim.kernels._compile import inlined_kernel as inlined_kernel
+from hysim.kernels._compile import sources as sources
+from hysim.kernels._compile import unstored as unstored
 
 VECTOR = types.Array(float64, 1, "C")
 CONSTANTS = types.Array(float64, 1, "C", readonly=True)

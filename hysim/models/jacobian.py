@@ -80,7 +80,8 @@ class Jacobian:
         return self.summary()
 
 
-def response_jacobian(law: Any, u: Any, names: Iterable[str] | None = None) -> Jacobian:
+def response_jacobian(law: Any, u: Any, names: Iterable[str] | None, fine: Any) -> Jacobian:
+    """As `hysim.Law.response_jacobian`; `fine` is the law as the differences take it."""
     inputs = read_only(u, "u", ndim=1)
     if isinstance(names, str):
         raise TypeError(f"names must be a sequence of names, got the string {names!r}")
@@ -92,8 +93,8 @@ def response_jacobian(law: Any, u: Any, names: Iterable[str] | None = None) -> J
     if impossible and names is not None:
         raise ValueError(f"the output of this {type(law).__name__} has no derivative by {', '.join(impossible)} here")
     asked = tuple(name for name in asked if name not in impossible)
-    y = law.response(inputs)
-    columns = [_column(law, name, inputs, y, *steps[name]) for name in asked] if y.size else []
+    y, near = law.response(inputs), fine.response(inputs)
+    columns = [_column(fine, name, inputs, near, *steps[name]) for name in asked] if y.size else []
     matrix = np.column_stack(columns) if columns else np.zeros((y.size, len(asked)))
     return Jacobian(names=asked, matrix=matrix, response=y)
 

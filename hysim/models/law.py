@@ -44,6 +44,7 @@ State = tuple[float, ...]
 
 _AHEAD = 4  # runs through the turning points before the search for a steady memory
 _EXACT = 1e-12  # of the range: what a step along a branch leaves out,
+_FINEST = 1e-14  # in differences,
 _ROUGH = 1e-4  # in the first steps of a search, which rank points,
 _CLOSE = 1e-8  # and in its later ones, whose differences over 1e-6 of the box are still slopes
 _FEW = 0.5  # of the samples: more turning points are those of noise
@@ -343,7 +344,7 @@ class Law(Placed, ABC):
         """
         from hysim.models.jacobian import response_jacobian  # loaded where it is needed
 
-        return response_jacobian(self, u, names)
+        return response_jacobian(self, u, names, self._known_to(_FINEST))
 
     def memory(self, u: npt.ArrayLike) -> FloatArray:
         """Memory at the samples of `u`; parameters and errors as in `response`.
@@ -573,11 +574,15 @@ class Law(Placed, ABC):
 
     def rough(self) -> "Law":
         """A law with nearly the same output, for the first steps of a search; itself where that is cheap enough."""
-        return _loose(type(self), _ROUGH)(**self.arguments) if self.hidden else self
+        return self._known_to(_ROUGH)
 
     def close(self) -> "Law":
         """A law with the same output to what a search can tell, cheaper to compute; itself where there is none."""
-        return _loose(type(self), _CLOSE)(**self.arguments) if self.hidden else self
+        return self._known_to(_CLOSE)
+
+    def _known_to(self, tolerance: float) -> "Law":
+        known = not self.hidden or self.tolerance == tolerance
+        return self if known else _with_tolerance(type(self), tolerance)(**self.arguments)
 
     def regressors(self, parameters: Parameters, record: Record) -> FloatArray:
         """Columns in which the output is affine, and the rest of it, shape (n_sets, n_samples, n_columns + 1)."""
@@ -713,9 +718,9 @@ class Law(Placed, ABC):
 
 
 @lru_cache(maxsize=256)
-def _loose(family: type[Law], tolerance: float) -> type[Law]:
-    """The family with the tolerance of a search."""
-    return type(f"Loose{family.__name__}", (family,), {"tolerance": tolerance})
+def _with_tolerance(family: type[Law], tolerance: float) -> type[Law]:
+    """The family with another tolerance of its integrator."""
+    return type(family.__name__, (family,), {"tolerance": tolerance})
 
 
 def _first(u: FloatArray) -> float:

@@ -12,7 +12,7 @@ from collections.abc import Callable, Mapping
 from typing import Any
 
 from hysim._basics.frozen import FloatArray
-from hysim.kernels._compile import sources, unstored
+from hysim.kernels.stepping import sources, unstored
 
 _TEXT = """\
 def rates(p: FloatArray, x: FloatArray, u: float, s: float, out: FloatArray) -> None:
@@ -56,8 +56,9 @@ def step_of(cls: Any) -> tuple[Callable[[FloatArray, FloatArray, float], float],
 
     n = cls.hidden
     names: dict[str, Any] = {"FloatArray": FloatArray, "math": math, "LARGEST": LARGEST, "MAX_STEPS": MAX_STEPS}
-    for name in ("slope", "output", "longest", "flows", "flow"):
-        if (function := getattr(cls, name)) is not None:
+    said = {"slope": cls.slope, "output": cls.output, "longest": cls.longest, "flows": cls.flows, "flow": cls.flow}
+    for name, function in said.items():
+        if function is not None:
             tree = _parsed(inspect.getsource(function))
             _Places(tree.args.args[0].arg, constants_of(cls)).visit(tree)
             names[name] = unstored(_defined(tree, function, f"{cls.__qualname__}.{name}", {**function.__globals__}))

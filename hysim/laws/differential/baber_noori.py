@@ -12,8 +12,8 @@ import numpy as np
 import numpy.typing as npt
 
 from hysim._basics.frozen import FloatArray
-from hysim.kernels._compile import inlined_kernel
 from hysim.kernels.elementary import power
+from hysim.kernels.stepping import inlined_kernel
 from hysim.laws.differential import _boucwen_search, _wear_search
 from hysim.laws.differential._memory_law import MemoryLaw
 from hysim.laws.differential.boucwen import BoucWen
