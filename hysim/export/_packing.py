@@ -155,7 +155,9 @@ class Traced(np.ndarray[Any, np.dtype[np.object_]]):
             return _plain(self).astype(kind)
         if kind == np.float64:
             return self
-        return _elementwise(_recorder("single" if kind == np.float32 else "trunc"), (self,))
+        if kind.kind == "f":
+            raise UntraceableError(_names((self,)))
+        return _elementwise(_recorder("trunc"), (self,))
 
 
 def traced(number: Symbol) -> FloatArray:
@@ -167,7 +169,7 @@ def traced(number: Symbol) -> FloatArray:
 
 _UFUNCS: dict[np.ufunc, str] = {
     **{each.evaluate: name for name, each in OPERATIONS.items() if isinstance(each.evaluate, np.ufunc)},
-    **{np.ldexp: "ldexp", np.bitwise_and: "logical_and", np.bitwise_or: "logical_or", np.invert: "logical_not"},
+    **{np.bitwise_and: "logical_and", np.bitwise_or: "logical_or", np.invert: "logical_not"},
 }
 _POWERS = {1.0: "", 2.0: "square", 0.5: "sqrt", -1.0: "reciprocal"}
 """How numpy computes the power of an array to a plain number."""
@@ -175,9 +177,6 @@ _POWERS = {1.0: "", 2.0: "square", 0.5: "sqrt", -1.0: "reciprocal"}
 
 def _called(ufunc: np.ufunc, inputs: tuple[Any, ...]) -> Any:
     """The result of a function on arrays element by element, at least one of them with symbols."""
-    if ufunc is np.frexp:
-        exponents = _elementwise(_recorder("exponent"), inputs)
-        return np.ldexp(inputs[0], -exponents), exponents
     if ufunc is np.power and isinstance(inputs[1], (int, float)) and (name := _POWERS.get(inputs[1])) is not None:
         return _elementwise(_recorder(name), inputs[:1]) if name else inputs[0]
     if ufunc not in _UFUNCS:

@@ -38,14 +38,9 @@ OPERATIONS: dict[str, Operation] = {
     "reciprocal": Operation(np.reciprocal, "(1.0 / {0})"),
     "power": Operation(np.power, "pow({0}, {1})"),
     "absolute": Operation(np.absolute, "fabs({0})"),
-    "exp2": Operation(np.exp2, "@exp2({0})"),
-    "rint": Operation(np.rint, "@rounded({0})"),
     "sign": Operation(np.sign, "({0} > 0.0 ? 1.0 : {0} < 0.0 ? -1.0 : {0} == 0.0 ? 0.0 : {0})"),
     "maximum": Operation(np.maximum, "@larger({0}, {1})"),
     "minimum": Operation(np.minimum, "@smaller({0}, {1})"),
-    "single": Operation(np.float32, "@single({0})"),
-    "exponent": Operation(lambda x: np.float64(np.frexp(x)[1]), "@exponent({0})"),
-    "ldexp": Operation(lambda x, k: np.ldexp(x, np.int32(k)), "@scaled({0}, {1})"),
     "gammainc": Operation(gammainc, "@gamma_share({0}, {1})"),
     "isfinite": Operation(np.isfinite, "(fabs({0}) < INFINITY)"),
     "isinf": Operation(np.isinf, "({0} - {0} != 0.0 && {0} == {0})"),
@@ -224,32 +219,13 @@ static double @gamma_share(double a, double x)
 HELPERS: Mapping[str, str] = {
     "larger": "static double @larger(double a, double b)\n{\n    return a >= b || a != a ? a : b;\n}\n",
     "smaller": "static double @smaller(double a, double b)\n{\n    return a <= b || a != a ? a : b;\n}\n",
-    "exp2": "static double @exp2(double x)\n{\n    return exp2(x);\n}\n",
-    "rounded": "static double @rounded(double x)\n{\n    return rint(x);\n}\n",
-    "single": "static double @single(double x)\n{\n    return (double)(float)x;\n}\n",
     "is_negative": "static int @is_negative(double x)\n{\n    return copysign(1.0, x) < 0.0;\n}\n",
-    "exponent": "static double @exponent(double x)\n{\n    int k = 0;\n    (void)frexp(x, &k);\n    return k;\n}\n",
-    "scaled": "static double @scaled(double x, double k)\n{\n"
-    "    return ldexp(x, k > 10000.0 ? 10000 : k > -10000.0 ? (int)k : -10000);\n}\n",
     "gamma_share": _GAMMA_SHARE,
 }
 """Functions that the texts of operations call."""
 
 _JS_HELPERS: Mapping[str, str] = {
-    "exp2": "const @exp2 = (x) => Math.pow(2.0, x);\n",
-    "rounded": "function @rounded(x) {\n    const low = Math.floor(x), part = x - low;\n"
-    "    return part < 0.5 || (part === 0.5 && low % 2.0 === 0.0) || !Number.isFinite(x) ? "
-    "(part < 0.5 ? low : Number.isFinite(x) ? low : x) : low + 1.0;\n}\n",
-    "single": "const @single = Math.fround;\n",
     "is_negative": "const @is_negative = (x) => x < 0.0 || 1.0 / x < 0.0;\n",
-    "exponent": "function @exponent(x) {\n    if (x === 0.0 || !Number.isFinite(x)) return 0.0;\n"
-    "    let size = Math.abs(x), k = 0.0;\n"
-    "    while (size >= 1.0) { size *= 0.5; k += 1.0; }\n"
-    "    while (size < 0.5) { size *= 2.0; k -= 1.0; }\n    return k;\n}\n",
-    "scaled": "function @scaled(x, k) {\n    let left = Math.max(-4000.0, Math.min(4000.0, k));\n"
-    "    while (left > 1000.0) { x *= 2.0 ** 1000.0; left -= 1000.0; }\n"
-    "    while (left < -1000.0) { x *= 2.0 ** -1000.0; left += 1000.0; }\n"
-    "    return x * 2.0 ** left;\n}\n",
 }
 """Those that JavaScript has no words for in common with C."""
 

@@ -12,6 +12,7 @@ from collections.abc import Callable, Mapping
 from typing import Any
 
 from hysim._basics.frozen import FloatArray
+from hysim._names import meant
 from hysim.kernels.stepping import sources, unstored
 
 _TEXT = """\
@@ -59,8 +60,13 @@ def step_of(cls: Any) -> tuple[Callable[[FloatArray, FloatArray, float], float],
     said = {"slope": cls.slope, "output": cls.output, "longest": cls.longest, "flows": cls.flows, "flow": cls.flow}
     for name, function in said.items():
         if function is not None:
-            tree = _parsed(inspect.getsource(function))
-            _Places(tree.args.args[0].arg, constants_of(cls)).visit(tree)
+            try:
+                tree = _parsed(inspect.getsource(function))
+            except OSError:
+                raise TypeError(
+                    f"the source of the {name} of {cls.__name__} cannot be read: define it in a file or a notebook"
+                ) from None
+            _Places(cls.__name__, tree.args.args[0].arg, constants_of(cls)).visit(tree)
             names[name] = unstored(_defined(tree, function, f"{cls.__qualname__}.{name}", {**function.__globals__}))
     states = ", ".join(f"x[{i}]" for i in range(n))
     text = _TEXT.format(
@@ -79,12 +85,14 @@ def step_of(cls: Any) -> tuple[Callable[[FloatArray, FloatArray, float], float],
 class _Places(ast.NodeTransformer):
     """Writes places of a vector for the attributes of the parameters; a tuple is the rest of the vector."""
 
-    def __init__(self, vector: str, constants: Mapping[str, bool]) -> None:
-        self.vector, self.is_tuple, self.names = vector, constants, list(constants)
+    def __init__(self, family: str, vector: str, constants: Mapping[str, bool]) -> None:
+        self.family, self.vector, self.is_tuple, self.names = family, vector, constants, list(constants)
 
     def visit_Attribute(self, node: ast.Attribute) -> ast.expr:
         if not (isinstance(node.value, ast.Name) and node.value.id == self.vector):
             return node
+        if node.attr not in self.names:
+            raise TypeError(f"{self.family} has no parameter {node.attr!r}{meant(node.attr, self.names)}")
         place: ast.expr = ast.Constant(self.names.index(node.attr))
         return ast.Subscript(node.value, ast.Slice(place) if self.is_tuple[node.attr] else place, ast.Load())
 
