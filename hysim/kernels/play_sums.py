@@ -14,7 +14,7 @@ the last input and the positions.
 
 import math
 
-from numba import float64, types, void
+from numba import void
 
 from hysim._basics.frozen import FloatArray
 from hysim.kernels._compile import borrowed, inlined, inner, kernel, signed_kernel
@@ -173,15 +173,6 @@ def inverse_step(parameters: FloatArray, state: FloatArray, y: float) -> float:
         output = step(own, law, end)
         state[0], state[1] = end, y if end == u else output
     return float(u)
-
-
-@signed_kernel(void(CONSTANTS, VECTOR, CONSTANTS, types.Array(float64, 2, "C")))
-def positions(parameters: FloatArray, state: FloatArray, u: FloatArray, out: FloatArray) -> None:
-    """Positions of the plays at the samples of `u` into `out`, shape (n_samples, n_plays)."""
-    for k in range(u.size):
-        step(parameters, state, u[k])
-        for i in range(state.size - 1):
-            out[k, i] = state[1 + i]
 
 
 @signed_kernel(void(CONSTANTS, VECTOR, CONSTANTS, CONSTANTS, VECTOR))

@@ -37,12 +37,10 @@ import numpy.typing as npt
 from hysim._basics.frozen import FloatArray, check_whole, checked, read_only
 from hysim._basics.parallel import in_pieces
 from hysim.kernels import preisach as kernels
-from hysim.laws.operators._clamp_search import TURN, runs_clockwise, variants_of_sign
+from hysim.laws.operators._bank_search import TURN, SignedStructure, check_increasing, table_of
 from hysim.models.by_structure import ByStructure
-from hysim.models.composable import Composable
 from hysim.models.law import Law, Packed, State
 from hysim.models.parameters import Coordinate, space_of, spans
-from hysim.models.protocols import Identifiable, Variant
 from hysim.models.search_space import ALL_FREE, Freedom, Parameters, SearchSpace
 from hysim.models.tables import Tables
 from hysim.records import Record
@@ -54,7 +52,7 @@ _NOTHING = np.array([[0.0, 1.0]]), np.array([[0.0]])  # levels and weights of a 
 
 
 @checked
-class PreisachStructure(Identifiable, Composable):
+class PreisachStructure(SignedStructure):
     """A bank of relays to be identified; see `Preisach.structure`."""
 
     law: type[Law]
@@ -94,7 +92,7 @@ class PreisachStructure(Identifiable, Composable):
 
     def regressors(self, parameters: Parameters, record: Record) -> FloatArray:
         """The output of each relay of weight 1, then 1 and 0."""
-        levels, z0 = _table("levels", parameters)[0], _memory(parameters)
+        levels, z0 = table_of("levels", parameters)[0], _memory(parameters)
         relays = np.eye(_n_weights(levels))
         sets = {"levels": levels, "weights": np.tile(relays, (len(z0), 1)), "z0": np.repeat(z0, len(relays), axis=0)}
         outputs = self.law.responses(sets, record.u).reshape(len(z0), len(relays), -1).transpose(0, 2, 1)
@@ -104,13 +102,13 @@ class PreisachStructure(Identifiable, Composable):
     def steady(self, parameters: Parameters, record: Record) -> dict[str, Any]:
         """The parameters with the memory after one run through the record, which erases what was before it."""
         shape = np.broadcast_shapes(*map(np.shape, parameters.values()))
-        levels = _table("levels", parameters)[0]
+        levels = table_of("levels", parameters)[0]
         extremes = self._law(levels, np.zeros(_n_weights(levels))).advance(record.u)[1][1:]
         return {**parameters} | {f"z0[{k}]": np.full(shape, value)[()] for k, value in enumerate(extremes)}
 
     def assemble(self, parameters: Mapping[str, float]) -> Any:
         """The law with these parameters, one number for each name."""
-        levels, weights = (_table(name, parameters)[0] for name in ("levels", "weights"))
+        levels, weights = (table_of(name, parameters)[0] for name in ("levels", "weights"))
         past = [value for value in _memory(parameters)[0].tolist() if value > levels[0]]
         return self._law(levels, weights, offset=parameters["offset"], z0=tuple(past))
 
@@ -126,10 +124,6 @@ class PreisachStructure(Identifiable, Composable):
         """All relays down, after the cycle, or after one former turning point."""
         return "rest", "periodic", "free"
 
-    def variants(self) -> tuple[Variant, ...]:
-        """Weights of one sign, of that of the record's loop or the other, or of both."""
-        return variants_of_sign(self, self.one_signed)
-
     def _levels(self, record: Record) -> FloatArray:
         """The structure's own, or even steps over the span of the input."""
         if self.levels:
@@ -143,7 +137,7 @@ class PreisachStructure(Identifiable, Composable):
         columns = np.concatenate([*self.regressors(parameters, record)])[:, :-1]
         _, factor = np.linalg.qr(np.column_stack([columns, np.resize(record.y, len(columns))]))
         relays, goal = np.split(factor, [columns.shape[1]], axis=1)
-        rows, lower = np.tril_indices(len(_table("levels", parameters)[0]) - 1)
+        rows, lower = np.tril_indices(len(table_of("levels", parameters)[0]) - 1)
         nearest = np.lexsort((rows, rows - lower))
         if np.linalg.matrix_rank(relays) == relays.shape[1]:
             return ()
@@ -157,11 +151,9 @@ class PreisachStructure(Identifiable, Composable):
 
     def _signs(self, record: Record, n: int) -> dict[str, tuple[float, float]]:
         """Bounds at zero of the weights off the diagonal."""
-        if self.one_signed is False:
-            return {}
-        side = (-np.inf, 0.0) if runs_clockwise(record) != self.against else (0.0, np.inf)
-        rows, columns = np.tril_indices(n)
-        return {f"weights[{k}]": side for k in np.flatnonzero(rows > columns).tolist()}
+        side, (rows, columns) = self.side(record), np.tril_indices(n)
+        off = np.flatnonzero(rows > columns).tolist()
+        return {f"weights[{k}]": side for k in off if side is not None}
 
 
 def check_relays(levels: FloatArray, weights: FloatArray) -> None:
@@ -171,24 +163,16 @@ def check_relays(levels: FloatArray, weights: FloatArray) -> None:
         raise ValueError(
             f"levels and weights must be N + 1 and N (N + 1) / 2 numbers, got {levels.shape[1]} and {weights.shape[1]}"
         )
-    if not (np.diff(levels) > 0.0).all():
-        raise ValueError(f"levels must increase, got {levels[0].tolist() if len(levels) == 1 else levels}")
+    check_increasing("levels", levels)
 
 
 def _n_weights(levels: FloatArray) -> int:
     return levels.size * (levels.size - 1) // 2
 
 
-def _table(what: str, parameters: Parameters) -> FloatArray:
-    """The numbers of a tuple over the sets, shape (n_sets, length)."""
-    count = sum(name.startswith(f"{what}[") for name in parameters)
-    columns = np.broadcast_arrays(*(np.ravel(parameters[f"{what}[{k}]"]) for k in range(count)))
-    return np.stack(columns, axis=1)
-
-
 def _memory(parameters: Parameters) -> FloatArray:
     """Inputs before the first sample, shape (n_sets, n_past)."""
-    return _table("z0", parameters) if "z0[0]" in parameters else np.reshape(parameters[TURN], (-1, 1))
+    return table_of("z0", parameters) if "z0[0]" in parameters else np.reshape(parameters[TURN], (-1, 1))
 
 
 def _support(columns: FloatArray, goal: FloatArray, bounds: list[tuple[float, float]]) -> npt.NDArray[np.bool_]:
@@ -238,17 +222,14 @@ class RelayLaw(ByStructure, Law):
     def pack(cls, tables: Tables) -> Packed:
         """Parameters and state as `hysim.kernels.preisach.step` takes them, after the inputs z0."""
         parameters = cls._rows(tables["levels"], tables["weights"], tables["offset"][:, 0])
-        n_sets, n_past = len(parameters), tables["z0"].shape[1]
-        if not n_past:
-            lowest, low = parameters[:, kernels.HEAD : kernels.HEAD + 1], parameters[:, 1:2]
-            rest = np.zeros((n_sets, _ROOM - 1))
-            return Packed(parameters, np.concatenate([np.zeros((n_sets, 2)), lowest, rest, low, rest], axis=1))
-        memory = np.zeros((n_sets, 2 + 2 * _ROOM))
-        numbers, past = (np.asarray(table, dtype=float) for table in (parameters, tables["z0"]))
-        for state, row, inputs in zip(memory, numbers, past, strict=True):
-            state[2], state[2 + _ROOM] = row[kernels.HEAD], row[1]
-            for u in inputs.tolist():
-                kernels.step(read_only(row), state, u)
+        lowest, low = parameters[:, kernels.HEAD : kernels.HEAD + 1], parameters[:, 1:2]
+        rest = np.zeros((len(parameters), _ROOM - 1))
+        memory = np.concatenate([rest[:, :2], lowest, rest, low, rest], axis=1)
+        if tables["z0"].shape[1]:
+            memory = np.asarray(memory, dtype=float)
+            for state, row, past in zip(memory, read_only(parameters), tables["z0"], strict=True):
+                for u in past:
+                    kernels.step(row, state, float(u))
         return Packed(parameters, memory)
 
     @property

@@ -1,43 +1,66 @@
-"""Laws of plays and stops.
+"""Banks of plays and stops: what their families share.
 
     z_i(k) = min(max(z_i(k-1), u_k - r_i), u_k + r_i)
     y      = offset + feedthrough u + sum_i w_i z_i              plays
     y      = offset + feedthrough u + sum_i w_i (u - z_i)        stops
 
 The positions z_i are the memory; z0 is where they stand before the first sample, which pushes them like any other. A
-stop is a play of the negative weight beside a line, so that with c = feedthrough + sum w_i for stops every law is
+stop is a play of the negative weight beside a line, so that with c = feedthrough + sum w_i for stops every law of
+`Clamps` is
 
     y = offset + c u + sum_i v_i z_i,    v_i = w_i or -w_i
 """
 
+from dataclasses import replace
 from typing import Any, ClassVar
 
 import numpy as np
 import numpy.typing as npt
 
-from hysim._basics.frozen import FloatArray, items, read_only
+from hysim._basics.frozen import FloatArray, items, own_items, read_only
 from hysim.kernels import clamps as kernels
 from hysim.laws.differential.limit_cycle import LimitCycle
+from hysim.laws.operators._bank_search import BankStructure, check_elements, pushed_by_rows
+from hysim.models.by_structure import ByStructure
 from hysim.models.law import Law, Packed
 from hysim.models.protocols import CompiledLaw
-from hysim.models.tables import Tables
+from hysim.models.search_space import Parameters
+from hysim.models.tables import Tables, check_signs, table_of_one
+from hysim.records import Record
 
 
-class Bank(Law):
-    """Plays or stops; a law says what its thresholds and weights are called, and adds its fields."""
+class Elements:
+    """One play or stop, or several; a family says what its thresholds and weights are called."""
 
     thresholds_name: ClassVar[str] = "thresholds"
     weights_name: ClassVar[str] = "weights"
     stops: ClassVar[bool] = False
-    bank: ClassVar[bool] = True  # whether thresholds, weights and z0 are tuples
-    ordered: ClassVar[bool] = False  # whether the thresholds must increase
-    offset: float
-    z0: Any
+
+    @property
+    def elements(self) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Thresholds, weights and initial positions, shape (n_plays,) each."""
+        own, names = items(self), (self.thresholds_name, self.weights_name, "z0")
+        thresholds, weights, z0 = (read_only(np.atleast_1d(own[name]), name) for name in names)
+        return thresholds, weights, z0
+
+
+class Bank(Elements, ByStructure):
+    """Several plays or stops, whose fields are tuples.
+
+    A family of which the input pushes the plays in another way than `Clamps` says so in `pushed`, one with another
+    output of them in `outputs_of_one`.
+    """
+
+    ordered: ClassVar[bool] = True  # whether the thresholds must increase
+    by_input: ClassVar[bool] = True  # whether the input itself pushes
+    positive: ClassVar[tuple[str, ...]] = ()
+    not_negative: ClassVar[tuple[str, ...]] = ()
+    z0: tuple[float, ...]
 
     def __post_init__(self) -> None:
-        if self.bank and len(self.z0) == 1:
+        if len(self.z0) == 1:
             object.__setattr__(self, "z0", self.z0 * len(items(self)[self.thresholds_name]))
-        super().__post_init__()
+        self.check({name: table_of_one(value) for name, value in own_items(self).items()})
 
     @classmethod
     def completed(cls, tables: dict[str, FloatArray]) -> dict[str, FloatArray]:
@@ -49,18 +72,75 @@ class Bank(Law):
     @classmethod
     def check(cls, tables: Tables) -> None:
         """Refuse elements that are no plays or stops of this law."""
-        super().check(tables)
+        check_signs(tables, cls.positive, cls.not_negative)
         check_elements(cls, *(tables[name] for name in (cls.thresholds_name, cls.weights_name, "z0")))
 
-    @property
-    def elements(self) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Thresholds, weights and initial positions, shape (n_plays,) each."""
-        names = self.thresholds_name, self.weights_name, "z0"
-        thresholds, weights, z0 = (read_only(self.tables[name][0], name) for name in names)
-        return thresholds, weights, z0
+    @classmethod
+    def pushed(cls, tables: Tables, parameters: Parameters, record: Record) -> FloatArray:
+        """Positions (n_sets, n_samples, n_plays) along a record; `tables` are those of a law with weights of zero."""
+        head = np.zeros((len(tables["z0"]), kernels.N_OUTPUT))
+        rows = np.concatenate([head, tables["thresholds"], tables["weights"]], axis=1)
+        return pushed_by_rows(kernels.step, rows, tables["z0"], record.u)
+
+    @classmethod
+    def outputs_of_one(cls, z: FloatArray, parameters: Parameters, record: Record) -> FloatArray:
+        """Outputs of plays or stops of the weight one at positions `z`, (n_sets, n_samples, n_plays)."""
+        return record.u[:, np.newaxis] - z if cls.stops else z
+
+    @classmethod
+    def derived(cls, parameters: Parameters, record: Record) -> dict[str, FloatArray]:
+        """Parameters of the law in place of coordinates of the search, by name, (n_sets,) each."""
+        return {}
+
+    @classmethod
+    def structure(
+        cls, *, plays: int = 10, thresholds: npt.ArrayLike = (), one_signed: bool | None = None
+    ) -> BankStructure:
+        """Plays for `hysim.identify`: how many, or where.
+
+        Parameters
+        ----------
+        plays : int
+            Their number, with thresholds from zero in even steps over half the span of the input.
+        thresholds : sequence of float, optional
+            The thresholds themselves [unit of u].
+        one_signed : bool, optional
+            Whether all weights past the threshold zero have the sign of the record's loop (positive for a
+            counterclockwise one). Else they are free, and may be of alternating signs on noisy records. By default
+            the one with the lower BIC on the record.
+
+        Returns
+        -------
+        BankStructure
+
+        Raises
+        ------
+        ValueError, TypeError
+            If the number is not a positive int, or a threshold is not a finite number.
+
+        Examples
+        --------
+        >>> import hysim as hs
+        >>> fit = hs.identify(hs.PrandtlIshlinskii.structure(plays=4), hs.datasets.table1())
+        >>> fit.n_parameters, round(fit.fit_percent, 1)
+        (5, 94.6)
+        """
+        places = tuple(read_only(thresholds, cls.thresholds_name, ndim=1).tolist())
+        return BankStructure(law=cls, thresholds=places, plays=plays, one_signed=one_signed)
+
+    def is_one_signed(self) -> bool:
+        """Whether all weights past the threshold zero have one sign."""
+        thresholds, weights, _ = self.elements
+        lagging = weights[thresholds > 0.0]
+        return bool((lagging >= 0.0).all() or (lagging <= 0.0).all())
+
+    def as_structure(self) -> Any:
+        """The structure with the thresholds of this law, or with those by default where it has none."""
+        thresholds = tuple(self.elements[0].tolist())
+        return replace(self.structure(), thresholds=thresholds, one_signed=None if self.is_one_signed() else False)
 
 
-class ClampLaw(Bank):
+class Clamps(Elements, Law):
     """A sum of plays or stops beside a line."""
 
     step = staticmethod(kernels.step)
@@ -71,10 +151,9 @@ class ClampLaw(Bank):
         """Slope c beside the plays, and their thresholds and weights v in the order of the thresholds."""
         thresholds, weights, _ = self.elements
         order = np.argsort(thresholds, kind="stable")
-        feedthrough = self.feedthrough
         if self.stops:
-            return feedthrough + float(weights.sum()), thresholds[order], -weights[order]
-        return feedthrough, thresholds[order], weights[order]
+            return self.feedthrough + float(weights.sum()), thresholds[order], -weights[order]
+        return self.feedthrough, thresholds[order], weights[order]
 
     @classmethod
     def pack(cls, tables: Tables) -> Packed:
@@ -86,17 +165,14 @@ class ClampLaw(Bank):
 
     @classmethod
     def path(cls, law: CompiledLaw, u: FloatArray, y: FloatArray) -> int:
-        output, elements = np.split(law.parameters, [kernels.N_OUTPUT])
-        thresholds, weights = np.split(elements, 2)
-        kernels.path(thresholds, weights, output, law.state[1:], np.empty(weights.size), u, y)
+        kernels.batch(law.parameters[np.newaxis], law.state[np.newaxis], u[np.newaxis], y[np.newaxis])
         law.state[0] = u[-1]
         return -1
 
     @classmethod
     def rows(cls, tables: Tables, u: FloatArray, y: FloatArray) -> None:
-        output = cls.pack(tables).parameters[:, : kernels.N_OUTPUT]
-        thresholds, weights = (read_only(tables[name]) for name in (cls.thresholds_name, cls.weights_name))
-        kernels.batch(thresholds, weights, read_only(output), read_only(tables["z0"]), u, y)
+        parameters, memory = cls.pack(tables)
+        kernels.batch(read_only(parameters), memory, u, y)
 
     def tangent(self, direction: npt.ArrayLike, z: npt.ArrayLike, u: npt.ArrayLike) -> FloatArray:
         """Slope dy/du [unit of y / unit of u] at the positions `z`, for an input at `u` that moves in `direction`.
@@ -108,7 +184,8 @@ class ClampLaw(Bank):
         if not np.all(velocity):
             raise ValueError("direction must not be zero: an input that stands still has two slopes")
         thresholds, weights, _ = self.elements
-        memory = np.asarray(z, dtype=float) if self.bank else np.asarray(z, dtype=float)[..., np.newaxis]
+        memory = np.asarray(z, dtype=float)
+        memory = memory if isinstance(self, Bank) else memory[..., np.newaxis]
         pushed = np.where(velocity > 0.0, inputs - thresholds >= memory, inputs + thresholds <= memory)
         moving = ~pushed if self.stops else pushed
         return np.asarray(self.feedthrough + np.sum(weights * moving, axis=-1))
@@ -155,55 +232,12 @@ class ClampLaw(Bank):
         r, v = thresholds[reached], weights[reached]
         corners = np.concatenate([[X], X - 2.0 * r, [-X]])
         falling = slope * corners + np.minimum(X - r, corners[:, np.newaxis] + r) @ v
+        k = int(np.argmax(np.sign(falling[:-1]) * np.sign(falling[1:]) <= 0.0))
+        beyond = falling[k] * (corners[k + 1] - corners[k]) / (falling[k + 1] - falling[k]) if falling[k] else 0.0
         return LimitCycle(
             amplitude=X,
             peak=float(slope * X + v @ (X - r)),
-            coercive=_first_zero(corners, falling),
+            coercive=float(corners[k] - beyond),
             mid_width=float(abs(2.0 * (v @ np.minimum(r, X - r)))),
             energy=float(4.0 * (v @ (r * (r - X)))),
         )
-
-
-def check_elements(cls: type[Bank], thresholds: FloatArray, weights: FloatArray, z0: FloatArray) -> None:
-    """Refuse tables (n_sets, n_plays) that are no elements of a law of the class `cls`."""
-    name = cls.thresholds_name
-    if not thresholds.shape[1] == weights.shape[1] == z0.shape[1]:
-        raise ValueError(
-            f"{name}, {cls.weights_name} and z0 must be equally long, got {thresholds.shape[1]}, "
-            f"{weights.shape[1]} and {z0.shape[1]}"
-        )
-    if (thresholds < 0.0).any():
-        raise ValueError(f"{name} must not be negative, got {thresholds.min():g}")
-    if cls.ordered and not (np.diff(thresholds) > 0.0).all():
-        raise ValueError(f"{name} must increase, got {thresholds[0].tolist() if len(thresholds) == 1 else thresholds}")
-
-
-def end_positions(thresholds: FloatArray, z0: FloatArray, u: FloatArray) -> FloatArray:
-    """Positions (n_sets, n_plays) at the end of the input `u`, from those before its first sample."""
-    z = z0.copy()
-    for value in _turning_values(u):
-        z = np.minimum(np.maximum(z, value - thresholds), value + thresholds)
-    return z
-
-
-def positions(thresholds: FloatArray, z0: FloatArray, u: FloatArray) -> FloatArray:
-    """Positions (n_sets, n_samples, n_plays) for thresholds and initial positions (n_sets, n_plays)."""
-    z = np.empty((len(z0), u.size, z0.shape[1]))
-    constant, moving = read_only(thresholds), z0.copy()
-    for i in range(len(z0)):
-        kernels.positions(constant[i], moving[i], u, z[i])
-    return z
-
-
-def _turning_values(u: FloatArray) -> FloatArray:
-    """First and last input, and those between at which it turns: no other moves a play to a new place."""
-    steps = np.diff(u)
-    moves = np.flatnonzero(steps)
-    turns = moves[1:][np.sign(steps[moves[1:]]) != np.sign(steps[moves[:-1]])]
-    return np.concatenate([u[:1], u[turns], u[-1:]])
-
-
-def _first_zero(u: FloatArray, y: FloatArray) -> float:
-    """First zero of a polyline through points of falling `u`, whose ends are opposite."""
-    k = int(np.argmax(np.sign(y[:-1]) * np.sign(y[1:]) <= 0.0))
-    return float(u[k] - y[k] * (u[k + 1] - u[k]) / (y[k + 1] - y[k])) if y[k] else float(u[k])
