@@ -20,7 +20,7 @@ import numpy.typing as npt
 from hysim._basics.frozen import FloatArray, items, own_items, read_only
 from hysim.kernels import clamps as kernels
 from hysim.laws.differential.limit_cycle import LimitCycle
-from hysim.laws.operators._bank_search import BankStructure, check_elements, pushed_by_rows
+from hysim.laws.operators._bank_search import Axis, BankStructure, check_elements, pushed_by_rows
 from hysim.models.by_structure import ByStructure
 from hysim.models.law import Law, Packed
 from hysim.models.protocols import CompiledLaw
@@ -53,6 +53,7 @@ class Bank(Elements, ByStructure):
 
     ordered: ClassVar[bool] = True  # whether the thresholds must increase
     by_input: ClassVar[bool] = True  # whether the input itself pushes
+    axes: ClassVar[tuple[Axis, ...]] = ()  # fields that are searched beside the thresholds
     positive: ClassVar[tuple[str, ...]] = ()
     not_negative: ClassVar[tuple[str, ...]] = ()
     z0: tuple[float, ...]
@@ -126,7 +127,7 @@ class Bank(Elements, ByStructure):
         (5, 94.6)
         """
         places = tuple(read_only(thresholds, cls.thresholds_name, ndim=1).tolist())
-        return BankStructure(law=cls, thresholds=places, plays=plays, one_signed=one_signed)
+        return BankStructure(law=cls, thresholds=places, plays=plays, one_signed=one_signed, axes=cls.axes)
 
     def is_one_signed(self) -> bool:
         """Whether all weights past the threshold zero have one sign."""
@@ -136,8 +137,10 @@ class Bank(Elements, ByStructure):
 
     def as_structure(self) -> Any:
         """The structure with the thresholds of this law, or with those by default where it has none."""
-        thresholds = tuple(self.elements[0].tolist())
-        return replace(self.structure(), thresholds=thresholds, one_signed=None if self.is_one_signed() else False)
+        thresholds, own = tuple(self.elements[0].tolist()), items(self)
+        one_signed = None if self.is_one_signed() else False
+        axes = {each.parameter.name: own[each.parameter.name] for each in self.axes}
+        return replace(self.structure(), thresholds=thresholds, one_signed=one_signed, own=axes)
 
 
 class Clamps(Elements, Law):

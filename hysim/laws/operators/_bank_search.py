@@ -160,7 +160,8 @@ class BankStructure(SignedStructure):
 
         def parameters(x: FloatArray) -> dict[str, FloatArray]:
             numbers = space.parameters(x)
-            return numbers | self.law.derived(numbers, record)
+            derived: dict[str, FloatArray] = self.law.derived(numbers, record)
+            return numbers | derived
 
         return replace(space, parameters=parameters)
 

@@ -4,9 +4,11 @@ import math
 from abc import abstractmethod
 
 import numpy as np
+import numpy.typing as npt
 
-from hysim._basics.frozen import FloatArray, read_only
+from hysim._basics.frozen import FloatArray, checked, read_only
 from hysim.kernels import play_sums as kernels
+from hysim.laws.operators._bank import Bank
 from hysim.laws.operators.prandtl_ishlinskii import PrandtlIshlinskii
 from hysim.models.law import Law, Packed, State
 from hysim.models.protocols import UNLIMITED, CompiledLaw, Limits
@@ -15,6 +17,8 @@ from hysim.models.tables import Tables
 _WIDTH = 3  # place of the width behind the limits and the offset
 IDENTITY = (0.0, 0.0, 0.0, 0.0, 1.0)
 """The envelope gamma(u) = u."""
+EXAMPLE = {"thresholds": (0.0, 0.1, 0.2, 0.35, 0.5, 0.7), "weights": (0.4, 0.3, 0.2, 0.2, 0.1, 0.1)}
+"""Plays of the laws that stand for the families."""
 
 
 class PlaySum(Law):
@@ -60,7 +64,7 @@ class PlaySum(Law):
             parameters[_WIDTH] = 0.0
             u = still.step(read_only(parameters, finite=False), still.state, float(y[0]))
             u0 = u if math.isfinite(u) else 0.0
-        return self.inverse_from(self.advance([u0])[1] if state is None else state)
+        return self.inverse_from(self.advance([u0 or 0.0])[1] if state is None else state)
 
     def compiled_inverse(self, u0: float, limits: Limits = UNLIMITED, sample_time: float = math.inf) -> CompiledLaw:
         self.check_invertible()
@@ -76,6 +80,44 @@ class PlaySum(Law):
         y = kernels.step(law.parameters, law.state.copy(), state[0])
         parameters = read_only(np.concatenate([limits, law.parameters]), finite=False)
         return CompiledLaw(kernels.inverse_step, parameters, np.concatenate([[state[0], y], law.state]))
+
+
+@checked
+class PlaysAtSampleTime(Bank, PlaySum):
+    """The law at one sample time, with thresholds ``r_i + width |u_k - u_(k-1)|``."""
+
+    thresholds: tuple[float, ...] = ()
+    weights: tuple[float, ...] = ()
+    width: float = 0.0
+    offset: float = 0.0
+    z0: tuple[float, ...] = (0.0,)
+
+    def refusal(self) -> str | None:
+        """Why the law has no inverse at its sample time; None where it has one."""
+        if (refusal := self.plays.refusal()) is not None:
+            return refusal
+        sums = np.cumsum(self.weights)
+        with np.errstate(divide="ignore"):
+            limits = np.abs(sums) / (2.0 * np.abs(sums - sums[0]))
+        i = int(np.argmin(limits))
+        if self.width < limits[i]:
+            return None
+        return (
+            f"the law has no stable inverse at this sample time: beta / sample_time is {self.width:g}, but the sums of "
+            f"weights s_i = w_0 + ... + w_i ask for less than |s_i| / (2 |s_i - s_0|), {limits[i]:g} for i = {i}; "
+            "give the speed, or take longer samples"
+        )
+
+    def response_at(self, u: npt.ArrayLike, widening: FloatArray) -> FloatArray:
+        """Output at the samples of `u` of plays whose thresholds are wider by `widening`, shape (n_samples,)."""
+        inputs = read_only(u, "u", ndim=1)
+        if self.u0 is not None:
+            longer = np.append(self.u0, inputs), np.append(widening[:1], widening)
+            return np.asarray(self.placed(None).response_at(*longer)[1:])
+        y = np.empty(inputs.size)
+        parameters, memory = self.packed
+        kernels.widened(parameters, memory.copy(), inputs, read_only(widening), y)
+        return y
 
 
 def rows_of(tables: Tables) -> FloatArray:

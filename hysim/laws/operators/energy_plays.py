@@ -17,7 +17,6 @@ from hysim.models.search_space import Parameters
 from hysim.models.tables import Tables
 from hysim.records import Record
 
-_AXES = (Axis(Parameter("field", 3e-3, 3.0, unit="h", physical=(True, False)), (0.1, 0.03, 0.01, 0.3, 1.0)),)
 _SPACING = 2.0  # of the thresholds: finer towards zero
 
 
@@ -67,6 +66,7 @@ class EnergyPlays(Bank, Law):
 
     units: ClassVar = {"thresholds": "u", "weights": "y", "field": "u", "feedthrough": "y/u", "offset": "y", "z0": "u"}
     positive = ("field",)
+    axes = (Axis(Parameter("field", 3e-3, 3.0, unit="h", physical=(True, False)), (0.1, 0.03, 0.01, 0.3, 1.0)),)
     example = Example(
         {"thresholds": (0.0, 0.2, 0.5), "weights": (0.2, 0.6, 0.4), "field": 0.15},
         (-2.0, 2.0),
@@ -122,7 +122,7 @@ class EnergyPlays(Bank, Law):
         15.0
         """
         plain = super().structure(plays=plays, thresholds=thresholds, one_signed=True)
-        return replace(plain, axes=_AXES, spacing=_SPACING)
+        return replace(plain, spacing=_SPACING)
 
     def as_structure(self) -> BankStructure:
         """The structure with the thresholds of this law, its field first, or that by default where it has none."""

@@ -9,7 +9,7 @@ import numpy.typing as npt
 from hysim._basics.frozen import FloatArray, read_only
 from hysim.laws.operators._bank import Bank
 from hysim.laws.operators._bank_search import Axis, BankStructure, pushed_by_rows, table_of
-from hysim.laws.operators._play_sums import IDENTITY, PlaySum, rows_of
+from hysim.laws.operators._play_sums import EXAMPLE, IDENTITY, PlaySum, rows_of
 from hysim.models.model import Example, family
 from hysim.models.parameters import Parameter, spans
 from hysim.models.search_space import Parameters
@@ -81,13 +81,10 @@ class GeneralizedPrandtlIshlinskii(Bank, PlaySum):
     units: ClassVar = {"offset": "y"}
     by_input: ClassVar[bool] = False
     example = Example(
-        {
-            "thresholds": (0.0, 0.1, 0.2, 0.35, 0.5, 0.7), "weights": (0.4, 0.3, 0.2, 0.2, 0.1, 0.1),
-            "left": (1.2, 1.4, 0.0, 0.0, 0.1),
-        },
+        {**EXAMPLE, "left": (1.2, 1.4, 0.0, 0.0, 0.1)},
         (-2.0, 2.0),
         title="Prandtl-Ishlinskii: envelopes",
-    )  # fmt: skip
+    )
 
     @classmethod
     def check(cls, tables: Tables) -> None:

@@ -15,7 +15,7 @@ import numpy.typing as npt
 from hysim._basics.frozen import FloatArray, read_only
 from hysim.laws.operators._bank import Bank
 from hysim.laws.operators._bank_search import DeadZoneStructure, check_dead_zones, dead_zone
-from hysim.laws.operators._play_sums import PlaySum
+from hysim.laws.operators._play_sums import EXAMPLE, PlaySum
 from hysim.laws.operators.prandtl_ishlinskii import PrandtlIshlinskii, wrong_sum
 from hysim.models.inverse_search import searched_inverse
 from hysim.models.law import State
@@ -77,12 +77,9 @@ class ModifiedPrandtlIshlinskii(Bank, PlaySum):
 
     units: ClassVar = {"thresholds": "u", "offset": "y", "z0": "u"}
     example = Example(
-        {
-            "thresholds": (0.0, 0.1, 0.2, 0.35, 0.5, 0.7), "weights": (0.4, 0.3, 0.2, 0.2, 0.1, 0.1),
-            "dead_zones": (-0.4, 0.0, 0.4), "dead_zone_weights": (0.3, 1.0, -0.3),
-        },
+        {**EXAMPLE, "dead_zones": (-0.4, 0.0, 0.4), "dead_zone_weights": (0.3, 1.0, -0.3)},
         title="Prandtl-Ishlinskii: dead zones",
-    )  # fmt: skip
+    )
 
     @classmethod
     def check(cls, tables: Tables) -> None:

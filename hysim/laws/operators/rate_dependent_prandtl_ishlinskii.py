@@ -12,18 +12,18 @@ are positive: samples must be further apart than about 2 beta. The condition on 
 """
 
 import math
-from dataclasses import fields, replace
-from typing import ClassVar
+from dataclasses import fields
+from typing import ClassVar, Self
 
 import numpy as np
 import numpy.typing as npt
 
-from hysim._basics.frozen import FloatArray, check_positive, checked, items, read_only
+from hysim._basics.frozen import FloatArray, check_positive, items, read_only
 from hysim._names import among
 from hysim.kernels import play_sums as kernels
 from hysim.laws.operators._bank import Bank
-from hysim.laws.operators._bank_search import Axis, BankStructure, pushed_by_rows
-from hysim.laws.operators._play_sums import PlaySum, rows_of
+from hysim.laws.operators._bank_search import Axis, pushed_by_rows
+from hysim.laws.operators._play_sums import EXAMPLE, PlaysAtSampleTime, rows_of
 from hysim.laws.operators.prandtl_ishlinskii import PrandtlIshlinskii
 from hysim.models.batch import Reduction
 from hysim.models.composable import Placed
@@ -34,47 +34,6 @@ from hysim.models.protocols import UNLIMITED, CompiledLaw, Limits, Startable, ne
 from hysim.models.search_space import Parameters
 from hysim.models.tables import Tables, check_signs
 from hysim.records import Record
-
-# up to half a span of the input at its highest speed
-_AXES = (Axis(Parameter("beta", 0.0, 1.0, unit="h/v"), (0.0, 0.1, 0.3)),)
-
-
-@checked
-class PlaysAtSampleTime(Bank, PlaySum):
-    """The law at one sample time, with thresholds ``r_i + width |u_k - u_(k-1)|``."""
-
-    thresholds: tuple[float, ...] = ()
-    weights: tuple[float, ...] = ()
-    width: float = 0.0
-    offset: float = 0.0
-    z0: tuple[float, ...] = (0.0,)
-
-    def refusal(self) -> str | None:
-        """Why the law has no inverse at its sample time; None where it has one."""
-        if (refusal := self.plays.refusal()) is not None:
-            return refusal
-        sums = np.cumsum(self.weights)
-        with np.errstate(divide="ignore"):
-            limits = np.abs(sums) / (2.0 * np.abs(sums - sums[0]))
-        i = int(np.argmin(limits))
-        if self.width < limits[i]:
-            return None
-        return (
-            f"the law has no stable inverse at this sample time: beta / sample_time is {self.width:g}, but the sums of "
-            f"weights s_i = w_0 + ... + w_i ask for less than |s_i| / (2 |s_i - s_0|), {limits[i]:g} for i = {i}; "
-            "give the speed, or take longer samples"
-        )
-
-    def response_at(self, u: npt.ArrayLike, widening: FloatArray) -> FloatArray:
-        """Output at the samples of `u` of plays whose thresholds are wider by `widening`, shape (n_samples,)."""
-        inputs = read_only(u, "u", ndim=1)
-        if self.u0 is not None:
-            longer = np.append(self.u0, inputs), np.append(widening[:1], widening)
-            return np.asarray(self.placed(None).response_at(*longer)[1:])
-        y = np.empty(inputs.size)
-        parameters, memory = self.packed
-        kernels.widened(parameters, memory.copy(), inputs, read_only(widening), y)
-        return y
 
 
 @family
@@ -109,6 +68,10 @@ class RateDependentPrandtlIshlinskii(Bank, Placed):
     ValueError
         If lengths differ, a number is not finite, beta or a threshold is negative, or the thresholds do not increase.
 
+    Notes
+    -----
+    `hysim.identify` searches for beta, and takes a structure as of `PrandtlIshlinskii.structure`.
+
     Examples
     --------
     >>> import hysim as hs
@@ -127,32 +90,16 @@ class RateDependentPrandtlIshlinskii(Bank, Placed):
     offset: float = 0.0
     z0: tuple[float, ...] = (0.0,)
 
-    example = Example(
-        {
-            "thresholds": (0.0, 0.1, 0.2, 0.35, 0.5, 0.7), "weights": (0.4, 0.3, 0.2, 0.2, 0.1, 0.1), "beta": 0.005,
-        },
-        title="Prandtl-Ishlinskii: with the rate",
-    )  # fmt: skip
+    example = Example({**EXAMPLE, "beta": 0.005}, title="Prandtl-Ishlinskii: with the rate")
     dynamic: ClassVar[bool] = True
     by_input: ClassVar[bool] = False
+    axes = (Axis(Parameter("beta", 0.0, 1.0, unit="h/v"), (0.0, 0.1, 0.3)),)  # up to half a span at the highest speed
     not_negative = ("beta",)
 
     @property
     def plays(self) -> PrandtlIshlinskii:
         """The sum of plays for an input that stands still, without the offset."""
         return PrandtlIshlinskii(thresholds=self.thresholds, weights=self.weights, z0=self.z0)
-
-    @classmethod
-    def structure(
-        cls, *, plays: int = 10, thresholds: npt.ArrayLike = (), one_signed: bool | None = None
-    ) -> BankStructure:
-        """Plays for `hysim.identify`, as of `PrandtlIshlinskii.structure`; beta is searched."""
-        plain = super().structure(plays=plays, thresholds=thresholds, one_signed=one_signed)
-        return replace(plain, axes=_AXES)
-
-    def as_structure(self) -> BankStructure:
-        """The structure with the thresholds and beta of this law."""
-        return replace(super().as_structure(), own={"beta": self.beta})
 
     @classmethod
     def pushed(cls, tables: Tables, parameters: Parameters, record: Record) -> FloatArray:
@@ -193,7 +140,13 @@ class RateDependentPrandtlIshlinskii(Bank, Placed):
             another length.
         """
         law = self.at(sample_time)
-        return law.response(u) if speed is None else law.response_at(u, self.beta * _as_speed(speed, u))
+        if speed is None:
+            return law.response(u)
+        speeds = read_only(speed, "speed", ndim=1)
+        if speeds.size != np.size(u):
+            raise ValueError(f"speed must have {np.size(u)} samples as the signal has, got {speeds.size}")
+        check_signs({"speed": speeds}, (), ("speed",))
+        return law.response_at(u, self.beta * speeds)
 
     def signals(self, u: npt.ArrayLike, sample_time: float) -> dict[str, FloatArray]:
         """Output ``"y"`` and positions ``"z"`` at the samples of `u`; see `response`."""
@@ -241,7 +194,7 @@ class RateDependentPrandtlIshlinskii(Bank, Placed):
         """Whether there is an `inverse`, for a known speed; with a sample time, an `inverse_response` without one."""
         return self.plays.is_invertible() and (sample_time is None or self.at(sample_time).is_invertible())
 
-    def inverse(self) -> "RateDependentPrandtlIshlinskii":
+    def inverse(self) -> Self:
         """The law that gives the input for a wanted output, exactly, at the same speed of the input.
 
         Use it as ``inverse.response(y, sample_time, speed=...)``. Errors are those of `PrandtlIshlinskii.inverse`.
@@ -253,15 +206,10 @@ class RateDependentPrandtlIshlinskii(Bank, Placed):
         >>> law.inverse().beta, law.inverse().thresholds, law.inverse().weights
         (0.5, (0.0, 0.5), (0.5, -0.25))
         """
-        inverse = self.plays.inverse()
-        rise = self.offset
-        return RateDependentPrandtlIshlinskii(
-            thresholds=inverse.thresholds,
-            weights=inverse.weights,
-            beta=abs(self.weights[0]) * self.beta,
-            offset=0.0 - rise * sum(inverse.weights),
-            z0=tuple(z + rise for z in inverse.z0),
-        )
+        plain = self.plays.inverse()
+        offset, z0 = 0.0 - self.offset * sum(plain.weights), tuple(z + self.offset for z in plain.z0)
+        beta = abs(self.weights[0]) * self.beta
+        return type(self)(thresholds=plain.thresholds, weights=plain.weights, beta=beta, offset=offset, z0=z0)
 
     def inverse_response(
         self,
@@ -287,15 +235,6 @@ class RateDependentPrandtlIshlinskii(Bank, Placed):
     def compiled_inverse(self, u0: float, limits: Limits = UNLIMITED, sample_time: float = math.inf) -> CompiledLaw:
         """The inverse at a sample time [s], stepped; see `hysim.Law.compiled_inverse`."""
         return self.at(sample_time).compiled_inverse(u0, limits)
-
-
-def _as_speed(speed: npt.ArrayLike, u: npt.ArrayLike) -> FloatArray:
-    speeds = read_only(speed, "speed", ndim=1)
-    if speeds.size != np.size(u):
-        raise ValueError(f"speed must have {np.size(u)} samples as the signal has, got {speeds.size}")
-    if (speeds < 0.0).any():
-        raise ValueError(f"speed must not be negative, got {speeds.min():g}")
-    return speeds
 
 
 def _width(beta: npt.ArrayLike, sample_time: float) -> FloatArray:
