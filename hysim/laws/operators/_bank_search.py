@@ -395,6 +395,27 @@ def check_increasing(name: str, table: FloatArray) -> None:
         raise ValueError(f"{name} must increase, got {table[0].tolist() if len(table) == 1 else table}")
 
 
+def conditioned(u: FloatArray) -> tuple[float, float]:
+    """Extremes of the cycle between the lowest and the highest input, that of the branch at the first sample last."""
+    moves = np.diff(u)
+    rises = bool(moves[np.flatnonzero(moves)[:1]].sum() > 0.0)
+    low, high = float(u.min()), float(u.max())
+    return (high, low) if rises else (low, high)
+
+
+def dominant_extremes(u: FloatArray) -> list[float]:
+    """The last input, behind the turning points that no later one has wiped out, the oldest first; at least two.
+
+    Seen from the end, they are where the input is higher or lower than ever: of highs in a row the highest, and so on.
+    """
+    back = u[::-1]
+    sides = np.diff(np.maximum.accumulate(back)) + np.diff(np.minimum.accumulate(back))  # of one sign: never both
+    places = np.flatnonzero(sides)
+    last_of_a_row = np.sign(sides[places[1:]]) != np.sign(sides[places[:-1]])
+    extremes = back[1 + places[np.append(last_of_a_row, True)[: places.size]]][::-1].tolist()
+    return [*extremes, float(u[-1])] if extremes else [float(u[-1])] * 2
+
+
 def _pasts(turns: Sequence[str], record: Record) -> list[dict[str, float]]:
     """Former turning points from which a search begins: single ones, or cycles that faded towards the first sample."""
     half, first = spans(record)["h"], float(record.u[0])

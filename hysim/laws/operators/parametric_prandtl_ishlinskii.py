@@ -17,6 +17,8 @@ import numpy.typing as npt
 
 from hysim._basics.frozen import FloatArray
 from hysim.kernels import clamps as kernels
+from hysim.laws.operators._bank_search import conditioned, dominant_extremes, moved
+from hysim.laws.operators._densities import thinned
 from hysim.models.law import Law, Packed
 from hysim.models.model import Example, family
 from hysim.models.parameters import Parameter, declared_space, spans
@@ -27,7 +29,7 @@ from hysim.records import Record
 _DENSITIES = ((-0.5, 0.3), (0.0, 0.15), (1.0, 0.15), (0.0, 1.0))  # exponent, and decay in half spans of the input
 _TURNS = (-2.0, -1.0, 0.0, 1.0, 2.0)  # of a free memory, in half spans from the first input
 _SMALLEST = 1e-280  # a smaller incomplete gamma function is its first term
-_SAMPLES, _TURN = 250, 0.01  # beside reversals by more than this part of the span, for the choice of the past
+_SAMPLES = 250  # for the choice of the past
 _STRONG = 10.0  # difference of two BIC that is very strong evidence
 
 
@@ -120,13 +122,13 @@ class ParametricPrandtlIshlinskii(Law):
     @classmethod
     def check(cls, tables: Tables) -> None:
         """Refuse what is no density or no number of plays."""
-        if not (tables["exponent"] > -1.0).all():
-            raise ValueError(f"exponent must be above -1, got {tables['exponent'].min()}")
         super().check(tables)
+        exponent, reach, plays = (tables[name] for name in ("exponent", "reach", "plays"))
         idle = (tables["weight"] == 0.0) & (tables["weight_slope"] == 0.0)
-        if not ((tables["reach"] > 0.0) | (idle & (tables["reach"] == 0.0))).all():
-            raise ValueError(f"reach must be positive beside a weight, got {tables['reach'].min()}")
-        plays = tables["plays"]
+        if not (exponent > -1.0).all():
+            raise ValueError(f"exponent must be above -1, got {exponent.min()}")
+        if not ((reach > 0.0) | (idle & (reach == 0.0))).all():
+            raise ValueError(f"reach must be positive beside a weight, got {reach.min()}")
         if not ((plays >= 1.0) & (plays == np.round(plays))).all():
             raise ValueError(f"plays must be whole and positive, got {plays.min()}")
         if not tables["z0"].shape[1]:
@@ -136,14 +138,13 @@ class ParametricPrandtlIshlinskii(Law):
     def pack(cls, tables: Tables) -> Packed:
         """Parameters as `hysim.kernels.clamps.bent_step` takes them, and the positions after the inputs z0."""
         thresholds, shares = _plays(tables)
-        coefficients = tables["input_coefficients"]
-        head = [tables[name] for name in ("offset", "weight", "weight_slope")]
-        degree = np.full_like(tables["offset"], coefficients.shape[1])
-        past = tables["z0"].T[:, :, np.newaxis]
-        z = past[0] + np.zeros_like(thresholds)
-        for u in past[1:]:
-            z = np.minimum(np.maximum(z, u - thresholds), u + thresholds)
-        parameters = np.concatenate([degree, *head, coefficients, thresholds, shares], axis=1)
+        numbers = [tables[name] for name in ("offset", "weight", "weight_slope", "input_coefficients")]
+        degree = np.full_like(tables["offset"], numbers[-1].shape[1])
+        first, *past = tables["z0"].T[:, :, np.newaxis]
+        z = first + np.zeros_like(thresholds)
+        for u in past:
+            z = moved(z, thresholds, u)
+        parameters = np.concatenate([degree, *numbers, thresholds, shares], axis=1)
         return Packed(parameters, np.concatenate([np.zeros_like(degree), z], axis=1))
 
     @property
@@ -176,16 +177,12 @@ class ParametricPrandtlIshlinskii(Law):
         held = {name: value for name, value in known.items() if name not in freedom.free} | {**freedom.fixed}
         turns = [{}] if names[-1] in held else [{names[-1]: turn} for turn in _TURNS]
         starts = [{"exponent": a, "decay": decay} | turn for a, decay in _DENSITIES for turn in turns]
-        asked = replace(freedom, fixed=held)
-        return declared_space(
-            law.searched, starts, law.scalars, law.initial, record, asked, law.screened, defaults=self.defaults()
-        )
+        asked, numbers = replace(freedom, fixed=held), (law.scalars, law.initial)
+        return declared_space(law.searched, starts, *numbers, record, asked, law.screened, defaults=self.defaults())
 
     def _likely_past(self, record: Record) -> tuple[float, float]:
         """Inputs before the first sample: those of the cycle, unless plays that stand still fit clearly better."""
-        chosen = np.linspace(0, len(record) - 1, min(_SAMPLES, len(record))).round().astype(np.intp)
-        kept = np.union1d(chosen, record.reversals(_TURN))
-        short, first = Record(u=record.u[kept], y=record.y[kept]), float(record.u[0])
+        short, first = thinned(record, _SAMPLES), float(record.u[0])
         best, criterion = conditioned(record.u), np.inf
         for past in (best, (0.0, 0.0), (first, first)):
             own = 2.0 * len(short) * np.log(max(replace(self, z0=past)._least_error(short), _SMALLEST))
@@ -216,29 +213,6 @@ class ParametricPrandtlIshlinskii(Law):
         n_sets = max((np.size(value) for value in parameters.values()), default=1)
         inputs = dominant_extremes(np.append(record.u, record.u[0]))
         return {**parameters} | {f"z0[{k}]": np.full(n_sets, u) for k, u in enumerate(inputs)}
-
-
-def conditioned(u: FloatArray) -> tuple[float, float]:
-    """Extremes of the cycle between the lowest and the highest input, that of the branch at the first sample last."""
-    moves = np.diff(u)
-    rises = bool(moves[np.flatnonzero(moves)[:1]].sum() > 0.0)
-    low, high = float(u.min()), float(u.max())
-    return (high, low) if rises else (low, high)
-
-
-def dominant_extremes(u: FloatArray) -> list[float]:
-    """The last input, behind the turning points that no later one has wiped out, the oldest first; at least two.
-
-    Seen from the end, they are where the input is higher or lower than ever: of highs in a row the highest, and so on.
-    """
-    back = u[::-1]
-    higher = np.flatnonzero(np.diff(np.maximum.accumulate(back)) > 0.0) + 1
-    lower = np.flatnonzero(np.diff(np.minimum.accumulate(back)) < 0.0) + 1
-    places = np.concatenate([higher, lower])
-    kinds = np.repeat([1, -1], [higher.size, lower.size])[np.argsort(places)]
-    last_of_a_row = np.append(kinds[1:] != kinds[:-1], True)[: kinds.size]
-    extremes = back[np.sort(places)[last_of_a_row]][::-1].tolist()
-    return [*extremes, float(u[-1])] if extremes else [float(u[-1])] * 2
 
 
 def _plays(tables: Tables) -> tuple[FloatArray, FloatArray]:
