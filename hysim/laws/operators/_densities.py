@@ -39,13 +39,14 @@ The state before a record, all relays down or what the record itself leaves, is 
 Source: P. H. C. Eilers, B. D. Marx, Statist. Sci. 11 (1996), for differences as a penalty on many coefficients.
 """
 
+import itertools
 from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
-from hysim._basics.frozen import FloatArray
+from hysim._basics.frozen import FloatArray, read_only
 from hysim._columns.turning import TOLERANCE
 from hysim.records import Record
 
@@ -87,26 +88,62 @@ class ReversalCurve(NamedTuple):
         """E(turn, b) at inputs from the lowest to the turning point."""
         return np.asarray(0.5 * (self.fall.y[0] - _at(b, self.fall)))
 
+    def above_line(self, turn: float, levels: FloatArray, reached: FloatArray) -> FloatArray:
+        """Half of what the rise to the curve is above a straight line from the turning point before."""
+        if self.rise is None:
+            return np.zeros(levels.size)
+        start, end = _at(np.array([turn, self.turn]), self.rise)
+        return np.asarray(0.5 * (_at(levels, self.rise) - start - reached * (end - start)))
 
-def curves_of(record: Record, tolerance: float) -> list[ReversalCurve]:
+
+def everett_from_curves(
+    record: Record, levels: npt.ArrayLike | None, tolerance: float
+) -> tuple[FloatArray, FloatArray, float]:
+    """Levels, E at the pairs of them (upper, lower), and the output at the lowest input.
+
+    E is zero above the diagonal, and beyond the curves as at their ends.
+    """
+    low, slack, curves = float(record.u.min()), tolerance * float(np.ptp(record.u)), _curves_of(record, tolerance)
+    grid = _levels_of(low, curves) if levels is None else read_only(levels, "levels", ndim=1)
+    if not grid.size or grid[0] > low + slack:
+        raise ValueError(f"levels must begin at the lowest input {low:g} or below, got {grid[:1].tolist()}")
+    table = np.zeros((grid.size, grid.size))
+    turn, below = low, np.zeros(grid.size)
+    for curve in curves:
+        above = np.where(grid < curve.turn, curve.everett(grid), 0.0)
+        between = np.flatnonzero((grid > turn) & (grid <= curve.turn))
+        reached = (grid[between] - turn) / (curve.turn - turn)
+        share = np.append(
+            np.cumsum(np.abs(np.diff(above - below))[::-1])[::-1], 0.0
+        )  # total variation above each level
+        share = share / (share[0] or 1.0)
+        for k, t, r in zip(between, reached, curve.above_line(turn, grid[between], reached), strict=True):
+            table[k] = np.where(grid <= turn, (1.0 - t) * below + t * above + r * share, 0.0)
+            inner = (grid > turn) & (grid < grid[k])
+            stretched = turn + (grid[inner] - turn) / t
+            table[k, inner] = t * curve.everett(stretched) + r * np.interp(stretched, grid, share)
+        turn, below = curve.turn, above
+    table[grid > turn] = below
+    return grid, table, float(np.mean([curve.fall.y[-1] for curve in curves]))
+
+
+def _curves_of(record: Record, tolerance: float) -> list[ReversalCurve]:
     """The curves of a record by their turning points, of equal ones the last; a ValueError if it has none."""
     low, slack = float(record.u.min()), tolerance * float(np.ptp(record.u))
     branches = record.branches(tolerance)
-    curves: dict[float, ReversalCurve] = {}
-    for before, branch in zip((None, *branches), branches, strict=False):
-        if branch.u[-1] >= branch.u[0]:
-            continue
-        if branch.u[-1] > low + slack:
-            raise ValueError(
-                f"the way down from {branch.u[0]:g} must end at the lowest input {low:g}, it ends at {branch.u[-1]:g}"
-            )
-        curves[float(branch.u[0])] = ReversalCurve(branch, before)
+    pairs = zip((None, *branches), branches, strict=False)
+    curves = {float(fall.u[0]): ReversalCurve(fall, rise) for rise, fall in pairs if fall.u[-1] < fall.u[0]}
     if not curves:
         raise ValueError("the input never falls: a reversal curve is a way up and the way down after it")
+    for turn, (fall, _) in curves.items():
+        if fall.u[-1] > low + slack:
+            raise ValueError(
+                f"the way down from {turn:g} must end at the lowest input {low:g}, it ends at {fall.u[-1]:g}"
+            )
     return [curves[turn] for turn in sorted(curves)]
 
 
-def levels_of(low: float, curves: list[ReversalCurve]) -> FloatArray:
+def _levels_of(low: float, curves: list[ReversalCurve]) -> FloatArray:
     """The turning points and all inputs of the curves; even steps between turning points if these are too many."""
     turns = np.array([low, *(curve.turn for curve in curves)])
     span = float(turns[-1] - low)
@@ -117,39 +154,6 @@ def levels_of(low: float, curves: list[ReversalCurve]) -> FloatArray:
     parts = np.maximum(np.round(np.diff(turns) * _MOST_LEVELS / span), 1).astype(int)
     steps = [np.linspace(a, b, n + 1)[:-1] for a, b, n in zip(turns[:-1], turns[1:], parts, strict=True)]
     return np.append(np.concatenate(steps), turns[-1])
-
-
-def everett_between(low: float, levels: FloatArray, curves: list[ReversalCurve]) -> FloatArray:
-    """E at the pairs of levels (upper, lower), zero above the diagonal; beyond the curves as at their ends."""
-    table = np.zeros((levels.size, levels.size))
-    turn, below = low, np.zeros(levels.size)
-    for curve in curves:
-        above = np.where(levels < curve.turn, curve.everett(levels), 0.0)
-        between = np.flatnonzero((levels > turn) & (levels <= curve.turn))
-        reached = (levels[between] - turn) / (curve.turn - turn)
-        share = _share(above - below)
-        for k, t, r in zip(between, reached, _above_line(curve, turn, levels[between], reached), strict=True):
-            table[k] = np.where(levels <= turn, (1.0 - t) * below + t * above + r * share, 0.0)
-            inner = (levels > turn) & (levels < levels[k])
-            stretched = turn + (levels[inner] - turn) / t
-            table[k, inner] = t * curve.everett(stretched) + r * np.interp(stretched, levels, share)
-        turn, below = curve.turn, above
-    table[levels > turn] = below
-    return table
-
-
-def _share(difference: FloatArray) -> FloatArray:
-    """Total variation above each level over that above the lowest one."""
-    above = np.append(np.cumsum(np.abs(np.diff(difference))[::-1])[::-1], 0.0)
-    return above / (above[0] or 1.0)
-
-
-def _above_line(curve: ReversalCurve, turn: float, levels: FloatArray, reached: FloatArray) -> FloatArray:
-    """Half of what the rise to a curve is above a straight line from the turning point before."""
-    if curve.rise is None:
-        return np.zeros(levels.size)
-    start, end = _at(np.array([turn, curve.turn]), curve.rise)
-    return np.asarray(0.5 * (_at(levels, curve.rise) - start - reached * (end - start)))
 
 
 def _at(inputs: FloatArray, branch: Record) -> FloatArray:
@@ -205,38 +209,34 @@ def chosen(
     return Chosen(weights[:, 0], offset, float(strengths[best]), left_out)
 
 
-def smooth(
-    law: type[Any], levels: tuple[float, ...], records: Sequence[Record], strength: float | None
-) -> tuple[FloatArray, float, tuple[float, ...]]:
-    """Weights and offset of a law of spread relays between the levels, and the inputs before the first record."""
+def smooth(law: type[Any], records: Sequence[Record], intervals: int | None, strength: float | None) -> Any:
+    """The law of spread relays with the density of the best strength, after the inputs before the first record."""
+    low, high = min(float(each.u.min()) for each in records), max(float(each.u.max()) for each in records)
+    n = _supported(high - low, records) if intervals is None else intervals
+    levels = tuple(np.linspace(low, high, n + 1).tolist())
     short = [thinned(record, _MOST_SAMPLES) for record in records]
-    y, parts, n = np.concatenate([record.y for record in short]), parts_of(short), len(levels) - 1
-    cells = min(n, _MOST_CELLS)
+    y, parts, cells = np.concatenate([record.y for record in short]), parts_of(short), min(n, _MOST_CELLS)
     table, penalty = linear_between(cells, n), roughness(cells)
     relays = law(levels=levels, weights=(0.0,) * len(table))
+
+    def chosen_after(pasts: Sequence[tuple[float, ...]]) -> Chosen:
+        sets = [
+            {"levels": np.array(levels), "weights": table.T, "z0": np.tile(z0, (table.shape[1], 1))} for z0 in pasts
+        ]
+        columns = [law.responses(each, record.u).T for each, record in zip(sets, short, strict=True)]
+        return chosen(np.concatenate(columns), y, parts, penalty, strength)
+
     at_rest = [levels[:1] for _ in short]
     repeated = [(*levels[:1], *relays.advance(record.u)[1][1:]) for record in short]
-    best: tuple[Chosen, tuple[float, ...]] | None = None
-    for pasts in (at_rest, repeated):
-        columns = [_outputs(law, levels, table, past, each.u) for past, each in zip(pasts, short, strict=True)]
-        fit = chosen(np.concatenate(columns), y, parts, penalty, strength)
-        if best is None or fit.left_out < best[0].left_out:
-            best = fit, tuple(value for value in pasts[0] if value > levels[0])
-    assert best is not None  # there are two states
-    return table @ best[0].weights, best[0].offset, best[1]
+    fit, past = min(
+        ((chosen_after(pasts), pasts[0]) for pasts in (at_rest, repeated)), key=lambda each: each[0].left_out
+    )
+    z0 = tuple(value for value in past if value > levels[0])
+    return law(levels=levels, weights=tuple((table @ fit.weights).tolist()), offset=fit.offset, z0=z0)
 
 
-def _outputs(
-    law: type[Any], levels: tuple[float, ...], table: FloatArray, past: tuple[float, ...], u: FloatArray
-) -> FloatArray:
-    """Outputs (n_samples, n_coefficients) of laws whose weights are the columns of a table."""
-    sets = {"levels": np.array(levels), "weights": table.T, "z0": np.tile(past, (table.shape[1], 1))}
-    return np.asarray(law.responses(sets, u)).T
-
-
-def supported(records: Sequence[Record]) -> int:
+def _supported(span: float, records: Sequence[Record]) -> int:
     """Intervals no finer than the steps of the inputs, at most 64."""
-    span = max(float(each.u.max()) for each in records) - min(float(each.u.min()) for each in records)
     steps = np.abs(np.concatenate([np.diff(each.u) for each in records]))
     if span == 0.0:
         raise ValueError("the input is constant: nothing can be identified from it")
@@ -311,11 +311,9 @@ def linear_between(cells: int, n: int) -> FloatArray:
     tents[np.arange(n), first], tents[np.arange(n), first + 1] = 1.0 - share, share
     values = _beyond_diagonal(cells)
     table = np.zeros((rows.size, values.shape[2]))
-    for a in (0, 1):
-        for b in (0, 1):
-            p, q = first + a, first + b
-            part = tents[rows, p[rows]] * tents[columns, q[columns]]
-            table += part[:, np.newaxis] * values[p[rows], q[columns]]
+    for a, b in itertools.product((0, 1), repeat=2):
+        p, q = first[rows] + a, first[columns] + b
+        table += (tents[rows, p] * tents[columns, q])[:, np.newaxis] * values[p, q]
     table *= ratio**2
     table[rows == columns] = 0.0
     of_diagonal = np.flatnonzero(np.equal(*np.tril_indices(cells)))

@@ -28,15 +28,7 @@ from hysim._basics.blas import one_blas_thread
 from hysim._basics.frozen import FloatArray, check_whole, read_only
 from hysim._columns.turning import TOLERANCE
 from hysim.kernels import preisach as kernels
-from hysim.laws.operators._densities import (
-    Density,
-    curves_of,
-    everett_between,
-    levels_of,
-    relay_weights,
-    smooth,
-    supported,
-)
+from hysim.laws.operators._densities import Density, everett_from_curves, relay_weights, smooth
 from hysim.laws.operators._relays import RelayLaw, everett_of, weights_of
 from hysim.laws.operators.prandtl_ishlinskii import PrandtlIshlinskii
 from hysim.models.law import State
@@ -238,13 +230,7 @@ class Preisach(RelayLaw):
         >>> [round(weight, 12) for weight in curves.weights], round(curves.offset, 12)
         ([1.0, 0.5, 1.0], 3.0)
         """
-        curves = curves_of(record, tolerance)
-        low = float(record.u.min())
-        grid = levels_of(low, curves) if levels is None else read_only(levels, "levels", ndim=1)
-        if not grid.size or grid[0] > low + tolerance * float(np.ptp(record.u)):
-            raise ValueError(f"levels must begin at the lowest input {low:g} or below, got {grid[:1].tolist()}")
-        everett = everett_between(low, grid, curves)
-        lowest = float(np.mean([curve.fall.y[-1] for curve in curves]))
+        grid, everett, lowest = everett_from_curves(record, levels, tolerance)
         return cls.from_everett(grid, everett, offset=lowest + float(everett[-1, 0]))
 
     @classmethod
@@ -293,12 +279,9 @@ class Preisach(RelayLaw):
             raise ValueError(f"strength must be finite and not negative, got {strength}")
         if intervals is not None:
             check_whole(intervals, "intervals")
-        count = supported(given) if intervals is None else intervals
-        low, high = min(float(each.u.min()) for each in given), max(float(each.u.max()) for each in given)
-        levels = tuple(np.linspace(low, high, count + 1).tolist())
         with one_blas_thread():
-            weights, offset, past = smooth(cls, levels, given, strength)
-        return cls(levels=levels, weights=tuple(weights.tolist()), offset=offset, z0=past)
+            law: Self = smooth(cls, given, intervals, strength)
+        return law
 
     def slope_bounds(self) -> tuple[float, float]:
         """Lowest and highest slope dy/du over every input between the levels.
