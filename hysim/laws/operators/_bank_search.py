@@ -31,6 +31,7 @@ x has on the record. The weight of the dead zone zero is one, because a factor o
 """
 
 import itertools
+from abc import abstractmethod
 from collections.abc import Mapping, Sequence
 from dataclasses import field, fields, replace
 from typing import Any, NamedTuple
@@ -86,6 +87,17 @@ class SignedStructure(Identifiable, Composable):
         area = np.dot(record.u, np.roll(record.y, -1)), np.dot(np.roll(record.u, -1), record.y)
         positive = (clockwise == bool(area[0] < area[1])) != self.against
         return (0.0, np.inf) if positive else (-np.inf, 0.0)
+
+    @abstractmethod
+    def initial(self, parameters: Parameters) -> FloatArray:
+        """The initial memory of the laws, (n_sets, n_memory)."""
+
+    def assemble(self, parameters: Mapping[str, float]) -> Any:
+        """The law with these parameters, one number for each name."""
+        tuples = {name.partition("[")[0] for name in parameters if "[" in name}
+        values = {**parameters, **{name: table_of(name, parameters)[0] for name in tuples}}
+        values["z0"] = self.initial(parameters)[0]
+        return self.law(**{each.name: values[each.name] for each in fields(self.law) if each.name in values})
 
 
 @checked
@@ -161,7 +173,8 @@ class BankStructure(SignedStructure):
         def parameters(x: FloatArray) -> dict[str, FloatArray]:
             numbers = space.parameters(x)
             derived: dict[str, FloatArray] = self.law.derived(numbers, record)
-            return numbers | derived
+            known = {name: np.full(len(np.atleast_2d(x)), value) for name, value in self.known.items()}
+            return numbers | derived | known
 
         return replace(space, parameters=parameters)
 
@@ -184,15 +197,6 @@ class BankStructure(SignedStructure):
         shape = np.broadcast_shapes(*map(np.shape, parameters.values()))
         columns = (column.reshape(shape)[()] for column in z.T)
         return {**parameters} | dict(zip(self._names("z0", z.shape[1]), columns, strict=True))
-
-    def assemble(self, parameters: Mapping[str, float]) -> Any:
-        """The law with these parameters, one number for each name."""
-        numbers = {**self.known, **parameters}
-        tuples = {name.partition("[")[0] for name in numbers if "[" in name}
-        values = (
-            numbers | {name: table_of(name, numbers)[0] for name in tuples} | {"z0": self._tables(parameters)["z0"][0]}
-        )
-        return self.law(**{each.name: values[each.name] for each in fields(self.law) if each.name in values})
 
     def assumed_states(self, record: Record) -> tuple[str, ...]:
         """At rest at zero or at the first input, after the cycle, or after one former turning point."""
@@ -243,20 +247,22 @@ class BankStructure(SignedStructure):
     def _has_feedthrough(self) -> bool:
         return any(each.name == "feedthrough" for each in fields(self.law))
 
-    def _positions(self, parameters: Parameters, record: Record) -> FloatArray:
-        positions: FloatArray = self.law.pushed(self._tables(parameters), {**self.known, **parameters}, record)
-        return positions
-
-    def _tables(self, parameters: Parameters) -> dict[str, FloatArray]:
-        """Offset, thresholds, weights and initial positions of laws of the weights zero, (n_sets, n) each."""
-        thresholds = table_of(self.law.thresholds_name, parameters)
-        z0 = np.zeros_like(thresholds)
+    def initial(self, parameters: Parameters) -> FloatArray:
+        """The positions of the plays: given ones, or those after the stroke from rest at zero by the turning points."""
         if "z0[0]" in parameters:
-            z0 = table_of("z0", parameters)
-        else:  # the stroke from rest at zero through the former turning points
-            for turn in reversed([parameters[turn] for turn in self._turns if turn in parameters]):
-                z0 = moved(z0, thresholds, np.ravel(turn)[:, np.newaxis])
-        return {"offset": np.zeros((len(z0), 1)), "thresholds": thresholds, "weights": np.zeros_like(z0), "z0": z0}
+            return table_of("z0", parameters)
+        thresholds = table_of(self.law.thresholds_name, parameters)
+        z = np.zeros_like(thresholds)
+        for turn in reversed([parameters[turn] for turn in self._turns if turn in parameters]):
+            z = moved(z, thresholds, np.ravel(turn)[:, np.newaxis])
+        return z
+
+    def _positions(self, parameters: Parameters, record: Record) -> FloatArray:
+        """Positions (n_sets, n_samples, n_plays) along a record, which do not depend on the weights."""
+        thresholds, z0 = table_of(self.law.thresholds_name, parameters), self.initial(parameters)
+        tables = {"offset": np.zeros((len(z0), 1)), "thresholds": thresholds, "weights": np.zeros_like(z0), "z0": z0}
+        positions: FloatArray = self.law.pushed(tables, parameters, record)
+        return positions
 
 
 @checked

@@ -68,15 +68,17 @@ class PreisachStructure(SignedStructure):
 
     def search_space(self, record: Record, freedom: Freedom = ALL_FREE) -> SearchSpace:
         """The memory as a coordinate where it is free; the rest is linear."""
-        scale = spans(record)["h"]
-        levels = self._levels(record)
+        scale, levels = spans(record)["h"], np.array(self.levels)
+        if not levels.size:  # even steps over the span of the input
+            levels = np.linspace(record.u.min(), record.u.max(), self.intervals + 1)
         places = {f"levels[{k}]": value for k, value in enumerate(levels.tolist())}
         columns = (*(f"weights[{k}]" for k in range(_n_weights(levels))), "offset")
         lowest, highest = float(levels[0]), float(levels[-1])
         defaults = {**places, **dict.fromkeys(columns, 0.0), TURN: lowest}
         if searched := [name for name in places if name in (*freedom.free, *freedom.fixed)]:
             raise ValueError(f"{searched[0]!r} is not searched: give the levels to structure(levels=...)")
-        signs = self._signs(record, levels.size - 1)
+        side, (rows, lower) = self.side(record), np.tril_indices(levels.size - 1)
+        signs = {f"weights[{k}]": side for k in np.flatnonzero(rows > lower).tolist() if side is not None}
         resting = {TURN: lowest} if freedom.starts_at_rest("rest") and TURN not in freedom.free else {}
         turns = freedom.fixed.get(TURN, lowest if resting else np.linspace(lowest, highest, _STARTS))
         untold = self._untold(record, {**places, TURN: turns}, signs)
@@ -84,10 +86,9 @@ class PreisachStructure(SignedStructure):
         held = {**places, **resting, **{name: 0.0 for name in untold if name not in freedom.free}, **chosen}
         limits = freedom.limits(defaults, held)
         turn = Coordinate(TURN, *limits.get(TURN, (lowest, highest)), scale, physical=(True, True))
-        points = [
-            {TURN: value} for value in np.linspace(turn.lower, turn.upper, 1 if TURN in held else _STARTS).tolist()
-        ]
+        begins = np.linspace(turn.lower, turn.upper, 1 if TURN in held else _STARTS).tolist()
         bounds = {name: pair for name, pair in {**signs, **limits}.items() if name in columns and name not in held}
+        points = [{TURN: value} for value in begins]
         return space_of([turn], columns, defaults, held, limits, points, bounds=bounds, state=(TURN,), screened=0)
 
     def regressors(self, parameters: Parameters, record: Record) -> FloatArray:
@@ -103,14 +104,14 @@ class PreisachStructure(SignedStructure):
         """The parameters with the memory after one run through the record, which erases what was before it."""
         shape = np.broadcast_shapes(*map(np.shape, parameters.values()))
         levels = table_of("levels", parameters)[0]
-        extremes = self._law(levels, np.zeros(_n_weights(levels))).advance(record.u)[1][1:]
+        law: Any = self.law
+        extremes = law(levels=levels, weights=np.zeros(_n_weights(levels))).advance(record.u)[1][1:]
         return {**parameters} | {f"z0[{k}]": np.full(shape, value)[()] for k, value in enumerate(extremes)}
 
-    def assemble(self, parameters: Mapping[str, float]) -> Any:
-        """The law with these parameters, one number for each name."""
-        levels, weights = (table_of(name, parameters)[0] for name in ("levels", "weights"))
-        past = [value for value in _memory(parameters)[0].tolist() if value > levels[0]]
-        return self._law(levels, weights, offset=parameters["offset"], z0=tuple(past))
+    def initial(self, parameters: Parameters) -> FloatArray:
+        """Inputs before the first sample, but for those at the lowest level."""
+        past = _memory(parameters)
+        return past[:, past[0] > parameters["levels[0]"]]
 
     def notes(self, record: Record, law: Any) -> tuple[str, ...]:
         """Number of the weights that the record does not determine."""
@@ -123,12 +124,6 @@ class PreisachStructure(SignedStructure):
     def assumed_states(self, record: Record) -> tuple[str, ...]:
         """All relays down, after the cycle, or after one former turning point."""
         return "rest", "periodic", "free"
-
-    def _levels(self, record: Record) -> FloatArray:
-        """The structure's own, or even steps over the span of the input."""
-        if self.levels:
-            return np.array(self.levels)
-        return np.linspace(record.u.min(), record.u.max(), self.intervals + 1)
 
     def _untold(
         self, record: Record, parameters: Parameters, signs: Mapping[str, tuple[float, float]]
@@ -144,16 +139,6 @@ class PreisachStructure(SignedStructure):
         used = _support(relays, goal[:, 0], [signs.get(f"weights[{k}]", (-np.inf, np.inf)) for k in range(rows.size)])
         independent = _independent(relays, [rows.size, *nearest[used[nearest]], *nearest[~used[nearest]]])
         return tuple(f"weights[{k}]" for k in range(rows.size) if k not in independent)
-
-    def _law(self, levels: FloatArray, weights: FloatArray, **others: Any) -> Any:
-        law: Any = self.law
-        return law(levels=tuple(levels), weights=tuple(weights), **others)
-
-    def _signs(self, record: Record, n: int) -> dict[str, tuple[float, float]]:
-        """Bounds at zero of the weights off the diagonal."""
-        side, (rows, columns) = self.side(record), np.tril_indices(n)
-        off = np.flatnonzero(rows > columns).tolist()
-        return {f"weights[{k}]": side for k in off if side is not None}
 
 
 def check_relays(levels: FloatArray, weights: FloatArray) -> None:
