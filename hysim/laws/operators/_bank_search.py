@@ -32,7 +32,8 @@ x has on the record. The weight of the dead zone zero is one, because a factor o
 
 import itertools
 from abc import abstractmethod
-from collections.abc import Mapping, Sequence
+from collections import ChainMap
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import field, fields, replace
 from typing import Any, NamedTuple
 
@@ -126,49 +127,30 @@ class BankStructure(SignedStructure):
     def search_space(self, record: Record, freedom: Freedom = ALL_FREE) -> SearchSpace:
         """Thresholds and memory as coordinates where they are free; the rest is linear."""
         half, first, turns = spans(record)["h"], float(record.u[0]), self._turns
-        thresholds = self._thresholds(half)
-        names, weights = (
-            self._names(what, thresholds.size) for what in (self.law.thresholds_name, self.law.weights_name)
-        )
+        places = self._thresholds(half)
+        thresholds, axes = named(self.law.thresholds_name, places.tolist()), self._axes(record)
+        weights = dict(zip(named(self.law.weights_name, places), places.tolist(), strict=True))
         columns = (*weights, *(("feedthrough",) if self._has_feedthrough else ()), "offset")
-        axes, starts = self._axes(record)
-        defaults = {
-            **dict(zip(names, thresholds.tolist(), strict=True)),
-            **{name: values[0] for name, values in starts.items()},
-            **dict.fromkeys(columns, 0.0),
-            **dict.fromkeys(turns, first),
-        }
+        starts = {each.name: begins for each, begins in axes}
+        rest = dict.fromkeys(columns, 0.0) | dict.fromkeys(turns, first)
+        defaults = {**thresholds, **{name: begins[0] for name, begins in starts.items()}, **rest}
         chosen = freedom.held(defaults, at_rest=turns if freedom.starts_at_rest("rest") else ())
-        held = {name: defaults[name] for name in names if name not in freedom.free} | chosen
+        held = {name: value for name, value in thresholds.items() if name not in freedom.free} | chosen
         limits = freedom.limits(defaults, held)
-        gaps = zip(names, _gaps(thresholds), strict=True)
         box = [
-            *(Coordinate(name, *gap, half, physical=(True, True)) for name, gap in gaps),
+            *(Coordinate(*each, half, physical=(True, True)) for each in _gaps(thresholds)),
             *(Coordinate(turn, first - 2.0 * half, first + 2.0 * half, half) for turn in turns),
-            *axes,
+            *(each for each, _ in axes),
         ]
-        pasts = [point for point in _pasts(turns, record) if not set(turns) & set(held)] or [{}]
-        free = {name: values for name, values in starts.items() if name not in held}
-        points = [
-            past | dict(zip(free, values, strict=True))
-            for past in pasts
-            for values in itertools.product(*free.values())
-        ]
+        pasts = [past for past in _pasts(turns, record) if not set(turns) & set(held)] or [{}]
+        free = [[{name: value} for value in begins] for name, begins in starts.items() if name not in held]
+        points = [dict(ChainMap(*each)) for each in itertools.product(pasts, *free)]
         side = self.side(record, clockwise=self.law.stops)
-        turning = {name for name, threshold in zip(weights, thresholds, strict=True) if threshold > 0.0} - set(held)
-        bounds = {name: side for name in weights if side is not None and name in turning}
+        bounds = {name: side for name, r in weights.items() if side is not None and r > 0.0 and name not in held}
+        bounds |= {name: pair for name, pair in limits.items() if name in columns}
         searched = {each.name for each in box} - set(held)
-        space = space_of(
-            box,
-            columns,
-            defaults,
-            held,
-            limits,
-            points,
-            bounds=bounds | {name: pair for name, pair in limits.items() if name in columns},
-            state=turns,
-            screened=0 if searched <= {*turns} else 64 if searched <= {*turns, *starts} else 256,
-        )
+        few = 0 if searched <= {*turns} else 64 if searched <= {*turns, *starts} else 256
+        space = space_of(box, columns, defaults, held, limits, points, bounds=bounds, state=turns, screened=few)
 
         def parameters(x: FloatArray) -> dict[str, FloatArray]:
             numbers = space.parameters(x)
@@ -181,10 +163,8 @@ class BankStructure(SignedStructure):
     def regressors(self, parameters: Parameters, record: Record) -> FloatArray:
         """One column for each element, the input where there is a feedthrough, 1 and 0."""
         z = self._positions(parameters, record)
-        ones = np.ones((*z.shape[:2], 1))
-        static = [record.u[:, np.newaxis] * ones] if self._has_feedthrough else []
-        elements = self.law.outputs_of_one(z, parameters, record)
-        return np.concatenate([elements, *static, ones, np.zeros_like(ones)], axis=-1)
+        static = [np.broadcast_to(record.u[:, np.newaxis], (*z.shape[:2], 1))] if self._has_feedthrough else []
+        return with_offset(self.law.outputs_of_one(z, parameters, record), *static)
 
     def steady(self, parameters: Parameters, record: Record) -> dict[str, Any]:
         """The parameters with the positions after one run through the record, which erases what was before it.
@@ -195,8 +175,7 @@ class BankStructure(SignedStructure):
         if np.ptp(record.u) == 0.0:
             z = np.full_like(z, record.u[0])
         shape = np.broadcast_shapes(*map(np.shape, parameters.values()))
-        columns = (column.reshape(shape)[()] for column in z.T)
-        return {**parameters} | dict(zip(self._names("z0", z.shape[1]), columns, strict=True))
+        return {**parameters} | named("z0", (column.reshape(shape)[()] for column in z.T))
 
     def assumed_states(self, record: Record) -> tuple[str, ...]:
         """At rest at zero or at the first input, after the cycle, or after one former turning point."""
@@ -222,21 +201,15 @@ class BankStructure(SignedStructure):
         steps = np.arange(self.plays) + float(self.law.stops)
         return np.asarray(half * (steps / (self.plays + float(self.law.stops))) ** self.spacing)
 
-    def _axes(self, record: Record) -> tuple[list[Coordinate], dict[str, tuple[float, ...]]]:
-        """The coordinates beside thresholds and turning points, and where their search begins, by name."""
+    def _axes(self, record: Record) -> list[tuple[Coordinate, tuple[float, ...]]]:
+        """The coordinates beside thresholds and turning points, and where their search begins."""
         rated = any("v" in each.parameter.unit for each in self.axes)
-        units = rate_spans(record) if rated else spans(record)
-        coordinates, starts = [], {}
-        for each, begins in self.axes:
-            unit = unit_of(each.unit, units)
-            box = each.lower * unit, each.upper * unit
-            coordinates.append(Coordinate(each.name, *box, unit, physical=each.physical))
-            own = [self.own[each.name]] if each.name in self.own else []
-            starts[each.name] = (*own, *(unit * start for start in begins))
-        return coordinates, starts
-
-    def _names(self, what: str, count: int) -> tuple[str, ...]:
-        return tuple(f"{what}[{k}]" for k in range(count))
+        units, axes = rate_spans(record) if rated else spans(record), []
+        for each, starts in self.axes:
+            unit, own = unit_of(each.unit, units), [self.own[each.name]] if each.name in self.own else []
+            coordinate = Coordinate(each.name, each.lower * unit, each.upper * unit, unit, physical=each.physical)
+            axes.append((coordinate, (*own, *(unit * start for start in starts))))
+        return axes
 
     @property
     def _turns(self) -> tuple[str, ...]:
@@ -289,29 +262,26 @@ class DeadZoneStructure(Identifiable, Composable):
         zones = np.array(self.dead_zones)
         if not zones.size:  # zero and even steps inside the range of x
             zones = np.unique(np.append(np.linspace(float(x.min()), float(x.max()), self.count + 2)[1:-1], 0.0))
-        columns = (*(f"dead_zone_weights[{j}]" for j in range(zones.size)), "offset")
+        columns = (*named("dead_zone_weights", zones), "offset")
         defaults = dict(zip(weights, start.tolist(), strict=True)) | dict.fromkeys(columns, 0.0)
         through = tuple(columns[j] for j in np.flatnonzero(zones == 0.0))
         held = freedom.held(defaults | dict.fromkeys(through, 1.0), redundant=tuple((name,) for name in through))
         limits = freedom.limits(defaults, held)
-        starts = [defaults, *([dict(zip(weights, self.weights, strict=True))] if self.weights else [])]
+        starts = [defaults, *([named("weights", self.weights)] if self.weights else [])]
         slope = float(np.ptp(record.y)) / float(np.ptp(record.u)) or 1.0
         largest = max(_LARGEST * abs(slope), 2.0 * float(np.abs(start).max()))  # a steep start is inside
-        sides = {name: np.clip(own.bounds.get(name, (-np.inf, np.inf)), -largest, largest) for name in weights}
-        box = [
-            Coordinate(name, float(low), float(high), slope, physical=(low == 0.0, high == 0.0))
-            for name, (low, high) in sides.items()
-        ]
-        held = dict(own.held) | {f"dead_zones[{j}]": d for j, d in enumerate(zones.tolist())} | held
+        box = []
+        for name in weights:
+            low, high = np.clip(own.bounds.get(name, (-np.inf, np.inf)), -largest, largest).tolist()
+            box.append(Coordinate(name, low, high, slope, physical=(low == 0.0, high == 0.0)))
+        held = {**own.held, **named("dead_zones", zones.tolist()), **held}
         return space_of(box, columns, defaults, held, limits, starts, state=own.state, screened=0)
 
     def regressors(self, parameters: Parameters, record: Record) -> FloatArray:
         """Columns S_0(x), S_1(x), ..., 1, 0 of the output, shape (n_sets, n_samples, n_zones + 2)."""
         z = self.plays.regressors(parameters, record)[..., :-2]
         x = np.matmul(z, table_of("weights", parameters)[..., np.newaxis])
-        ones = np.ones_like(x)
-        zones = dead_zone(x, table_of("dead_zones", parameters)[:, np.newaxis])
-        return np.concatenate([zones, ones, np.zeros_like(ones)], axis=-1)
+        return with_offset(dead_zone(x, table_of("dead_zones", parameters)[:, np.newaxis]))
 
     def steady(self, parameters: Parameters, record: Record) -> dict[str, Any]:
         """The parameters with the positions of the steady cycle of which `record` is one period or more."""
@@ -349,6 +319,17 @@ def table_of(what: str, parameters: Parameters) -> FloatArray:
     for k in range(count):
         table[:, k] = parameters[f"{what}[{k}]"]
     return table
+
+
+def named(what: str, values: Iterable[Any]) -> dict[str, Any]:
+    """The numbers of a tuple by their names, ``what[0]``, ``what[1]`` ..."""
+    return {f"{what}[{k}]": value for k, value in enumerate(values)}
+
+
+def with_offset(*columns: FloatArray) -> FloatArray:
+    """Columns (n_sets, n_samples, n) of what the output is affine in, with 1 for the offset and 0 for the rest."""
+    ones = np.ones((*columns[0].shape[:2], 1))
+    return np.concatenate([*columns, ones, np.zeros_like(ones)], axis=-1)
 
 
 def moved(z: FloatArray, thresholds: FloatArray, u: FloatArray) -> FloatArray:
@@ -433,12 +414,11 @@ def _pasts(turns: Sequence[str], record: Record) -> list[dict[str, float]]:
     return [dict(zip(turns, past, strict=True)) for past in every.tolist()]
 
 
-def _gaps(thresholds: FloatArray) -> list[tuple[float, float]]:
-    """For each threshold the middles of the gaps to its neighbours; zero below the first."""
-    order = np.argsort(thresholds, kind="stable")
-    middles = 0.5 * (thresholds[order][1:] + thresholds[order][:-1])
-    last = 1.5 * float(thresholds.max(initial=0.0)) or 1.0
-    edges = np.concatenate([[0.0], middles, [last]])
-    gaps = np.empty((thresholds.size, 2))
-    gaps[order] = np.stack([edges[:-1], edges[1:]], axis=1)
-    return [(lower, upper) for lower, upper in gaps.tolist()]
+def _gaps(thresholds: Mapping[str, float]) -> list[tuple[str, float, float]]:
+    """Each threshold with the middles of the gaps to its neighbours; zero below the first."""
+    ranked = sorted(thresholds, key=lambda name: thresholds[name])
+    values = np.array([thresholds[name] for name in ranked])
+    middles = 0.5 * (values[1:] + values[:-1])
+    edges = [0.0, *middles.tolist(), 1.5 * float(values.max(initial=0.0)) or 1.0]
+    gaps = dict(zip(ranked, itertools.pairwise(edges), strict=True))
+    return [(name, *gaps[name]) for name in thresholds]

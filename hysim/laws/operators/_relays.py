@@ -37,7 +37,7 @@ import numpy.typing as npt
 from hysim._basics.frozen import FloatArray, check_whole, checked, read_only
 from hysim._basics.parallel import in_pieces
 from hysim.kernels import preisach as kernels
-from hysim.laws.operators._bank_search import TURN, SignedStructure, check_increasing, table_of
+from hysim.laws.operators._bank_search import TURN, SignedStructure, check_increasing, named, table_of, with_offset
 from hysim.models.by_structure import ByStructure
 from hysim.models.law import Law, Packed, State
 from hysim.models.parameters import Coordinate, space_of, spans
@@ -71,8 +71,8 @@ class PreisachStructure(SignedStructure):
         scale, levels = spans(record)["h"], np.array(self.levels)
         if not levels.size:  # even steps over the span of the input
             levels = np.linspace(record.u.min(), record.u.max(), self.intervals + 1)
-        places = {f"levels[{k}]": value for k, value in enumerate(levels.tolist())}
-        columns = (*(f"weights[{k}]" for k in range(_n_weights(levels))), "offset")
+        places = named("levels", levels.tolist())
+        columns = (*named("weights", range(_n_weights(levels))), "offset")
         lowest, highest = float(levels[0]), float(levels[-1])
         defaults = {**places, **dict.fromkeys(columns, 0.0), TURN: lowest}
         if searched := [name for name in places if name in (*freedom.free, *freedom.fixed)]:
@@ -96,9 +96,8 @@ class PreisachStructure(SignedStructure):
         levels, z0 = table_of("levels", parameters)[0], _memory(parameters)
         relays = np.eye(_n_weights(levels))
         sets = {"levels": levels, "weights": np.tile(relays, (len(z0), 1)), "z0": np.repeat(z0, len(relays), axis=0)}
-        outputs = self.law.responses(sets, record.u).reshape(len(z0), len(relays), -1).transpose(0, 2, 1)
-        ones = np.ones((*outputs.shape[:2], 1))
-        return np.concatenate([outputs, ones, np.zeros_like(ones)], axis=-1)
+        outputs = self.law.responses(sets, record.u).reshape(len(z0), len(relays), -1)
+        return with_offset(outputs.transpose(0, 2, 1))
 
     def steady(self, parameters: Parameters, record: Record) -> dict[str, Any]:
         """The parameters with the memory after one run through the record, which erases what was before it."""
@@ -106,7 +105,7 @@ class PreisachStructure(SignedStructure):
         levels = table_of("levels", parameters)[0]
         law: Any = self.law
         extremes = law(levels=levels, weights=np.zeros(_n_weights(levels))).advance(record.u)[1][1:]
-        return {**parameters} | {f"z0[{k}]": np.full(shape, value)[()] for k, value in enumerate(extremes)}
+        return {**parameters} | named("z0", (np.full(shape, value)[()] for value in extremes))
 
     def initial(self, parameters: Parameters) -> FloatArray:
         """Inputs before the first sample, but for those at the lowest level."""
@@ -115,8 +114,7 @@ class PreisachStructure(SignedStructure):
 
     def notes(self, record: Record, law: Any) -> tuple[str, ...]:
         """Number of the weights that the record does not determine."""
-        places = {f"levels[{k}]": value for k, value in enumerate(law.levels)}
-        columns = self.regressors({**places, TURN: law.levels[0]}, record)[0, :, :-1]
+        columns = self.regressors({**named("levels", law.levels), TURN: law.levels[0]}, record)[0, :, :-1]
         untold = columns.shape[1] - int(np.linalg.matrix_rank(columns))
         told = f"this record does not tell {untold} of the {len(law.weights)} weights from the others"
         return (told,) if untold else ()

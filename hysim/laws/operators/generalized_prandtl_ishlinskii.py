@@ -8,7 +8,7 @@ import numpy.typing as npt
 
 from hysim._basics.frozen import FloatArray, read_only
 from hysim.laws.operators._bank import Bank
-from hysim.laws.operators._bank_search import Axis, BankStructure, pushed_by_rows, table_of
+from hysim.laws.operators._bank_search import Axis, BankStructure, named, pushed_by_rows, table_of
 from hysim.laws.operators._play_sums import EXAMPLE, IDENTITY, PlaySum, rows_of
 from hysim.models.model import Example, family
 from hysim.models.parameters import Parameter, spans
@@ -126,8 +126,8 @@ class GeneralizedPrandtlIshlinskii(Bank, PlaySum):
         plain = super().structure(plays=plays, thresholds=thresholds, one_signed=one_signed)
         if not known["left"].size:
             return replace(plain, axes=_AXES[: 1 + envelopes])
-        numbers = {f"{side}[{k}]": each for side in known for k, each in enumerate(known[side].tolist())}
-        return replace(plain, known=numbers)
+        numbers = [named(side, each.tolist()) for side, each in known.items()]
+        return replace(plain, known=numbers[0] | numbers[1])
 
     @classmethod
     def pushed(cls, tables: Tables, parameters: Parameters, record: Record) -> FloatArray:
@@ -140,13 +140,10 @@ class GeneralizedPrandtlIshlinskii(Bank, PlaySum):
         """Coefficients ``left[0]`` ... ``left[4]`` for bend and skew, and those of the right envelope for a lead."""
         if "bend" not in parameters:
             return {}
-        skew = parameters["skew"]
-        sides = {"left": skew} | ({"right": skew + parameters["lead"]} if "lead" in parameters else {})
-        return {
-            f"{side}[{k}]": column
-            for side, phase in sides.items()
-            for k, column in enumerate(_between_the_ends(np.asarray(parameters["bend"]), np.asarray(phase), record))
-        }
+        bend, skew = (np.asarray(parameters[name]) for name in ("bend", "skew"))
+        left = named("left", _between_the_ends(bend, skew, record))
+        right = _between_the_ends(bend, skew + parameters["lead"], record) if "lead" in parameters else []
+        return left | named("right", right)
 
     def as_structure(self) -> BankStructure:
         """The structure with the thresholds and envelopes of this law, or with free ones where it has none."""
