@@ -177,36 +177,26 @@ def relay_weights(grid: FloatArray, density: Density) -> tuple[float, ...]:
     return tuple(np.sum(area * heights, axis=(1, 2)).tolist())
 
 
-class Chosen(NamedTuple):
-    """Coefficients of the columns and offset; the strength, and the rms of the errors at the left-out samples."""
-
-    weights: FloatArray
-    offset: float
-    strength: float
-    left_out: float
-
-
 def chosen(
     columns: FloatArray, y: FloatArray, parts: Sequence[Parts], penalty: FloatArray, strength: float | None = None
-) -> Chosen:
-    """The fit to outputs `y` (n_samples,) with the strength that the parts choose."""
+) -> tuple[float, FloatArray, float]:
+    """The rms of the errors at left-out samples, coefficients and offset of the fit with the strength they choose."""
     strengths = STRENGTHS if strength is None else np.array([strength])
     centre, middle = columns.mean(axis=0), float(y.mean())  # about which the sums keep more digits
     columns, y = columns - centre, y - middle
-    whole, exact = moments(columns, y), _EXACT * float(np.std(y))
+    whole, exact = _moments(columns, y), max(_EXACT * float(np.std(y)), np.finfo(float).tiny)
     score, squares = np.zeros(strengths.size), np.zeros(strengths.size)
     for kind in parts:
         for part in kind:
-            weights, offsets = fits(whole - moments(columns[part], y[part]), penalty, strengths)
+            weights, offsets = _fits(whole - _moments(columns[part], y[part]), penalty, strengths)
             each = np.sum((y[part, np.newaxis] - columns[part] @ weights - offsets) ** 2, axis=0)
-            rms = np.maximum(np.sqrt(each / part.size), max(exact, np.finfo(float).tiny))
+            rms = np.maximum(np.sqrt(each / part.size), exact)
             score += rms / rms.min() / len(kind)
             squares += each
     best = int(np.argmin(score))
-    weights, offsets = fits(whole, penalty, strengths[[best]])
+    weights, offsets = _fits(whole, penalty, strengths[[best]])
     left_out = float(np.sqrt(squares[best] / sum(part.size for each in parts for part in each)))
-    offset = middle + float(offsets[0]) - float(centre @ weights[:, 0])
-    return Chosen(weights[:, 0], offset, float(strengths[best]), left_out)
+    return left_out, weights[:, 0], middle + float(offsets[0]) - float(centre @ weights[:, 0])
 
 
 def smooth(law: type[Any], records: Sequence[Record], intervals: int | None, strength: float | None) -> Any:
@@ -219,20 +209,17 @@ def smooth(law: type[Any], records: Sequence[Record], intervals: int | None, str
     table, penalty = linear_between(cells, n), roughness(cells)
     relays = law(levels=levels, weights=(0.0,) * len(table))
 
-    def chosen_after(pasts: Sequence[tuple[float, ...]]) -> Chosen:
-        sets = [
-            {"levels": np.array(levels), "weights": table.T, "z0": np.tile(z0, (table.shape[1], 1))} for z0 in pasts
-        ]
-        columns = [law.responses(each, record.u).T for each, record in zip(sets, short, strict=True)]
-        return chosen(np.concatenate(columns), y, parts, penalty, strength)
-
     at_rest = [levels[:1] for _ in short]
     repeated = [(*levels[:1], *relays.advance(record.u)[1][1:]) for record in short]
-    fit, past = min(
-        ((chosen_after(pasts), pasts[0]) for pasts in (at_rest, repeated)), key=lambda each: each[0].left_out
-    )
+    fits = []
+    for pasts in (at_rest, repeated):
+        memories = [np.tile(past, (table.shape[1], 1)) for past in pasts]
+        sets = [{"levels": np.array(levels), "weights": table.T, "z0": z0} for z0 in memories]
+        columns = [law.responses(each, record.u).T for each, record in zip(sets, short, strict=True)]
+        fits.append((*chosen(np.concatenate(columns), y, parts, penalty, strength), pasts[0]))
+    _, weights, offset, past = min(fits, key=lambda fit: fit[0])
     z0 = tuple(value for value in past if value > levels[0])
-    return law(levels=levels, weights=tuple((table @ fit.weights).tolist()), offset=fit.offset, z0=z0)
+    return law(levels=levels, weights=tuple((table @ weights).tolist()), offset=offset, z0=z0)
 
 
 def _supported(span: float, records: Sequence[Record]) -> int:
@@ -273,24 +260,18 @@ def _covered(u: FloatArray, others: Sequence[Record]) -> bool:
 
 
 def roughness(n: int) -> FloatArray:
-    """P for the weights of `n` intervals, row by row."""
+    """P for the weights of `n` intervals, row by row.
+
+    Differences that reach the diagonal, or beyond it, are left out; the diagonal has its own.
+    """
     rows, columns = np.tril_indices(n)
-    place = {(i, j): k for k, (i, j) in enumerate(zip(rows.tolist(), columns.tolist(), strict=True))}
-    differences = []
-    for i, j in place:
-        if i == j:
-            stencils = [{(i, i): 1.0, (i + 1, i + 1): -2.0, (i + 2, i + 2): 1.0}]
-        else:
-            stencils = [
-                {(i, j): 1.0, (i + 1, j): -2.0, (i + 2, j): 1.0},
-                {(i, j): 1.0, (i, j + 1): -2.0, (i, j + 2): 1.0},
-                {(i, j): _MIXED, (i + 1, j): -_MIXED, (i, j + 1): -_MIXED, (i + 1, j + 1): _MIXED},
-            ]
-        inside = (each for each in stencils if all(p in place and (p[0] == p[1]) == (i == j) for p in each))
-        differences += [{place[p]: value for p, value in each.items()} for each in inside]
-    table = np.zeros((len(differences), rows.size))
-    for row, each in zip(table, differences, strict=True):
-        row[list(each)] = list(each.values())
+    first, second, one = np.diff(np.eye(n), axis=0), np.diff(np.eye(n), 2, axis=0), np.eye(n)
+    off = np.tril(np.ones((n, n), dtype=bool), -1).ravel()
+    differences = np.concatenate([np.kron(second, one), np.kron(one, second), _MIXED * np.kron(first, first)])
+    inside = differences[~differences[:, ~off].any(axis=1)]
+    inside = inside[np.argsort((inside != 0.0).argmax(axis=1), kind="stable")]
+    table = np.zeros((len(inside) + len(second), rows.size))
+    table[: len(inside), rows > columns], table[len(inside) :, rows == columns] = inside[:, off], second
     return np.asarray(table.T @ table + _RIDGE * np.eye(rows.size))
 
 
@@ -336,14 +317,14 @@ def _beyond_diagonal(cells: int) -> FloatArray:
     return values
 
 
-def moments(columns: FloatArray, y: FloatArray) -> FloatArray:
+def _moments(columns: FloatArray, y: FloatArray) -> FloatArray:
     """Sums of products (n_columns + 2, n_columns + 2) of columns, a constant and outputs; those of parts add up."""
     beside = np.column_stack([columns, np.ones(y.size), y])
     return np.asarray(beside.T @ beside)
 
 
-def fits(sums: FloatArray, penalty: FloatArray, strengths: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Coefficients (n_columns, n_strengths) and offsets (n_strengths,) of the best fits, from `moments`."""
+def _fits(sums: FloatArray, penalty: FloatArray, strengths: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Coefficients (n_columns, n_strengths) and offsets (n_strengths,) of the best fits, from `_moments`."""
     from scipy.linalg import eigh  # imported where it is needed
 
     columns, middle = sums[:-2, -2] / sums[-2, -2], sums[-1, -2] / sums[-2, -2]

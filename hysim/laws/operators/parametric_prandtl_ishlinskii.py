@@ -17,7 +17,7 @@ import numpy.typing as npt
 
 from hysim._basics.frozen import FloatArray
 from hysim.kernels import clamps as kernels
-from hysim.laws.operators._bank_search import conditioned, dominant_extremes, moved
+from hysim.laws.operators._bank_search import conditioned, dominant_extremes, moved, named, table_of
 from hysim.laws.operators._densities import thinned
 from hysim.models.law import Law, Packed
 from hysim.models.model import Example, family
@@ -118,6 +118,7 @@ class ParametricPrandtlIshlinskii(Law):
         Parameter("z0", -2.0, 2.0, unit="h", from_first=True),
     )
     screened = 64
+    structural = ("plays",)
 
     @classmethod
     def check(cls, tables: Tables) -> None:
@@ -125,12 +126,14 @@ class ParametricPrandtlIshlinskii(Law):
         super().check(tables)
         exponent, reach, plays = (tables[name] for name in ("exponent", "reach", "plays"))
         idle = (tables["weight"] == 0.0) & (tables["weight_slope"] == 0.0)
-        if not (exponent > -1.0).all():
-            raise ValueError(f"exponent must be above -1, got {exponent.min()}")
-        if not ((reach > 0.0) | (idle & (reach == 0.0))).all():
-            raise ValueError(f"reach must be positive beside a weight, got {reach.min()}")
-        if not ((plays >= 1.0) & (plays == np.round(plays))).all():
-            raise ValueError(f"plays must be whole and positive, got {plays.min()}")
+        rules = (
+            (exponent > -1.0, f"exponent must be above -1, got {exponent.min()}"),
+            ((reach > 0.0) | (idle & (reach == 0.0)), f"reach must be positive beside a weight, got {reach.min()}"),
+            ((plays >= 1.0) & (plays == np.round(plays)), f"plays must be whole and positive, got {plays.min()}"),
+        )
+        for holds, message in rules:
+            if not holds.all():
+                raise ValueError(message)
         if not tables["z0"].shape[1]:
             raise ValueError("z0 must hold at least one input")
 
@@ -146,11 +149,6 @@ class ParametricPrandtlIshlinskii(Law):
             z = moved(z, thresholds, u)
         parameters = np.concatenate([degree, *numbers, thresholds, shares], axis=1)
         return Packed(parameters, np.concatenate([np.zeros_like(degree), z], axis=1))
-
-    @property
-    def structural(self) -> tuple[str, ...]:
-        """The number of plays."""
-        return ("plays",)
 
     def memory(self, u: npt.ArrayLike) -> FloatArray:
         """Positions of the plays at the samples of `u`, shape (n_samples, n_plays); errors as of `response`."""
@@ -181,28 +179,27 @@ class ParametricPrandtlIshlinskii(Law):
         return declared_space(law.searched, starts, *numbers, record, asked, law.screened, defaults=self.defaults())
 
     def _likely_past(self, record: Record) -> tuple[float, float]:
-        """Inputs before the first sample: those of the cycle, unless plays that stand still fit clearly better."""
-        short, first = thinned(record, _SAMPLES), float(record.u[0])
+        """Inputs before the first sample: those of the cycle, unless plays that stand still fit clearly better.
+
+        What counts is the residual of the best of the densities from which a search begins.
+        """
+        short, first, (exponent, decay) = thinned(record, _SAMPLES), float(record.u[0]), np.array(_DENSITIES).T
+        density = {"exponent": exponent, "decay": spans(short)["h"] * decay}
         best, criterion = conditioned(record.u), np.inf
         for past in (best, (0.0, 0.0), (first, first)):
-            own = 2.0 * len(short) * np.log(max(replace(self, z0=past)._least_error(short), _SMALLEST))
+            law = replace(self, z0=past)
+            columns = law.regressors({**law.scalars, **density}, short)[..., :-1]
+            columns = columns / np.maximum(np.linalg.norm(columns, axis=1, keepdims=True), _SMALLEST)
+            fits = (each @ np.linalg.lstsq(each, short.y, rcond=None)[0] for each in columns)
+            error = min(float(np.linalg.norm(short.y - fit)) for fit in fits)
+            own = 2.0 * len(short) * np.log(max(error, _SMALLEST))
             if own < criterion - _STRONG:
                 best, criterion = past, own
         return best
 
-    def _least_error(self, record: Record) -> float:
-        """Norm of the residual of the best of the densities from which a search begins."""
-        exponent, decay = np.array(_DENSITIES).T
-        density = {"exponent": exponent, "decay": spans(record)["h"] * decay}
-        columns = self.regressors({**self.scalars, **density}, record)[..., :-1]
-        columns = columns / np.maximum(np.linalg.norm(columns, axis=1, keepdims=True), _SMALLEST)
-        fits = (each @ np.linalg.lstsq(each, record.y, rcond=None)[0] for each in columns)
-        return min(float(np.linalg.norm(record.y - fit)) for fit in fits)
-
     def regressors(self, parameters: Parameters, record: Record) -> FloatArray:
         """Columns of weight, weight_slope, 1, u, u^2, ... and 0, shape (n_sets, n_samples, n_columns + 1)."""
-        n_inputs = sum(name.startswith("z0[") for name in parameters) or len(self.z0)
-        law = replace(self, z0=(0.0,) * n_inputs)
+        law = replace(self, z0=(0.0,) * (table_of("z0", parameters).shape[1] or len(self.z0)))
         zero = {**parameters, **dict.fromkeys(law.columns, 0.0)}
         lag = law.outputs({**zero, "weight": 1.0}, record.u)
         powers = [np.broadcast_to(record.u**k, lag.shape) for k in range(len(self.input_coefficients) + 1)]
@@ -212,7 +209,7 @@ class ParametricPrandtlIshlinskii(Law):
         """The record's own dominant turning points as the inputs before it, (n_sets,) by name."""
         n_sets = max((np.size(value) for value in parameters.values()), default=1)
         inputs = dominant_extremes(np.append(record.u, record.u[0]))
-        return {**parameters} | {f"z0[{k}]": np.full(n_sets, u) for k, u in enumerate(inputs)}
+        return {**parameters} | named("z0", (np.full(n_sets, u) for u in inputs))
 
 
 def _plays(tables: Tables) -> tuple[FloatArray, FloatArray]:
