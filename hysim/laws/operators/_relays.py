@@ -204,7 +204,7 @@ class RelayLaw(ByStructure, Law):
     @classmethod
     def pack(cls, tables: Tables) -> Packed:
         """Parameters and state as `hysim.kernels.preisach.step` takes them, after the inputs z0."""
-        parameters = cls._rows(tables["levels"], tables["weights"], tables["offset"][:, 0])
+        parameters = cls._rows(tables)
         lowest, low = parameters[:, kernels.HEAD : kernels.HEAD + 1], parameters[:, 1:2]
         rest = np.zeros((len(parameters), _ROOM - 1))
         memory = np.concatenate([rest[:, :2], lowest, rest, low, rest], axis=1)
@@ -268,8 +268,7 @@ class RelayLaw(ByStructure, Law):
 
     @classmethod
     def rows(cls, tables: Tables, u: FloatArray, y: FloatArray) -> None:
-        parameters = cls._rows(tables["levels"], tables["weights"], tables["offset"][:, 0])
-        kernels.batch(read_only(parameters), read_only(tables["z0"]), u, y)
+        kernels.batch(read_only(cls._rows(tables)), read_only(tables["z0"]), u, y)
 
     def as_structure(self) -> PreisachStructure:
         """The structure with the levels of this law."""
@@ -298,22 +297,19 @@ class RelayLaw(ByStructure, Law):
 
     def _staircase(self, past: State, n_samples: int) -> tuple[FloatArray, FloatArray, FloatArray, int]:
         """Parameters, extremes and outputs as kernels take them after the inputs `past`, and the last place."""
-        parameters = read_only(self._rows(*(np.array([part]) for part in (self.levels, self.weights, self.offset)))[0])
+        parameters = read_only(self._rows(self.tables)[0])
         x, y = np.empty(1 + len(past) + n_samples), np.empty(1 + len(past) + n_samples)
         x[0], y[0] = parameters[kernels.HEAD], parameters[1]
         return parameters, x, y, kernels.path(parameters, x, y, 0, read_only(past), np.empty(len(past)))
 
     @classmethod
-    def _rows(cls, levels: FloatArray, weights: FloatArray, offset: FloatArray) -> FloatArray:
-        """The kernels' parameters (n_sets, n_parameters) of laws with one row each, or of the same row."""
-        if not levels.size:
-            levels, weights = _NOTHING
-        everett = everett_of(weights)
-        n_sets, n = max(len(levels), len(weights), len(offset)), levels.shape[1]
+    def _rows(cls, tables: Tables) -> FloatArray:
+        """The kernels' parameters (n_sets, n_parameters)."""
+        levels, weights = (tables["levels"], tables["weights"]) if tables["levels"].size else _NOTHING
+        offset, everett, n = tables["offset"], everett_of(weights), levels.shape[1]
         signed = (everett - everett.transpose(0, 2, 1)).reshape(len(everett), n * n)
-        lowest = (offset - everett[:, -1, 0])[:, np.newaxis]
-        parts = np.array([[float(cls.spread)]]), lowest, np.array([[float(n)]]), levels, signed
-        return np.concatenate([np.broadcast_to(part, (n_sets, part.shape[1])) for part in parts], axis=1)
+        parts = np.array([[float(cls.spread)]]), offset - everett[:, -1, :1], np.array([[float(n)]]), levels, signed
+        return np.concatenate([np.broadcast_to(part, (len(offset), part.shape[1])) for part in parts], axis=1)
 
 
 def everett_of(weights: FloatArray) -> FloatArray:
