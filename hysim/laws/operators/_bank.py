@@ -59,9 +59,9 @@ class Bank(Elements, ByStructure):
     z0: tuple[float, ...]
 
     def __post_init__(self) -> None:
-        if len(self.z0) == 1:
-            object.__setattr__(self, "z0", self.z0 * len(items(self)[self.thresholds_name]))
-        self.check({name: table_of_one(value) for name, value in own_items(self).items()})
+        tables = self.completed({name: table_of_one(value) for name, value in own_items(self).items()})
+        object.__setattr__(self, "z0", tuple(tables["z0"][0].tolist()))
+        self.check(tables)
 
     @classmethod
     def completed(cls, tables: dict[str, FloatArray]) -> dict[str, FloatArray]:

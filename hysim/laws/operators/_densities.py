@@ -1,4 +1,4 @@
-"""Densities of relays: from a function, from first-order reversal curves, and smooth ones from records.
+"""Densities of relays and of plays: from a function, from first-order reversal curves, and smooth ones from records.
 
 Reversal curves tell the Everett function, between the turning points as well.
 
@@ -48,9 +48,11 @@ import numpy.typing as npt
 
 from hysim._basics.frozen import FloatArray, read_only
 from hysim._columns.turning import TOLERANCE
+from hysim.models.tables import Tables
 from hysim.records import Record
 
 STRENGTHS = np.logspace(-10.0, 4.0, 43)
+_SMALLEST = 1e-280  # a smaller incomplete gamma function is its first term
 _RIDGE = 1e-3  # of the squares of second differences
 _MOST_CURVES = 8
 _MOST_INTERVALS = 64
@@ -334,3 +336,20 @@ def _fits(sums: FloatArray, penalty: FloatArray, strengths: FloatArray) -> tuple
     share = vectors.T @ (sums[:-2, -1] - columns * sums[-1, -2]) / scale
     weights = vectors @ (share[:, np.newaxis] / (np.maximum(size, 0.0)[:, np.newaxis] + np.maximum(strengths, _LEAST)))
     return weights, middle - columns @ weights
+
+
+def gamma_plays(tables: Tables) -> tuple[FloatArray, FloatArray]:
+    """Thresholds and shares (n_sets, n_plays) of plays with a parametric density; see its law.
+
+    Laws with fewer plays have some without a share.
+    """
+    from scipy.special import gammainc  # imported where it is needed
+
+    plays = tables["plays"]
+    place = np.minimum(np.arange(plays.max() + 1.0), plays) / plays
+    edges = tables["reach"] * place**2
+    power, decay = tables["exponent"] + 1.0, tables["decay"]
+    with np.errstate(invalid="ignore", divide="ignore", over="ignore", under="ignore"):
+        whole = gammainc(power, tables["reach"] / decay)
+        below = np.where(whole > _SMALLEST, gammainc(power, edges / decay) / whole, place ** (2.0 * power))
+    return 0.5 * (edges[:, 1:] + edges[:, :-1]), np.diff(below, axis=1)

@@ -18,7 +18,7 @@ import numpy.typing as npt
 from hysim._basics.frozen import FloatArray
 from hysim.kernels import clamps as kernels
 from hysim.laws.operators._bank_search import conditioned, dominant_extremes, moved, named, table_of
-from hysim.laws.operators._densities import thinned
+from hysim.laws.operators._densities import gamma_plays, thinned
 from hysim.models.law import Law, Packed
 from hysim.models.model import Example, family
 from hysim.models.parameters import Parameter, declared_space, spans
@@ -28,7 +28,7 @@ from hysim.records import Record
 
 _DENSITIES = ((-0.5, 0.3), (0.0, 0.15), (1.0, 0.15), (0.0, 1.0))  # exponent, and decay in half spans of the input
 _TURNS = (-2.0, -1.0, 0.0, 1.0, 2.0)  # of a free memory, in half spans from the first input
-_SMALLEST = 1e-280  # a smaller incomplete gamma function is its first term
+_SMALLEST = 1e-280  # norm: nothing is divided by less
 _SAMPLES = 250  # for the choice of the past
 _STRONG = 10.0  # difference of two BIC that is very strong evidence
 
@@ -126,21 +126,19 @@ class ParametricPrandtlIshlinskii(Law):
         super().check(tables)
         exponent, reach, plays = (tables[name] for name in ("exponent", "reach", "plays"))
         idle = (tables["weight"] == 0.0) & (tables["weight_slope"] == 0.0)
-        rules = (
-            (exponent > -1.0, f"exponent must be above -1, got {exponent.min()}"),
-            ((reach > 0.0) | (idle & (reach == 0.0)), f"reach must be positive beside a weight, got {reach.min()}"),
-            ((plays >= 1.0) & (plays == np.round(plays)), f"plays must be whole and positive, got {plays.min()}"),
-        )
-        for holds, message in rules:
-            if not holds.all():
-                raise ValueError(message)
+        if not (exponent > -1.0).all():
+            raise ValueError(f"exponent must be above -1, got {exponent.min()}")
+        if not ((reach > 0.0) | (idle & (reach == 0.0))).all():
+            raise ValueError(f"reach must be positive beside a weight, got {reach.min()}")
+        if not ((plays >= 1.0) & (plays == np.round(plays))).all():
+            raise ValueError(f"plays must be whole and positive, got {plays.min()}")
         if not tables["z0"].shape[1]:
             raise ValueError("z0 must hold at least one input")
 
     @classmethod
     def pack(cls, tables: Tables) -> Packed:
         """Parameters as `hysim.kernels.clamps.bent_step` takes them, and the positions after the inputs z0."""
-        thresholds, shares = _plays(tables)
+        thresholds, shares = gamma_plays(tables)
         numbers = [tables[name] for name in ("offset", "weight", "weight_slope", "input_coefficients")]
         degree = np.full_like(tables["offset"], numbers[-1].shape[1])
         first, *past = tables["z0"].T[:, :, np.newaxis]
@@ -157,12 +155,12 @@ class ParametricPrandtlIshlinskii(Law):
     @property
     def thresholds(self) -> FloatArray:
         """Threshold r_k of each play, shape (n_plays,) [unit of u]."""
-        return np.asarray(_plays(self.tables)[0][0])
+        return np.asarray(gamma_plays(self.tables)[0][0])
 
     @property
     def shares(self) -> FloatArray:
         """Share m_k of each play in the weight, shape (n_plays,); their sum is one."""
-        return np.asarray(_plays(self.tables)[1][0])
+        return np.asarray(gamma_plays(self.tables)[1][0])
 
     def search_space(self, record: Record, freedom: Freedom = ALL_FREE) -> SearchSpace:
         """Box of the two parameters of the density, and of the former turning point where the memory is free."""
@@ -210,17 +208,3 @@ class ParametricPrandtlIshlinskii(Law):
         n_sets = max((np.size(value) for value in parameters.values()), default=1)
         inputs = dominant_extremes(np.append(record.u, record.u[0]))
         return {**parameters} | named("z0", (np.full(n_sets, u) for u in inputs))
-
-
-def _plays(tables: Tables) -> tuple[FloatArray, FloatArray]:
-    """Thresholds and shares (n_sets, n_plays); laws with fewer plays have some without a share."""
-    from scipy.special import gammainc  # imported where it is needed
-
-    plays = tables["plays"]
-    place = np.minimum(np.arange(plays.max() + 1.0), plays) / plays
-    edges = tables["reach"] * place**2
-    power, decay = tables["exponent"] + 1.0, tables["decay"]
-    with np.errstate(invalid="ignore", divide="ignore", over="ignore", under="ignore"):
-        whole = gammainc(power, tables["reach"] / decay)
-        below = np.where(whole > _SMALLEST, gammainc(power, edges / decay) / whole, place ** (2.0 * power))
-    return 0.5 * (edges[:, 1:] + edges[:, :-1]), np.diff(below, axis=1)
