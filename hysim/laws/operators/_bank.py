@@ -19,8 +19,9 @@ import numpy.typing as npt
 
 from hysim._basics.frozen import FloatArray, items, own_items, read_only
 from hysim.kernels import clamps as kernels
+from hysim.kernels.stepping import Step
 from hysim.laws.differential.limit_cycle import LimitCycle
-from hysim.laws.operators._bank_search import Axis, BankStructure, check_elements, pushed_by_rows
+from hysim.laws.operators._bank_search import Axis, BankStructure, check_elements
 from hysim.models.by_structure import ByStructure
 from hysim.models.law import Law, Packed
 from hysim.models.protocols import CompiledLaw
@@ -47,7 +48,7 @@ class Elements:
 class Bank(Elements, ByStructure):
     """Several plays or stops, whose fields are tuples.
 
-    A family of which the input pushes the plays in another way than `Clamps` says so in `pushed`, one with another
+    A family of which the input pushes the plays in another way than `Clamps` says so in `push`, one with another
     output of them in `outputs_of_one`.
     """
 
@@ -77,11 +78,13 @@ class Bank(Elements, ByStructure):
         check_elements(cls, *(tables[name] for name in (cls.thresholds_name, cls.weights_name, "z0")))
 
     @classmethod
-    def pushed(cls, tables: Tables, parameters: Parameters, record: Record) -> FloatArray:
-        """Positions (n_sets, n_samples, n_plays) along a record; `tables` are those of a law with weights of zero."""
+    def push(cls, tables: Tables, parameters: Parameters, record: Record) -> tuple[Step, FloatArray]:
+        """A step that pushes the plays along a record, and its parameters (n_sets, n_parameters).
+
+        `tables` are those of laws with weights of zero, since the positions do not depend on them.
+        """
         head = np.zeros((len(tables["z0"]), kernels.N_OUTPUT))
-        rows = np.concatenate([head, tables["thresholds"], tables["weights"]], axis=1)
-        return pushed_by_rows(kernels.step, rows, tables["z0"], record.u)
+        return kernels.step, np.concatenate([head, tables["thresholds"], tables["weights"]], axis=1)
 
     @classmethod
     def outputs_of_one(cls, z: FloatArray, parameters: Parameters, record: Record) -> FloatArray:

@@ -40,7 +40,6 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from hysim._basics.frozen import FloatArray, check_whole, checked, read_only
-from hysim.kernels.stepping import Step
 from hysim.models.composable import Composable
 from hysim.models.parameters import Coordinate, Parameter, rate_spans, space_of, spans, unit_of
 from hysim.models.protocols import Identifiable, Variant
@@ -232,10 +231,15 @@ class BankStructure(SignedStructure):
 
     def _positions(self, parameters: Parameters, record: Record) -> FloatArray:
         """Positions (n_sets, n_samples, n_plays) along a record, which do not depend on the weights."""
+        from hysim.kernels.memories import drive_memory  # compiled where it is needed
+
         thresholds, z0 = table_of(self.law.thresholds_name, parameters), self.initial(parameters)
         tables = {"offset": np.zeros((len(z0), 1)), "thresholds": thresholds, "weights": np.zeros_like(z0), "z0": z0}
-        positions: FloatArray = self.law.pushed(tables, parameters, record)
-        return positions
+        step, rows = self.law.push(tables, parameters, record)
+        z = np.empty((len(z0), len(record), z0.shape[1]))
+        for row, start, positions in zip(rows, z0, z, strict=True):
+            drive_memory(step, read_only(row), np.append(record.u[:1], start), record.u, positions)
+        return z
 
 
 @checked
@@ -335,16 +339,6 @@ def with_offset(*columns: FloatArray) -> FloatArray:
 def moved(z: FloatArray, thresholds: FloatArray, u: FloatArray) -> FloatArray:
     """Positions of plays that stood at `z`, once the input is `u`."""
     return np.minimum(np.maximum(z, u - thresholds), u + thresholds)
-
-
-def pushed_by_rows(step: Step, rows: FloatArray, z0: FloatArray, u: FloatArray) -> FloatArray:
-    """Positions (n_sets, n_samples, n_plays) of laws with this step and these parameters, one a row."""
-    from hysim.kernels.memories import drive_memory  # compiled where it is needed
-
-    z = np.empty((len(z0), u.size, z0.shape[1]))
-    for row, start, positions in zip(rows, z0, z, strict=True):
-        drive_memory(step, read_only(row), np.append(u[:1], start), u, positions)
-    return z
 
 
 def dead_zone(x: FloatArray, d: float | FloatArray) -> FloatArray:

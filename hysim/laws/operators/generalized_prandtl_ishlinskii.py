@@ -7,8 +7,9 @@ import numpy as np
 import numpy.typing as npt
 
 from hysim._basics.frozen import FloatArray, read_only
+from hysim.kernels.stepping import Step
 from hysim.laws.operators._bank import Bank
-from hysim.laws.operators._bank_search import Axis, BankStructure, named, pushed_by_rows, table_of
+from hysim.laws.operators._bank_search import Axis, BankStructure, named, table_of
 from hysim.laws.operators._play_sums import EXAMPLE, IDENTITY, PlaySum, rows_of
 from hysim.models.model import Example, family
 from hysim.models.parameters import Parameter, spans
@@ -130,10 +131,10 @@ class GeneralizedPrandtlIshlinskii(Bank, PlaySum):
         return replace(plain, known=numbers[0] | numbers[1])
 
     @classmethod
-    def pushed(cls, tables: Tables, parameters: Parameters, record: Record) -> FloatArray:
-        """Positions (n_sets, n_samples, n_plays) along a record."""
+    def push(cls, tables: Tables, parameters: Parameters, record: Record) -> tuple[Step, FloatArray]:
+        """The law's own step, with the envelopes among the parameters."""
         sides = {side: table_of(side, parameters) for side in ("left", "right")}
-        return pushed_by_rows(cls.step, rows_of({**tables, **sides}), tables["z0"], record.u)
+        return cls.step, rows_of({**tables, **sides})
 
     @classmethod
     def derived(cls, parameters: Parameters, record: Record) -> dict[str, FloatArray]:

@@ -109,19 +109,17 @@ class ModifiedPrandtlIshlinskii(Bank, PlaySum):
         >>> hs.identify(structure, hs.datasets.table1()).n_parameters
         7
         """
-        counted = isinstance(dead_zones, int)
-        return DeadZoneStructure(
-            law=cls,
-            plays=PrandtlIshlinskii.structure(plays=plays, thresholds=thresholds, one_signed=one_signed),
-            count=dead_zones if isinstance(dead_zones, int) else 0,
-            dead_zones=() if counted else tuple(read_only(dead_zones, "dead_zones", ndim=1).tolist()),
-        )
+        plain = PrandtlIshlinskii.structure(plays=plays, thresholds=thresholds, one_signed=one_signed)
+        if isinstance(dead_zones, int):
+            return DeadZoneStructure(law=cls, plays=plain, count=dead_zones)
+        places = tuple(read_only(dead_zones, "dead_zones", ndim=1).tolist())
+        return DeadZoneStructure(law=cls, plays=plain, count=0, dead_zones=places)
 
     def inverted(self, y: FloatArray, u0: float | None, state: State | None) -> FloatArray:
         """The inverse of S, then that of the plays, exact to rounding.
 
-        Raises ValueError also if z0 holds
-        positions that no input leads to; one for a law that is not invertible names the weight.
+        Raises ValueError also if z0 holds positions that no input leads to; one for a law that is not invertible names
+        the weight.
         """
         if (refusal := self.refusal()) is not None:
             raise ValueError(refusal)

@@ -20,9 +20,9 @@ import numpy.typing as npt
 
 from hysim._basics.frozen import FloatArray, check_positive, items, read_only
 from hysim._names import among
-from hysim.kernels import play_sums as kernels
+from hysim.kernels.stepping import Step
 from hysim.laws.operators._bank import Bank
-from hysim.laws.operators._bank_search import Axis, pushed_by_rows
+from hysim.laws.operators._bank_search import Axis
 from hysim.laws.operators._play_sums import EXAMPLE, PlaysAtSampleTime, rows_of
 from hysim.laws.operators.prandtl_ishlinskii import PrandtlIshlinskii
 from hysim.models.batch import Reduction
@@ -102,11 +102,10 @@ class RateDependentPrandtlIshlinskii(Bank, Placed):
         return PrandtlIshlinskii(thresholds=self.thresholds, weights=self.weights, z0=self.z0)
 
     @classmethod
-    def pushed(cls, tables: Tables, parameters: Parameters, record: Record) -> FloatArray:
-        """Positions (n_sets, n_samples, n_plays) along a record."""
+    def push(cls, tables: Tables, parameters: Parameters, record: Record) -> tuple[Step, FloatArray]:
+        """The step of `PlaysAtSampleTime`, and its parameters."""
         width = np.reshape(parameters["beta"], (-1, 1)) / record.sample_time
-        rows = rows_of({**tables, "width": np.broadcast_to(width, tables["offset"].shape)})
-        return pushed_by_rows(kernels.step, rows, tables["z0"], record.u)
+        return PlaysAtSampleTime.step, rows_of({**tables, "width": np.broadcast_to(width, tables["offset"].shape)})
 
     def at(self, sample_time: float) -> PlaysAtSampleTime:
         """The law at one sample time [s], as loops step it. Raises ValueError if the sample time is not positive."""
