@@ -134,14 +134,16 @@ def _curves_of(record: Record, tolerance: float) -> list[ReversalCurve]:
     low, slack = float(record.u.min()), tolerance * float(np.ptp(record.u))
     branches = record.branches(tolerance)
     pairs = zip((None, *branches), branches, strict=False)
-    curves = {float(fall.u[0]): ReversalCurve(fall, rise) for rise, fall in pairs if fall.u[-1] < fall.u[0]}
-    if not curves:
-        raise ValueError("the input never falls: a reversal curve is a way up and the way down after it")
-    for turn, (fall, _) in curves.items():
-        if fall.u[-1] > low + slack:
+    every = [ReversalCurve(fall, rise) for rise, fall in pairs if fall.u[-1] < fall.u[0]]
+    for each in every:
+        end = float(each.fall.u[-1])
+        if end > low + slack:
             raise ValueError(
-                f"the way down from {turn:g} must end at the lowest input {low:g}, it ends at {fall.u[-1]:g}"
+                f"the way down from {each.turn:g} must end at the lowest input {low:g}, it ends at {end:g}"
             )
+    if not every:
+        raise ValueError("the input never falls: a reversal curve is a way up and the way down after it")
+    curves = {each.turn: each for each in every}
     return [curves[turn] for turn in sorted(curves)]
 
 
