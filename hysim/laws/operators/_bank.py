@@ -33,8 +33,8 @@ from hysim.records import Record
 class Elements:
     """One play or stop, or several; a family says what its thresholds and weights are called."""
 
-    thresholds_name: ClassVar[str] = "thresholds"
-    weights_name: ClassVar[str] = "weights"
+    thresholds_name: ClassVar[str] = "threshold"
+    weights_name: ClassVar[str] = "gain"
     stops: ClassVar[bool] = False
 
     @property
@@ -52,6 +52,8 @@ class Bank(Elements, ByStructure):
     output of them in `outputs_of_one`.
     """
 
+    thresholds_name: ClassVar[str] = "thresholds"
+    weights_name: ClassVar[str] = "weights"
     ordered: ClassVar[bool] = True  # whether the thresholds must increase
     by_input: ClassVar[bool] = True  # whether the input itself pushes
     axes: ClassVar[tuple[Axis, ...]] = ()  # fields that are searched beside the thresholds

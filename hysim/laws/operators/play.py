@@ -50,8 +50,6 @@ class Play(Clamps):
     z0: float = 0.0
 
     example = Example({"threshold": 0.25}, title="Play")
-    thresholds_name: ClassVar[str] = "threshold"
-    weights_name: ClassVar[str] = "gain"
     not_negative = ("threshold",)
     searched = (
         Parameter("threshold", 1e-3, 1.5, unit="h", physical=(True, False)),
@@ -105,8 +103,6 @@ class Stop(Clamps):
     z0: float = 0.0
 
     example = Example({"threshold": 0.4}, title="Stop")
-    thresholds_name: ClassVar[str] = "threshold"
-    weights_name: ClassVar[str] = "gain"
     stops: ClassVar[bool] = True
     not_negative = Play.not_negative
     searched, starts, screened, columns_by = Play.searched, Play.starts, Play.screened, Play.columns_by
