@@ -118,13 +118,43 @@ class BankStructure(SignedStructure):
     axes: tuple[Axis, ...] = ()
     own: Mapping[str, float] = field(default_factory=dict)
     known: Mapping[str, float] = field(default_factory=dict)
+    zones: int | None = None  # number of dead zones behind plays, beside that of zero
+    dead_zones: tuple[float, ...] = ()
 
     def __post_init__(self) -> None:
         check_whole(self.plays, "plays")
+        check_whole(self.zones or 0, "dead_zones", least=0)
+        if self.dead_zones:
+            check_dead_zones(*[np.atleast_2d(self.dead_zones)] * 2)
         check_elements(self.law, *[np.atleast_2d(self.thresholds)] * 3)
 
     def search_space(self, record: Record, freedom: Freedom = ALL_FREE) -> SearchSpace:
-        """Thresholds and memory as coordinates where they are free; the rest is linear."""
+        """Thresholds and memory as coordinates where they are free, weights before dead zones; the rest is linear."""
+        if self.zones is None:
+            return self._space_of_plays(record, freedom)
+        if not freedom.starts_at_rest("rest"):
+            raise ValueError('the memory of plays before dead zones is not searched: use initial="rest" or "periodic"')
+        own = self._space_of_plays(record, Freedom(initial=freedom.initial))
+        weights, (start, x) = own.columns[:-1], self._plain(own, record)
+        zones = np.array(self.dead_zones)
+        if not zones.size:  # zero and even steps inside the range of x
+            zones = np.unique(np.append(np.linspace(float(x.min()), float(x.max()), self.zones + 2)[1:-1], 0.0))
+        columns = (*named("dead_zone_weights", zones), "offset")
+        defaults = dict(zip(weights, start.tolist(), strict=True)) | dict.fromkeys(columns, 0.0)
+        through = tuple(columns[j] for j in np.flatnonzero(zones == 0.0))
+        held = freedom.held(defaults | dict.fromkeys(through, 1.0), redundant=tuple((name,) for name in through))
+        limits = freedom.limits(defaults, held)
+        starts = [defaults, *([self.own] if self.own else [])]
+        slope = float(np.ptp(record.y)) / float(np.ptp(record.u)) or 1.0
+        largest = max(_LARGEST * abs(slope), 2.0 * float(np.abs(start).max()))  # a steep start is inside
+        box = []
+        for name in weights:
+            low, high = np.clip(own.bounds.get(name, (-np.inf, np.inf)), -largest, largest).tolist()
+            box.append(Coordinate(name, low, high, slope, physical=(low == 0.0, high == 0.0)))
+        held = {**own.held, **named("dead_zones", zones.tolist()), **held}
+        return space_of(box, columns, defaults, held, limits, starts, state=own.state, screened=0)
+
+    def _space_of_plays(self, record: Record, freedom: Freedom) -> SearchSpace:
         half, first, turns = spans(record)["h"], float(record.u[0]), self._turns
         places = self._thresholds(half)
         thresholds, axes = named(self.law.thresholds_name, places.tolist()), self._axes(record)
@@ -160,7 +190,14 @@ class BankStructure(SignedStructure):
         return replace(space, parameters=parameters)
 
     def regressors(self, parameters: Parameters, record: Record) -> FloatArray:
-        """One column for each element, the input where there is a feedthrough, 1 and 0."""
+        """One column for each element or dead zone, the input where there is a feedthrough, 1 and 0."""
+        columns = self._columns(parameters, record)
+        if self.zones is None:
+            return columns
+        x = np.matmul(columns[..., :-2], table_of("weights", parameters)[..., np.newaxis])
+        return with_offset(dead_zone(x, table_of("dead_zones", parameters)[:, np.newaxis]))
+
+    def _columns(self, parameters: Parameters, record: Record) -> FloatArray:
         z = self._positions(parameters, record)
         static = [np.broadcast_to(record.u[:, np.newaxis], (*z.shape[:2], 1))] if self._has_feedthrough else []
         return with_offset(self.law.outputs_of_one(z, parameters, record), *static)
@@ -178,7 +215,7 @@ class BankStructure(SignedStructure):
 
     def assumed_states(self, record: Record) -> tuple[str, ...]:
         """At rest at zero or at the first input, after the cycle, or after one former turning point."""
-        return "rest", "still", "periodic", "free"
+        return "rest", "still", "periodic", *(("free",) if self.zones is None else ())
 
     def longer_past(self) -> "BankStructure | None":
         """With one former turning point more."""
@@ -219,6 +256,17 @@ class BankStructure(SignedStructure):
     def _has_feedthrough(self) -> bool:
         return any(each.name == "feedthrough" for each in fields(self.law))
 
+    def _plain(self, own: SearchSpace, record: Record) -> tuple[FloatArray, FloatArray]:
+        """Weights of the plain law that fits best, and its output without the offset."""
+        from scipy.optimize import lsq_linear
+
+        columns = self._columns(own.parameters(np.empty((1, 0))), record)[0, :, :-1]
+        limits = np.array([own.bounds.get(name, (-np.inf, np.inf)) for name in own.columns])
+        size, unit = np.abs(columns).max(axis=0), float(np.abs(record.y).max()) or 1.0
+        box = tuple(limits.T * size / unit)  # the tolerance of the solver is an absolute one
+        weights = lsq_linear(columns / size, record.y / unit, bounds=box, method="bvls").x[:-1] * unit / size[:-1]
+        return weights, columns[:, :-1] @ weights
+
     def initial(self, parameters: Parameters) -> FloatArray:
         """The positions of the plays: given ones, or those after the stroke from rest at zero by the turning points."""
         if "z0[0]" in parameters:
@@ -240,79 +288,6 @@ class BankStructure(SignedStructure):
         for row, start, positions in zip(rows, z0, z, strict=True):
             drive_memory(step, read_only(row), np.append(record.u[:1], start), record.u, positions)
         return z
-
-
-@checked
-class DeadZoneStructure(Identifiable, Composable):
-    """Plays and dead zones to be identified; see `ModifiedPrandtlIshlinskii.structure`."""
-
-    law: type
-    plays: BankStructure
-    dead_zones: tuple[float, ...] = ()
-    count: int = 5
-    weights: tuple[float, ...] = ()
-
-    def __post_init__(self) -> None:
-        check_whole(self.count, "dead_zones", least=0)
-        if self.dead_zones:
-            check_dead_zones(*[np.atleast_2d(self.dead_zones)] * 2)
-
-    def search_space(self, record: Record, freedom: Freedom = ALL_FREE) -> SearchSpace:
-        """The plays' weights as coordinates; the dead zones' weights and the offset are linear."""
-        if not freedom.starts_at_rest("rest"):
-            raise ValueError('the memory of plays before dead zones is not searched: use initial="rest" or "periodic"')
-        own = self.plays.search_space(record, Freedom(initial=freedom.initial))
-        weights, (start, x) = own.columns[:-1], self._plain(own, record)
-        zones = np.array(self.dead_zones)
-        if not zones.size:  # zero and even steps inside the range of x
-            zones = np.unique(np.append(np.linspace(float(x.min()), float(x.max()), self.count + 2)[1:-1], 0.0))
-        columns = (*named("dead_zone_weights", zones), "offset")
-        defaults = dict(zip(weights, start.tolist(), strict=True)) | dict.fromkeys(columns, 0.0)
-        through = tuple(columns[j] for j in np.flatnonzero(zones == 0.0))
-        held = freedom.held(defaults | dict.fromkeys(through, 1.0), redundant=tuple((name,) for name in through))
-        limits = freedom.limits(defaults, held)
-        starts = [defaults, *([named("weights", self.weights)] if self.weights else [])]
-        slope = float(np.ptp(record.y)) / float(np.ptp(record.u)) or 1.0
-        largest = max(_LARGEST * abs(slope), 2.0 * float(np.abs(start).max()))  # a steep start is inside
-        box = []
-        for name in weights:
-            low, high = np.clip(own.bounds.get(name, (-np.inf, np.inf)), -largest, largest).tolist()
-            box.append(Coordinate(name, low, high, slope, physical=(low == 0.0, high == 0.0)))
-        held = {**own.held, **named("dead_zones", zones.tolist()), **held}
-        return space_of(box, columns, defaults, held, limits, starts, state=own.state, screened=0)
-
-    def regressors(self, parameters: Parameters, record: Record) -> FloatArray:
-        """Columns S_0(x), S_1(x), ..., 1, 0 of the output, shape (n_sets, n_samples, n_zones + 2)."""
-        z = self.plays.regressors(parameters, record)[..., :-2]
-        x = np.matmul(z, table_of("weights", parameters)[..., np.newaxis])
-        return with_offset(dead_zone(x, table_of("dead_zones", parameters)[:, np.newaxis]))
-
-    def steady(self, parameters: Parameters, record: Record) -> dict[str, Any]:
-        """The parameters with the positions of the steady cycle of which `record` is one period or more."""
-        return self.plays.steady(parameters, record)
-
-    def assemble(self, parameters: Mapping[str, float]) -> Any:
-        """The law with these parameters, one number for each name."""
-        return replace(self.plays, law=self.law).assemble(parameters)
-
-    def assumed_states(self, record: Record) -> tuple[str, ...]:
-        """At rest at zero or at the first input, or after the cycle."""
-        return tuple(state for state in self.plays.assumed_states(record) if state != "free")
-
-    def variants(self) -> tuple[Variant, ...]:
-        """The choices of the plays."""
-        return tuple(each._replace(family=replace(self, plays=each.family)) for each in self.plays.variants())
-
-    def _plain(self, own: SearchSpace, record: Record) -> tuple[FloatArray, FloatArray]:
-        """Weights of the plain law that fits best, and its output without the offset."""
-        from scipy.optimize import lsq_linear
-
-        columns = self.plays.regressors(own.parameters(np.empty((1, 0))), record)[0, :, :-1]
-        limits = np.array([own.bounds.get(name, (-np.inf, np.inf)) for name in own.columns])
-        size, unit = np.abs(columns).max(axis=0), float(np.abs(record.y).max()) or 1.0
-        box = tuple(limits.T * size / unit)  # the tolerance of the solver is an absolute one
-        weights = lsq_linear(columns / size, record.y / unit, bounds=box, method="bvls").x[:-1] * unit / size[:-1]
-        return weights, columns[:, :-1] @ weights
 
 
 def table_of(what: str, parameters: Parameters) -> FloatArray:

@@ -7,6 +7,7 @@ either side. Where these sums have one sign it has an inverse of its own kind, e
 """
 
 import math
+from dataclasses import replace
 from typing import ClassVar
 
 import numpy as np
@@ -14,7 +15,7 @@ import numpy.typing as npt
 
 from hysim._basics.frozen import FloatArray, read_only
 from hysim.laws.operators._bank import Bank
-from hysim.laws.operators._bank_search import DeadZoneStructure, check_dead_zones, dead_zone
+from hysim.laws.operators._bank_search import BankStructure, check_dead_zones, dead_zone, named
 from hysim.laws.operators._play_sums import EXAMPLE, PlaySum
 from hysim.laws.operators.prandtl_ishlinskii import PrandtlIshlinskii, wrong_sum
 from hysim.models.inverse_search import searched_inverse
@@ -76,6 +77,7 @@ class ModifiedPrandtlIshlinskii(Bank, PlaySum):
     z0: tuple[float, ...] = (0.0,)
 
     units: ClassVar = {"thresholds": "u", "offset": "y", "z0": "u"}
+    by_input: ClassVar[bool] = False
     example = Example(
         {**EXAMPLE, "dead_zones": (-0.4, 0.0, 0.4), "dead_zone_weights": (0.3, 1.0, -0.3)},
         title="Prandtl-Ishlinskii: dead zones",
@@ -95,7 +97,7 @@ class ModifiedPrandtlIshlinskii(Bank, PlaySum):
         thresholds: npt.ArrayLike = (),
         one_signed: bool | None = None,
         dead_zones: int | npt.ArrayLike = 5,
-    ) -> DeadZoneStructure:
+    ) -> BankStructure:
         """Plays and dead zones for `hysim.identify`; `plays`, `thresholds` and `one_signed` as of `PrandtlIshlinskii`.
 
         `dead_zones` is their number beside that of threshold zero, whose weight is held at one, with thresholds in even
@@ -109,11 +111,10 @@ class ModifiedPrandtlIshlinskii(Bank, PlaySum):
         >>> hs.identify(structure, hs.datasets.table1()).n_parameters
         7
         """
-        plain = PrandtlIshlinskii.structure(plays=plays, thresholds=thresholds, one_signed=one_signed)
+        plain = super().structure(plays=plays, thresholds=thresholds, one_signed=one_signed)
         if isinstance(dead_zones, int):
-            return DeadZoneStructure(law=cls, plays=plain, count=dead_zones)
-        places = tuple(read_only(dead_zones, "dead_zones", ndim=1).tolist())
-        return DeadZoneStructure(law=cls, plays=plain, count=0, dead_zones=places)
+            return replace(plain, zones=dead_zones)
+        return replace(plain, zones=0, dead_zones=tuple(read_only(dead_zones, "dead_zones", ndim=1).tolist()))
 
     def inverted(self, y: FloatArray, u0: float | None, state: State | None) -> FloatArray:
         """The inverse of S, then that of the plays, exact to rounding.
@@ -132,11 +133,10 @@ class ModifiedPrandtlIshlinskii(Bank, PlaySum):
                 x += weight * dead_zone(wanted, np.copysign(threshold, side * slope))
         return self.plays.inverted(x, u0, state)
 
-    def as_structure(self) -> DeadZoneStructure:
+    def as_structure(self) -> BankStructure:
         """The structure with the thresholds of this law, or with those by default where it has none."""
-        own = self.dead_zones if self.thresholds else ()
-        plays, count = self.plays.as_structure(), 0 if own else 5
-        return DeadZoneStructure(law=type(self), plays=plays, dead_zones=own, count=count, weights=self.weights)
+        own, known = named("weights", self.weights), self.dead_zones if self.thresholds else ()
+        return replace(super().as_structure(), own=own, dead_zones=known)
 
     def _side(self, side: float) -> PrandtlIshlinskii:
         """Plays whose initial curve is the sum of the dead zones from zero upwards, or (side = -1) downwards."""
