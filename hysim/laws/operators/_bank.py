@@ -12,7 +12,7 @@ stop is a play of the negative weight beside a line, so that with c = feedthroug
 """
 
 from dataclasses import replace
-from typing import Any, ClassVar
+from typing import ClassVar
 
 import numpy as np
 import numpy.typing as npt
@@ -140,7 +140,7 @@ class Bank(Elements, ByStructure):
         lagging = weights[thresholds > 0.0]
         return bool((lagging >= 0.0).all() or (lagging <= 0.0).all())
 
-    def as_structure(self) -> Any:
+    def as_structure(self) -> BankStructure:
         """The structure with the thresholds of this law, or with those by default where it has none."""
         thresholds, own = tuple(self.elements[0].tolist()), items(self)
         one_signed = None if self.is_one_signed() else False

@@ -104,8 +104,8 @@ class SignedStructure(Identifiable, Composable):
 class BankStructure(SignedStructure):
     """A bank of plays or stops to be identified; see `PrandtlIshlinskii.structure`.
 
-    Its law is one of `hysim.laws.operators._bank.Bank`. The law's `axes` are searched beside the thresholds; a search
-    begins at its `own` values, by name, where there are some. `known` are numbers that are not searched.
+    Its law is a `hysim.laws.operators._bank.Bank`. The `axes` are searched beside the thresholds; a search begins at
+    `own` values, by name, where there are some. `known` are numbers that are not searched.
     """
 
     law: Any
@@ -155,6 +155,7 @@ class BankStructure(SignedStructure):
         return space_of(box, columns, defaults, held, limits, starts, state=own.state, screened=0)
 
     def _space_of_plays(self, record: Record, freedom: Freedom) -> SearchSpace:
+        """The space without dead zones."""
         half, first, turns = spans(record)["h"], float(record.u[0]), self._turns
         places = self._thresholds(half)
         thresholds, axes = named(self.law.thresholds_name, places.tolist()), self._axes(record)

@@ -90,7 +90,7 @@ class ModifiedPrandtlIshlinskii(Bank, PlaySum):
         check_dead_zones(tables["dead_zones"], tables["dead_zone_weights"])
 
     @classmethod
-    def structure(  # type: ignore[override]  # of plays and dead zones
+    def structure(
         cls,
         *,
         plays: int = 10,
