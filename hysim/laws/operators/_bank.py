@@ -19,7 +19,6 @@ import numpy.typing as npt
 
 from hysim._basics.frozen import FloatArray, items, own_items, read_only
 from hysim.kernels import clamps as kernels
-from hysim.kernels.stepping import Step
 from hysim.laws.differential.limit_cycle import LimitCycle
 from hysim.laws.operators._bank_search import Axis, BankStructure, check_elements
 from hysim.models.by_structure import ByStructure
@@ -48,7 +47,7 @@ class Elements:
 class Bank(Elements, ByStructure):
     """Several plays or stops, whose fields are tuples.
 
-    A family of which the input pushes the plays in another way than `Clamps` says so in `push`, one with another
+    A family of which the input pushes the plays in another way than `Clamps` says so in `pushing`, one with another
     output of them in `outputs_of_one`.
     """
 
@@ -80,13 +79,9 @@ class Bank(Elements, ByStructure):
         check_elements(cls, *(tables[name] for name in (cls.thresholds_name, cls.weights_name, "z0")))
 
     @classmethod
-    def push(cls, tables: Tables, parameters: Parameters, record: Record) -> tuple[Step, FloatArray]:
-        """A step that pushes the plays along a record, and its parameters (n_sets, n_parameters).
-
-        `tables` are those of laws with weights of zero, since the positions do not depend on them.
-        """
-        head = np.zeros((len(tables["z0"]), kernels.N_OUTPUT))
-        return kernels.step, np.concatenate([head, tables["thresholds"], tables["weights"]], axis=1)
+    def pushing(cls, parameters: Parameters, record: Record) -> Tables:
+        """What there is beside the input where it pushes the plays, as `rows_of` takes it."""
+        return {}
 
     @classmethod
     def outputs_of_one(cls, z: FloatArray, parameters: Parameters, record: Record) -> FloatArray:

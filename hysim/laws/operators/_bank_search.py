@@ -40,12 +40,16 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from hysim._basics.frozen import FloatArray, check_whole, checked, read_only
+from hysim.kernels import play_sums as kernels
 from hysim.models.composable import Composable
 from hysim.models.parameters import Coordinate, Parameter, rate_spans, space_of, spans, unit_of
 from hysim.models.protocols import Identifiable, Variant
 from hysim.models.search_space import ALL_FREE, Freedom, Parameters, SearchSpace
+from hysim.models.tables import Tables
 from hysim.records import Record
 
+IDENTITY = (0.0, 0.0, 0.0, 0.0, 1.0)
+"""The envelope gamma(u) = u."""
 TURN = "turn"
 _LEVELS = 33, 9  # of a single former turning point, and of one beside others, from which the search begins
 _SIZES = (0.2, 0.4, 0.6, 0.8, 1.0, 1.3)  # of several about the middle of the input, in half spans, likewise
@@ -280,14 +284,11 @@ class BankStructure(SignedStructure):
 
     def _positions(self, parameters: Parameters, record: Record) -> FloatArray:
         """Positions (n_sets, n_samples, n_plays) along a record, which do not depend on the weights."""
-        from hysim.kernels.memories import drive_memory  # compiled where it is needed
-
         thresholds, z0 = table_of(self.law.thresholds_name, parameters), self.initial(parameters)
         tables = {"offset": np.zeros((len(z0), 1)), "thresholds": thresholds, "weights": np.zeros_like(z0), "z0": z0}
-        step, rows = self.law.push(tables, parameters, record)
-        z = np.empty((len(z0), len(record), z0.shape[1]))
-        for row, start, positions in zip(rows, z0, z, strict=True):
-            drive_memory(step, read_only(row), np.append(record.u[:1], start), record.u, positions)
+        rows = read_only(rows_of({**tables, **self.law.pushing(parameters, record)}))
+        z, state = np.empty((len(z0), len(record), z0.shape[1])), np.insert(z0, 0, record.u[0], axis=1)
+        kernels.positions(rows, state, record.u, z)
         return z
 
 
@@ -310,6 +311,20 @@ def with_offset(*columns: FloatArray) -> FloatArray:
     """Columns (n_sets, n_samples, n) of what the output is affine in, with 1 for the offset and 0 for the rest."""
     ones = np.ones((*columns[0].shape[:2], 1))
     return np.concatenate([*columns, ones, np.zeros_like(ones)], axis=-1)
+
+
+def rows_of(tables: Tables) -> FloatArray:
+    """Rows as the kernels take them: offset, width, envelopes, thresholds, weights, and the dead zones behind.
+
+    Of the width, the envelopes `left` and `right`, and the dead zones there may be none in the tables; a right envelope
+    without coefficients is the left one.
+    """
+    offset = tables["offset"]
+    left = tables.get("left", np.tile(IDENTITY, (len(offset), 1)))
+    right = tables.get("right", left)
+    head = [offset, tables.get("width", np.zeros_like(offset)), left, right if right.shape[1] else left]
+    behind = [tables[name] for name in ("dead_zones", "dead_zone_weights") if name in tables]
+    return np.concatenate([*head, tables["thresholds"], tables["weights"], *behind], axis=1)
 
 
 def moved(z: FloatArray, thresholds: FloatArray, u: FloatArray) -> FloatArray:

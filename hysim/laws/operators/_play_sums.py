@@ -9,14 +9,13 @@ import numpy.typing as npt
 from hysim._basics.frozen import FloatArray, checked, read_only
 from hysim.kernels import play_sums as kernels
 from hysim.laws.operators._bank import Bank
+from hysim.laws.operators._bank_search import rows_of
 from hysim.laws.operators.prandtl_ishlinskii import PrandtlIshlinskii
 from hysim.models.law import Law, Packed, State
 from hysim.models.protocols import UNLIMITED, CompiledLaw, Limits
 from hysim.models.tables import Tables
 
 _WIDTH = 3  # place of the width behind the limits and the offset
-IDENTITY = (0.0, 0.0, 0.0, 0.0, 1.0)
-"""The envelope gamma(u) = u."""
 EXAMPLE = {"thresholds": (0.0, 0.1, 0.2, 0.35, 0.5, 0.7), "weights": (0.4, 0.3, 0.2, 0.2, 0.1, 0.1)}
 """Plays of the laws that stand for the families."""
 
@@ -118,17 +117,3 @@ class PlaysAtSampleTime(Bank, PlaySum):
         parameters, memory = self.packed
         kernels.widened(parameters, memory.copy(), inputs, read_only(widening), y)
         return y
-
-
-def rows_of(tables: Tables) -> FloatArray:
-    """Rows as the kernels take them: offset, width, envelopes, thresholds, weights, and the dead zones behind.
-
-    Of the width, the envelopes `left` and `right`, and the dead zones there may be none in the tables; a right envelope
-    without coefficients is the left one.
-    """
-    offset = tables["offset"]
-    left = tables.get("left", np.tile(IDENTITY, (len(offset), 1)))
-    right = tables.get("right", left)
-    head = [offset, tables.get("width", np.zeros_like(offset)), left, right if right.shape[1] else left]
-    behind = [tables[name] for name in ("dead_zones", "dead_zone_weights") if name in tables]
-    return np.concatenate([*head, tables["thresholds"], tables["weights"], *behind], axis=1)

@@ -7,10 +7,9 @@ import numpy as np
 import numpy.typing as npt
 
 from hysim._basics.frozen import FloatArray, read_only
-from hysim.kernels.stepping import Step
 from hysim.laws.operators._bank import Bank
-from hysim.laws.operators._bank_search import Axis, BankStructure, named, table_of
-from hysim.laws.operators._play_sums import EXAMPLE, IDENTITY, PlaySum, rows_of
+from hysim.laws.operators._bank_search import IDENTITY, Axis, BankStructure, named, table_of
+from hysim.laws.operators._play_sums import EXAMPLE, PlaySum
 from hysim.models.model import Example, family
 from hysim.models.parameters import Parameter, spans
 from hysim.models.search_space import Parameters
@@ -131,10 +130,9 @@ class GeneralizedPrandtlIshlinskii(Bank, PlaySum):
         return replace(plain, known=numbers[0] | numbers[1])
 
     @classmethod
-    def push(cls, tables: Tables, parameters: Parameters, record: Record) -> tuple[Step, FloatArray]:
-        """The law's own step, with the envelopes among the parameters."""
-        sides = {side: table_of(side, parameters) for side in ("left", "right")}
-        return cls.step, rows_of({**tables, **sides})
+    def pushing(cls, parameters: Parameters, record: Record) -> Tables:
+        """The envelopes."""
+        return {side: table_of(side, parameters) for side in ("left", "right")}
 
     @classmethod
     def derived(cls, parameters: Parameters, record: Record) -> dict[str, FloatArray]:

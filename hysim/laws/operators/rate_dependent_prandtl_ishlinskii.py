@@ -20,10 +20,9 @@ import numpy.typing as npt
 
 from hysim._basics.frozen import FloatArray, check_positive, items, read_only
 from hysim._names import among
-from hysim.kernels.stepping import Step
 from hysim.laws.operators._bank import Bank
-from hysim.laws.operators._bank_search import Axis
-from hysim.laws.operators._play_sums import EXAMPLE, PlaysAtSampleTime, rows_of
+from hysim.laws.operators._bank_search import Axis, table_of
+from hysim.laws.operators._play_sums import EXAMPLE, PlaysAtSampleTime
 from hysim.laws.operators.prandtl_ishlinskii import PrandtlIshlinskii
 from hysim.models.batch import Reduction
 from hysim.models.composable import Placed
@@ -102,10 +101,11 @@ class RateDependentPrandtlIshlinskii(Bank, Placed):
         return PrandtlIshlinskii(thresholds=self.thresholds, weights=self.weights, z0=self.z0)
 
     @classmethod
-    def push(cls, tables: Tables, parameters: Parameters, record: Record) -> tuple[Step, FloatArray]:
-        """The step of `PlaysAtSampleTime`, and its parameters."""
-        width = np.reshape(parameters["beta"], (-1, 1)) / record.sample_time
-        return PlaysAtSampleTime.step, rows_of({**tables, "width": np.broadcast_to(width, tables["offset"].shape)})
+    def pushing(cls, parameters: Parameters, record: Record) -> Tables:
+        """The growth of the thresholds with the step of the input."""
+        beta = np.reshape(parameters["beta"], (-1, 1))
+        n_sets = len(table_of("thresholds", parameters))
+        return {"width": np.broadcast_to(beta / record.sample_time, (n_sets, 1))}
 
     def at(self, sample_time: float) -> PlaysAtSampleTime:
         """The law at one sample time [s], as loops step it. Raises ValueError if the sample time is not positive."""
