@@ -140,7 +140,7 @@ def case(draw: int, model: str) -> Row:
     return {
         "draw": draw,
         "model": model,
-        "law": type(structure).__name__.replace("ClampStructure", "PrandtlIshlinskii"),
+        "law": type(structure).__name__.replace("BankStructure", "PrandtlIshlinskii"),
         "n_records": len(own),
         "error_in_noise": prediction_error(truth, fit.model),
         "cpu_seconds": seconds,

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from scipy.integrate import quad
 
 import hysim as hs
-from hysim.laws.operators.parametric_prandtl_ishlinskii import conditioned, dominant_extremes
+from hysim.laws.operators._bank_search import conditioned, dominant_extremes
 
 LAW = hs.ParametricPrandtlIshlinskii(
     exponent=-0.6, decay=0.15, weight=0.3, weight_slope=0.1, offset=0.2, input_coefficients=(2.0, 0.1, -0.05), reach=2.0

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import hysim as hs
-from hysim.laws.operators._smooth_density import linear_between, parts_of, roughness
+from hysim.laws.operators._densities import linear_between, parts_of, roughness
 
 CYCLE = np.sin(np.linspace(0.0, 2.0 * np.pi, 120, endpoint=False))
 LEVELS = np.linspace(-1.3, 1.3, 41)

@@ -12,7 +12,7 @@ is what is left of the input, u - z. All laws of this family are one sum of such
 over plays with through = 0, over stops with through = 1. The plays do not know of each other: at each sample
 the clamps are taken side by side, then the terms are added in their order, from the first to the last.
 
-`output` is (through, offset, feedthrough). A position z changes in place. The plays may also have a common weight that
+The plays may also have a common weight that
 depends on the input, beside a polynomial of it (`bent_step`):
 
     y = offset + c_1 u + ... + c_n u^n + (weight + weight_slope u) sum_i m_i (z_i - u)
@@ -35,51 +35,28 @@ def clamp(z: float, u: float, r: float) -> float:
 
 
 @kernel
-def positions(thresholds: FloatArray, z: FloatArray, u: FloatArray, out: FloatArray) -> None:
-    """Positions of all plays at the samples of `u` into `out`, shape (n_samples, n_plays)."""
-    for k in range(u.size):
-        for i in range(thresholds.size):
-            z[i] = clamp(z[i], u[k], thresholds[i])
-            out[k, i] = z[i]
-
-
-@kernel
-def path(
-    thresholds: FloatArray,
-    weights: FloatArray,
-    output: FloatArray,
-    z: FloatArray,
-    terms: FloatArray,
-    u: FloatArray,
-    out: FloatArray,
-) -> None:
-    """Output of one law at the samples of `u` into `out`; `terms` has room for one number for each play."""
-    through, offset, feedthrough = output[0], output[1], output[2]
-    sign = 1.0 - 2.0 * through
-    for k in range(u.size):
-        for i in range(thresholds.size):  # by itself, so that it is done for several plays at once
-            z[i] = clamp(z[i], u[k], thresholds[i])
-            terms[i] = weights[i] * (through * u[k] + sign * z[i])
-        total = offset + feedthrough * u[k]
-        for i in range(thresholds.size):
-            total += terms[i]
-        out[k] = total
-
-
-@kernel
-def batch(
-    thresholds: FloatArray, weights: FloatArray, output: FloatArray, z0: FloatArray, u: FloatArray, out: FloatArray
-) -> None:
+def batch(parameters: FloatArray, state: FloatArray, u: FloatArray, out: FloatArray) -> None:
     """Outputs of many laws into `out`, shape (n_sets, n_samples).
 
-    `thresholds`, `weights` and `z0` are (n_sets, n_plays), `output` is (n_sets, 3), `u` is (1, n_samples) or
-    (n_sets, n_samples).
+    Parameters and states are those of `step`, one law a row; the positions in the state move along. `u` is
+    (1, n_samples) or (n_sets, n_samples).
     """
-    z, terms = np.empty(z0.shape[1]), np.empty(z0.shape[1])
-    for i in range(out.shape[0]):
-        for j in range(z.size):
-            z[j] = z0[i, j]
-        path(thresholds[i], weights[i], output[i], z, terms, u[min(i, u.shape[0] - 1)], out[i])
+    n_plays = state.shape[1] - 1
+    terms = np.empty(n_plays)
+    for k in range(out.shape[0]):
+        through, offset, feedthrough = parameters[k, 0], parameters[k, 1], parameters[k, 2]
+        sign, z, inputs = 1.0 - 2.0 * through, state[k, 1:].copy(), u[min(k, u.shape[0] - 1)]
+        elements = parameters[k, N_OUTPUT:].copy()  # known to be apart, which makes the loop faster
+        thresholds, weights = elements[:n_plays], elements[n_plays:]
+        for j in range(inputs.size):
+            for i in range(n_plays):  # by itself, so that it is done for several plays at once
+                z[i] = clamp(z[i], inputs[j], thresholds[i])
+                terms[i] = weights[i] * (through * inputs[j] + sign * z[i])
+            total = offset + feedthrough * inputs[j]
+            for i in range(n_plays):
+                total += terms[i]
+            out[k, j] = total
+        state[k, 1:] = z
 
 
 @kernel

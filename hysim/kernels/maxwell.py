@@ -37,6 +37,13 @@ def relaxed(along: float, begin: float, end: float, kappa: float) -> float:
 
 
 @inlined
+def friction(parameters: FloatArray, n: int, speed: float) -> float:
+    """Friction of `n` elements together at a steady speed."""
+    i = 2 * n + 1
+    return stribeck(speed, parameters[i], parameters[i + 1], parameters[i + 2], parameters[i + 3])
+
+
+@inlined
 def move(
     parameters: FloatArray, state: FloatArray, first: int, rise: float, duration: float, begin: float, end: float
 ) -> float:
@@ -84,9 +91,7 @@ def step(parameters: FloatArray, state: FloatArray, u: float) -> float:
     n = (parameters.size - _N_OTHERS) // 2
     rise = u - state[0]
     rate = rise / parameters[0]
-    g = stribeck(
-        abs(rate), parameters[2 * n + 1], parameters[2 * n + 2], parameters[2 * n + 3], parameters[2 * n + 4]
-    )  # fmt: skip
+    g = friction(parameters, n, abs(rate))
     force = move(parameters, state, 1, rise, parameters[0], g, g)
     state[0] = u
     return float(parameters[2 * n + 7] + force + parameters[2 * n + 6] * rate)
@@ -97,12 +102,7 @@ def rated_step(parameters: FloatArray, state: FloatArray, u: float) -> float:
     """Force after a stroke of an element without the viscous part; see `rates`."""
     n = (parameters.size - _N_OTHERS) // 2
     rise = u - state[0]
-    begin = stribeck(
-        abs(state[3]), parameters[2 * n + 1], parameters[2 * n + 2], parameters[2 * n + 3], parameters[2 * n + 4]
-    )  # fmt: skip
-    end = stribeck(
-        abs(state[2]), parameters[2 * n + 1], parameters[2 * n + 2], parameters[2 * n + 3], parameters[2 * n + 4]
-    )  # fmt: skip
+    begin, end = friction(parameters, n, abs(state[3])), friction(parameters, n, abs(state[2]))
     force = move(parameters, state, 4, rise, state[1], begin, end)
     moved_on(state, u)
     return float(parameters[2 * n + 7] + force)

@@ -14,7 +14,7 @@ the last input and the positions.
 
 import math
 
-from numba import float64, types, void
+from numba import void
 
 from hysim._basics.frozen import FloatArray
 from hysim.kernels._compile import borrowed, inlined, inner, kernel, signed_kernel
@@ -83,15 +83,6 @@ def output_after(parameters: FloatArray, state: FloatArray, u: float, widening: 
 
 
 @inner
-def slope_of_all(parameters: FloatArray, n_plays: int) -> float:
-    """Sum of the weights."""
-    total = 0.0
-    for i in range(n_plays):
-        total += parameters[N_HEAD + n_plays + i]
-    return total
-
-
-@inner
 def output_and_slope(
     parameters: FloatArray, state: FloatArray, u: float, direction: float
 ) -> tuple[float, float, float]:
@@ -126,13 +117,12 @@ def step(parameters: FloatArray, state: FloatArray, u: float) -> float:
 
 
 @inner
-def solved(parameters: FloatArray, state: FloatArray, y: float, direction: float) -> float:
-    """Input in a direction from the last one that takes the output to `y`; nan where there is none.
+def solved(parameters: FloatArray, state: FloatArray, y: float, direction: float, side: float) -> float:
+    """Input in a direction from the last one that takes the output to `y`, on one side of it; nan if there is none.
 
-    The output of a law without dead zones is monotone in the input, of the sign of all weights together: Newton's
-    method in a bracket that closes on the zero, and a bisection where the output stands still.
+    The output of a law without dead zones is monotone in the input: Newton's method in a bracket that closes on the
+    zero, and a bisection where the output stands still.
     """
-    rising = math.copysign(1.0, slope_of_all(parameters, state.size - 1))
     u = behind = state[0]
     beyond, ahead = direction * math.inf, _FIRST_STEP * (1.0 + abs(u))
     for _ in range(_MAX_STEPS):
@@ -140,7 +130,7 @@ def solved(parameters: FloatArray, state: FloatArray, y: float, direction: float
         error = total - y
         if abs(error) <= _ROUNDINGS * (size + abs(y)):
             break
-        if direction * rising * error < 0.0:
+        if side * error < 0.0:
             behind = u
         else:
             beyond = u
@@ -165,9 +155,12 @@ def inverse_step(parameters: FloatArray, state: FloatArray, y: float) -> float:
     `parameters` are the limits and those of `step`; `state` is (u, y) and that of `step`.
     """
     own, law = borrowed(parameters)[N_LIMITS:], borrowed(state)[N_PLACE:]
-    rise = y - output_and_slope(own, law, law[0], 1.0)[0]
-    direction = math.copysign(1.0, slope_of_all(own, law.size - 1)) * math.copysign(1.0, rise)
-    u = solved(own, law, y, direction)
+    n_plays, rising = law.size - 1, 0.0  # the sign of all weights together
+    for i in range(n_plays):
+        rising += own[N_HEAD + n_plays + i]
+    side = math.copysign(1.0, y - output_and_slope(own, law, law[0], 1.0)[0])
+    direction = math.copysign(1.0, rising) * side
+    u = solved(own, law, y, direction, side)
     end = within_limits(parameters, u, direction)
     if not math.isnan(end):
         output = step(own, law, end)
@@ -175,13 +168,14 @@ def inverse_step(parameters: FloatArray, state: FloatArray, y: float) -> float:
     return float(u)
 
 
-@signed_kernel(void(CONSTANTS, VECTOR, CONSTANTS, types.Array(float64, 2, "C")))
+@kernel
 def positions(parameters: FloatArray, state: FloatArray, u: FloatArray, out: FloatArray) -> None:
-    """Positions of the plays at the samples of `u` into `out`, shape (n_samples, n_plays)."""
-    for k in range(u.size):
-        step(parameters, state, u[k])
-        for i in range(state.size - 1):
-            out[k, i] = state[1 + i]
+    """Positions of the plays of many laws, one a row, at the samples of `u`: (n_sets, n_samples, n_plays)."""
+    for i in range(out.shape[0]):
+        for k in range(u.size):
+            step(parameters[i], state[i], u[k])
+            for j in range(out.shape[2]):
+                out[i, k, j] = state[i, 1 + j]
 
 
 @signed_kernel(void(CONSTANTS, VECTOR, CONSTANTS, CONSTANTS, VECTOR))

@@ -2,33 +2,37 @@
 
 import math
 from abc import abstractmethod
-from typing import ClassVar
 
 import numpy as np
 import numpy.typing as npt
 
-from hysim._basics.frozen import FloatArray, read_only
+from hysim._basics.frozen import FloatArray, checked, read_only
 from hysim.kernels import play_sums as kernels
-from hysim.laws.operators._clamps import Bank
+from hysim.laws.operators._bank import Bank
+from hysim.laws.operators._bank_search import rows_of
 from hysim.laws.operators.prandtl_ishlinskii import PrandtlIshlinskii
-from hysim.models.by_structure import ByStructure
-from hysim.models.law import State
+from hysim.models.law import Law, Packed, State
 from hysim.models.protocols import UNLIMITED, CompiledLaw, Limits
 from hysim.models.tables import Tables
 
 _WIDTH = 3  # place of the width behind the limits and the offset
-IDENTITY = (0.0, 0.0, 0.0, 0.0, 1.0)
-"""The envelope gamma(u) = u."""
+EXAMPLE = {"thresholds": (0.0, 0.1, 0.2, 0.35, 0.5, 0.7), "weights": (0.4, 0.3, 0.2, 0.2, 0.1, 0.1)}
+"""Plays of the laws that stand for the families."""
 
 
-class ExtendedPlays(ByStructure, Bank):
-    """A sum of plays behind envelopes, with wider thresholds or in front of dead zones."""
+class PlaySum(Law):
+    """A sum of plays behind envelopes, with wider thresholds or in front of dead zones: a bank of one of these."""
 
     step = staticmethod(kernels.step)
-    ordered: ClassVar[bool] = True
 
     thresholds: tuple[float, ...]
     weights: tuple[float, ...]
+    z0: tuple[float, ...]
+
+    @classmethod
+    def pack(cls, tables: Tables) -> Packed:
+        """Rows with what the family has beside plays."""
+        return Packed(rows_of(tables), cls.initial_memory(tables))
 
     @property
     def plays(self) -> PrandtlIshlinskii:
@@ -51,10 +55,15 @@ class ExtendedPlays(ByStructure, Bank):
             self.plays.inverse()  # refuses these positions
 
     def inverse_begun(self, y: FloatArray, u0: float | None, state: State | None) -> CompiledLaw:
-        """In closed form, from the first sample or from rest."""
+        """In closed form, from the first sample or from rest: the first input finds the plays at z0, at any speed."""
         self.check_invertible()
-        first = self._first_input(float(y[0])) if u0 is None and state is None else u0
-        return self.inverse_from(self.advance([first or 0.0])[1] if state is None else state)
+        if state is None and u0 is None:
+            still = self.inverse_from((0.0, *self.z0))
+            parameters = still.parameters.copy()
+            parameters[_WIDTH] = 0.0
+            u = still.step(read_only(parameters, finite=False), still.state, float(y[0]))
+            u0 = u if math.isfinite(u) else 0.0
+        return self.inverse_from(self.advance([u0 or 0.0])[1] if state is None else state)
 
     def compiled_inverse(self, u0: float, limits: Limits = UNLIMITED, sample_time: float = math.inf) -> CompiledLaw:
         self.check_invertible()
@@ -64,14 +73,6 @@ class ExtendedPlays(ByStructure, Bank):
         """Message for an output that no input gives."""
         return f"no input gives the output at sample {sample} (y = {y:g})"
 
-    def _first_input(self, y: float) -> float:
-        """The first input that finds the plays at z0 and gives `y`, whatever its speed would be."""
-        inverse = self.inverse_from((0.0, *self.z0))
-        still = inverse.parameters.copy()
-        still[_WIDTH] = 0.0
-        u = inverse.step(read_only(still, finite=False), inverse.state, y)
-        return u if math.isfinite(u) else 0.0
-
     def inverse_from(self, state: State, limits: Limits = UNLIMITED) -> CompiledLaw:
         """The inverse of the law in this state, as `hysim.kernels.inverses` has it."""
         law, _ = self._begun(state[0], state)
@@ -80,55 +81,39 @@ class ExtendedPlays(ByStructure, Bank):
         return CompiledLaw(kernels.inverse_step, parameters, np.concatenate([[state[0], y], law.state]))
 
 
-def kernel_rows(
-    tables: Tables,
-    *,
-    width: npt.ArrayLike = 0.0,
-    left: FloatArray | None = None,
-    right: FloatArray | None = None,
-    behind: tuple[FloatArray, ...] = (),
-) -> FloatArray:
-    """Rows as the kernels take them: offset, width, envelopes, thresholds, weights, and the dead zones behind."""
-    n_sets = len(tables["offset"])
-    same = np.tile(IDENTITY, (n_sets, 1))
-    widths = np.broadcast_to(np.reshape(width, (-1, 1)), (n_sets, 1))
-    envelopes = same if left is None else left, same if right is None else right
-    return np.concatenate(
-        [tables["offset"], widths, *envelopes, tables["thresholds"], tables["weights"], *behind], axis=1
-    )
+@checked
+class PlaysAtSampleTime(Bank, PlaySum):
+    """The law at one sample time, with thresholds ``r_i + width |u_k - u_(k-1)|``."""
 
+    thresholds: tuple[float, ...] = ()
+    weights: tuple[float, ...] = ()
+    width: float = 0.0
+    offset: float = 0.0
+    z0: tuple[float, ...] = (0.0,)
 
-def positions_of(
-    thresholds: FloatArray,
-    z0: FloatArray,
-    u: FloatArray,
-    *,
-    width: npt.ArrayLike = 0.0,
-    left: FloatArray | None = None,
-    right: FloatArray | None = None,
-) -> FloatArray:
-    """Positions (n_sets, n_samples, n_plays) of plays (n_sets, n_plays), pushed as `kernel_rows` says."""
-    from hysim.kernels.memories import drive_memory  # compiled where it is needed
-
-    tables = {"offset": np.zeros((len(z0), 1)), "thresholds": thresholds, "weights": np.zeros_like(z0)}
-    rows = kernel_rows(tables, width=width, left=left, right=right)
-    z = np.empty((len(z0), u.size, z0.shape[1]))
-    for row, start, positions in zip(rows, z0, z, strict=True):
-        drive_memory(kernels.step, read_only(row), np.append(u[:1], start), u, positions)
-    return z
-
-
-def dead_zone(x: FloatArray, d: float | FloatArray) -> FloatArray:
-    """One-sided dead zone of the threshold `d`; the input itself where that is zero."""
-    return np.where(np.equal(d, 0.0), x, np.where(np.greater(d, 0.0), np.maximum(x - d, 0.0), np.minimum(x - d, 0.0)))
-
-
-def check_dead_zones(thresholds: FloatArray, weights: FloatArray) -> None:
-    """Refuse tables (n_sets, n_zones) that are no dead zones."""
-    if thresholds.shape[1] != weights.shape[1] or not thresholds.shape[1]:
-        raise ValueError(
-            f"dead_zones and dead_zone_weights must be equally long and not empty, got {thresholds.shape[1]} "
-            f"and {weights.shape[1]}"
+    def refusal(self) -> str | None:
+        """Why the law has no inverse at its sample time; None where it has one."""
+        if (refusal := self.plays.refusal()) is not None:
+            return refusal
+        sums = np.cumsum(self.weights)
+        with np.errstate(divide="ignore"):
+            limits = np.abs(sums) / (2.0 * np.abs(sums - sums[0]))
+        i = int(np.argmin(limits))
+        if self.width < limits[i]:
+            return None
+        return (
+            f"the law has no stable inverse at this sample time: beta / sample_time is {self.width:g}, but the sums of "
+            f"weights s_i = w_0 + ... + w_i ask for less than |s_i| / (2 |s_i - s_0|), {limits[i]:g} for i = {i}; "
+            "give the speed, or take longer samples"
         )
-    if not (np.diff(thresholds) > 0.0).all():
-        raise ValueError(f"dead_zones must increase, got {thresholds[0].tolist()}")
+
+    def response_at(self, u: npt.ArrayLike, widening: FloatArray) -> FloatArray:
+        """Output at the samples of `u` of plays whose thresholds are wider by `widening`, shape (n_samples,)."""
+        inputs = read_only(u, "u", ndim=1)
+        if self.u0 is not None:
+            longer = np.append(self.u0, inputs), np.append(widening[:1], widening)
+            return np.asarray(self.placed(None).response_at(*longer)[1:])
+        y = np.empty(inputs.size)
+        parameters, memory = self.packed
+        kernels.widened(parameters, memory.copy(), inputs, read_only(widening), y)
+        return y

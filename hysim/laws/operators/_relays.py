@@ -37,12 +37,10 @@ import numpy.typing as npt
 from hysim._basics.frozen import FloatArray, check_whole, checked, read_only
 from hysim._basics.parallel import in_pieces
 from hysim.kernels import preisach as kernels
-from hysim.laws.operators._clamp_search import TURN, runs_clockwise, variants_of_sign
+from hysim.laws.operators._bank_search import TURN, SignedStructure, check_increasing, named, table_of, with_offset
 from hysim.models.by_structure import ByStructure
-from hysim.models.composable import Composable
 from hysim.models.law import Law, Packed, State
 from hysim.models.parameters import Coordinate, space_of, spans
-from hysim.models.protocols import Identifiable, Variant
 from hysim.models.search_space import ALL_FREE, Freedom, Parameters, SearchSpace
 from hysim.models.tables import Tables
 from hysim.records import Record
@@ -54,7 +52,7 @@ _NOTHING = np.array([[0.0, 1.0]]), np.array([[0.0]])  # levels and weights of a 
 
 
 @checked
-class PreisachStructure(Identifiable, Composable):
+class PreisachStructure(SignedStructure):
     """A bank of relays to be identified; see `Preisach.structure`."""
 
     law: type[Law]
@@ -70,15 +68,17 @@ class PreisachStructure(Identifiable, Composable):
 
     def search_space(self, record: Record, freedom: Freedom = ALL_FREE) -> SearchSpace:
         """The memory as a coordinate where it is free; the rest is linear."""
-        scale = spans(record)["h"]
-        levels = self._levels(record)
-        places = {f"levels[{k}]": value for k, value in enumerate(levels.tolist())}
-        columns = (*(f"weights[{k}]" for k in range(_n_weights(levels))), "offset")
+        scale, levels = spans(record)["h"], np.array(self.levels)
+        if not levels.size:  # even steps over the span of the input
+            levels = np.linspace(record.u.min(), record.u.max(), self.intervals + 1)
+        places = named("levels", levels.tolist())
+        columns = (*named("weights", range(_n_weights(levels))), "offset")
         lowest, highest = float(levels[0]), float(levels[-1])
         defaults = {**places, **dict.fromkeys(columns, 0.0), TURN: lowest}
         if searched := [name for name in places if name in (*freedom.free, *freedom.fixed)]:
             raise ValueError(f"{searched[0]!r} is not searched: give the levels to structure(levels=...)")
-        signs = self._signs(record, levels.size - 1)
+        side, (rows, lower) = self.side(record), np.tril_indices(levels.size - 1)
+        signs = {f"weights[{k}]": side for k in np.flatnonzero(rows > lower).tolist() if side is not None}
         resting = {TURN: lowest} if freedom.starts_at_rest("rest") and TURN not in freedom.free else {}
         turns = freedom.fixed.get(TURN, lowest if resting else np.linspace(lowest, highest, _STARTS))
         untold = self._untold(record, {**places, TURN: turns}, signs)
@@ -86,38 +86,35 @@ class PreisachStructure(Identifiable, Composable):
         held = {**places, **resting, **{name: 0.0 for name in untold if name not in freedom.free}, **chosen}
         limits = freedom.limits(defaults, held)
         turn = Coordinate(TURN, *limits.get(TURN, (lowest, highest)), scale, physical=(True, True))
-        points = [
-            {TURN: value} for value in np.linspace(turn.lower, turn.upper, 1 if TURN in held else _STARTS).tolist()
-        ]
+        begins = np.linspace(turn.lower, turn.upper, 1 if TURN in held else _STARTS).tolist()
         bounds = {name: pair for name, pair in {**signs, **limits}.items() if name in columns and name not in held}
+        points = [{TURN: value} for value in begins]
         return space_of([turn], columns, defaults, held, limits, points, bounds=bounds, state=(TURN,), screened=0)
 
     def regressors(self, parameters: Parameters, record: Record) -> FloatArray:
         """The output of each relay of weight 1, then 1 and 0."""
-        levels, z0 = _table("levels", parameters)[0], _memory(parameters)
+        levels, z0 = table_of("levels", parameters)[0], _memory(parameters)
         relays = np.eye(_n_weights(levels))
         sets = {"levels": levels, "weights": np.tile(relays, (len(z0), 1)), "z0": np.repeat(z0, len(relays), axis=0)}
-        outputs = self.law.responses(sets, record.u).reshape(len(z0), len(relays), -1).transpose(0, 2, 1)
-        ones = np.ones((*outputs.shape[:2], 1))
-        return np.concatenate([outputs, ones, np.zeros_like(ones)], axis=-1)
+        outputs = self.law.responses(sets, record.u).reshape(len(z0), len(relays), -1)
+        return with_offset(outputs.transpose(0, 2, 1))
 
     def steady(self, parameters: Parameters, record: Record) -> dict[str, Any]:
         """The parameters with the memory after one run through the record, which erases what was before it."""
         shape = np.broadcast_shapes(*map(np.shape, parameters.values()))
-        levels = _table("levels", parameters)[0]
-        extremes = self._law(levels, np.zeros(_n_weights(levels))).advance(record.u)[1][1:]
-        return {**parameters} | {f"z0[{k}]": np.full(shape, value)[()] for k, value in enumerate(extremes)}
+        levels = table_of("levels", parameters)[0]
+        law: Any = self.law
+        extremes = law(levels=levels, weights=np.zeros(_n_weights(levels))).advance(record.u)[1][1:]
+        return {**parameters} | named("z0", (np.full(shape, value)[()] for value in extremes))
 
-    def assemble(self, parameters: Mapping[str, float]) -> Any:
-        """The law with these parameters, one number for each name."""
-        levels, weights = (_table(name, parameters)[0] for name in ("levels", "weights"))
-        past = [value for value in _memory(parameters)[0].tolist() if value > levels[0]]
-        return self._law(levels, weights, offset=parameters["offset"], z0=tuple(past))
+    def initial(self, parameters: Parameters) -> FloatArray:
+        """Inputs before the first sample, but for those at the lowest level."""
+        past = _memory(parameters)
+        return past[:, past[0] > parameters["levels[0]"]]
 
     def notes(self, record: Record, law: Any) -> tuple[str, ...]:
         """Number of the weights that the record does not determine."""
-        places = {f"levels[{k}]": value for k, value in enumerate(law.levels)}
-        columns = self.regressors({**places, TURN: law.levels[0]}, record)[0, :, :-1]
+        columns = self.regressors({**named("levels", law.levels), TURN: law.levels[0]}, record)[0, :, :-1]
         untold = columns.shape[1] - int(np.linalg.matrix_rank(columns))
         told = f"this record does not tell {untold} of the {len(law.weights)} weights from the others"
         return (told,) if untold else ()
@@ -126,16 +123,6 @@ class PreisachStructure(Identifiable, Composable):
         """All relays down, after the cycle, or after one former turning point."""
         return "rest", "periodic", "free"
 
-    def variants(self) -> tuple[Variant, ...]:
-        """Weights of one sign, of that of the record's loop or the other, or of both."""
-        return variants_of_sign(self, self.one_signed)
-
-    def _levels(self, record: Record) -> FloatArray:
-        """The structure's own, or even steps over the span of the input."""
-        if self.levels:
-            return np.array(self.levels)
-        return np.linspace(record.u.min(), record.u.max(), self.intervals + 1)
-
     def _untold(
         self, record: Record, parameters: Parameters, signs: Mapping[str, tuple[float, float]]
     ) -> tuple[str, ...]:
@@ -143,25 +130,13 @@ class PreisachStructure(Identifiable, Composable):
         columns = np.concatenate([*self.regressors(parameters, record)])[:, :-1]
         _, factor = np.linalg.qr(np.column_stack([columns, np.resize(record.y, len(columns))]))
         relays, goal = np.split(factor, [columns.shape[1]], axis=1)
-        rows, lower = np.tril_indices(len(_table("levels", parameters)[0]) - 1)
+        rows, lower = np.tril_indices(len(table_of("levels", parameters)[0]) - 1)
         nearest = np.lexsort((rows, rows - lower))
         if np.linalg.matrix_rank(relays) == relays.shape[1]:
             return ()
         used = _support(relays, goal[:, 0], [signs.get(f"weights[{k}]", (-np.inf, np.inf)) for k in range(rows.size)])
         independent = _independent(relays, [rows.size, *nearest[used[nearest]], *nearest[~used[nearest]]])
         return tuple(f"weights[{k}]" for k in range(rows.size) if k not in independent)
-
-    def _law(self, levels: FloatArray, weights: FloatArray, **others: Any) -> Any:
-        law: Any = self.law
-        return law(levels=tuple(levels), weights=tuple(weights), **others)
-
-    def _signs(self, record: Record, n: int) -> dict[str, tuple[float, float]]:
-        """Bounds at zero of the weights off the diagonal."""
-        if self.one_signed is False:
-            return {}
-        side = (-np.inf, 0.0) if runs_clockwise(record) != self.against else (0.0, np.inf)
-        rows, columns = np.tril_indices(n)
-        return {f"weights[{k}]": side for k in np.flatnonzero(rows > columns).tolist()}
 
 
 def check_relays(levels: FloatArray, weights: FloatArray) -> None:
@@ -171,24 +146,16 @@ def check_relays(levels: FloatArray, weights: FloatArray) -> None:
         raise ValueError(
             f"levels and weights must be N + 1 and N (N + 1) / 2 numbers, got {levels.shape[1]} and {weights.shape[1]}"
         )
-    if not (np.diff(levels) > 0.0).all():
-        raise ValueError(f"levels must increase, got {levels[0].tolist() if len(levels) == 1 else levels}")
+    check_increasing("levels", levels)
 
 
 def _n_weights(levels: FloatArray) -> int:
     return levels.size * (levels.size - 1) // 2
 
 
-def _table(what: str, parameters: Parameters) -> FloatArray:
-    """The numbers of a tuple over the sets, shape (n_sets, length)."""
-    count = sum(name.startswith(f"{what}[") for name in parameters)
-    columns = np.broadcast_arrays(*(np.ravel(parameters[f"{what}[{k}]"]) for k in range(count)))
-    return np.stack(columns, axis=1)
-
-
 def _memory(parameters: Parameters) -> FloatArray:
     """Inputs before the first sample, shape (n_sets, n_past)."""
-    return _table("z0", parameters) if "z0[0]" in parameters else np.reshape(parameters[TURN], (-1, 1))
+    return table_of("z0", parameters) if "z0[0]" in parameters else np.reshape(parameters[TURN], (-1, 1))
 
 
 def _support(columns: FloatArray, goal: FloatArray, bounds: list[tuple[float, float]]) -> npt.NDArray[np.bool_]:
@@ -237,18 +204,15 @@ class RelayLaw(ByStructure, Law):
     @classmethod
     def pack(cls, tables: Tables) -> Packed:
         """Parameters and state as `hysim.kernels.preisach.step` takes them, after the inputs z0."""
-        parameters = cls._rows(tables["levels"], tables["weights"], tables["offset"][:, 0])
-        n_sets, n_past = len(parameters), tables["z0"].shape[1]
-        if not n_past:
-            lowest, low = parameters[:, kernels.HEAD : kernels.HEAD + 1], parameters[:, 1:2]
-            rest = np.zeros((n_sets, _ROOM - 1))
-            return Packed(parameters, np.concatenate([np.zeros((n_sets, 2)), lowest, rest, low, rest], axis=1))
-        memory = np.zeros((n_sets, 2 + 2 * _ROOM))
-        numbers, past = (np.asarray(table, dtype=float) for table in (parameters, tables["z0"]))
-        for state, row, inputs in zip(memory, numbers, past, strict=True):
-            state[2], state[2 + _ROOM] = row[kernels.HEAD], row[1]
-            for u in inputs.tolist():
-                kernels.step(read_only(row), state, u)
+        parameters = cls._rows(tables)
+        lowest, low = parameters[:, kernels.HEAD : kernels.HEAD + 1], parameters[:, 1:2]
+        rest = np.zeros((len(parameters), _ROOM - 1))
+        memory = np.concatenate([rest[:, :2], lowest, rest, low, rest], axis=1)
+        if tables["z0"].shape[1]:
+            memory = np.asarray(memory, dtype=float)
+            for state, row, past in zip(memory, read_only(parameters), tables["z0"], strict=True):
+                for u in past:
+                    kernels.step(row, state, float(u))
         return Packed(parameters, memory)
 
     @property
@@ -304,8 +268,7 @@ class RelayLaw(ByStructure, Law):
 
     @classmethod
     def rows(cls, tables: Tables, u: FloatArray, y: FloatArray) -> None:
-        parameters = cls._rows(tables["levels"], tables["weights"], tables["offset"][:, 0])
-        kernels.batch(read_only(parameters), read_only(tables["z0"]), u, y)
+        kernels.batch(read_only(cls._rows(tables)), read_only(tables["z0"]), u, y)
 
     def as_structure(self) -> PreisachStructure:
         """The structure with the levels of this law."""
@@ -334,22 +297,19 @@ class RelayLaw(ByStructure, Law):
 
     def _staircase(self, past: State, n_samples: int) -> tuple[FloatArray, FloatArray, FloatArray, int]:
         """Parameters, extremes and outputs as kernels take them after the inputs `past`, and the last place."""
-        parameters = read_only(self._rows(*(np.array([part]) for part in (self.levels, self.weights, self.offset)))[0])
+        parameters = read_only(self._rows(self.tables)[0])
         x, y = np.empty(1 + len(past) + n_samples), np.empty(1 + len(past) + n_samples)
         x[0], y[0] = parameters[kernels.HEAD], parameters[1]
         return parameters, x, y, kernels.path(parameters, x, y, 0, read_only(past), np.empty(len(past)))
 
     @classmethod
-    def _rows(cls, levels: FloatArray, weights: FloatArray, offset: FloatArray) -> FloatArray:
-        """The kernels' parameters (n_sets, n_parameters) of laws with one row each, or of the same row."""
-        if not levels.size:
-            levels, weights = _NOTHING
-        everett = everett_of(weights)
-        n_sets, n = max(len(levels), len(weights), len(offset)), levels.shape[1]
+    def _rows(cls, tables: Tables) -> FloatArray:
+        """The kernels' parameters (n_sets, n_parameters)."""
+        levels, weights = (tables["levels"], tables["weights"]) if tables["levels"].size else _NOTHING
+        offset, everett, n = tables["offset"], everett_of(weights), levels.shape[1]
         signed = (everett - everett.transpose(0, 2, 1)).reshape(len(everett), n * n)
-        lowest = (offset - everett[:, -1, 0])[:, np.newaxis]
-        parts = np.array([[float(cls.spread)]]), lowest, np.array([[float(n)]]), levels, signed
-        return np.concatenate([np.broadcast_to(part, (n_sets, part.shape[1])) for part in parts], axis=1)
+        parts = np.array([[float(cls.spread)]]), offset - everett[:, -1, :1], np.array([[float(n)]]), levels, signed
+        return np.concatenate([np.broadcast_to(part, (len(offset), part.shape[1])) for part in parts], axis=1)
 
 
 def everett_of(weights: FloatArray) -> FloatArray:

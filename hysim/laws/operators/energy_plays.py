@@ -1,30 +1,27 @@
 """Energy-based plays: cells of dry friction behind an anhysteretic curve."""
 
-from collections.abc import Mapping
-from typing import Any, ClassVar
+from dataclasses import replace
+from typing import ClassVar
 
 import numpy as np
 import numpy.typing as npt
 
-from hysim._basics.frozen import FloatArray, checked, read_only
+from hysim._basics.frozen import FloatArray, read_only
 from hysim.kernels import energy_plays as kernels
-from hysim.laws.operators._clamp_search import Axis, ClampStructure, Pushing
-from hysim.laws.operators._clamps import Bank
-from hysim.models.by_structure import ByStructure
-from hysim.models.law import Packed
+from hysim.laws.operators._bank import Bank
+from hysim.laws.operators._bank_search import Axis, BankStructure
+from hysim.models.law import Law, Packed
 from hysim.models.model import Example, family
-from hysim.models.parameters import spans
+from hysim.models.parameters import Parameter
 from hysim.models.search_space import Parameters
 from hysim.models.tables import Tables
 from hysim.records import Record
 
-_FIELDS = (3e-3, 3.0)  # of the anhysteretic curve, in half spans of the input
-_STARTS = (0.1, 0.03, 0.01, 0.3, 1.0)
 _SPACING = 2.0  # of the thresholds: finer towards zero
 
 
 @family
-class EnergyPlays(ByStructure, Bank):
+class EnergyPlays(Bank, Law):
     """Energy-based plays, ``y = offset + feedthrough u + sum_i w_i L(z_i / field)`` over plays of the thresholds r_i.
 
     ``z_i(k) = min(max(z_i(k-1), u_k - r_i), u_k + r_i)`` is the reversible field of cell i, what a pinning force r_i
@@ -69,13 +66,13 @@ class EnergyPlays(ByStructure, Bank):
 
     units: ClassVar = {"thresholds": "u", "weights": "y", "field": "u", "feedthrough": "y/u", "offset": "y", "z0": "u"}
     positive = ("field",)
+    axes = (Axis(Parameter("field", 3e-3, 3.0, unit="h", physical=(True, False)), (0.1, 0.03, 0.01, 0.3, 1.0)),)
     example = Example(
         {"thresholds": (0.0, 0.2, 0.5), "weights": (0.2, 0.6, 0.4), "field": 0.15},
         (-2.0, 2.0),
         title="Magnetic core: energy-based plays",
         group="Magnetic cores",
     )
-    ordered: ClassVar[bool] = True
 
     thresholds: tuple[float, ...] = ()
     weights: tuple[float, ...] = ()
@@ -93,7 +90,9 @@ class EnergyPlays(ByStructure, Bank):
         return Packed(np.concatenate([tables[name] for name in names], axis=1), cls.initial_memory(tables))
 
     @classmethod
-    def structure(cls, *, plays: int = 20, thresholds: npt.ArrayLike = ()) -> ClampStructure:
+    def structure(  # type: ignore[override]  # its weights have one sign
+        cls, *, plays: int = 20, thresholds: npt.ArrayLike = ()
+    ) -> BankStructure:
         """Cells for `hysim.identify`, whose weights have one sign: how many, or where.
 
         Parameters
@@ -105,7 +104,7 @@ class EnergyPlays(ByStructure, Bank):
 
         Returns
         -------
-        ClampStructure
+        BankStructure
             The field is searched; weights, feedthrough and offset are solved for.
 
         Raises
@@ -122,11 +121,18 @@ class EnergyPlays(ByStructure, Bank):
         >>> round(fit.estimates["field"], 3)
         15.0
         """
-        return _structure(cls, tuple(read_only(thresholds, "thresholds", ndim=1).tolist()), plays)
+        plain = super().structure(plays=plays, thresholds=thresholds, one_signed=True)
+        return replace(plain, spacing=_SPACING)
 
-    def as_structure(self) -> ClampStructure:
+    def as_structure(self) -> BankStructure:
         """The structure with the thresholds of this law, its field first, or that by default where it has none."""
-        return _structure(type(self), self.thresholds, 20, self.field) if self.thresholds else self.structure()
+        own = {"field": self.field} if self.thresholds else {}
+        return replace(self.structure(), thresholds=self.thresholds, own=own)
+
+    @classmethod
+    def outputs_of_one(cls, z: FloatArray, parameters: Parameters, record: Record) -> FloatArray:
+        """The curve at the positions (n_sets, n_samples, n_plays)."""
+        return _anhysteretic(z / np.reshape(parameters["field"], (-1, 1, 1)))
 
     @property
     def saturation(self) -> float:
@@ -166,37 +172,9 @@ class EnergyPlays(ByStructure, Bank):
         >>> core.dissipated([0.0, 100.0, -100.0]).round(3).tolist()
         [0.0, 16.251, 48.753]
         """
-        thresholds, weights, _ = self.elements
         curves = _anhysteretic(self.remembered(u) / self.field)
         moved = np.abs(np.diff(curves, axis=0, prepend=curves[:1]))
-        return np.asarray(np.cumsum(moved, axis=0) @ (thresholds * weights))
-
-
-@checked
-class AnhystereticCurve(Pushing):
-    """The search for the scale of the curve behind the plays."""
-
-    first: tuple[float, ...] = ()  # scale from which the search begins
-
-    def axes(self, record: Record) -> dict[str, Axis]:
-        """The field."""
-        half = spans(record)["h"]
-        starts = (*self.first, *(half * start for start in _STARTS))
-        return {"field": Axis(_FIELDS[0] * half, _FIELDS[1] * half, starts, half, (True, False))}
-
-    def outputs(self, z: FloatArray, parameters: Parameters) -> FloatArray:
-        """The curve at the positions (n_sets, n_samples, n_plays)."""
-        return _anhysteretic(z / np.reshape(parameters["field"], (-1, 1, 1)))
-
-    def arguments(self, parameters: Mapping[str, float]) -> dict[str, Any]:
-        """The field."""
-        return {"field": parameters["field"]}
-
-
-def _structure(law: type, thresholds: tuple[float, ...], plays: int, *first: float) -> ClampStructure:
-    """A structure of cells; `first` is the field from which the search begins."""
-    curve = AnhystereticCurve(first=first)
-    return ClampStructure(law=law, thresholds=thresholds, plays=plays, one_signed=True, pushing=curve, spacing=_SPACING)
+        return np.asarray(np.cumsum(moved, axis=0) @ (np.array(self.thresholds) * self.weights))
 
 
 def _anhysteretic(x: FloatArray) -> FloatArray:

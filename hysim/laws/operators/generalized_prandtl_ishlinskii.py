@@ -1,30 +1,30 @@
 """The generalised Prandtl-Ishlinskii law: plays that the input pushes through envelope functions."""
 
-from collections.abc import Mapping
 from dataclasses import replace
-from typing import Any, ClassVar
+from typing import ClassVar
 
 import numpy as np
 import numpy.typing as npt
 
-from hysim._basics.frozen import FloatArray, checked, read_only
-from hysim.laws.operators._clamp_search import Axis, ClampStructure, Pushing
-from hysim.laws.operators._play_sums import IDENTITY, ExtendedPlays, kernel_rows, positions_of
-from hysim.laws.operators.prandtl_ishlinskii import PrandtlIshlinskii
-from hysim.models.law import Packed
+from hysim._basics.frozen import FloatArray, read_only
+from hysim.laws.operators._bank import Bank
+from hysim.laws.operators._bank_search import IDENTITY, Axis, BankStructure, named, table_of
+from hysim.laws.operators._play_sums import EXAMPLE, PlaySum
 from hysim.models.model import Example, family
-from hysim.models.parameters import spans
+from hysim.models.parameters import Parameter, spans
 from hysim.models.search_space import Parameters
 from hysim.models.tables import Tables
 from hysim.records import Record
 
-_BENDS = (0.02, 3.0)  # of the envelope between the ends of the input: nearly straight, nearly a step
-_SKEWS = (-3.0, 3.0)  # where the middle of the input is on the tanh
-_STARTS: tuple[tuple[float, ...], ...] = ((0.3, 1.0), (0.0, -1.0, 1.0), (0.2,))
+_AXES = (
+    Axis(Parameter("bend", 0.02, 3.0), (0.3, 1.0)),  # between the ends of the input: nearly straight, nearly a step
+    Axis(Parameter("skew", -3.0, 3.0), (0.0, -1.0, 1.0)),  # where the middle of the input is on the tanh
+    Axis(Parameter("lead", 0.0, 3.0), (0.2,)),
+)
 
 
 @family
-class GeneralizedPrandtlIshlinskii(ExtendedPlays):
+class GeneralizedPrandtlIshlinskii(Bank, PlaySum):
     """Generalised Prandtl-Ishlinskii law: plays that the input pushes through envelope functions.
 
     ::
@@ -79,14 +79,12 @@ class GeneralizedPrandtlIshlinskii(ExtendedPlays):
     z0: tuple[float, ...] = (0.0,)
 
     units: ClassVar = {"offset": "y"}
+    by_input: ClassVar[bool] = False
     example = Example(
-        {
-            "thresholds": (0.0, 0.1, 0.2, 0.35, 0.5, 0.7), "weights": (0.4, 0.3, 0.2, 0.2, 0.1, 0.1),
-            "left": (1.2, 1.4, 0.0, 0.0, 0.1),
-        },
+        {**EXAMPLE, "left": (1.2, 1.4, 0.0, 0.0, 0.1)},
         (-2.0, 2.0),
         title="Prandtl-Ishlinskii: envelopes",
-    )  # fmt: skip
+    )
 
     @classmethod
     def check(cls, tables: Tables) -> None:
@@ -104,7 +102,7 @@ class GeneralizedPrandtlIshlinskii(ExtendedPlays):
         envelopes: int = 1,
         left: npt.ArrayLike = (),
         right: npt.ArrayLike = (),
-    ) -> ClampStructure:
+    ) -> BankStructure:
         """Plays and envelopes for `hysim.identify`; `plays`, `thresholds` and `one_signed` as of `PrandtlIshlinskii`.
 
         One envelope is searched, or with ``envelopes=2`` also the ``lead`` in skew of the right one before the left
@@ -122,27 +120,35 @@ class GeneralizedPrandtlIshlinskii(ExtendedPlays):
         """
         if envelopes not in (1, 2):
             raise ValueError(f"envelopes must be 1 or 2, got {envelopes!r}")
-        known = tuple(tuple(read_only(side, "envelopes", ndim=1).tolist()) for side in (left, right))
-        if known[0]:
-            _check_envelopes(*(np.atleast_2d(side) for side in known))
-        pushing = Envelopes(left=known[0], right=known[1], count=envelopes)
-        plain = PrandtlIshlinskii.structure(plays=plays, thresholds=thresholds, one_signed=one_signed)
-        return replace(plain, law=cls, pushing=pushing)
+        known = {side: read_only(each, "envelopes", ndim=1) for side, each in (("left", left), ("right", right))}
+        if known["left"].size:
+            _check_envelopes(*(np.atleast_2d(side) for side in known.values()))
+        plain = super().structure(plays=plays, thresholds=thresholds, one_signed=one_signed)
+        if not known["left"].size:
+            return replace(plain, axes=_AXES[: 1 + envelopes])
+        numbers = [named(side, each.tolist()) for side, each in known.items()]
+        return replace(plain, known=numbers[0] | numbers[1])
 
     @classmethod
-    def pack(cls, tables: Tables) -> Packed:
-        """Rows with envelopes; see `hysim.kernels.play_sums`."""
-        left, right = _both(tables["left"], tables["right"])
-        return Packed(kernel_rows(tables, left=left, right=right), cls.initial_memory(tables))
+    def pushing(cls, parameters: Parameters, record: Record) -> Tables:
+        """The envelopes."""
+        return {side: table_of(side, parameters) for side in ("left", "right")}
 
-    def as_structure(self) -> ClampStructure:
+    @classmethod
+    def derived(cls, parameters: Parameters, record: Record) -> dict[str, FloatArray]:
+        """Coefficients ``left[0]`` ... ``left[4]`` for bend and skew, and those of the right envelope for a lead."""
+        if "bend" not in parameters:
+            return {}
+        bend, skew = (np.asarray(parameters[name]) for name in ("bend", "skew"))
+        left = named("left", _between_the_ends(bend, skew, record))
+        right = _between_the_ends(bend, skew + parameters["lead"], record) if "lead" in parameters else []
+        return left | named("right", right)
+
+    def as_structure(self) -> BankStructure:
         """The structure with the thresholds and envelopes of this law, or with free ones where it has none."""
         left, right = (self.left, self.right) if self.thresholds else ((), ())
-        one_signed = None if self.plays.is_one_signed() else False
+        one_signed = None if self.is_one_signed() else False
         return self.structure(thresholds=self.thresholds, one_signed=one_signed, left=left, right=right)
-
-    def _has_one_envelope(self) -> bool:
-        return self.right in ((), self.left)
 
     def refusal(self) -> str | None:
         """Why the law has no inverse; None where it has one.
@@ -150,58 +156,11 @@ class GeneralizedPrandtlIshlinskii(ExtendedPlays):
         With one envelope it has one where the plain law of the same plays is invertible, with two where the weights
         have one sign. In the gap between two envelopes the output stands still, and the nearest of its inputs is taken.
         """
-        if self._has_one_envelope():
+        if self.right in ((), self.left):
             return self.plays.refusal()
         if any(self.weights) and min(self.weights) * max(self.weights) >= 0.0:
             return None
         return f"the law has no inverse: with two envelopes its weights must have one sign, got {self.weights}"
-
-
-@checked
-class Envelopes(Pushing):
-    """The search for envelopes, unless the left one is known."""
-
-    by_input: ClassVar[bool] = False
-    left: tuple[float, ...] = ()
-    right: tuple[float, ...] = ()
-    count: int = 1
-
-    def axes(self, record: Record) -> dict[str, Axis]:
-        """Bend, skew, and with two envelopes the lead of the right one."""
-        if self.left:
-            return {}
-        bends, skews, leads = _STARTS
-        axes = {"bend": Axis(*_BENDS, bends, 1.0), "skew": Axis(*_SKEWS, skews, 1.0)}
-        return axes | ({"lead": Axis(0.0, _SKEWS[1], leads, 1.0)} if self.count == 2 else {})
-
-    def derived(self, parameters: Parameters, record: Record) -> dict[str, FloatArray]:
-        """Coefficients ``left[0]`` ... ``left[4]``, and those of the right envelope where there are two."""
-        if self.left:
-            return {}
-        bend, skew = parameters["bend"], parameters["skew"]
-        sides = {"left": skew} | ({"right": skew + parameters["lead"]} if self.count == 2 else {})
-        return {
-            f"{side}[{k}]": column
-            for side, phase in sides.items()
-            for k, column in enumerate(_between_the_ends(np.asarray(bend), np.asarray(phase), record))
-        }
-
-    def positions(self, parameters: Parameters, thresholds: FloatArray, z0: FloatArray, record: Record) -> FloatArray:
-        """Positions (n_sets, n_samples, n_plays)."""
-        left, right = (self._coefficients(side, parameters, len(z0)) for side in ("left", "right"))
-        return positions_of(thresholds, z0, record.u, left=left, right=right if right.size else left)
-
-    def arguments(self, parameters: Mapping[str, float]) -> dict[str, Any]:
-        """The envelopes."""
-        return {side: self._coefficients(side, parameters, 1)[0] for side in ("left", "right")}
-
-    def _coefficients(self, side: str, parameters: Mapping[str, Any], n_sets: int) -> FloatArray:
-        """Coefficients (n_sets, 5), or (n_sets, 0) for a right envelope that is the left one."""
-        known = self.left if side == "left" else self.right
-        if known or f"{side}[0]" not in parameters:
-            return np.tile(known, (n_sets, 1))
-        columns = (np.broadcast_to(np.ravel(parameters[f"{side}[{k}]"]), n_sets) for k in range(5))
-        return np.stack(list(columns), axis=1)
 
 
 def _between_the_ends(bend: FloatArray, phase: FloatArray, record: Record) -> list[FloatArray]:
@@ -213,14 +172,9 @@ def _between_the_ends(bend: FloatArray, phase: FloatArray, record: Record) -> li
     return [height, bend / half, phase - bend * middle / half, level, np.zeros_like(height)]
 
 
-def _both(left: FloatArray, right: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Both envelopes (n_sets, 5); without coefficients the right one is the left one."""
-    return left, right if right.size else left
-
-
 def _check_envelopes(left: FloatArray, right: FloatArray) -> None:
     """Refuse envelopes (n_sets, 5) that do not increase."""
-    for name, side in zip(("left", "right"), _both(left, right), strict=True):
+    for name, side in {"left": left, "right": right if right.shape[1] else left}.items():
         if side.shape[1] != len(IDENTITY):
             raise ValueError(f"{name} must hold 5 coefficients, got {side.shape[1]}")
         bend, line = side[:, 0] * side[:, 1], side[:, 4]

@@ -6,15 +6,14 @@ import numpy as np
 import numpy.typing as npt
 
 from hysim._basics.frozen import read_only
-from hysim.laws.operators._clamp_search import ClampStructure
-from hysim.laws.operators._clamps import ClampLaw
+from hysim.laws.operators._bank import Bank, Clamps
+from hysim.laws.operators._bank_search import BankStructure
 from hysim.laws.operators.prandtl_ishlinskii import PrandtlIshlinskii
-from hysim.models.by_structure import ByStructure
 from hysim.models.model import Example, family
 
 
 @family
-class MaxwellSlip(ByStructure, ClampLaw):
+class MaxwellSlip(Bank, Clamps):
     """Maxwell-slip law: springs side by side, each of which slips at an elongation of its own.
 
     ::
@@ -64,6 +63,7 @@ class MaxwellSlip(ByStructure, ClampLaw):
     thresholds_name: ClassVar[str] = "slips"
     weights_name: ClassVar[str] = "stiffness"
     stops: ClassVar[bool] = True
+    ordered: ClassVar[bool] = False
 
     stiffness: tuple[float, ...] = ()
     slips: tuple[float, ...] = ()
@@ -88,17 +88,16 @@ class MaxwellSlip(ByStructure, ClampLaw):
         return cls(stiffness=tuple(k.tolist()), slips=tuple((f / k).tolist()), feedthrough=feedthrough, offset=offset)
 
     @classmethod
-    def structure(
+    def structure(  # type: ignore[override]  # its elements are no plays
         cls, *, elements: int = 10, slips: npt.ArrayLike = (), one_signed: bool | None = None
-    ) -> ClampStructure:
+    ) -> BankStructure:
         """Elements for `hysim.identify`: their number, slipping in even steps up to half the input's span, or `slips`.
 
         With `one_signed` every stiffness has the sign of the record's loop, positive for a clockwise one; by default
         the BIC decides. Raises ValueError or TypeError if the number is not a positive int, or an elongation is not a
         finite number [unit of u].
         """
-        places = tuple(read_only(slips, "slips", ndim=1).tolist())
-        return ClampStructure(law=cls, thresholds=places, plays=elements, one_signed=one_signed)
+        return super().structure(plays=elements, thresholds=slips, one_signed=one_signed)
 
     @property
     def limits(self) -> tuple[float, ...]:
@@ -128,8 +127,3 @@ class MaxwellSlip(ByStructure, ClampLaw):
             offset=self.offset,
             z0=tuple(positions.tolist()),
         )
-
-    def as_structure(self) -> ClampStructure:
-        """The structure with the thresholds of this law, or with those by default where it has none."""
-        one_signed = all(k >= 0.0 for k in self.stiffness) or all(k <= 0.0 for k in self.stiffness)
-        return ClampStructure(law=type(self), thresholds=self.slips, one_signed=None if one_signed else False)

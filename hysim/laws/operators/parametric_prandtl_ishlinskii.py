@@ -17,6 +17,8 @@ import numpy.typing as npt
 
 from hysim._basics.frozen import FloatArray
 from hysim.kernels import clamps as kernels
+from hysim.laws.operators._bank_search import conditioned, dominant_extremes, moved, named, table_of
+from hysim.laws.operators._densities import gamma_plays, thinned
 from hysim.models.law import Law, Packed
 from hysim.models.model import Example, family
 from hysim.models.parameters import Parameter, declared_space, spans
@@ -26,8 +28,8 @@ from hysim.records import Record
 
 _DENSITIES = ((-0.5, 0.3), (0.0, 0.15), (1.0, 0.15), (0.0, 1.0))  # exponent, and decay in half spans of the input
 _TURNS = (-2.0, -1.0, 0.0, 1.0, 2.0)  # of a free memory, in half spans from the first input
-_SMALLEST = 1e-280  # a smaller incomplete gamma function is its first term
-_SAMPLES, _TURN = 250, 0.01  # beside reversals by more than this part of the span, for the choice of the past
+_SMALLEST = 1e-280  # norm: nothing is divided by less
+_SAMPLES = 250  # for the choice of the past
 _STRONG = 10.0  # difference of two BIC that is very strong evidence
 
 
@@ -116,17 +118,18 @@ class ParametricPrandtlIshlinskii(Law):
         Parameter("z0", -2.0, 2.0, unit="h", from_first=True),
     )
     screened = 64
+    structural = ("plays",)
 
     @classmethod
     def check(cls, tables: Tables) -> None:
         """Refuse what is no density or no number of plays."""
-        if not (tables["exponent"] > -1.0).all():
-            raise ValueError(f"exponent must be above -1, got {tables['exponent'].min()}")
         super().check(tables)
+        exponent, reach, plays = (tables[name] for name in ("exponent", "reach", "plays"))
         idle = (tables["weight"] == 0.0) & (tables["weight_slope"] == 0.0)
-        if not ((tables["reach"] > 0.0) | (idle & (tables["reach"] == 0.0))).all():
-            raise ValueError(f"reach must be positive beside a weight, got {tables['reach'].min()}")
-        plays = tables["plays"]
+        if not (exponent > -1.0).all():
+            raise ValueError(f"exponent must be above -1, got {exponent.min()}")
+        if not ((reach > 0.0) | (idle & (reach == 0.0))).all():
+            raise ValueError(f"reach must be positive beside a weight, got {reach.min()}")
         if not ((plays >= 1.0) & (plays == np.round(plays))).all():
             raise ValueError(f"plays must be whole and positive, got {plays.min()}")
         if not tables["z0"].shape[1]:
@@ -135,21 +138,15 @@ class ParametricPrandtlIshlinskii(Law):
     @classmethod
     def pack(cls, tables: Tables) -> Packed:
         """Parameters as `hysim.kernels.clamps.bent_step` takes them, and the positions after the inputs z0."""
-        thresholds, shares = _plays(tables)
-        coefficients = tables["input_coefficients"]
-        head = [tables[name] for name in ("offset", "weight", "weight_slope")]
-        degree = np.full_like(tables["offset"], coefficients.shape[1])
-        past = tables["z0"].T[:, :, np.newaxis]
-        z = past[0] + np.zeros_like(thresholds)
-        for u in past[1:]:
-            z = np.minimum(np.maximum(z, u - thresholds), u + thresholds)
-        parameters = np.concatenate([degree, *head, coefficients, thresholds, shares], axis=1)
+        thresholds, shares = gamma_plays(tables)
+        numbers = [tables[name] for name in ("offset", "weight", "weight_slope", "input_coefficients")]
+        degree = np.full_like(tables["offset"], numbers[-1].shape[1])
+        first, *past = tables["z0"].T[:, :, np.newaxis]
+        z = first + np.zeros_like(thresholds)
+        for u in past:
+            z = moved(z, thresholds, u)
+        parameters = np.concatenate([degree, *numbers, thresholds, shares], axis=1)
         return Packed(parameters, np.concatenate([np.zeros_like(degree), z], axis=1))
-
-    @property
-    def structural(self) -> tuple[str, ...]:
-        """The number of plays."""
-        return ("plays",)
 
     def memory(self, u: npt.ArrayLike) -> FloatArray:
         """Positions of the plays at the samples of `u`, shape (n_samples, n_plays); errors as of `response`."""
@@ -158,12 +155,12 @@ class ParametricPrandtlIshlinskii(Law):
     @property
     def thresholds(self) -> FloatArray:
         """Threshold r_k of each play, shape (n_plays,) [unit of u]."""
-        return np.asarray(_plays(self.tables)[0][0])
+        return np.asarray(gamma_plays(self.tables)[0][0])
 
     @property
     def shares(self) -> FloatArray:
         """Share m_k of each play in the weight, shape (n_plays,); their sum is one."""
-        return np.asarray(_plays(self.tables)[1][0])
+        return np.asarray(gamma_plays(self.tables)[1][0])
 
     def search_space(self, record: Record, freedom: Freedom = ALL_FREE) -> SearchSpace:
         """Box of the two parameters of the density, and of the former turning point where the memory is free."""
@@ -176,36 +173,31 @@ class ParametricPrandtlIshlinskii(Law):
         held = {name: value for name, value in known.items() if name not in freedom.free} | {**freedom.fixed}
         turns = [{}] if names[-1] in held else [{names[-1]: turn} for turn in _TURNS]
         starts = [{"exponent": a, "decay": decay} | turn for a, decay in _DENSITIES for turn in turns]
-        asked = replace(freedom, fixed=held)
-        return declared_space(
-            law.searched, starts, law.scalars, law.initial, record, asked, law.screened, defaults=self.defaults()
-        )
+        asked, numbers = replace(freedom, fixed=held), (law.scalars, law.initial)
+        return declared_space(law.searched, starts, *numbers, record, asked, law.screened, defaults=self.defaults())
 
     def _likely_past(self, record: Record) -> tuple[float, float]:
-        """Inputs before the first sample: those of the cycle, unless plays that stand still fit clearly better."""
-        chosen = np.linspace(0, len(record) - 1, min(_SAMPLES, len(record))).round().astype(np.intp)
-        kept = np.union1d(chosen, record.reversals(_TURN))
-        short, first = Record(u=record.u[kept], y=record.y[kept]), float(record.u[0])
+        """Inputs before the first sample: those of the cycle, unless plays that stand still fit clearly better.
+
+        What counts is the residual of the best of the densities from which a search begins.
+        """
+        short, first, (exponent, decay) = thinned(record, _SAMPLES), float(record.u[0]), np.array(_DENSITIES).T
+        density = {"exponent": exponent, "decay": spans(short)["h"] * decay}
         best, criterion = conditioned(record.u), np.inf
         for past in (best, (0.0, 0.0), (first, first)):
-            own = 2.0 * len(short) * np.log(max(replace(self, z0=past)._least_error(short), _SMALLEST))
+            law = replace(self, z0=past)
+            columns = law.regressors({**law.scalars, **density}, short)[..., :-1]
+            columns = columns / np.maximum(np.linalg.norm(columns, axis=1, keepdims=True), _SMALLEST)
+            fits = (each @ np.linalg.lstsq(each, short.y, rcond=None)[0] for each in columns)
+            error = min(float(np.linalg.norm(short.y - fit)) for fit in fits)
+            own = 2.0 * len(short) * np.log(max(error, _SMALLEST))
             if own < criterion - _STRONG:
                 best, criterion = past, own
         return best
 
-    def _least_error(self, record: Record) -> float:
-        """Norm of the residual of the best of the densities from which a search begins."""
-        exponent, decay = np.array(_DENSITIES).T
-        density = {"exponent": exponent, "decay": spans(record)["h"] * decay}
-        columns = self.regressors({**self.scalars, **density}, record)[..., :-1]
-        columns = columns / np.maximum(np.linalg.norm(columns, axis=1, keepdims=True), _SMALLEST)
-        fits = (each @ np.linalg.lstsq(each, record.y, rcond=None)[0] for each in columns)
-        return min(float(np.linalg.norm(record.y - fit)) for fit in fits)
-
     def regressors(self, parameters: Parameters, record: Record) -> FloatArray:
         """Columns of weight, weight_slope, 1, u, u^2, ... and 0, shape (n_sets, n_samples, n_columns + 1)."""
-        n_inputs = sum(name.startswith("z0[") for name in parameters) or len(self.z0)
-        law = replace(self, z0=(0.0,) * n_inputs)
+        law = replace(self, z0=(0.0,) * (table_of("z0", parameters).shape[1] or len(self.z0)))
         zero = {**parameters, **dict.fromkeys(law.columns, 0.0)}
         lag = law.outputs({**zero, "weight": 1.0}, record.u)
         powers = [np.broadcast_to(record.u**k, lag.shape) for k in range(len(self.input_coefficients) + 1)]
@@ -215,41 +207,4 @@ class ParametricPrandtlIshlinskii(Law):
         """The record's own dominant turning points as the inputs before it, (n_sets,) by name."""
         n_sets = max((np.size(value) for value in parameters.values()), default=1)
         inputs = dominant_extremes(np.append(record.u, record.u[0]))
-        return {**parameters} | {f"z0[{k}]": np.full(n_sets, u) for k, u in enumerate(inputs)}
-
-
-def conditioned(u: FloatArray) -> tuple[float, float]:
-    """Extremes of the cycle between the lowest and the highest input, that of the branch at the first sample last."""
-    moves = np.diff(u)
-    rises = bool(moves[np.flatnonzero(moves)[:1]].sum() > 0.0)
-    low, high = float(u.min()), float(u.max())
-    return (high, low) if rises else (low, high)
-
-
-def dominant_extremes(u: FloatArray) -> list[float]:
-    """The last input, behind the turning points that no later one has wiped out, the oldest first; at least two.
-
-    Seen from the end, they are where the input is higher or lower than ever: of highs in a row the highest, and so on.
-    """
-    back = u[::-1]
-    higher = np.flatnonzero(np.diff(np.maximum.accumulate(back)) > 0.0) + 1
-    lower = np.flatnonzero(np.diff(np.minimum.accumulate(back)) < 0.0) + 1
-    places = np.concatenate([higher, lower])
-    kinds = np.repeat([1, -1], [higher.size, lower.size])[np.argsort(places)]
-    last_of_a_row = np.append(kinds[1:] != kinds[:-1], True)[: kinds.size]
-    extremes = back[np.sort(places)[last_of_a_row]][::-1].tolist()
-    return [*extremes, float(u[-1])] if extremes else [float(u[-1])] * 2
-
-
-def _plays(tables: Tables) -> tuple[FloatArray, FloatArray]:
-    """Thresholds and shares (n_sets, n_plays); laws with fewer plays have some without a share."""
-    from scipy.special import gammainc  # imported where it is needed
-
-    plays = tables["plays"]
-    place = np.minimum(np.arange(plays.max() + 1.0), plays) / plays
-    edges = tables["reach"] * place**2
-    power, decay = tables["exponent"] + 1.0, tables["decay"]
-    with np.errstate(invalid="ignore", divide="ignore", over="ignore", under="ignore"):
-        whole = gammainc(power, tables["reach"] / decay)
-        below = np.where(whole > _SMALLEST, gammainc(power, edges / decay) / whole, place ** (2.0 * power))
-    return 0.5 * (edges[:, 1:] + edges[:, :-1]), np.diff(below, axis=1)
+        return {**parameters} | named("z0", (np.full(n_sets, u) for u in inputs))

@@ -9,40 +9,14 @@ from typing import ClassVar
 import numpy as np
 
 from hysim._basics.frozen import FloatArray
-from hysim.laws.operators._clamps import ClampLaw
+from hysim.laws.operators._bank import Clamps
 from hysim.models.model import Example, family
 from hysim.models.parameters import Parameter
 from hysim.models.search_space import Parameters
 
 
-class _Element(ClampLaw):
-    """One play or stop."""
-
-    thresholds_name: ClassVar[str] = "threshold"
-    weights_name: ClassVar[str] = "gain"
-    bank: ClassVar[bool] = False
-    threshold: float
-    gain: float
-
-    searched = (
-        Parameter("threshold", 1e-3, 1.5, unit="h", physical=(True, False)),
-        Parameter("z0", -1.0, 1.0, unit="h", from_first=True),
-        Parameter("gain", unit="y/u", affine=True),
-        Parameter("offset", unit="y", affine=True),
-    )
-    starts = tuple({"threshold": share, "z0": 0.0} for share in (0.1, 0.3, 0.6))
-    screened = 256
-
-    def columns_by(
-        self, outputs: Callable[[Parameters, FloatArray], FloatArray], parameters: Parameters, u: FloatArray
-    ) -> FloatArray:
-        """Columns z (or u - z), 1 and 0 of the output, shape (n_sets, n_samples, 3)."""
-        element = outputs({**parameters, "gain": 1.0, "offset": 0.0}, u)
-        return np.stack([element, np.ones_like(element), np.zeros_like(element)], axis=-1)
-
-
 @family
-class Play(_Element):
+class Play(Clamps):
     """Play (backlash) of half width r, ``y = offset + gain z`` with ``z_k = min(max(z_(k-1), u_k - r), u_k + r)``.
 
     Exact at the samples of an input that is monotone between them. The loop runs counterclockwise.
@@ -76,10 +50,26 @@ class Play(_Element):
     z0: float = 0.0
 
     example = Example({"threshold": 0.25}, title="Play")
+    not_negative = ("threshold",)
+    searched = (
+        Parameter("threshold", 1e-3, 1.5, unit="h", physical=(True, False)),
+        Parameter("z0", -1.0, 1.0, unit="h", from_first=True),
+        Parameter("gain", unit="y/u", affine=True),
+        Parameter("offset", unit="y", affine=True),
+    )
+    starts = tuple({"threshold": share, "z0": 0.0} for share in (0.1, 0.3, 0.6))
+    screened = 256
+
+    def columns_by(
+        self, outputs: Callable[[Parameters, FloatArray], FloatArray], parameters: Parameters, u: FloatArray
+    ) -> FloatArray:
+        """Columns z (or u - z), 1 and 0 of the output, shape (n_sets, n_samples, 3)."""
+        element = outputs({**parameters, "gain": 1.0, "offset": 0.0}, u)
+        return np.stack([element, np.ones_like(element), np.zeros_like(element)], axis=-1)
 
 
 @family
-class Stop(_Element):
+class Stop(Clamps):
     """Stop (elastic-perfectly plastic element), ``y = offset + gain (u - z)`` with the z of `Play`.
 
     A spring, fixed at z, that slips at the elongation r. The loop runs clockwise.
@@ -107,12 +97,15 @@ class Stop(_Element):
     [0.0, 0.5, 0.0, -0.5]
     """
 
-    example = Example({"threshold": 0.4}, title="Stop")
-    stops: ClassVar[bool] = True
     threshold: float = 1.0
     gain: float = 1.0
     offset: float = 0.0
     z0: float = 0.0
+
+    example = Example({"threshold": 0.4}, title="Stop")
+    stops: ClassVar[bool] = True
+    not_negative = Play.not_negative
+    searched, starts, screened, columns_by = Play.searched, Play.starts, Play.screened, Play.columns_by
 
     @property
     def saturation(self) -> float:

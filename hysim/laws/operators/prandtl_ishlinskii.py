@@ -20,9 +20,7 @@ import numpy.typing as npt
 
 from hysim._basics.frozen import FloatArray, read_only
 from hysim.kernels import inverses
-from hysim.laws.operators._clamp_search import ClampStructure
-from hysim.laws.operators._clamps import ClampLaw
-from hysim.models.by_structure import ByStructure
+from hysim.laws.operators._bank import Bank, Clamps
 from hysim.models.law import State
 from hysim.models.model import Example, family
 from hysim.models.protocols import UNLIMITED, CompiledLaw, Limits
@@ -31,7 +29,7 @@ _CONSISTENT = 1e-9  # of the largest threshold: what rounding may add to the dis
 
 
 @family
-class PrandtlIshlinskii(ByStructure, ClampLaw):
+class PrandtlIshlinskii(Bank, Clamps):
     """Prandtl-Ishlinskii law, ``y = offset + sum w_i z_i`` over plays of the thresholds r_i.
 
     ``z_i(k) = min(max(z_i(k-1), u_k - r_i), u_k + r_i)``. Positive weights give the counterclockwise loops of
@@ -69,7 +67,6 @@ class PrandtlIshlinskii(ByStructure, ClampLaw):
     [0.0, 1.0, 0.5, -1.0]
     """
 
-    ordered: ClassVar[bool] = True
     units: ClassVar = {"thresholds": "u", "weights": "y/u", "offset": "y", "z0": "u"}
     example = Example(
         {
@@ -85,47 +82,6 @@ class PrandtlIshlinskii(ByStructure, ClampLaw):
     weights: tuple[float, ...] = ()
     offset: float = 0.0
     z0: tuple[float, ...] = (0.0,)
-
-    @classmethod
-    def structure(
-        cls, *, plays: int = 10, thresholds: npt.ArrayLike = (), one_signed: bool | None = None
-    ) -> ClampStructure:
-        """Plays for `hysim.identify`: how many, or where.
-
-        Parameters
-        ----------
-        plays : int
-            Their number, with thresholds from zero in even steps over half the span of the input.
-        thresholds : sequence of float, optional
-            The thresholds themselves [unit of u].
-        one_signed : bool, optional
-            Whether all weights past the threshold zero have the sign of the record's loop (positive for a
-            counterclockwise one). Else they are free, and may be of alternating signs on noisy records. By default
-            the one with the lower BIC on the record.
-
-        Returns
-        -------
-        ClampStructure
-
-        Raises
-        ------
-        ValueError, TypeError
-            If the number is not a positive int, or a threshold is not a finite number.
-
-        Examples
-        --------
-        >>> import hysim as hs
-        >>> fit = hs.identify(hs.PrandtlIshlinskii.structure(plays=4), hs.datasets.table1())
-        >>> fit.n_parameters, round(fit.fit_percent, 1)
-        (5, 94.6)
-        """
-        places = tuple(read_only(thresholds, "thresholds", ndim=1).tolist())
-        return ClampStructure(law=cls, thresholds=places, plays=plays, one_signed=one_signed)
-
-    def is_one_signed(self) -> bool:
-        """Whether all weights past the threshold zero have one sign."""
-        lagging = [weight for weight, threshold in zip(self.weights, self.thresholds, strict=True) if threshold > 0.0]
-        return all(weight >= 0.0 for weight in lagging) or all(weight <= 0.0 for weight in lagging)
 
     def is_invertible(self) -> bool:
         """Whether r_0 = 0 and the sums w_0 + ... + w_i have one sign: then there is an `inverse`."""
@@ -183,12 +139,6 @@ class PrandtlIshlinskii(ByStructure, ClampLaw):
         start = self.advance([u0])[1] if state is None and u0 is not None else state
         law = self if start is None else replace(self, z0=start[1:], u0=None)
         return law.inverse().response(y)
-
-    def as_structure(self) -> ClampStructure:
-        """The structure with the thresholds of this law, or with those by default where it has none."""
-        return ClampStructure(
-            law=type(self), thresholds=self.thresholds, one_signed=None if self.is_one_signed() else False
-        )
 
 
 def wrong_sum(weights: npt.ArrayLike) -> int | None:

@@ -14,28 +14,12 @@ ends on a piece on which y is linear, so that it is exact.
 
 Sources: F. Preisach, Z. Phys. 94 (1935); D. H. Everett, Trans. Faraday Soc. 51 (1955); I. D. Mayergoyz,
 Mathematical Models of Hysteresis, 1991, for first-order reversal curves and the interpolation of E.
-
-The Everett function from first-order reversal curves, between the turning points as well.
-
-A curve turns at a_m on its way up from the lowest input L and falls back to it. On its way down it measures
-
-    E(a_m, b) = (y(a_m) - y(b)) / 2
-
-at each of its samples b. Between two curves, with t = (a - a_m) / (a_(m+1) - a_m),
-
-    E(a, b) = (1 - t) E(a_m, b) + t E(a_(m+1), b) + r(a) c(b)     for b up to a_m
-    E(a, b) = t E(a_(m+1), b') + r(a) c(b')                       for b from a_m to a, b' stretched to end at a_(m+1)
-
-r(a) is half of what the output on the rise to a_(m+1) is above a straight line from a_m. The relays between the curves
-have it in proportion to their weights' sizes: c(b) is the total variation of E(a_(m+1), .) - E(a_m, .) above b over
-that above the lowest input. So the rise is met as well as the curves, and a law whose density is even between the
-turning points is returned exactly, whatever the levels.
 """
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
-from typing import ClassVar, NamedTuple, Self
+from typing import ClassVar, Self
 
 import numpy as np
 import numpy.typing as npt
@@ -44,123 +28,15 @@ from hysim._basics.blas import one_blas_thread
 from hysim._basics.frozen import FloatArray, check_whole, read_only
 from hysim._columns.turning import TOLERANCE
 from hysim.kernels import preisach as kernels
+from hysim.laws.operators._densities import Density, everett_from_curves, relay_weights, smooth
 from hysim.laws.operators._relays import RelayLaw, everett_of, weights_of
-from hysim.laws.operators._smooth_density import smooth, supported
 from hysim.laws.operators.prandtl_ishlinskii import PrandtlIshlinskii
 from hysim.models.law import State
 from hysim.models.model import Example, family
 from hysim.models.protocols import UNLIMITED, CompiledLaw, Limits
 from hysim.records import Record, several
 
-_MOST_LEVELS = 100  # beside turning points
-_CLOSEST = 1e-3  # distance of levels, as a fraction of the span
-Density = Callable[[FloatArray, FloatArray], npt.ArrayLike]
-"""Weight of relays per area at arrays of upper and lower thresholds of one shape."""
-
-_POINTS = 8  # of Gauss's rule on an interval
-
 _ROOM = 1000  # extremes that the inverse keeps in a loop
-
-
-class ReversalCurve(NamedTuple):
-    """A way down, and the rise before it; None if the record begins at the turning point."""
-
-    fall: Record
-    rise: Record | None
-
-    @property
-    def turn(self) -> float:
-        """Input at which the curve turns."""
-        return float(self.fall.u[0])
-
-    def everett(self, b: FloatArray) -> FloatArray:
-        """E(turn, b) at inputs from the lowest to the turning point."""
-        return np.asarray(0.5 * (self.fall.y[0] - _at(b, self.fall)))
-
-
-def curves_of(record: Record, tolerance: float) -> list[ReversalCurve]:
-    """The curves of a record by their turning points, of equal ones the last; a ValueError if it has none."""
-    low, slack = float(record.u.min()), tolerance * float(np.ptp(record.u))
-    branches = record.branches(tolerance)
-    curves: dict[float, ReversalCurve] = {}
-    for before, branch in zip((None, *branches), branches, strict=False):
-        if branch.u[-1] >= branch.u[0]:
-            continue
-        if branch.u[-1] > low + slack:
-            raise ValueError(
-                f"the way down from {branch.u[0]:g} must end at the lowest input {low:g}, it ends at {branch.u[-1]:g}"
-            )
-        curves[float(branch.u[0])] = ReversalCurve(branch, before)
-    if not curves:
-        raise ValueError("the input never falls: a reversal curve is a way up and the way down after it")
-    return [curves[turn] for turn in sorted(curves)]
-
-
-def levels_of(low: float, curves: list[ReversalCurve]) -> FloatArray:
-    """The turning points and all inputs of the curves; even steps between turning points if these are too many."""
-    turns = np.array([low, *(curve.turn for curve in curves)])
-    span = float(turns[-1] - low)
-    every = np.unique(np.concatenate([turns, *(curve.fall.u for curve in curves)]))
-    every = every[(every >= low) & (every <= turns[-1])]
-    if every.size <= _MOST_LEVELS and np.diff(every).min() >= _CLOSEST * span:
-        return np.asarray(every)
-    parts = np.maximum(np.round(np.diff(turns) * _MOST_LEVELS / span), 1).astype(int)
-    steps = [np.linspace(a, b, n + 1)[:-1] for a, b, n in zip(turns[:-1], turns[1:], parts, strict=True)]
-    return np.append(np.concatenate(steps), turns[-1])
-
-
-def everett_between(low: float, levels: FloatArray, curves: list[ReversalCurve]) -> FloatArray:
-    """E at the pairs of levels (upper, lower), zero above the diagonal; beyond the curves as at their ends."""
-    table = np.zeros((levels.size, levels.size))
-    turn, below = low, np.zeros(levels.size)
-    for curve in curves:
-        above = np.where(levels < curve.turn, curve.everett(levels), 0.0)
-        between = np.flatnonzero((levels > turn) & (levels <= curve.turn))
-        reached = (levels[between] - turn) / (curve.turn - turn)
-        share = _share(above - below)
-        for k, t, r in zip(between, reached, _above_line(curve, turn, levels[between], reached), strict=True):
-            table[k] = np.where(levels <= turn, (1.0 - t) * below + t * above + r * share, 0.0)
-            inner = (levels > turn) & (levels < levels[k])
-            stretched = turn + (levels[inner] - turn) / t
-            table[k, inner] = t * curve.everett(stretched) + r * np.interp(stretched, levels, share)
-        turn, below = curve.turn, above
-    table[levels > turn] = below
-    return table
-
-
-def _share(difference: FloatArray) -> FloatArray:
-    """Total variation above each level over that above the lowest one."""
-    above = np.append(np.cumsum(np.abs(np.diff(difference))[::-1])[::-1], 0.0)
-    return above / (above[0] or 1.0)
-
-
-def _above_line(curve: ReversalCurve, turn: float, levels: FloatArray, reached: FloatArray) -> FloatArray:
-    """Half of what the rise to a curve is above a straight line from the turning point before."""
-    if curve.rise is None:
-        return np.zeros(levels.size)
-    start, end = _at(np.array([turn, curve.turn]), curve.rise)
-    return np.asarray(0.5 * (_at(levels, curve.rise) - start - reached * (end - start)))
-
-
-def _at(inputs: FloatArray, branch: Record) -> FloatArray:
-    """Outputs of a branch where its input passes the inputs."""
-    order = np.argsort(branch.u, kind="stable")
-    return np.interp(inputs, branch.u[order], branch.y[order])
-
-
-def _relay_weights(grid: FloatArray, density: Density) -> tuple[float, ...]:
-    """A density integrated over each pair of intervals between the levels."""
-    rows, columns = np.tril_indices(max(grid.size - 1, 0))
-    nodes, share = np.polynomial.legendre.leggauss(_POINTS)
-    p, q = (1.0 + nodes) / 2.0, (1.0 + nodes[:, np.newaxis]) / 2.0
-    length = np.diff(grid)
-    diagonal = (rows == columns)[:, np.newaxis, np.newaxis]
-    reach = np.where(diagonal, p, 1.0)  # of b on the way up to a
-    a = grid[rows][:, np.newaxis, np.newaxis] + length[rows][:, np.newaxis, np.newaxis] * p
-    b = grid[columns][:, np.newaxis, np.newaxis] + length[columns][:, np.newaxis, np.newaxis] * reach * q
-    area = (length[rows] * length[columns] / 4.0)[:, np.newaxis, np.newaxis] * np.outer(share, share) * reach
-    heights = np.asarray(density(np.broadcast_to(a, b.shape), b), dtype=float)
-    return tuple(np.sum(area * heights, axis=(1, 2)).tolist())
 
 
 def _two_bells(up: FloatArray, down: FloatArray) -> FloatArray:
@@ -254,7 +130,7 @@ class Preisach(RelayLaw):
     """
 
     spread: ClassVar[bool] = True
-    example = Example({"levels": tuple(_GRID.tolist()), "weights": _relay_weights(_GRID, _two_bells)}, title="Preisach")
+    example = Example({"levels": tuple(_GRID.tolist()), "weights": relay_weights(_GRID, _two_bells)}, title="Preisach")
 
     levels: tuple[float, ...] = ()
     weights: tuple[float, ...] = ()
@@ -289,7 +165,7 @@ class Preisach(RelayLaw):
         [1.5, 3.0, 1.5]
         """
         grid = read_only(levels, "levels", ndim=1)
-        return cls(levels=tuple(grid), weights=_relay_weights(grid, density), offset=offset)
+        return cls(levels=tuple(grid), weights=relay_weights(grid, density), offset=offset)
 
     @classmethod
     def from_plays(cls, levels: npt.ArrayLike, law: PrandtlIshlinskii) -> Self:
@@ -354,13 +230,7 @@ class Preisach(RelayLaw):
         >>> [round(weight, 12) for weight in curves.weights], round(curves.offset, 12)
         ([1.0, 0.5, 1.0], 3.0)
         """
-        curves = curves_of(record, tolerance)
-        low = float(record.u.min())
-        grid = levels_of(low, curves) if levels is None else read_only(levels, "levels", ndim=1)
-        if not grid.size or grid[0] > low + tolerance * float(np.ptp(record.u)):
-            raise ValueError(f"levels must begin at the lowest input {low:g} or below, got {grid[:1].tolist()}")
-        everett = everett_between(low, grid, curves)
-        lowest = float(np.mean([curve.fall.y[-1] for curve in curves]))
+        grid, everett, lowest = everett_from_curves(record, levels, tolerance)
         return cls.from_everett(grid, everett, offset=lowest + float(everett[-1, 0]))
 
     @classmethod
@@ -409,12 +279,9 @@ class Preisach(RelayLaw):
             raise ValueError(f"strength must be finite and not negative, got {strength}")
         if intervals is not None:
             check_whole(intervals, "intervals")
-        count = supported(given) if intervals is None else intervals
-        low, high = min(float(each.u.min()) for each in given), max(float(each.u.max()) for each in given)
-        levels = tuple(np.linspace(low, high, count + 1).tolist())
         with one_blas_thread():
-            weights, offset, past = smooth(cls, levels, given, strength)
-        return cls(levels=levels, weights=tuple(weights.tolist()), offset=offset, z0=past)
+            law: Self = smooth(cls, given, intervals, strength)
+        return law
 
     def slope_bounds(self) -> tuple[float, float]:
         """Lowest and highest slope dy/du over every input between the levels.

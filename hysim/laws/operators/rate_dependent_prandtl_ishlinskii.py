@@ -12,82 +12,31 @@ are positive: samples must be further apart than about 2 beta. The condition on 
 """
 
 import math
-from collections.abc import Mapping
-from dataclasses import fields, replace
-from typing import Any, ClassVar
+from dataclasses import fields
+from typing import ClassVar, Self
 
 import numpy as np
 import numpy.typing as npt
 
-from hysim._basics.frozen import FloatArray, checked, read_only
-from hysim.kernels import play_sums as kernels
-from hysim.laws.operators._clamp_search import Axis, ClampStructure, Pushing
-from hysim.laws.operators._play_sums import ExtendedPlays, kernel_rows, positions_of
+from hysim._basics.frozen import FloatArray, check_positive, items, read_only
+from hysim._names import among
+from hysim.laws.operators._bank import Bank
+from hysim.laws.operators._bank_search import Axis, table_of
+from hysim.laws.operators._play_sums import EXAMPLE, PlaysAtSampleTime
 from hysim.laws.operators.prandtl_ishlinskii import PrandtlIshlinskii
 from hysim.models.batch import Reduction
-from hysim.models.by_structure import ByStructure
 from hysim.models.composable import Placed
-from hysim.models.law import Packed, State
+from hysim.models.law import State
 from hysim.models.model import Example, family
-from hysim.models.parameters import spans
+from hysim.models.parameters import Parameter
 from hysim.models.protocols import UNLIMITED, CompiledLaw, Limits, Startable, needed_time
 from hysim.models.search_space import Parameters
-from hysim.models.tables import Tables
+from hysim.models.tables import Tables, check_signs
 from hysim.records import Record
-
-_LARGEST = 1.0  # of the widening at the record's highest speed, in half spans
-_STARTS = (0.0, 0.1, 0.3)
-
-
-@checked
-class PlaysAtSampleTime(ExtendedPlays):
-    """The law at one sample time, with thresholds ``r_i + width |u_k - u_(k-1)|``."""
-
-    thresholds: tuple[float, ...] = ()
-    weights: tuple[float, ...] = ()
-    width: float = 0.0
-    offset: float = 0.0
-    z0: tuple[float, ...] = (0.0,)
-
-    @classmethod
-    def pack(cls, tables: Tables) -> Packed:
-        """Rows with wider thresholds; see `hysim.kernels.play_sums`."""
-        return Packed(kernel_rows(tables, width=tables["width"]), cls.initial_memory(tables))
-
-    def as_structure(self) -> ClampStructure:
-        """The structure with the thresholds of this law."""
-        return ClampStructure(law=PrandtlIshlinskii, thresholds=self.thresholds)
-
-    def refusal(self) -> str | None:
-        """Why the law has no inverse at its sample time; None where it has one."""
-        if (refusal := self.plays.refusal()) is not None:
-            return refusal
-        sums = np.cumsum(self.weights)
-        with np.errstate(divide="ignore"):
-            limits = np.abs(sums) / (2.0 * np.abs(sums - sums[0]))
-        i = int(np.argmin(limits))
-        if self.width < limits[i]:
-            return None
-        return (
-            f"the law has no stable inverse at this sample time: beta / sample_time is {self.width:g}, but the sums of "
-            f"weights s_i = w_0 + ... + w_i ask for less than |s_i| / (2 |s_i - s_0|), {limits[i]:g} for i = {i}; "
-            "give the speed, or take longer samples"
-        )
-
-    def response_at(self, u: npt.ArrayLike, widening: FloatArray) -> FloatArray:
-        """Output at the samples of `u` of plays whose thresholds are wider by `widening`, shape (n_samples,)."""
-        inputs = read_only(u, "u", ndim=1)
-        if self.u0 is not None:
-            longer = np.append(self.u0, inputs), np.append(widening[:1], widening)
-            return np.asarray(self.placed(None).response_at(*longer)[1:])
-        y = np.empty(inputs.size)
-        parameters = read_only(self.pack(self.tables).parameters[0])
-        kernels.widened(parameters, np.array([0.0, *self.z0]), inputs, read_only(widening), y)
-        return y
 
 
 @family
-class RateDependentPrandtlIshlinskii(ByStructure, Placed):
+class RateDependentPrandtlIshlinskii(Bank, Placed):
     """Rate-dependent Prandtl-Ishlinskii law, ``y = offset + sum w_i z_i``, thresholds ``r_i + beta |u'|``.
 
     ::
@@ -118,6 +67,10 @@ class RateDependentPrandtlIshlinskii(ByStructure, Placed):
     ValueError
         If lengths differ, a number is not finite, beta or a threshold is negative, or the thresholds do not increase.
 
+    Notes
+    -----
+    `hysim.identify` searches for beta, and takes a structure as of `PrandtlIshlinskii.structure`.
+
     Examples
     --------
     >>> import hysim as hs
@@ -136,21 +89,11 @@ class RateDependentPrandtlIshlinskii(ByStructure, Placed):
     offset: float = 0.0
     z0: tuple[float, ...] = (0.0,)
 
-    example = Example(
-        {
-            "thresholds": (0.0, 0.1, 0.2, 0.35, 0.5, 0.7), "weights": (0.4, 0.3, 0.2, 0.2, 0.1, 0.1), "beta": 0.005,
-        },
-        title="Prandtl-Ishlinskii: with the rate",
-    )  # fmt: skip
+    example = Example({**EXAMPLE, "beta": 0.005}, title="Prandtl-Ishlinskii: with the rate")
     dynamic: ClassVar[bool] = True
-    thresholds_name: ClassVar[str] = "thresholds"
-    weights_name: ClassVar[str] = "weights"
-    stops: ClassVar[bool] = False
-    ordered: ClassVar[bool] = True
-
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "z0", self.plays.z0)
-        _width(np.array(self.beta), 1.0)
+    by_input: ClassVar[bool] = False
+    axes = (Axis(Parameter("beta", 0.0, 1.0, unit="h/v"), (0.0, 0.1, 0.3)),)  # up to half a span at the highest speed
+    not_negative = ("beta",)
 
     @property
     def plays(self) -> PrandtlIshlinskii:
@@ -158,24 +101,16 @@ class RateDependentPrandtlIshlinskii(ByStructure, Placed):
         return PrandtlIshlinskii(thresholds=self.thresholds, weights=self.weights, z0=self.z0)
 
     @classmethod
-    def structure(
-        cls, *, plays: int = 10, thresholds: npt.ArrayLike = (), one_signed: bool | None = None
-    ) -> ClampStructure:
-        """Plays for `hysim.identify`, as of `PrandtlIshlinskii.structure`; beta is searched."""
-        plain = PrandtlIshlinskii.structure(plays=plays, thresholds=thresholds, one_signed=one_signed)
-        return replace(plain, law=cls, pushing=Widening())
+    def pushing(cls, parameters: Parameters, record: Record) -> Tables:
+        """The growth of the thresholds with the step of the input."""
+        beta = np.reshape(parameters["beta"], (-1, 1))
+        n_sets = len(table_of("thresholds", parameters))
+        return {"width": np.broadcast_to(beta / record.sample_time, (n_sets, 1))}
 
     def at(self, sample_time: float) -> PlaysAtSampleTime:
         """The law at one sample time [s], as loops step it. Raises ValueError if the sample time is not positive."""
-        return PlaysAtSampleTime(
-            thresholds=self.thresholds,
-            weights=self.weights,
-            width=float(_width(np.array(self.beta), sample_time)),
-            offset=self.offset,
-            z0=self.z0,
-            u0=self.u0,
-            u_range=self.u_range,
-        )
+        others = {name: value for name, value in items(self).items() if name != "beta"}
+        return PlaysAtSampleTime(**others, width=float(_width(self.beta, sample_time)))
 
     def memory(self, u: npt.ArrayLike, sample_time: float) -> FloatArray:
         """Positions of the plays at the samples of `u`, shape (n_samples, n_plays); see `response`."""
@@ -204,7 +139,13 @@ class RateDependentPrandtlIshlinskii(ByStructure, Placed):
             another length.
         """
         law = self.at(sample_time)
-        return law.response(u) if speed is None else law.response_at(u, self.beta * _as_speed(speed, u))
+        if speed is None:
+            return law.response(u)
+        speeds = read_only(speed, "speed", ndim=1)
+        if speeds.size != np.size(u):
+            raise ValueError(f"speed must have {np.size(u)} samples as the signal has, got {speeds.size}")
+        check_signs({"speed": speeds}, (), ("speed",))
+        return law.response_at(u, self.beta * speeds)
 
     def signals(self, u: npt.ArrayLike, sample_time: float) -> dict[str, FloatArray]:
         """Output ``"y"`` and positions ``"z"`` at the samples of `u`; see `response`."""
@@ -241,10 +182,10 @@ class RateDependentPrandtlIshlinskii(ByStructure, Placed):
         workers: int | None = None,
     ) -> FloatArray:
         """Outputs of many laws at one sample time [s]; else as `PrandtlIshlinskii.responses`, with ``beta``."""
-        width = _width(np.asarray(parameters.get("beta", cls.beta), dtype=float), sample_time)
-        known = [field.name for field in fields(cls)]
+        width = _width(parameters.get("beta", cls.beta), sample_time)
+        known = [each.name for each in fields(cls)]
         if wrong := [name for name in parameters if name not in known]:
-            raise TypeError(f"unknown parameter {wrong[0]!r}: {cls.__name__} has {', '.join(known)}")
+            raise TypeError(f"unknown parameter {wrong[0]!r}: {cls.__name__} has {among(wrong[0], known)}")
         sets = {name: value for name, value in parameters.items() if name != "beta"} | {"width": width}
         return PlaysAtSampleTime.responses(sets, u, reduce=reduce, target=target, workers=workers)
 
@@ -252,7 +193,7 @@ class RateDependentPrandtlIshlinskii(ByStructure, Placed):
         """Whether there is an `inverse`, for a known speed; with a sample time, an `inverse_response` without one."""
         return self.plays.is_invertible() and (sample_time is None or self.at(sample_time).is_invertible())
 
-    def inverse(self) -> "RateDependentPrandtlIshlinskii":
+    def inverse(self) -> Self:
         """The law that gives the input for a wanted output, exactly, at the same speed of the input.
 
         Use it as ``inverse.response(y, sample_time, speed=...)``. Errors are those of `PrandtlIshlinskii.inverse`.
@@ -264,15 +205,10 @@ class RateDependentPrandtlIshlinskii(ByStructure, Placed):
         >>> law.inverse().beta, law.inverse().thresholds, law.inverse().weights
         (0.5, (0.0, 0.5), (0.5, -0.25))
         """
-        inverse = self.plays.inverse()
-        rise = self.offset
-        return RateDependentPrandtlIshlinskii(
-            thresholds=inverse.thresholds,
-            weights=inverse.weights,
-            beta=abs(self.weights[0]) * self.beta,
-            offset=0.0 - rise * sum(inverse.weights),
-            z0=tuple(z + rise for z in inverse.z0),
-        )
+        plain = self.plays.inverse()
+        offset, z0 = 0.0 - self.offset * sum(plain.weights), tuple(z + self.offset for z in plain.z0)
+        beta = abs(self.weights[0]) * self.beta
+        return type(self)(thresholds=plain.thresholds, weights=plain.weights, beta=beta, offset=offset, z0=z0)
 
     def inverse_response(
         self,
@@ -299,51 +235,10 @@ class RateDependentPrandtlIshlinskii(ByStructure, Placed):
         """The inverse at a sample time [s], stepped; see `hysim.Law.compiled_inverse`."""
         return self.at(sample_time).compiled_inverse(u0, limits)
 
-    def as_structure(self) -> ClampStructure:
-        """The structure with the thresholds and beta of this law."""
-        one_signed = None if self.plays.is_one_signed() else False
-        return ClampStructure(
-            law=type(self), thresholds=self.thresholds, one_signed=one_signed, pushing=Widening(beta=self.beta)
-        )
 
-
-@checked
-class Widening(Pushing):
-    """The search for beta, from a law's own or from none."""
-
-    by_input: ClassVar[bool] = False
-    beta: float | None = None
-
-    def axes(self, record: Record) -> dict[str, Axis]:
-        """Beta, up to half a span of the input at its highest speed."""
-        half = spans(record)["h"]
-        scale = half / (float(np.abs(np.diff(record.u)).max()) / record.sample_time)
-        own = () if self.beta is None else (self.beta,)
-        return {"beta": Axis(0.0, _LARGEST * scale, (*own, *(scale * start for start in _STARTS)), scale)}
-
-    def positions(self, parameters: Parameters, thresholds: FloatArray, z0: FloatArray, record: Record) -> FloatArray:
-        """Positions (n_sets, n_samples, n_plays)."""
-        width = np.broadcast_to(np.ravel(parameters["beta"]), len(z0)) / record.sample_time
-        return positions_of(thresholds, z0, record.u, width=width)
-
-    def arguments(self, parameters: Mapping[str, float]) -> dict[str, Any]:
-        """Beta."""
-        return {"beta": parameters["beta"]}
-
-
-def _as_speed(speed: npt.ArrayLike, u: npt.ArrayLike) -> FloatArray:
-    speeds = read_only(speed, "speed", ndim=1)
-    if speeds.size != np.size(u):
-        raise ValueError(f"speed must have {np.size(u)} samples as the signal has, got {speeds.size}")
-    if (speeds < 0.0).any():
-        raise ValueError(f"speed must not be negative, got {speeds.min():g}")
-    return speeds
-
-
-def _width(beta: FloatArray, sample_time: float) -> FloatArray:
+def _width(beta: npt.ArrayLike, sample_time: float) -> FloatArray:
     """Growth of the thresholds with the step of the input."""
-    if (beta < 0.0).any():
-        raise ValueError(f"beta must not be negative, got {beta.min():g}")
-    if not sample_time > 0.0:
-        raise ValueError(f"sample_time must be positive, got {sample_time}")
-    return np.asarray(beta / sample_time)
+    growth = np.asarray(beta, dtype=float)
+    check_signs({"beta": growth}, (), ("beta",))
+    check_positive(sample_time=sample_time)
+    return np.asarray(growth / sample_time)

@@ -1,0 +1,357 @@
+"""Densities of relays and of plays: from a function, from first-order reversal curves, and smooth ones from records.
+
+Reversal curves tell the Everett function, between the turning points as well.
+
+A curve turns at a_m on its way up from the lowest input L and falls back to it. On its way down it measures
+
+    E(a_m, b) = (y(a_m) - y(b)) / 2
+
+at each of its samples b. Between two curves, with t = (a - a_m) / (a_(m+1) - a_m),
+
+    E(a, b) = (1 - t) E(a_m, b) + t E(a_(m+1), b) + r(a) c(b)     for b up to a_m
+    E(a, b) = t E(a_(m+1), b') + r(a) c(b')                       for b from a_m to a, b' stretched to end at a_(m+1)
+
+r(a) is half of what the output on the rise to a_(m+1) is above a straight line from a_m. The relays between the curves
+have it in proportion to their weights' sizes: c(b) is the total variation of E(a_(m+1), .) - E(a_m, .) above b over
+that above the lowest input. So the rise is met as well as the curves, and a law whose density is even between the
+turning points is returned exactly, whatever the levels.
+
+A smooth density is as smooth as predicts best what was left out.
+
+The density is linear between the centres of coarse cells, and the law's weights w = B c are its integrals over the
+finer pairs of intervals between the levels: a law as coarse as the cells would be wrong between its levels by as much
+as the density is bent. With the output A w + d of weights w and offset d, smoothness is a small sum of squares of
+second differences of neighbouring cells, along each threshold and across both; the weights of the diagonal have their
+own along it. A ridge holds what these leave free. For each strength the best cells are those of
+
+    min ||y - d - A B c||^2 + strength (trace(B'A'A B) / trace(P)) c' P c,    P = D'D + ridge
+
+Parts are left out one at a time and predicted by fits to the others: each record whose input the others reach, or each
+cycle or curve of a single record; and a quarter of each record. The rms error of each part is taken over its least for
+any strength, so that a part that no strength predicts well has no more say than another; the strength is that of the
+least sum of the means over both kinds. Whole records alone choose too strong a smoothness, since without a record the
+gap is twice as wide as between records; quarters alone, and generalised cross-validation, choose too weak a one, since
+what a smooth law leaves of a clean record is no noise, but follows the curves. One generalised eigenproblem for each
+part gives the cells of all strengths at once.
+
+The state before a record, all relays down or what the record itself leaves, is the one of the lower left-out error.
+
+Source: P. H. C. Eilers, B. D. Marx, Statist. Sci. 11 (1996), for differences as a penalty on many coefficients.
+"""
+
+import itertools
+from collections.abc import Callable, Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from hysim._basics.frozen import FloatArray, read_only
+from hysim._columns.turning import TOLERANCE
+from hysim.models.tables import Tables
+from hysim.records import Record
+
+STRENGTHS = np.logspace(-10.0, 4.0, 43)
+_SMALLEST = 1e-280  # a smaller incomplete gamma function is its first term
+_RIDGE = 1e-3  # of the squares of second differences
+_MOST_CURVES = 8
+_MOST_INTERVALS = 64
+_MOST_CELLS = 24  # along a threshold; of 16, 24 and 32 those with the best predictions for their time
+_MOST_SAMPLES, _TURN = 2000, 0.01  # of a record, beside reversals by more than this part of the span
+_LEAST = 1e-14  # strength, below which rounding decides what the record does not determine
+_EXACT = 1e-6  # of the outputs' standard deviation: smaller errors are all equally good
+_COVERED = 0.02  # of its span, by which a record left out may reach beyond the others
+_MIXED = np.sqrt(2.0)  # weight of the difference across both thresholds, which is met once where it stands twice
+
+
+Parts = Sequence[npt.NDArray[np.intp]]
+"""Samples that are left out together."""
+
+
+_MOST_LEVELS = 100  # beside turning points
+_CLOSEST = 1e-3  # distance of levels, as a fraction of the span
+Density = Callable[[FloatArray, FloatArray], npt.ArrayLike]
+"""Weight of relays per area at arrays of upper and lower thresholds of one shape."""
+_POINTS = 8  # of Gauss's rule on an interval
+
+
+class ReversalCurve(NamedTuple):
+    """A way down, and the rise before it; None if the record begins at the turning point."""
+
+    fall: Record
+    rise: Record | None
+
+    @property
+    def turn(self) -> float:
+        """Input at which the curve turns."""
+        return float(self.fall.u[0])
+
+    def everett(self, b: FloatArray) -> FloatArray:
+        """E(turn, b) at inputs from the lowest to the turning point."""
+        return np.asarray(0.5 * (self.fall.y[0] - _at(b, self.fall)))
+
+    def above_line(self, turn: float, levels: FloatArray, reached: FloatArray) -> FloatArray:
+        """Half of what the rise to the curve is above a straight line from the turning point before."""
+        if self.rise is None:
+            return np.zeros(levels.size)
+        start, end = _at(np.array([turn, self.turn]), self.rise)
+        return np.asarray(0.5 * (_at(levels, self.rise) - start - reached * (end - start)))
+
+
+def everett_from_curves(
+    record: Record, levels: npt.ArrayLike | None, tolerance: float
+) -> tuple[FloatArray, FloatArray, float]:
+    """Levels, E at the pairs of them (upper, lower), and the output at the lowest input.
+
+    E is zero above the diagonal, and beyond the curves as at their ends.
+    """
+    low, slack, curves = float(record.u.min()), tolerance * float(np.ptp(record.u)), _curves_of(record, tolerance)
+    grid = _levels_of(low, curves) if levels is None else read_only(levels, "levels", ndim=1)
+    if not grid.size or grid[0] > low + slack:
+        raise ValueError(f"levels must begin at the lowest input {low:g} or below, got {grid[:1].tolist()}")
+    table = np.zeros((grid.size, grid.size))
+    turn, below = low, np.zeros(grid.size)
+    for curve in curves:
+        above = np.where(grid < curve.turn, curve.everett(grid), 0.0)
+        between = np.flatnonzero((grid > turn) & (grid <= curve.turn))
+        reached = (grid[between] - turn) / (curve.turn - turn)
+        share = np.append(
+            np.cumsum(np.abs(np.diff(above - below))[::-1])[::-1], 0.0
+        )  # total variation above each level
+        share = share / (share[0] or 1.0)
+        for k, t, r in zip(between, reached, curve.above_line(turn, grid[between], reached), strict=True):
+            table[k] = np.where(grid <= turn, (1.0 - t) * below + t * above + r * share, 0.0)
+            inner = (grid > turn) & (grid < grid[k])
+            stretched = turn + (grid[inner] - turn) / t
+            table[k, inner] = t * curve.everett(stretched) + r * np.interp(stretched, grid, share)
+        turn, below = curve.turn, above
+    table[grid > turn] = below
+    return grid, table, float(np.mean([curve.fall.y[-1] for curve in curves]))
+
+
+def _curves_of(record: Record, tolerance: float) -> list[ReversalCurve]:
+    """The curves of a record by their turning points, of equal ones the last; a ValueError if it has none."""
+    low, slack = float(record.u.min()), tolerance * float(np.ptp(record.u))
+    branches = record.branches(tolerance)
+    pairs = zip((None, *branches), branches, strict=False)
+    every = [ReversalCurve(fall, rise) for rise, fall in pairs if fall.u[-1] < fall.u[0]]
+    for each in every:
+        end = float(each.fall.u[-1])
+        if end > low + slack:
+            raise ValueError(
+                f"the way down from {each.turn:g} must end at the lowest input {low:g}, it ends at {end:g}"
+            )
+    if not every:
+        raise ValueError("the input never falls: a reversal curve is a way up and the way down after it")
+    curves = {each.turn: each for each in every}
+    return [curves[turn] for turn in sorted(curves)]
+
+
+def _levels_of(low: float, curves: list[ReversalCurve]) -> FloatArray:
+    """The turning points and all inputs of the curves; even steps between turning points if these are too many."""
+    turns = np.array([low, *(curve.turn for curve in curves)])
+    span = float(turns[-1] - low)
+    every = np.unique(np.concatenate([turns, *(curve.fall.u for curve in curves)]))
+    every = every[(every >= low) & (every <= turns[-1])]
+    if every.size <= _MOST_LEVELS and np.diff(every).min() >= _CLOSEST * span:
+        return np.asarray(every)
+    parts = np.maximum(np.round(np.diff(turns) * _MOST_LEVELS / span), 1).astype(int)
+    steps = [np.linspace(a, b, n + 1)[:-1] for a, b, n in zip(turns[:-1], turns[1:], parts, strict=True)]
+    return np.append(np.concatenate(steps), turns[-1])
+
+
+def _at(inputs: FloatArray, branch: Record) -> FloatArray:
+    """Outputs of a branch where its input passes the inputs."""
+    order = np.argsort(branch.u, kind="stable")
+    return np.interp(inputs, branch.u[order], branch.y[order])
+
+
+def relay_weights(grid: FloatArray, density: Density) -> tuple[float, ...]:
+    """A density integrated over each pair of intervals between the levels."""
+    rows, columns = np.tril_indices(max(grid.size - 1, 0))
+    nodes, share = np.polynomial.legendre.leggauss(_POINTS)
+    p, q = (1.0 + nodes) / 2.0, (1.0 + nodes[:, np.newaxis]) / 2.0
+    length = np.diff(grid)
+    diagonal = (rows == columns)[:, np.newaxis, np.newaxis]
+    reach = np.where(diagonal, p, 1.0)  # of b on the way up to a
+    a = grid[rows][:, np.newaxis, np.newaxis] + length[rows][:, np.newaxis, np.newaxis] * p
+    b = grid[columns][:, np.newaxis, np.newaxis] + length[columns][:, np.newaxis, np.newaxis] * reach * q
+    area = (length[rows] * length[columns] / 4.0)[:, np.newaxis, np.newaxis] * np.outer(share, share) * reach
+    heights = np.asarray(density(np.broadcast_to(a, b.shape), b), dtype=float)
+    return tuple(np.sum(area * heights, axis=(1, 2)).tolist())
+
+
+def chosen(
+    columns: FloatArray, y: FloatArray, parts: Sequence[Parts], penalty: FloatArray, strength: float | None = None
+) -> tuple[float, FloatArray, float]:
+    """The rms of the errors at left-out samples, coefficients and offset of the fit with the strength they choose."""
+    strengths = STRENGTHS if strength is None else np.array([strength])
+    centre, middle = columns.mean(axis=0), float(y.mean())  # about which the sums keep more digits
+    columns, y = columns - centre, y - middle
+    whole, exact = _moments(columns, y), max(_EXACT * float(np.std(y)), np.finfo(float).tiny)
+    score, squares = np.zeros(strengths.size), np.zeros(strengths.size)
+    for kind in parts:
+        for part in kind:
+            weights, offsets = _fits(whole - _moments(columns[part], y[part]), penalty, strengths)
+            each = np.sum((y[part, np.newaxis] - columns[part] @ weights - offsets) ** 2, axis=0)
+            rms = np.maximum(np.sqrt(each / part.size), exact)
+            score += rms / rms.min() / len(kind)
+            squares += each
+    best = int(np.argmin(score))
+    weights, offsets = _fits(whole, penalty, strengths[[best]])
+    left_out = float(np.sqrt(squares[best] / sum(part.size for each in parts for part in each)))
+    return left_out, weights[:, 0], middle + float(offsets[0]) - float(centre @ weights[:, 0])
+
+
+def smooth(law: type[Any], records: Sequence[Record], intervals: int | None, strength: float | None) -> Any:
+    """The law of spread relays with the density of the best strength, after the inputs before the first record."""
+    low, high = min(float(each.u.min()) for each in records), max(float(each.u.max()) for each in records)
+    n = _supported(high - low, records) if intervals is None else intervals
+    levels = tuple(np.linspace(low, high, n + 1).tolist())
+    short = [thinned(record, _MOST_SAMPLES) for record in records]
+    y, parts, cells = np.concatenate([record.y for record in short]), parts_of(short), min(n, _MOST_CELLS)
+    table, penalty = linear_between(cells, n), roughness(cells)
+    relays = law(levels=levels, weights=(0.0,) * len(table))
+
+    at_rest = [levels[:1] for _ in short]
+    repeated = [(*levels[:1], *relays.advance(record.u)[1][1:]) for record in short]
+    fits = []
+    for pasts in (at_rest, repeated):
+        memories = [np.tile(past, (table.shape[1], 1)) for past in pasts]
+        sets = [{"levels": np.array(levels), "weights": table.T, "z0": z0} for z0 in memories]
+        columns = [law.responses(each, record.u).T for each, record in zip(sets, short, strict=True)]
+        fits.append((*chosen(np.concatenate(columns), y, parts, penalty, strength), pasts[0]))
+    _, weights, offset, past = min(fits, key=lambda fit: fit[0])
+    z0 = tuple(value for value in past if value > levels[0])
+    return law(levels=levels, weights=tuple((table @ weights).tolist()), offset=offset, z0=z0)
+
+
+def _supported(span: float, records: Sequence[Record]) -> int:
+    """Intervals no finer than the steps of the inputs, at most 64."""
+    steps = np.abs(np.concatenate([np.diff(each.u) for each in records]))
+    if span == 0.0:
+        raise ValueError("the input is constant: nothing can be identified from it")
+    return int(np.clip(span / np.median(steps[steps > 0.0]), 2, _MOST_INTERVALS))
+
+
+def thinned(record: Record, most: int) -> Record:
+    """At most so many even samples of a record, and its reversals beyond noise."""
+    evenly = np.linspace(0, len(record) - 1, min(most, len(record))).round().astype(np.intp)
+    kept = np.union1d(evenly, record.reversals(_TURN))
+    return Record(u=record.u[kept], y=record.y[kept])
+
+
+def parts_of(records: Sequence[Record]) -> list[Parts]:
+    """Samples to leave out at a time, of each kind that these records have."""
+    cuts = np.cumsum([0, *(len(record) for record in records)])
+    samples = np.split(np.arange(cuts[-1]), cuts[1:-1])
+    quarters = [part for each in samples for part in np.array_split(each, 4)]
+    if len(records) > 1:
+        reached = [_covered(record.u, [*records[:k], *records[k + 1 :]]) for k, record in enumerate(records)]
+        whole = [part for part, within in zip(samples, reached, strict=True) if within]
+    else:
+        curves = np.split(samples[0], records[0].reversals(TOLERANCE)[1::2])
+        count = min(_MOST_CURVES, len(curves))
+        whole = [np.concatenate(curves[k::count]) for k in range(count if count > 2 else 0)]
+    return [whole, quarters] if whole else [quarters]
+
+
+def _covered(u: FloatArray, others: Sequence[Record]) -> bool:
+    """Whether the others reach as far as this input: relays that they do not switch have nothing to predict from."""
+    slack = _COVERED * float(np.ptp(u))
+    lowest, highest = min(float(each.u.min()) for each in others), max(float(each.u.max()) for each in others)
+    return bool(u.min() >= lowest - slack and u.max() <= highest + slack)
+
+
+def roughness(n: int) -> FloatArray:
+    """P for the weights of `n` intervals, row by row.
+
+    Differences that reach the diagonal, or beyond it, are left out; the diagonal has its own.
+    """
+    rows, columns = np.tril_indices(n)
+    first, second, one = np.diff(np.eye(n), axis=0), np.diff(np.eye(n), 2, axis=0), np.eye(n)
+    off = np.tril(np.ones((n, n), dtype=bool), -1).ravel()
+    differences = np.concatenate([np.kron(second, one), np.kron(one, second), _MIXED * np.kron(first, first)])
+    inside = differences[~differences[:, ~off].any(axis=1)]
+    inside = inside[np.argsort((inside != 0.0).argmax(axis=1), kind="stable")]
+    table = np.zeros((len(inside) + len(second), rows.size))
+    table[: len(inside), rows > columns], table[len(inside) :, rows == columns] = inside[:, off], second
+    return np.asarray(table.T @ table + _RIDGE * np.eye(rows.size))
+
+
+def linear_between(cells: int, n: int) -> FloatArray:
+    """Table B (n (n + 1) / 2, cells (cells + 1) / 2) from weights of coarse cells to weights on `n` intervals.
+
+    The density is linear between the centres of the cells off the diagonal, and goes on linearly beyond them; so do the
+    weights per length along the diagonal.
+    """
+    rows, columns = np.tril_indices(n)
+    if cells >= n:
+        return np.eye(rows.size)
+    ratio = cells / n
+    centre = (np.arange(n) + 0.5) * ratio - 0.5
+    first = np.clip(np.floor(centre).astype(np.intp), 0, cells - 2)
+    share = centre - first
+    tents = np.zeros((n, cells))  # of each coarse cell at the centres of the intervals
+    tents[np.arange(n), first], tents[np.arange(n), first + 1] = 1.0 - share, share
+    values = _beyond_diagonal(cells)
+    table = np.zeros((rows.size, values.shape[2]))
+    for a, b in itertools.product((0, 1), repeat=2):
+        p, q = first[rows] + a, first[columns] + b
+        table += (tents[rows, p] * tents[columns, q])[:, np.newaxis] * values[p, q]
+    table *= ratio**2
+    table[rows == columns] = 0.0
+    of_diagonal = np.flatnonzero(np.equal(*np.tril_indices(cells)))
+    table[np.ix_(np.flatnonzero(rows == columns), of_diagonal)] = ratio * tents
+    return table
+
+
+def _beyond_diagonal(cells: int) -> FloatArray:
+    """Densities (cells, cells, n_coefficients) in a square of cells: linear on the diagonal and next to it above."""
+    rows, columns = np.tril_indices(cells)
+    values = np.zeros((cells, cells, rows.size))
+    below = np.flatnonzero(rows > columns)
+    values[rows[below], columns[below], below] = 1.0
+    inner = np.arange(1, cells - 1)
+    values[inner, inner] = values[inner, inner - 1] + values[inner + 1, inner] - values[inner + 1, inner - 1]
+    values[0, 0] = 2.0 * values[1, 0] - values[2, 0]
+    values[-1, -1] = 2.0 * values[-1, -2] - values[-1, -3]
+    k = np.arange(cells - 1)
+    values[k, k + 1] = values[k, k] + values[k + 1, k + 1] - values[k + 1, k]
+    return values
+
+
+def _moments(columns: FloatArray, y: FloatArray) -> FloatArray:
+    """Sums of products (n_columns + 2, n_columns + 2) of columns, a constant and outputs; those of parts add up."""
+    beside = np.column_stack([columns, np.ones(y.size), y])
+    return np.asarray(beside.T @ beside)
+
+
+def _fits(sums: FloatArray, penalty: FloatArray, strengths: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Coefficients (n_columns, n_strengths) and offsets (n_strengths,) of the best fits, from `_moments`."""
+    from scipy.linalg import eigh  # imported where it is needed
+
+    columns, middle = sums[:-2, -2] / sums[-2, -2], sums[-1, -2] / sums[-2, -2]
+    normal = sums[:-2, :-2] - np.outer(columns, sums[-2, :-2])
+    scale = float(np.trace(normal) / np.trace(penalty)) or 1.0
+    size, vectors = eigh(normal / scale, penalty)
+    share = vectors.T @ (sums[:-2, -1] - columns * sums[-1, -2]) / scale
+    weights = vectors @ (share[:, np.newaxis] / (np.maximum(size, 0.0)[:, np.newaxis] + np.maximum(strengths, _LEAST)))
+    return weights, middle - columns @ weights
+
+
+def gamma_plays(tables: Tables) -> tuple[FloatArray, FloatArray]:
+    """Thresholds and shares (n_sets, n_plays) of plays with a parametric density; see its law.
+
+    Laws with fewer plays have some without a share.
+    """
+    from scipy.special import gammainc  # imported where it is needed
+
+    plays = tables["plays"]
+    place = np.minimum(np.arange(plays.max() + 1.0), plays) / plays
+    edges = tables["reach"] * place**2
+    power, decay = tables["exponent"] + 1.0, tables["decay"]
+    with np.errstate(invalid="ignore", divide="ignore", over="ignore", under="ignore"):
+        whole = gammainc(power, tables["reach"] / decay)
+        below = np.where(whole > _SMALLEST, gammainc(power, edges / decay) / whole, place ** (2.0 * power))
+    return 0.5 * (edges[:, 1:] + edges[:, :-1]), np.diff(below, axis=1)
