@@ -209,13 +209,13 @@ def more_samples(result: Result) -> list[str]:
 
 
 def wear_and_pinching(result: Result) -> list[str]:
-    """Backward Euler beside the series."""
+    """Backward Euler beside the integrated law."""
     rows = where(result["rows"], law="worn and pinched")
     euler = [f"{number(row['backward_euler_percent'], 2)} % wrong at {row['steps']} steps a cycle" for row in rows]
     return [
         f"On a spring that wears off and pinches, backward Euler, as OpenSees takes it, is {listed(euler)}.",
-        "The series differ from themselves with half the steps by at most "
-        f"{error_of(max(column(result['rows'], 'series_percent')))} % of the memory's range. Euler's step is "
+        "The law differs from itself with half the steps by at most "
+        f"{error_of(max(column(result['rows'], 'law_percent')))} % of the memory's range. Euler's step is "
         "repeated here, not run in OpenSees.",
     ]
 

@@ -9,7 +9,7 @@ rounding    closed forms: what the rounding of each step comes to. A step rounds
             the most samples is repeated with the state after each sample, and the length of each step, off by 2^-36
             in all the same direction, the worst case for a flow on a line. Its distance from the run, scaled to one
             rounding of 2^-53, is what one rounding in each step comes to.
-series      that, and 1e-11 of the range of the output on the branch.
+integrated  that, and 1e-9 of the range of the output on the branch (a law by its slope), or 1e-11 (Jiles-Atherton).
 
 A law that escapes is to escape in all runs, and in every form: the path kernels, batches, the compiled step. Only where
 rounding decides is a difference no fault, and that is measured too: all samples are gone through again with the state
@@ -32,7 +32,7 @@ Array = np.ndarray[Any, np.dtype[Any]]
 Rng = np.random.Generator
 
 N_PIECES = 64
-SERIES = 1e-11
+INTEGRATED, SERIES = 1e-9, 1e-11
 ROUNDINGS = 16.0
 LAST_SUM = 4.0
 OFF, NEAREST = 2.0**-36, 2.0**-51
@@ -232,15 +232,13 @@ def size(law: Any, before: Array, u: Array, y: Array) -> Array:
     return np.full(u.size, abs(law.offset) + float(np.abs(law.weights) @ arms))
 
 
-def is_series(law: Any) -> bool:
-    """Whether a law is evaluated by power series, good to 1e-11 of the range, and not in closed form."""
+def promised(law: Any) -> float:
+    """Part of the range to which a law is known, zero for a closed form."""
     if isinstance(law, hs.Sum | hs.Cascade):
-        return any(is_series(part) for part in law.members)
-    if isinstance(law, hs.ZhuWangBoucWen):
-        return law.n != 1.0
-    if isinstance(law, hs.BoucWenBaberNoori):
-        return any((law.delta_a, law.delta_nu, law.delta_eta, law.zeta_s))
-    return isinstance(law, hs.Duhem | hs.JilesAtherton)
+        return max(promised(part) for part in law.members)
+    if isinstance(law, hs.BoucWenBaberNoori | hs.Duhem) or (isinstance(law, hs.ZhuWangBoucWen) and law.n != 1.0):
+        return INTEGRATED
+    return SERIES if isinstance(law, hs.JilesAtherton) else 0.0
 
 
 # ---------------------------------------------------------------------------------- the runs
@@ -344,9 +342,8 @@ def compared(case: Case, found: list[Run], errors: Spread) -> float:
     coarse, some, fine = (run.y for run in found)
     where = np.append(case.kept, case.u.size - 1)
     apart = np.abs(np.concatenate([some - fine[case.kept], coarse - fine[-1:]]))
-    promised = SERIES if is_series(case.law) else 0.0
     allowed = ROUNDINGS * errors.y + LAST_SUM * UNIT * size(case.law, case.before, case.u, fine)
-    ratio = worst(apart, allowed[where] + promised * max(float(np.ptp(fine)), errors.y_range))
+    ratio = worst(apart, allowed[where] + promised(case.law) * max(float(np.ptp(fine)), errors.y_range))
     if found[0].state and not isinstance(case.law, hs.Sum | hs.Cascade | hs.RateDependentPrandtlIshlinskii):
         n_memories = len(places(case.law)[1])  # of a magnetic core the rest of a place is no memory of its own
         states = np.array([run.state[1 : 1 + n_memories] for run in found])

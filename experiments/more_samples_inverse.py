@@ -18,7 +18,6 @@ from more_samples import (
     PEAK_PIECES,
     PEAK_ROUNDS,
     ROUNDINGS,
-    SERIES,
     UNIT,
     WELL_INSIDE,
     Array,
@@ -26,7 +25,7 @@ from more_samples import (
     Spread,
     Verdict,
     draw_case,
-    is_series,
+    promised,
     perturbed,
     pieces,
     places,
@@ -306,8 +305,7 @@ def allowed(wanted: Wanted, u: Array, errors: Spread) -> tuple[Array, Array]:
             rounded_u = rounded_u + LAST_SUM * UNIT * (np.abs(wanted.y) + abs(law.offset)) * 4.0 / least
         return at_y + float(np.abs(law.weights).sum() * zones) * rounded_u, at_y / wanted.slope + rounded_u
     at_y = at_y + ROUNDINGS * errors.y
-    if is_series(law):
-        at_y += SERIES * float(np.ptp(np.append(wanted.y, wanted.y0)))
+    at_y += promised(law) * float(np.ptp(np.append(wanted.y, wanted.y0)))
     slope: Any = wanted.slope
     if not slope:
         _, path = perturbed(case, *places(law), 0.0, 0.0)

@@ -36,7 +36,9 @@ from hysim.records import Record
 
 Bounds = tuple[FloatArray, FloatArray]
 
-_MOST_STEPS = 500  # of the series from one sample to the next: laws that need more are steps, and take most of the time
+_MOST_STEPS = (
+    500  # of the integrator from one sample to the next: laws that need more are steps, and take most of the time
+)
 
 
 class Terms(NamedTuple):
@@ -66,7 +68,7 @@ class Terms(NamedTuple):
         return np.where(wanted > 0, 0.0, -np.inf), np.where(wanted < 0, 0.0, np.inf)
 
     def run(self, u: FloatArray, numbers: FloatArray, y0: FloatArray, bound: float) -> tuple[FloatArray, int]:
-        """Outputs (n_sets, n_samples) from y0 (n_sets,), inf where a law diverges, and the terms of series taken."""
+        """Outputs (n_sets, n_samples) from y0 (n_sets,), inf where a law diverges, and the slopes taken."""
         feedthrough, offset = shifts(self, numbers)
         coefficients = numbers[:, : len(self.terms)]
         memory = y0 - offset
@@ -216,7 +218,7 @@ def bic_of(cost: float, n_samples: int, n_parameters: int) -> float:
 
 @dataclass
 class Work:
-    """Terms of series per sample that free runs have taken, and the `most` allowed; no clock is read."""
+    """Slopes per sample that free runs have taken, and the `most` allowed; no clock is read."""
 
     most: float = math.inf
     done: float = 0.0

@@ -71,7 +71,7 @@ class Stepping(NamedTuple):
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Law(Placed, ABC):
-    """A rate-independent law that is known by its step.
+    """A rate-independent law that is known by its step, or by its slope, of which the step follows.
 
     A family is a subclass under the decorator `hysim.family`: its fields, and the class attributes below. A field is
     a float or a tuple of floats.
@@ -80,6 +80,18 @@ class Law(Placed, ABC):
     ----------
     step : staticmethod
         ``step(parameters, state, u) -> y``, a plain function that numba can compile, or a kernel.
+    slope : staticmethod
+        ``slope(p, z, ..., u, s)`` in place of a step: the slopes dz/du of the hidden states, one number or a tuple, for
+        an input at u that moves in the direction s, 1 or -1; ``p.name`` is the parameter of this name. It is integrated
+        to 1e-10 of the range (`hysim.kernels.branch`). The first states are those of `initial`, the others begin at
+        zero. The first one may have a corner at zero.
+    output : staticmethod
+        ``output(p, z, ..., u) -> y``, of some or all hidden states; by default the first one.
+    flows, flow : staticmethod, optional
+        ``flow(p, z, last, u)``, the first state after a stroke in closed form, where ``flows(p)`` is true.
+    longest : staticmethod, optional
+        ``longest(p, z, ..., slope, s)``, the longest step of the integrator [unit of u], for what is narrow; `slope` is
+        that of the first state.
     start : staticmethod
         ``start(parameters, state, u0)``, likewise, which completes for a first input the state that `pack` has and the
         workspace behind it, whatever is there; by default the last input is the first one. A steady cycle is computed
