@@ -3,8 +3,8 @@
 They must not, whatever the law: its output at a sample depends on the order of the turning points alone. Random hostile
 laws of each family (`hostile_laws`) go along one stride from a random state in one piece, in some, and in up to 64, by
 the path kernels, in batches, by the compiled step, and backwards by the inverse. `more_samples` says what may differ:
-nothing for plays and relays, roundings for closed forms, and 1e-9 of the range besides for laws by their slope. Beside them: a
-path that is cut and continued, an input that stands still, and the mirrored law, each to the bit.
+nothing for plays and relays, roundings for closed forms, and 1e-9 of the range besides for laws by their slope. Beside
+them: a path that is cut and continued, an input that stands still, and the mirrored law, each to the bit.
 
 A `BoucWenOscillator` and all else that depends on time is left out: its samples say when the input is what it is, and
 between them it is held, or goes on a line, so that more of them are another input.

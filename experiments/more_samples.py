@@ -348,9 +348,9 @@ def compared(case: Case, found: list[Run], errors: Spread) -> float:
         n_memories = len(places(case.law)[1])  # of a magnetic core the rest of a place is no memory of its own
         states = np.array([run.state[1 : 1 + n_memories] for run in found])
         apart = np.abs(states[:2] - states[2]).max(axis=0)
-        allowed = ROUNDINGS * errors.memory + promised * errors.memory_range
-        if errors is NOTHING and promised:  # no more than what a law goes through, without its way there
-            allowed = promised * np.abs(states[2] - case.law.advance(case.before)[1][1 : 1 + n_memories])
+        allowed = ROUNDINGS * errors.memory + promised(case.law) * errors.memory_range
+        if errors is NOTHING and promised(case.law):  # no more than what a law goes through, without its way there
+            allowed = promised(case.law) * np.abs(states[2] - case.law.advance(case.before)[1][1 : 1 + n_memories])
         ratio = max(ratio, worst(apart, allowed))
     return ratio
 
