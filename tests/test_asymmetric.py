@@ -78,8 +78,8 @@ def literal(model, u: np.ndarray) -> np.ndarray:
 def test_the_memory_is_that_of_the_equation(family, n):
     model = law(family, n)
     expected = literal(model, PATH)
-    # 1e-12 of the range is the laws' promise; the explicit steps away from z = 0 leave (1e-9)^(1 + n) each.
-    tolerance = 1e-12 * np.ptp(expected) + 10.0 * 1e-9 ** (1.0 + n)
+    # 1e-10 of the range is the laws' promise; the explicit steps away from z = 0 leave (1e-9)^(1 + n) each.
+    tolerance = 1e-10 * np.ptp(expected) + 10.0 * 1e-9 ** (1.0 + n)
     assert np.abs(model.memory(PATH) - expected).max() < tolerance
 
 
@@ -90,8 +90,8 @@ def test_without_its_own_terms_it_is_the_bouc_wen_law(family, n):
     same = family(**COMMON, n=n).response(PATH)
     if family is hs.GeneralizedBoucWen:
         assert np.array_equal(same, bouc_wen)
-    else:  # other formulas: a few roundings for n = 1, the series' promise otherwise
-        assert np.abs(same - bouc_wen).max() < (1e-15 if n == 1.0 else 1e-12) * np.ptp(bouc_wen)
+    else:  # other formulas: a few roundings for n = 1, an integrated law's promise otherwise
+        assert np.abs(same - bouc_wen).max() < (1e-15 if n == 1.0 else 1e-10) * np.ptp(bouc_wen)
 
 
 @pytest.mark.parametrize("delta", [-2.0, -0.5, 0.5, 2.0])
@@ -101,7 +101,7 @@ def test_the_closed_form_of_zhu_and_wang_solves_the_equation(delta, beta, gamma)
     model = hs.ZhuWangBoucWen(A=0.2, beta=beta, gamma=gamma, delta=delta, z0=0.05)
     u = np.array([-0.6, 0.8, -0.9, 0.1, -1.0, 1.0])
     expected = literal(model, u)
-    assert np.abs(model.memory(u) - expected).max() < 1e-12 * np.ptp(expected) + 1e-16
+    assert np.abs(model.memory(u) - expected).max() < 1e-10 * np.ptp(expected) + 1e-16
 
 
 @pytest.mark.parametrize("family", FAMILIES)
@@ -127,7 +127,7 @@ def test_the_rate_of_the_input_does_not_matter(family, u, n):
     model = law(family, n)
     z = model.memory(u)
     slow = np.concatenate([np.repeat(np.linspace(a, b, 5)[:-1], 2) for a, b in itertools.pairwise(u)] + [[u[-1]]])
-    assert np.abs(model.memory(slow)[::8] - z).max() < 1e-12 * max(1.0, np.ptp(z))  # the laws' promise
+    assert np.abs(model.memory(slow)[::8] - z).max() < 1e-10 * max(1.0, np.ptp(z))  # an integrated law's promise
 
 
 @given(u=st.lists(st.floats(-1.0, 1.0), min_size=2, max_size=12), n=st.sampled_from([1.0, 1.3, 2.0]))
@@ -167,7 +167,7 @@ def test_the_inverse_undoes_the_response(family, n):
     assert np.abs(model.response(back) - y).max() < room
     assert np.abs(back - PATH).max() < 10.0 * room  # that over the lowest slope, 0.4, and its sum over the path
     u, z = PATH[4], model.memory(PATH)[4]
-    assert model.inverse_response(y[5:], state=(u, z)) == pytest.approx(PATH[5:], abs=1e-13)
+    assert model.inverse_response(y[5:], state=(u, z)) == pytest.approx(PATH[5:], abs=1e-10)
 
 
 @pytest.mark.parametrize("family", FAMILIES)
@@ -246,4 +246,4 @@ def test_it_is_stored_to_the_bit(family, tmp_path):
 def test_a_memory_that_is_hardly_a_number_is_as_good_as_none(n, first):
     law = hs.ZhuWangBoucWen(beta=0.3, gamma=0.1, n=n, delta=-0.01)
     for end in (3.0, -3.0):
-        np.testing.assert_allclose(law.response([0.0, first, end])[-1], law.response([0.0, end])[-1], rtol=1e-12)
+        np.testing.assert_allclose(law.response([0.0, first, end])[-1], law.response([0.0, end])[-1], rtol=1e-10)

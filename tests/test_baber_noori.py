@@ -64,9 +64,9 @@ def literal(model, u: np.ndarray) -> np.ndarray:
 def test_memory_and_energy_are_those_of_the_equations(own, n):
     model = law(OWN[own], n)
     expected = literal(model, PATH)
-    # 1e-12 of the range is the law's promise; the solver finds a zero of z to 1e-11, its explicit steps away from
+    # 1e-10 of the range is the law's promise; the solver finds a zero of z to 1e-11, its explicit steps away from
     # there leave (1e-9)^(1 + n) each.
-    tolerance = 2e-11 * np.ptp(expected[:, 0]) + 10.0 * 1e-9 ** (1.0 + n)
+    tolerance = 1e-10 * np.ptp(expected[:, 0]) + 10.0 * 1e-9 ** (1.0 + n)
     assert np.abs(model.memory(PATH) - expected[:, 0]).max() < tolerance
     assert np.abs(model.energy(PATH) - expected[:, 1]).max() < 5.0 * tolerance  # its range is 5 times that of z
 
@@ -110,7 +110,7 @@ def test_samples_on_the_way_do_not_matter_and_the_law_is_odd(u, n):
     model = law(OWN["both"], n, z0=0.0)
     z = model.memory(u)
     slow = np.concatenate([np.linspace(a, b, 5)[:-1] for a, b in itertools.pairwise(u)] + [[u[-1]]])
-    assert np.abs(model.memory(slow)[::4] - z).max() < 1e-12 * max(1.0, np.ptp(z))  # the law's promise
+    assert np.abs(model.memory(slow)[::4] - z).max() < 1e-10 * max(1.0, np.ptp(z))  # an integrated law's promise
     assert np.array_equal(model.memory(np.negative(u)), -z)
 
 
@@ -132,9 +132,9 @@ def test_the_inverse_undoes_the_response(own):
     y = model.response(PATH)
     back = model.inverse_response(y)
     assert np.abs(model.response(back) - y).max() < 1e-14 * np.ptp(y)  # where the search ends
-    assert np.abs(back - PATH).max() < 1e-12  # that over the lowest slope, summed over the path
+    assert np.abs(back - PATH).max() < 1e-10  # that over the lowest slope, summed over the path
     _, state = model.advance(PATH[:5])
-    assert model.inverse_response(y[5:], state=state) == pytest.approx(PATH[5:], abs=1e-12)
+    assert model.inverse_response(y[5:], state=state) == pytest.approx(PATH[5:], abs=1e-10)
     with pytest.raises(SimulationError, match="has no inverse at sample"):
         law(OWN[own], gain=-2.0).inverse_response(law(OWN[own], gain=-2.0).response(PATH))
 

@@ -47,7 +47,7 @@ def test_it_is_the_polynomial_duhem_law(law, u):
     terms = {"u'": law.B, "|u'|": law.alpha * law.offset, "|u'| u": law.alpha * law.c, "|u'| y": -law.alpha}
     duhem = hs.Duhem.from_terms(terms, y0=law.response(u)[0])
     y = law.response(u)
-    assert np.abs(duhem.response(u) - y).max() < 1e-12 * max(1.0, np.abs(y).max())  # the series' promise
+    assert np.abs(duhem.response(u) - y).max() < 1e-10 * max(1.0, np.abs(y).max())  # an integrated law's promise
 
 
 @given(laws(), short_inputs(), st.data())

@@ -49,8 +49,8 @@ def coleman_hodgdon(a: float, b: float, c: float, y0: float, u: np.ndarray) -> n
 def test_coleman_hodgdon_is_its_closed_form(a, b, c):
     law = hs.Duhem.from_terms({"u'": b, "|u'| u": a * c, "|u'| y": -a}, y0=0.4)
     expected = coleman_hodgdon(a, b, c, 0.4, PATH)
-    # The promise of the series: 1e-12 of the range, whatever the length of a move.
-    assert np.abs(law.response(PATH) - expected).max() < 1e-12 * np.ptp(expected)
+    # The promise of an integrated law: 1e-10 of the range, whatever the length of a move.
+    assert np.abs(law.response(PATH) - expected).max() < 1e-10 * np.ptp(expected)
 
 
 def test_dahl_is_bouc_wen_of_n_1_and_gamma_0():
@@ -78,7 +78,7 @@ def test_literal_integration_agrees():
 def test_samples_inserted_on_a_segment_do_not_change_the_others():
     fine = np.concatenate([np.linspace(a, b, 7)[:-1] for a, b in itertools.pairwise(PATH)] + [PATH[-1:]])
     coarse, dense = GENERAL.response(PATH), GENERAL.response(fine)[::6]
-    assert np.abs(coarse - dense).max() < 1e-12 * np.ptp(coarse)  # both are within this of the truth
+    assert np.abs(coarse - dense).max() < 1e-10 * np.ptp(coarse)  # both are within this of the truth
 
 
 def test_rests_change_nothing():
@@ -115,7 +115,7 @@ def test_the_memory_is_the_output():
 def test_without_rectified_terms_the_way_back_is_the_way_there():
     u = np.linspace(0.0, 1.5, 30)
     there, back = np.split(hs.Duhem(p=GENERAL.p, q=[[0.0]]).response(np.concatenate([u, u[::-1]])), 2)
-    assert np.abs(there - back[::-1]).max() < 1e-12 * np.ptp(there)  # the series' promise
+    assert np.abs(there - back[::-1]).max() < 1e-10 * np.ptp(there)  # an integrated law's promise
 
 
 def test_an_escape_names_its_sample_and_spares_the_rest_of_a_batch():
@@ -152,8 +152,8 @@ def test_the_slopes_of_the_two_branches_are_one_law():
         assert law.tangent(direction, -0.2, 0.4) == pytest.approx(at, rel=1e-15)
     p, q = (np.pad(part, ((0, 0), (0, 0))) for part in (GENERAL.p, np.pad(GENERAL.q, ((0, 1), (0, 0)))))
     again = hs.Duhem.from_branches(ascending=p + q, descending=p - q, y0=GENERAL.y0)
-    # Halves of sums: one rounding of a coefficient, and the series' promise.
-    assert np.abs(again.response(PATH) - GENERAL.response(PATH)).max() < 1e-12
+    # Halves of sums: one rounding of a coefficient, and an integrated law's promise.
+    assert np.abs(again.response(PATH) - GENERAL.response(PATH)).max() < 1e-10
 
 
 def test_a_structure_begins_at_a_regression_and_finds_the_law():

@@ -71,8 +71,8 @@ def literal(law: hs.Duhem, u: np.ndarray) -> np.ndarray:
 def test_bouc_wen_of_whole_n_is_a_duhem_law(n, A, beta, share, feedthrough, u):
     bouc_wen, law = bouc_wen_and_duhem(n, A, beta, share * beta, feedthrough, u[0])
     expected = bouc_wen.response(u)
-    # The promise of the series: 1e-12 of the range; on tiny moves the feedthrough leaves rounding of z0 besides.
-    room = 1e-12 * np.ptp(expected) + 1e-15 * (1.0 + abs(feedthrough * u[0]))
+    # The promise of an integrated law: 1e-10 of the range; on tiny moves the feedthrough leaves rounding of z0 besides.
+    room = 1e-10 * np.ptp(expected) + 1e-15 * (1.0 + abs(feedthrough * u[0]))
     assert np.abs(law.response(u) - expected).max() <= room
 
 
@@ -81,7 +81,7 @@ def test_a_long_record_that_crosses_zero_at_every_turn_stays_with_bouc_wen(n):
     u = np.cumsum(np.random.default_rng(5).normal(size=2000))
     bouc_wen, law = bouc_wen_and_duhem(n, 1.0, 0.6, -0.3, 2.0, u[0])
     expected = bouc_wen.response(u)
-    assert np.abs(law.response(u) - expected).max() < 1e-12 * np.ptp(expected)  # the series' promise
+    assert np.abs(law.response(u) - expected).max() < 1e-10 * np.ptp(expected)  # an integrated law's promise
 
 
 def test_literal_integration_agrees():
@@ -112,7 +112,7 @@ def test_a_slope_that_begins_with_a_high_power_of_the_input_is_not_taken_for_non
 def test_the_unit_of_the_memory_does_not_matter(unit):
     u = np.array([0.0, 1.0, -2.0, 0.5])
     z = hs.Duhem(p=[[unit]], q=[[0.0, -0.7]]).response(u)
-    assert z / unit == pytest.approx(hs.BoucWen(beta=0.7, gamma=0.0).memory(u), rel=1e-13)
+    assert z / unit == pytest.approx(hs.BoucWen(beta=0.7, gamma=0.0).memory(u), rel=1e-10)
 
 
 def test_a_law_at_rest_at_zero_where_its_slope_is_zero_finds_its_side():
@@ -256,9 +256,9 @@ def test_the_tangent_is_the_slope_of_the_response():
 def test_the_inverse_undoes_the_response(n):
     _, law = bouc_wen_and_duhem(n, -0.4, 0.3, -0.1, 2.0, PATH[0])
     y = law.response(PATH)
-    assert np.abs(law.inverse_response(y) - PATH).max() < 1e-12 * np.ptp(PATH)  # the promise of the step
+    assert np.abs(law.inverse_response(y) - PATH).max() < 1e-10 * np.ptp(PATH)  # an integrated law's promise
     _, state = law.advance(PATH[:4])
-    assert law.inverse_response(y[4:], state=state) == pytest.approx(PATH[4:], abs=1e-12)
+    assert law.inverse_response(y[4:], state=state) == pytest.approx(PATH[4:], abs=1e-10)
 
 
 def test_a_law_that_turns_has_no_inverse_and_says_where():

@@ -32,7 +32,7 @@ def test_the_output_begins_at_y0():
 def test_bouc_wen_with_an_offset_is_a_duhem_law():
     bouc_wen = hs.BoucWen(A=1.0, beta=0.6, gamma=0.3, feedthrough=2.0, offset=7.0, z0=0.25)
     expected = bouc_wen.response(PATH)
-    assert np.abs(LAW.response(PATH) - expected).max() < 1e-12 * np.ptp(expected)  # the promise of the series
+    assert np.abs(LAW.response(PATH) - expected).max() < 1e-10 * np.ptp(expected)  # an integrated law's promise
 
 
 @pytest.mark.parametrize("cut", range(PATH.size + 1))
@@ -56,7 +56,7 @@ def test_batches_are_the_path_to_the_bit():
 
 
 def test_the_inverse_undoes_the_response():
-    assert LAW.inverse_response(LAW.response(PATH)) == pytest.approx(PATH, abs=1e-11)  # 1e-12 of the output's range
+    assert LAW.inverse_response(LAW.response(PATH)) == pytest.approx(PATH, abs=1e-9)  # 1e-10 of the output's range
 
 
 def test_an_offset_makes_the_memory_another_thing_than_the_output():

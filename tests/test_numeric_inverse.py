@@ -1,7 +1,7 @@
 """The inverses that search on the law's step find every output that is reached, and refuse what is not.
 
 Where an output is small beside its terms, or the law is flat, many inputs give it to rounding. So what is judged is the
-output at the input that is found: it may be off by what rounds its terms, and by the step's promise for a power series.
+output at the input that is found: it may be off by what rounds its terms, and by the promise of an integrated law.
 """
 
 import sys
@@ -133,7 +133,7 @@ def test_an_input_at_which_the_memory_diverges_is_not_taken():
     )  # fmt: skip
     state = (1.365079359, -430.412453)
     u = law.inverse_response([6691.42], state=state)
-    assert law.advance(u, state)[0] == pytest.approx([6691.42], abs=1e-11 * 1.5e8)  # the promise of the power series
+    assert law.advance(u, state)[0] == pytest.approx([6691.42], abs=1e-11 * 1.5e8)  # an integrated law's promise
 
 
 def test_a_slope_that_rounding_hides_is_sought_further_away():

@@ -44,7 +44,7 @@ def test_for_n_2_a_rising_branch_is_riccatis(a, d, w):
     """a = c w^2 is among them, where the memory stands still for a moment and then rises with the forcing."""
     for length in (1e-3, 0.3, 5.0):
         expected = riccati(w, a, d, 1.0, length)
-        assert after(law(a, d, 1.0, n=2.0, z0=w), length) == pytest.approx(expected, abs=1e-12 * max(w, expected))
+        assert after(law(a, d, 1.0, n=2.0, z0=w), length) == pytest.approx(expected, abs=1e-10 * max(w, expected))
 
 
 @pytest.mark.parametrize("d", [30.0, 300.0, 1000.0, 3000.0, 1e5])
@@ -52,7 +52,7 @@ def test_the_first_way_from_zero_is_good_where_the_forcing_grows_on_it(d):
     """Stretches of a few times the length that is gone in one closed step, on which the forcing grows by an eighth."""
     for length in np.geomspace(3e-5, 3e-3, 12):
         expected = riccati(0.0, 1.0, d, 1.0, length)
-        assert after(law(1.0, d, 1.0, n=2.0), length) == pytest.approx(expected, rel=1e-12, abs=0.0)
+        assert after(law(1.0, d, 1.0, n=2.0), length) == pytest.approx(expected, rel=1e-10, abs=0.0)
 
 
 @pytest.mark.parametrize("n", [0.3, 2.0, 3.5])
@@ -67,7 +67,7 @@ def test_the_units_do_not_matter(n, of_u, of_z):
         plain = hs.ZhuWangBoucWen(A=A, beta=0.6, gamma=0.3, delta=delta, n=n).memory(u)
         decay = 1.0 / (Z ** (n - 1.0) * U)
         other = hs.ZhuWangBoucWen(A=A * Z / U, beta=0.6 * decay, gamma=0.3 * decay, delta=delta * Z / U / U, n=n)
-        assert np.abs(other.memory(U * u) / Z - plain).max() < 1e-12 * np.ptp(plain)
+        assert np.abs(other.memory(U * u) / Z - plain).max() < 1e-10 * np.ptp(plain)
 
 
 @pytest.mark.parametrize("n", [1.0, 2.0])
@@ -78,12 +78,12 @@ def test_from_nothing_a_forcing_that_begins_with_zero_decides_the_side(n):
         c, length = 0.7 + 0.2 * side, 2.0
         linear = (length + np.expm1(-c * length) / c) / c
         expected = 0.5 * linear if n == 1.0 else riccati(0.0, 0.0, 0.5, c, length)
-        assert after(model, length) == pytest.approx(side * expected, rel=1e-12)
+        assert after(model, length) == pytest.approx(side * expected, rel=1e-10)
 
 
 def test_without_its_term_a_memory_of_slope_one_does_not_rest():
     expected = np.sqrt(2.0) * np.tanh(np.sqrt(2.0) * 0.7 + np.arctanh(np.sqrt(0.5)))
-    assert after(law(2.0, 0.0, 1.0, n=2.0, z0=1.0), 0.7) == pytest.approx(expected, rel=1e-12, abs=0.0)
+    assert after(law(2.0, 0.0, 1.0, n=2.0, z0=1.0), 0.7) == pytest.approx(expected, rel=1e-10, abs=0.0)
     assert after(law(1.0, 0.0, 1.0, n=2.0, z0=1.0), 0.7) == 1.0  # at its balance it does
 
 

@@ -36,9 +36,7 @@ from hysim.records import Record
 
 Bounds = tuple[FloatArray, FloatArray]
 
-_MOST_STEPS = (
-    500  # of the integrator from one sample to the next: laws that need more are steps, and take most of the time
-)
+_MOST_STEPS = 200  # between two samples, of which each serves some three of the memory: more are steps of the law
 
 
 class Terms(NamedTuple):
