@@ -45,7 +45,7 @@ LONGER, LEAST = 4.0, 150.0  # times the run without a mutant; seconds, since a k
 # The quickest test first: the first failure ends a run.
 MAPPED = {
     "kernels/loop.py": "actuator_stages actuator_chain close_loop",
-    "kernels/branch.py": "branch a_law_by_its_slope baber_noori",
+    "kernels/branch.py": "branch a_new_family baber_noori",
     "kernels/batches.py": "composed clamp_operators own_laws",
     "kernels/boucwen.py": "boucwen_closed_forms boucwen_invariants boucwen_reference boucwen_far asymmetric",
     "kernels/boucwen_inverse.py": "inverse_undoes_response",

@@ -22,8 +22,9 @@ STRUCTURES = (
     "[friction]",
 )
 
-# numba's cache does not see an edit in another file: it is kept apart for each state of the kernels.
-kernels = b"".join(path.read_bytes() for path in sorted((ROOT / "hysim" / "kernels").rglob("*.py")))
+# numba's cache does not see an edit in another file: it is kept apart for each state of what is compiled.
+compiled = [path for room in ("kernels", "laws") for path in sorted((ROOT / "hysim" / room).rglob("*.py"))]
+kernels = b"".join(path.read_bytes() for path in [*compiled, ROOT / "hysim" / "models" / "slope.py"])
 os.environ.setdefault("NUMBA_CACHE_DIR", str(ROOT / ".numba_cache" / hashlib.sha256(kernels).hexdigest()[:16]))
 os.environ.setdefault("MPLBACKEND", "agg")
 # Workers of the tests share the cores: threads of a BLAS that wait for each other would take most of the time.

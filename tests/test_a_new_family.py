@@ -1,91 +1,127 @@
-"""A family that hysim does not have, `tests/square_dahl.py`, takes part in every verb."""
+"""Two families that hysim does not have take part in every verb: one by its step, one by the slope of two states.
+
+They are `tests/square_dahl.py` and `tests/fading_dahl.py`.
+"""
 
 import inspect
 import itertools
 import os
+import shutil
 import subprocess
 import sys
 
 import numpy as np
 import pytest
+from fading_dahl import FadingDahl
+from scipy.integrate import solve_ivp
 from square_dahl import SquareDahl
 
 import hysim as hs
 
-LAW = SquareDahl(k=3.0, coulomb=0.4, c=0.8, offset=0.1)
+LAWS = {
+    "step": SquareDahl(k=3.0, coulomb=0.4, c=0.8, offset=0.1),
+    "slope": FadingDahl(k=3.0, coulomb=0.4, fading=0.6, way=0.7, c=0.8, offset=0.1),
+}
 U = hs.signals.triangle(-1.0, 1.0, cycles=3, samples_per_cycle=40)
-RECORD = hs.Record(u=U, y=LAW.response(U), t=np.arange(U.size) * 0.01)
+T = np.arange(0.0, 4.0, 0.01)
+compiler = shutil.which("gcc") or shutil.which("cc")
 
 
-def obvious(law, u):
-    """The law's own differential equation, with a thousand steps a stroke."""
-    force, y = law.z0, [law.offset + law.c * u[0] + law.z0]
+@pytest.fixture(params=LAWS)
+def law(request):
+    return LAWS[request.param]
+
+
+def record_of(law, noise=0.0):
+    y = law.response(U) + noise * np.random.default_rng(1).normal(size=U.size)
+    return hs.Record(u=U, y=y, t=np.arange(U.size) * 0.01)
+
+
+def equation(law, s):
+    """Slopes of the hidden states, of one or two."""
+    if isinstance(law, FadingDahl):
+        return lambda u, x: law.slope(law, *x, u, s)
+    return lambda u, x: [law.k * (1.0 - s * x[0] / law.coulomb) ** 2]
+
+
+def test_it_has_at_most_forty_lines(law):
+    assert len(inspect.getsource(type(law)).splitlines()) <= 40
+
+
+def test_response_is_that_of_the_differential_equation(law):
+    u, x = np.array([0.0, 1.0, -0.3, 0.2, -1.0]), [0.0] * (len(law.state_at(0.0)) - 1)
+    y = [law.offset]
     for before, after in itertools.pairwise(u):
-        du = (after - before) / 1000
-        for _ in range(1000):
-            middle = force + 0.5 * du * law.k * (1.0 - np.sign(du) * force / law.coulomb) ** 2
-            force += du * law.k * (1.0 - np.sign(du) * middle / law.coulomb) ** 2
-        y.append(law.offset + law.c * after + force)
-    return np.array(y)
+        way = solve_ivp(equation(law, np.sign(after - before)), (before, after), x, "DOP853", rtol=1e-12, atol=1e-14)
+        x = way.y[:, -1]
+        y.append(law.offset + law.c * after + x[0])
+    assert law.response(u) == pytest.approx(y, abs=1e-10)
 
 
-def test_it_has_at_most_forty_lines():
-    assert len(inspect.getsource(SquareDahl).splitlines()) <= 40
+def test_more_samples_on_a_branch_change_nothing(law):
+    fine = np.interp(np.arange(0.0, U.size - 0.99, 0.125), np.arange(U.size), U)
+    assert np.abs(law.remembered(fine)[::8] - law.remembered(U)).max() < 1e-9
 
 
-def test_response_is_that_of_the_differential_equation():
-    u = np.array([0.0, 1.0, -0.3, 0.2, -1.0])
-    assert LAW.response(u) == pytest.approx(obvious(LAW, u), abs=1e-6)
+def test_a_cut_input_gives_the_same_bits(law):
+    first, state = law.advance(U[:50])
+    assert np.array_equal(np.append(first, law.advance(U[50:], state)[0]), law.response(U))
+    assert law.offset + law.c * U + law.remembered(U)[:, 0] == pytest.approx(law.response(U), abs=1e-15)
 
 
-def test_a_cut_input_gives_the_same_bits():
-    first, state = LAW.advance(U[:50])
-    assert np.array_equal(np.append(first, LAW.advance(U[50:], state)[0]), LAW.response(U))
-    assert LAW.offset + LAW.c * U + LAW.memory(U) == pytest.approx(LAW.response(U), abs=1e-15)
+def test_a_batch_has_the_rows_and_their_measures(law):
+    sets, y = {**law.scalars, "k": [1.0, 3.0]}, law.response(U)
+    assert np.array_equal(law.responses(sets, U)[1], y)
+    assert law.responses(sets, U, reduce="area")[1] == pytest.approx(hs.loop_metrics(U, y).area, rel=1e-12)
+    assert law.responses(sets, U, reduce="sse", target=y)[1] == 0.0
 
 
-def test_a_batch_has_the_rows_and_their_measures():
-    sets = {"k": [1.0, 3.0], "coulomb": 0.4, "c": 0.8, "offset": 0.1}
-    assert np.array_equal(SquareDahl.responses(sets, U)[1], LAW.response(U))
-    measured = SquareDahl.responses(sets, U, reduce="area")[1]
-    assert measured == pytest.approx(hs.loop_metrics(U, RECORD.y).area, rel=1e-12)
-    assert SquareDahl.responses(sets, U, reduce="sse", target=RECORD.y)[1] == 0.0
+def test_the_inverse_undoes_the_response(law):
+    assert law.inverse_response(law.response(U)) == pytest.approx(U, abs=1e-12 if law is LAWS["step"] else 1e-9)
 
 
-def test_the_inverse_undoes_the_response():
-    assert LAW.inverse_response(RECORD.y) == pytest.approx(U, abs=1e-12)
+def test_derivatives_are_those_of_differences(law):
+    jacobian = law.response_jacobian(U, ("coulomb", "k"))
+    for name in ("coulomb", "k"):
+        more, less = (law.with_scalars({name: law.scalars[name] + h}).response(U) for h in (1e-5, -1e-5))
+        assert jacobian[name] == pytest.approx((more - less) / 2e-5, abs=1e-6)
 
 
-def test_identify_finds_it_with_intervals():
-    noise = 1e-3 * np.random.default_rng(1).normal(size=U.size)
-    fit = hs.identify(SquareDahl, hs.Record(u=U, y=RECORD.y + noise))
-    for name in ("k", "coulomb", "c", "offset"):
-        assert fit.estimates[name] == pytest.approx(getattr(LAW, name), abs=5.0 * fit.stderr[name])
-        assert 0.0 < fit.stderr[name] < 0.1 * abs(getattr(LAW, name)) + 1e-3
+def test_identify_finds_it_with_intervals(law):
+    record, start = record_of(law, 1e-3), FadingDahl(way=0.7) if law is LAWS["slope"] else SquareDahl
+    fit = hs.identify(start, record)
+    for name in ("k", "coulomb", "c", "offset", *(("fading",) if law is LAWS["slope"] else ())):
+        assert fit.estimates[name] == pytest.approx(getattr(law, name), abs=5.0 * fit.stderr[name])
+        assert 0.0 < fit.stderr[name] < 0.1 * abs(getattr(law, name)) + 1e-3
+    assert np.array_equal(fit.residual, record.y - fit.model.response(U))
 
 
-def test_compare_ranks_it():
-    comparison = hs.compare({"mine": SquareDahl, "line": hs.Line}, RECORD)
+def test_compare_ranks_it(law):
+    comparison = hs.compare({"mine": law, "line": hs.Line}, record_of(law))
     assert comparison.ranked()[0].name == "mine"
 
 
-def test_it_is_saved_and_printed(tmp_path):
-    hs.save(LAW, tmp_path / "law.json")
-    assert hs.load_model(tmp_path / "law.json") == LAW
-    assert "coulomb = 0.4" in str(LAW)
+def test_it_is_saved_and_printed(law, tmp_path):
+    hs.save(law, tmp_path / "law.json")
+    assert hs.load_model(tmp_path / "law.json") == law
+    assert "coulomb = 0.4" in str(law)
 
 
-def test_a_loop_is_closed_around_it():
-    t = np.arange(0.0, 4.0, 0.01)
-    loop = hs.close_loop(LAW, hs.PID(kp=0.2, ki=20.0), t, 0.5 * np.sin(2.0 * t))
+def test_it_stands_in_sums_and_cascades(law):
+    y = law.response(U)
+    assert (law + hs.Line(slope=2.0)).response(U) == pytest.approx(y + 2.0 * U, abs=1e-14)
+    assert (hs.Line(slope=0.5) >> law).response(2.0 * U) == pytest.approx(y, abs=1e-14)
+
+
+def test_a_loop_is_closed_around_it(law):
+    loop = hs.close_loop(law, hs.PID(kp=0.2, ki=20.0), T, 0.5 * np.sin(2.0 * T))
     assert np.abs(loop.error[100:]).max() < 0.05
 
 
-def test_its_inverse_is_a_feedforward():
-    t = np.arange(0.0, 4.0, 0.01)
-    reference = 0.1 + 0.7 * np.sin(2.0 * t)
-    loop = hs.close_loop(LAW, hs.InverseFeedforward(law=LAW), t, reference)
-    assert loop.y[1:] == pytest.approx(reference[:-1], abs=1e-10)  # y is read just before the next command
+def test_its_inverse_is_a_feedforward(law):
+    reference = 0.1 + 0.7 * np.sin(2.0 * T)
+    loop = hs.close_loop(law, hs.InverseFeedforward(law=law), T, reference)
+    assert loop.y[1:] == pytest.approx(reference[:-1], abs=1e-9)  # y is read just before the next command
 
 
 def height(k: float) -> dict[str, float]:
@@ -98,14 +134,53 @@ def test_a_study_varies_it():
     assert (np.diff(study["height"]) > 0.0).all()
 
 
-def test_it_is_drawn():
-    assert hs.plot.loop(hs.simulate(LAW, RECORD.t, U)).lines
+@pytest.mark.skipif(compiler is None, reason="there is no C compiler here")
+def test_its_c_has_its_numbers(law, tmp_path):
+    hs.to_c(law, name="mine").write(tmp_path)
+    command = [compiler, "-std=c99", "-O2", "-ffp-contract=off", "mine_main.c", "mine.c", "-o", "main", "-lm"]
+    subprocess.run(command, cwd=tmp_path, check=True)
+    lines = "\n".join(map(repr, U.tolist())) + "\n"
+    out = subprocess.run([tmp_path / "main"], input=lines, capture_output=True, text=True, check=True).stdout
+    assert np.array(out.split(), float) == pytest.approx(law.response(U), abs=1e-12)
 
 
-def test_the_command_line_takes_it_by_its_import_path(tmp_path):
-    hs.save_record(RECORD, tmp_path / "record.csv")
-    command = [sys.executable, "-m", "hysim", "identify", "record.csv", "--model", "square_dahl:SquareDahl", "--json"]
+def test_its_page_and_its_picture_are_drawn(law, tmp_path):
+    assert "coulomb" in hs.to_page(law, tmp_path / "law.html").read_text()
+    assert hs.plot.loop(hs.simulate(law, T[: U.size], U)).lines
+
+
+def test_the_command_line_takes_it_by_its_import_path(law, tmp_path):
+    hs.save_record(record_of(law), tmp_path / "record.csv")
+    family = type(law)
+    model = ("--model", f"{family.__module__}:{family.__name__}")
+    command = [sys.executable, "-m", "hysim", "identify", "record.csv", *model, "--json"]
     path = os.pathsep.join([os.path.dirname(__file__), *filter(None, sys.path)])
     done = subprocess.run(command, cwd=tmp_path, env={**os.environ, "PYTHONPATH": path}, capture_output=True, text=True)
     assert done.returncode == 0, done.stderr
     assert "coulomb" in done.stdout
+
+
+# ---------------------------------------------------------------------------------- what is wrong
+
+
+def test_a_slope_that_diverges_is_named():
+    with pytest.raises(hs.SimulationError, match="diverges at sample 1"):
+        FadingDahl(fading=-5.0, way=0.01).response([0.0, 50.0])
+
+
+def test_a_slope_whose_text_cannot_be_read_is_refused():
+    names = {}
+    exec("def slope(p, z, u, s):\n    return p.k", names)
+    with pytest.raises(TypeError, match="source of the slope of Unread"):
+        type("Unread", (hs.Law,), {"__annotations__": {"k": float}, "k": 1.0, "slope": staticmethod(names["slope"])})
+
+
+def test_a_slope_that_names_no_field_is_refused():
+    with pytest.raises(TypeError, match="Misspelt has no parameter 'stifness'"):
+
+        class Misspelt(hs.Law):
+            stiffness: float = 1.0
+
+            @staticmethod
+            def slope(p, z, u, s):
+                return p.stifness

@@ -49,16 +49,6 @@ def test_the_close_law_has_the_output_of_the_law(of):
     assert np.median(error) < 1e-7
 
 
-def test_the_rough_law_with_a_ramp_is_near_the_law():
-    law, sets = LAWS["ramp"]
-    y, rough = (type(each).responses(sets, strokes(), workers=1) for each in (law, law.rough()))
-    both = np.isfinite(y).all(axis=1) & np.isfinite(rough).all(axis=1)
-    assert both.sum() > N_LAWS // 2
-    error = np.abs(rough[both] - y[both]).max(axis=1) / np.ptp(y[both], axis=1)
-    # steps that leave out 1e-4 of the memory
-    assert 0.0 < np.median(error) < 0.03
-
-
 def test_a_record_that_turns_at_most_samples_is_searched_on_its_beginning():
     rng = np.random.default_rng(4)
     u = rng.uniform(-0.5, 0.5, 2500)
