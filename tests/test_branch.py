@@ -149,16 +149,6 @@ def test_a_large_power_that_grows_from_nothing_on_one_step_is_not_missed():
         assert worn.memory([0.0, length])[-1] == pytest.approx(hs.BoucWen(**law).memory([0.0, length])[-1], rel=1e-10)
 
 
-@pytest.mark.parametrize("n", [0.5, 1.0, 1.5, 2.0, 3.0])
-@pytest.mark.parametrize("gamma", [0.5, -0.5, 0.2])
-def test_from_zero_a_memory_bends_to_the_side_to_which_it_goes(n, gamma):
-    """Unloading (gamma = beta) or loading (gamma = -beta) alone is straight: not the side that counts here."""
-    u = np.array([0.0, 1.5, -1.0])
-    law = {"A": 1.0, "beta": 0.5, "gamma": gamma, "n": n}
-    worn = hs.BoucWenBaberNoori(**law, delta_nu=1e-30)
-    assert worn.memory(u) == pytest.approx(hs.BoucWen(**law).memory(u), abs=1e-10)
-
-
 # ---------------------------------------------------------------------------------- memories that wear off
 
 
