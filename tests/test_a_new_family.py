@@ -97,8 +97,7 @@ def test_identify_finds_it_with_intervals(law):
 
 
 def test_compare_ranks_it(law):
-    comparison = hs.compare({"mine": law, "line": hs.Line}, record_of(law))
-    assert comparison.ranked()[0].name == "mine"
+    assert hs.compare({"mine": law, "line": hs.Line}, record_of(law)).ranked()[0].name == "mine"
 
 
 def test_it_is_saved_and_printed(law, tmp_path):
@@ -151,9 +150,8 @@ def test_its_page_and_its_picture_are_drawn(law, tmp_path):
 
 def test_the_command_line_takes_it_by_its_import_path(law, tmp_path):
     hs.save_record(record_of(law), tmp_path / "record.csv")
-    family = type(law)
-    model = ("--model", f"{family.__module__}:{family.__name__}")
-    command = [sys.executable, "-m", "hysim", "identify", "record.csv", *model, "--json"]
+    model = f"{type(law).__module__}:{type(law).__name__}"
+    command = [sys.executable, "-m", "hysim", "identify", "record.csv", "--model", model, "--json"]
     path = os.pathsep.join([os.path.dirname(__file__), *filter(None, sys.path)])
     done = subprocess.run(command, cwd=tmp_path, env={**os.environ, "PYTHONPATH": path}, capture_output=True, text=True)
     assert done.returncode == 0, done.stderr
