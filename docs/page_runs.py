@@ -40,7 +40,9 @@ def printed_by(page: Path) -> list[tuple[str, str | None]]:
             hs.plot.save_svg(plt.gcf(), figure)
             plt.close("all")
         if block is not None:
-            above = "\n" * part.string.count("\n", 0, part.start(1))  # a slope is read from its page
+            above = "\n" * part.string.count(
+                "\n", 0, part.start(1)
+            )  # a slope is read from its page
             with contextlib.redirect_stdout(io.StringIO()) as printed:
                 exec(compile(above + block, str(page), "exec"), namespace)
             found.append((printed.getvalue(), shown))
