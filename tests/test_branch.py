@@ -3,7 +3,6 @@
 import numba
 import numpy as np
 import pytest
-from scipy.integrate import solve_ivp
 
 import hysim as hs
 
@@ -93,33 +92,6 @@ def test_more_samples_on_a_branch_change_nothing(draw):
     assert error[worst] <= room[worst], {name: values[law] for name, values in sets.items()} | {"u": u0[law]}
 
 
-def test_the_stretch_after_a_zero_does_not_overshoot():
-    """A long first step about a memory of almost zero, where the terms look converged for large n."""
-    model = hs.ZhuWangBoucWen(A=1.0, beta=0.5, gamma=0.5, n=8.0, delta=0.1)
-    z, du = 0.149712985175117, -0.30896712902949797
-    ends = [model.advance(np.linspace(0.0, du, pieces + 1)[1:], (0.0, z))[0][-1] for pieces in (1, 2, 64)]
-    assert ends == pytest.approx([ends[2]] * 3, abs=1e-10 * abs(du))  # the promise of the law
-    assert ends[2] == pytest.approx(along(model, z, du), abs=1e-10)  # and of the solver
-
-
-def along(model, z, du):
-    """End of a falling branch by an adaptive Runge-Kutta method, cut at z = 0; beta = gamma, so that one side bends."""
-    bend = lambda v, w: [model.A - (2.0 * model.beta * abs(w[0]) ** model.n if w[0] < 0.0 else 0.0) - model.delta * v]  # noqa: E731
-    crossing = lambda v, w: w[0]  # noqa: E731
-    crossing.terminal = True
-    down = solve_ivp(bend, (0.0, du), [z], "DOP853", rtol=1e-13, atol=1e-15, events=crossing)
-    return solve_ivp(bend, (down.t[-1], du), [-1e-300], "DOP853", rtol=1e-13, atol=1e-15).y[0, -1]
-
-
-@pytest.mark.parametrize("n", [6.0, 12.0])
-def test_on_an_ordinary_sine_twice_the_samples_agree(n):
-    u = 2.0 * np.sin(np.linspace(0.0, 4.0 * np.pi, 81))
-    halves = np.interp(np.arange(0.0, 80.5, 0.5), np.arange(81), u)
-    model = hs.ZhuWangBoucWen(n=n, delta=0.1)
-    y = model.response(u)
-    assert np.abs(model.response(halves)[::2] - y).max() < 1e-9 * np.ptp(y)
-
-
 @pytest.mark.parametrize("n", [1.0, 2.0, 1.5])
 def test_a_long_branch_does_not_step_over_the_pinching(n):
     model = hs.BoucWenBaberNoori(A=2.0, beta=0.3, gamma=0.2, n=n, zeta_s=0.9)
@@ -129,14 +101,6 @@ def test_a_long_branch_does_not_step_over_the_pinching(n):
     assert np.abs(model.response(fine)[::64] - y).max() < 1e-9 * np.ptp(y)
     if n == 1.0:
         assert y[-1] == pytest.approx(0.833, abs=5e-4)  # as an adaptive solver has it, to its last printed digit
-
-
-def test_a_bell_that_narrows_to_nothing_is_left_out():
-    """The width crosses zero while the memory is far from the place of the pinching."""
-    model = hs.BoucWenBaberNoori(n=1.0, zeta_s=0.5, p=1.0, psi=0.1, lambda_=0.3, q=0.0)
-    coarse, _ = model.advance([3.0], (0.0, 0.9, -0.5))
-    fine, _ = model.advance(np.linspace(0.0, 3.0, 65)[1:], (0.0, 0.9, -0.5))
-    assert coarse[-1] == pytest.approx(fine[-1], abs=1e-10)
 
 
 def test_a_large_power_that_grows_from_nothing_on_one_step_is_not_missed():

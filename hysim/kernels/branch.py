@@ -14,6 +14,7 @@ MAX_STEPS steps, or is undefined, is `nan`.
 
 import math
 from collections.abc import Callable
+from typing import Any, TypeVar
 
 import numpy as np
 from scipy.integrate import DOP853, RK45
@@ -21,6 +22,7 @@ from scipy.integrate import DOP853, RK45
 from hysim._basics.frozen import FloatArray, read_only
 from hysim.kernels._compile import inlined, uncounted, unstored
 
+F = TypeVar("F", bound=Callable[..., Any])
 Rates = Callable[[FloatArray, FloatArray, float, float, FloatArray], None]
 """``rates(parameters, x, u, s, out)``: the slopes of the states `x` into `out`."""
 
@@ -83,12 +85,18 @@ def follower(
     It is compiled with the slopes inside, since numba keeps no code that takes functions.
     """
 
-    @unstored
+    def own(function: F) -> F:
+        """Compile a function under a name of its own: numba links functions of one name, from whatever file."""
+        function.__qualname__ = f"{rates.__module__}.{rates.__qualname__}.{function.__name__}"
+        return unstored(function)
+
+    @own
     def combine(
         n: int,
         parameters: FloatArray,
         x: FloatArray,
         u: float,
+        end: float,
         h: float,
         s: float,
         k: FloatArray,
@@ -98,7 +106,7 @@ def follower(
         b: FloatArray,
         c: FloatArray,
     ) -> None:
-        """One step of length `h` from the states `x`, whose slopes are the first in `k`, to those `after` it."""
+        """One step of length `h` to `end` from the states `x`, whose slopes are the first in `k`."""
         stages = c.size
         for j in range(1, stages):
             for i in range(n):
@@ -112,9 +120,9 @@ def follower(
             for m in range(stages):
                 total += b[m] * k[m * n + i]
             after[i] = x[i] + h * total
-        rates(parameters, after, u + h, s, k[stages * n : (stages + 1) * n])
+        rates(parameters, after, end, s, k[stages * n : (stages + 1) * n])
 
-    @unstored
+    @own
     def follow(
         n: int,
         parameters: FloatArray,
@@ -163,16 +171,17 @@ def follower(
                 x[0] = math.copysign(math.inf, x[0]) if k[0] * s * x[0] > 0.0 else math.nan
                 return evaluated
             at = u - left
+            there = u if h == left else at + h
             stages = _MANY if is_high else _FEW
             if is_high:
-                combine(n, parameters, x, at, h, s, k, y, after, _A8, _B8, _C8)
+                combine(n, parameters, x, at, there, h, s, k, y, after, _A8, _B8, _C8)
             else:
-                combine(n, parameters, x, at, h, s, k, y, after, _A5, _B5, _C5)
+                combine(n, parameters, x, at, there, h, s, k, y, after, _A5, _B5, _C5)
             evaluated += stages
             end = stages * n
             error = 0.0
             for i in range(n):
-                slope = min(abs(k[0]), farthest / abs(left)) if i == 0 else max(abs(k[i]), abs(k[end + i]))
+                slope = min(abs(k[0]), farthest / abs(u - last)) if i == 0 else max(abs(k[i]), abs(k[end + i]))
                 size = max(largest[i], slope * abs(left))
                 room = tolerance * (size if size > 0.0 else abs(after[i]))
                 if room != 0.0:

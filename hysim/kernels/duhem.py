@@ -81,7 +81,7 @@ def batch(
     total, state = 0, np.zeros(N_STATE)
     for i in range(begin, end if u.shape[1] > 0 else begin):
         row = u[min(i, u.shape[0] - 1)]
-        state[0], state[1] = row[0], z0[i]
+        state[0], state[1], state[-1] = row[0], z0[i], 0.0  # no slope is known yet
         for k in range(row.size):
             total += follow(1, parameters[i], state, row[k], TOLERANCE, parameters[i, 2] == 4.0, bound, most)
             out[i, k] = state[1]

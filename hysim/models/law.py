@@ -7,6 +7,7 @@ sample itself. A family declares its fields, its step, and where its search box 
 identification, printing and files follow from these. `hysim.laws.differential.dahl` is a short example.
 """
 
+import inspect
 import math
 from abc import ABC
 from collections.abc import Callable, Iterable, Mapping
@@ -30,7 +31,7 @@ from hysim.models.inverse_search import inverse_at_rest, inverse_response, not_r
 from hysim.models.parameters import Parameter, declared_space
 from hysim.models.protocols import UNLIMITED, CompiledLaw, Limits, Startable
 from hysim.models.search_space import ALL_FREE, Freedom, Parameters, SearchSpace
-from hysim.models.slope import states_of, step_of
+from hysim.models.slope import HOOKS, states_of, step_of
 from hysim.models.stages import Simpler, Stage, Subset
 from hysim.models.steady_cycle import Pass, PassOf, fixed_point
 from hysim.models.tables import Tables, arguments_of, check_signs, scalars_of, table_of_one, tables_of
@@ -126,7 +127,7 @@ class Law(Placed, ABC):
     longest: ClassVar[Any] = None
     flow: ClassVar[Any] = None
     flows: ClassVar[Any] = None
-    hidden: ClassVar[int] = 0
+    hidden_states: ClassVar[int] = 0
     tolerance: ClassVar[float] = _EXACT
     start: ClassVar[Any] = staticmethod(stepping.start)
     initial: ClassVar[tuple[str, ...]] = ("z0",)
@@ -142,8 +143,9 @@ class Law(Placed, ABC):
 
     def __init_subclass__(cls) -> None:
         super().__init_subclass__()
-        if isinstance(slope := vars(cls).get("slope"), staticmethod):  # and no number of this name
-            cls.hidden = states_of(slope)
+        says = cls.hidden_states > 0 or isinstance(vars(cls).get("slope"), staticmethod)  # and no number of this name
+        if says and (inspect.get_annotations(cls) or not vars(cls).keys().isdisjoint(HOOKS)):
+            cls.hidden_states = states_of(cls)
             step, cls.workspace = step_of(cls)
             cls.step = staticmethod(step)
 
@@ -162,9 +164,10 @@ class Law(Placed, ABC):
     @classmethod
     def pack(cls, tables: Tables) -> Packed:
         """Laws as the step takes them: by default the fields one behind the other, and the initial memory."""
-        memory = cls.initial_memory(tables, further=max(0, cls.hidden - len(cls.initial)))
+        own = sum(tables[name].shape[1] for name in cls.initial)
+        memory = cls.initial_memory(tables, further=max(0, cls.hidden_states - own))
         constants = [table for name, table in tables.items() if name not in cls.initial]
-        if cls.hidden:
+        if cls.hidden_states:
             constants.insert(0, np.full((len(memory), 1), cls.tolerance))
         return Packed(np.concatenate([memory[:, :0], *constants], axis=1), memory)
 
@@ -593,8 +596,8 @@ class Law(Placed, ABC):
         return self._known_to(_CLOSE)
 
     def _known_to(self, tolerance: float) -> "Law":
-        known = not self.hidden or self.tolerance == tolerance
-        return self if known else _with_tolerance(type(self), tolerance)(**self.arguments)
+        known = not self.hidden_states or self.tolerance == tolerance
+        return self if known else _with_tolerance(type(self), tolerance)(**items(self))
 
     def regressors(self, parameters: Parameters, record: Record) -> FloatArray:
         """Columns in which the output is affine, and the rest of it, shape (n_sets, n_samples, n_columns + 1)."""

@@ -148,7 +148,7 @@ class MemoryLaw(Law):
         u, z, *_ = state
         powers = [abs(c * u**k) for k, c in enumerate(self.input_polynomial.tolist(), 1)]
         terms = float(abs(self.offset) + sum(powers) + abs(self.gain * z))
-        if self.hidden:  # an integrated memory is known to a tolerance of its range
+        if self.hidden_states:  # an integrated memory is known to a tolerance of its range
             terms += self.tolerance / np.finfo(float).eps * float(np.abs(y).max())
         return self.search_inverse(state, terms=terms)
 
