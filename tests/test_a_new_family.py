@@ -145,8 +145,12 @@ def test_its_c_has_its_numbers(law, tmp_path):
     assert np.array(out.split(), float) == pytest.approx(law.response(U), abs=1e-12)
 
 
-def test_its_page_and_its_picture_are_drawn(law, tmp_path):
+@pytest.mark.extra("ziglang")
+def test_its_page_is_written(law, tmp_path):
     assert "coulomb" in hs.to_page(law, tmp_path / "law.html").read_text()
+
+
+def test_it_is_drawn(law):
     assert hs.plot.loop(hs.simulate(law, T[: U.size], U)).lines
 
 

@@ -36,7 +36,7 @@ from hysim.records import Record
 
 Bounds = tuple[FloatArray, FloatArray]
 
-_MOST_STEPS = 200  # between two samples, of which each serves some three of the memory: more are steps of the law
+_MOST_STEPS = 100  # between two samples, of which each serves some three of the memory: more are steps of the law
 
 
 class Terms(NamedTuple):

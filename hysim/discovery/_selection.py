@@ -122,7 +122,7 @@ HOPELESS = 20.0  # BIC above the best, beyond which a structure is not followed 
 _POINTS = 2  # candidates about which one round linearises
 _LIKELY = 8.0  # predicted BIC above the lowest one, beyond which a structure is not refined
 _TWINS = 6
-MOST_WORK = 3e5  # slopes for each sample, of one library: smooth laws take a tenth to a half of it
+MOST_WORK = 2.5e5  # slopes for each sample, of one library: smooth laws take a tenth to a half of it
 PATH_SHARE, SEARCH_SHARE = 0.45, 0.7  # of that, after which no further structure is tried; the rest is for last digits
 _EXPECTED = 40.0  # structures of one search, of which there are 30 to 100
 
