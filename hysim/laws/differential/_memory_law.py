@@ -48,7 +48,7 @@ class MemoryLaw(Law):
 
     @staticmethod
     def output(p: Any, z: float, u: float) -> float:
-        """y = offset + c1 u + c2 u^2 + ... + gain z."""
+        """Output y = offset + c1 u + c2 u^2 + ... + gain z."""
         return float(p.offset + polynomial(u, p.input_coefficients, 0) + p.gain * z)
 
     @classmethod
