@@ -89,7 +89,7 @@ def closure(function: F) -> F:
 
 
 def unstored(function: F) -> F:
-    """As `inlined`, for a function that is written out when its family is defined: its callers' files are kept."""
+    """As `uncounted`, for a function that is written out when its family is defined: the cache holds its callers."""
     compiler: Any = numba.njit
     return compiler(nogil=True, error_model="numpy", _nrt=False, **_NO_ENTRY)(function)  # type: ignore[no-any-return]
 

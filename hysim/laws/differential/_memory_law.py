@@ -27,8 +27,7 @@ from hysim.records import Record
 class MemoryLaw(Law):
     """A law with one memory z, and an output that is a polynomial of u plus gain z.
 
-    Its inverse is exact to the rounding of the output's terms, or to 1e-12 of the memory's stroke if stepped by
-    power series.
+    Its inverse is exact to the rounding of the output's terms, or to 1e-10 of the range for a law by its slope.
 
     `polynomial` names the field of the coefficients c1, c2, ..., a tuple or a single number.
     """
