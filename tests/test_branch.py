@@ -159,3 +159,17 @@ def test_a_memory_that_grows_fast_and_does_escape_is_said_to():
         for pieces in (1, 64):
             with pytest.raises(hs.SimulationError, match="diverges"):
                 model.response(np.linspace(0.0, 5.0, pieces + 1))
+
+
+def test_a_memory_that_leaves_zero_and_comes_back_within_a_step_is_cut_there():
+    model = hs.ZhuWangBoucWen(A=38.6, beta=2.3e-3, gamma=2.3e-3, n=2.0, delta=-1311.0)
+    ends = np.array(in_pieces(model, 0.675, (0.0, 0.0)))
+    assert np.ptp(ends[:, 1]) < 1e-10 * abs(ends[0, 1])
+
+
+@pytest.mark.parametrize("end", np.linspace(2.5, -0.2, 10))
+def test_no_step_goes_over_a_pole(end):
+    """The memory drifts off an unstable balance at first, and grows without end at u = 2.6."""
+    model = hs.ZhuWangBoucWen(A=-0.153528, beta=-519.368, gamma=-584.55, n=2.0, delta=-9.03205e-6, z0=-0.01197)
+    with pytest.raises(hs.SimulationError, match="diverges"):
+        model.response([2.77672, end])

@@ -44,8 +44,12 @@ _E8, _E8_LOW = read_only(DOP853.E5), read_only(DOP853.E3)
 _ROUNDING = 1e-15  # of the way: a memory that grows by steps of it diverges, and a zero is not looked for nearer
 _HOPELESS = 1e6  # error of order 5, times what is allowed, up to which order 8 is tried over the same length
 _SAFETY, _LEAST, _MOST = 0.9, 0.1, 5.0  # of the next length: those of SciPy, but for a growth by half as much
+# Estimates change their sign, and are small there by chance: an error counts as no less than this part of the one
+# before, and of the square of the error of order 3.
+_OF_LAST, _OF_SQUARE = 0.1, 0.01
 _NEWTON = 8  # tries to end at zero by Newton's rule; then by the rule of false position
 _AT_ZERO = 0.01  # of the tolerance
+_MOST_AHEAD = 1e6  # times what a further state is: no error that is allowed for what is ahead steps over a pole
 
 
 def workspace(n: int) -> int:
@@ -54,19 +58,20 @@ def workspace(n: int) -> int:
 
 
 @uncounted
-def missed(k: FloatArray, i: int, n: int, is_high: bool) -> float:
-    """What a step leaves out of the state `i`, for each unit of its length."""
+def missed(k: FloatArray, i: int, n: int, is_high: bool, h: float, size: float) -> float:
+    """What a step of length `h` leaves out of the state `i`, which comes to `size`."""
     if not is_high:
         total = 0.0
         for m in range(_FEW + 1):
             total += _E5[m] * k[m * n + i]
-        return abs(total)
+        return abs(h * total)
     high, low = 0.0, 0.0
     for m in range(_MANY + 1):
         high += _E8[m] * k[m * n + i]
         low += _E8_LOW[m] * k[m * n + i]
     ratio = low / high if high != 0.0 else 0.0
-    return abs(high) / math.sqrt(1.0 + 0.01 * ratio * ratio)
+    high, low = abs(h * high), abs(h * low)
+    return max(high / math.sqrt(1.0 + 0.01 * ratio * ratio), _OF_SQUARE * low * min(low / size, 1.0))
 
 
 @inlined
@@ -105,15 +110,17 @@ def follower(
         a: FloatArray,
         b: FloatArray,
         c: FloatArray,
-    ) -> None:
-        """One step of length `h` to `end` from the states `x`, whose slopes are the first in `k`."""
-        stages = c.size
+        side: float,
+    ) -> bool:
+        """One step of length `h` to `end` from `x`, whose slopes lead `k`; returns whether x[0] leaves its `side`."""
+        stages, crosses = c.size, False
         for j in range(1, stages):
             for i in range(n):
                 total = 0.0
                 for m in range(j):
                     total += a[j * stages + m] * k[m * n + i]
                 y[i] = x[i] + h * total
+            crosses = crosses or y[0] * side < 0.0
             rates(parameters, y, u + c[j] * h, s, k[j * n : (j + 1) * n])
         for i in range(n):
             total = 0.0
@@ -121,6 +128,7 @@ def follower(
                 total += b[m] * k[m * n + i]
             after[i] = x[i] + h * total
         rates(parameters, after, end, s, k[stages * n : (stages + 1) * n])
+        return crosses
 
     @own
     def follow(
@@ -152,17 +160,19 @@ def follower(
         if not is_known:
             rates(parameters, x, last, s, k[:n])
         ended[0], ended[1] = u, s
-        farthest = math.inf  # a memory that decays from far away goes no further than one that begins at zero
-        if abs(k[0] * (u - last)) > abs(x[0]):
+        # The slope of a memory that grows without end is no measure of what the stroke adds, and a memory that decays
+        # from far away goes no further than one that begins at zero.
+        steepest = abs(k[0])
+        if steepest == 0.0 or steepest * abs(u - last) > abs(x[0]):
             for i in range(n):
                 y[i] = x[i]
             y[0] = 0.0
-            rates(parameters, y, last, s, after)
-            farthest = abs(after[0] * (u - last))
+            rates(parameters, y, last if steepest > 0.0 else u, s, after)
+            steepest = min(steepest, abs(after[0])) if steepest > 0.0 else abs(after[0])
         for i in range(n):
             largest[i] = abs(x[i])
         left = h = u - last
-        aims, is_high, evaluated, done = 0, False, 1, 0.0
+        aims, is_high, evaluated, done, before = 0, False, 1, 0.0, 0.0
         for _ in range(most):
             h = math.copysign(min(abs(h), longest(parameters, x, k[0], s)), s)
             if abs(h) >= abs(left):
@@ -173,24 +183,31 @@ def follower(
             at = u - left
             there = u if h == left else at + h
             stages = _MANY if is_high else _FEW
+            side = x[0] if x[0] != 0.0 else k[0] * s
             if is_high:
-                combine(n, parameters, x, at, there, h, s, k, y, after, _A8, _B8, _C8)
+                crosses = combine(n, parameters, x, at, there, h, s, k, y, after, _A8, _B8, _C8, side)
             else:
-                combine(n, parameters, x, at, there, h, s, k, y, after, _A5, _B5, _C5)
+                crosses = combine(n, parameters, x, at, there, h, s, k, y, after, _A5, _B5, _C5, side)
             evaluated += stages
             end = stages * n
             error = 0.0
             for i in range(n):
-                slope = min(abs(k[0]), farthest / abs(u - last)) if i == 0 else max(abs(k[i]), abs(k[end + i]))
+                slope = min(abs(k[0]), steepest) if i == 0 else max(abs(k[i]), abs(k[end + i]))
                 size = max(largest[i], slope * abs(left))
+                if i > 0:
+                    size = min(size, _MOST_AHEAD * max(largest[i], abs(after[i])))
                 room = tolerance * (size if size > 0.0 else abs(after[i]))
                 if room != 0.0:
-                    error += abs(h) * missed(k, i, n, is_high) / room
+                    error += missed(k, i, n, is_high, h, room / tolerance) / room
             if not error <= 1.0:
                 h *= retreat(error, is_high)
                 is_high = True
                 continue
-            taken, rounding = h, _AT_ZERO * tolerance * max(largest[0], min(farthest, abs(k[0] * left)))
+            taken, rounding = h, _AT_ZERO * tolerance * max(largest[0], min(abs(k[0]), steepest) * abs(left))
+            comes_back = (crosses or side * after[0] < 0.0) and (x[0] == 0.0 or side * after[0] > 0.0)
+            if corner and comes_back and abs(h) > _ROUNDING * abs(u - last):  # to a zero inside the step
+                h *= 0.5
+                continue
             if corner and x[0] * after[0] < 0.0 and abs(after[0]) > rounding:
                 aims += 1
                 aimed, secant = h - after[0] / k[end], h * (abs(x[0]) / (abs(x[0]) + abs(after[0])))
@@ -216,7 +233,8 @@ def follower(
                 return evaluated
             left -= taken
             done += abs(taken)
-            h *= min(_MOST, _SAFETY * max(error, 1e-10) ** (-0.125 if is_high else -0.2))
+            h *= min(_MOST, _SAFETY * max(error, _OF_LAST * before, 1e-10) ** (-0.125 if is_high else -0.2))
+            before = error
         x[0] = math.nan
         return evaluated
 

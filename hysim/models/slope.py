@@ -26,7 +26,7 @@ def room(p: FloatArray, x: FloatArray, slope: float, s: float) -> float:
 
 def step(parameters: FloatArray, state: FloatArray, u: float) -> float:
     {move}
-    return output(parameters, {memory}, u)
+    return output(parameters, {memory}, u) if math.isfinite(state[1]) else state[1]
 """
 _MOVE = "follow({n}, parameters, state, u, parameters[0], True, LARGEST, MAX_STEPS)"
 _FLOW = """\
