@@ -9,7 +9,9 @@ rounding    closed forms: what the rounding of each step comes to. A step rounds
             the most samples is repeated with the state after each sample, and the length of each step, off by 2^-36
             in all the same direction, the worst case for a flow on a line. Its distance from the run, scaled to one
             rounding of 2^-53, is what one rounding in each step comes to.
-integrated  that, and 1e-9 of the range of the output on the branch (a law by its slope), or 1e-11 (Jiles-Atherton).
+integrated  1e-9 of the range of the output on the branch (a law by its slope), and what the tolerance of a step comes
+            to, 1e-12 of the state, measured in the same way: a law may let it grow, or move by less than 1e-3 of its
+            state. A case that needs this counts as grown. Jiles-Atherton: roundings, and 1e-11 of the range.
 
 A law that escapes is to escape in all runs, and in every form: the path kernels, batches, the compiled step. Only where
 rounding decides is a difference no fault, and that is measured too: all samples are gone through again with the state
@@ -36,7 +38,7 @@ INTEGRATED, SERIES = 1e-9, 1e-11
 ROUNDINGS = 16.0
 LAST_SUM = 4.0
 OFF, NEAREST = 2.0**-36, 2.0**-51
-UNIT = 2.0**-53
+UNIT, TOLERANCE = 2.0**-53, 1e-12
 SMALLEST = 2.0**-1022
 PEAK_ROUNDS, PEAK_PIECES = 40, 8
 BITS = ("Play", "Stop", "PrandtlIshlinskii", "ModifiedPrandtlIshlinskii", "MaxwellSlip",
@@ -133,7 +135,8 @@ def spread(case: Case, off: float = OFF) -> Spread:
         escapes.add(not np.isfinite(other[-1]))
         far_y = np.fmax(far_y, np.abs(other - y))
         far_memory = np.fmax(far_memory, np.abs(other_path[-1] - path[-1]))
-    return Spread(far_y * (UNIT / off), far_memory * (UNIT / off), np.ptp(path, axis=0), float(np.ptp(y)), escapes)
+    share = left_out(case.law) / off
+    return Spread(far_y * share, far_memory * share, np.ptp(path, axis=0), float(np.ptp(y)), escapes)
 
 
 def spread_through_peaks(case: Case) -> Spread:
@@ -241,6 +244,11 @@ def promised(law: Any) -> float:
     return SERIES if isinstance(law, hs.JilesAtherton) else 0.0
 
 
+def left_out(law: Any) -> float:
+    """Part of the state that a step leaves out: the tolerance of an integrated law, else a rounding."""
+    return TOLERANCE if promised(law) == INTEGRATED else UNIT
+
+
 # ---------------------------------------------------------------------------------- the runs
 
 
@@ -294,7 +302,7 @@ class Verdict(NamedTuple):
     """How a case ended: its worst distance over what is allowed; or why there is none."""
 
     ratio: float
-    end: str  # "compared", "escaped", "refused", "partly refused", "edge" (rounding decides whether it escapes)
+    end: str  # "compared", "grown", "escaped", "refused", "partly refused", "edge" (rounding decides about an escape)
 
 
 def judged(case: Case, found: list[Run], errors: Callable[[], Spread] | None) -> Verdict:
@@ -308,18 +316,19 @@ def judged(case: Case, found: list[Run], errors: Callable[[], Spread] | None) ->
     if errors is None:
         return Verdict(to_the_bit(case, found), "compared")
     ratio = compared(case, found, NOTHING)
+    end = "grown" if ratio > 1.0 and left_out(case.law) == TOLERANCE else "compared"
     if ratio > WELL_INSIDE:
         ratio = compared(case, found, errors())
     if ratio > 1.0:  # close to an unstable balance, at less than 2^-36 of it, only roundings themselves go the same way
-        ratio = min(ratio, compared(case, found, spread(case, NEAREST)))
+        ratio = min(ratio, compared(case, found, spread(case, max(NEAREST, left_out(case.law)))))
     if ratio > 1.0:
         ratio = min(ratio, compared(case, found, spread_through_peaks(case)))
-    return Verdict(ratio, "compared")
+    return Verdict(ratio, end)
 
 
 def apart_in_escape(case: Case, may_round: bool) -> Verdict:
     """The verdict where one run escapes and another does not: a violation, unless rounding decides."""
-    decided = not may_round or len(spread(case, ROUNDINGS * UNIT).escapes) == 1
+    decided = not may_round or len(spread(case, ROUNDINGS * left_out(case.law)).escapes) == 1
     return Verdict(np.inf, "escaped") if decided else Verdict(0.0, "edge")
 
 

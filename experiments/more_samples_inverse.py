@@ -234,14 +234,14 @@ def inverse_verdict(wanted: Wanted, inverse: Callable[[Wanted, Array], Array]) -
     """Compare the inputs for the last output alone, for some, and for all.
 
     A law that refuses where all wanted outputs are that of the beginning, to the bit, is undecided; one whose output
-    turns at the beginning, and goes the same way to both sides, may refuse.
+    turns at the beginning, and goes the same way to both sides, may refuse, and so may one that is too stiff.
     """
     try:
         coarse, some, fine = (inverse(wanted, y) for y in (wanted.y[-1:], wanted.y[wanted.kept], wanted.y))
     except (hs.SimulationError, ValueError):
         if (wanted.y == wanted.y0).all():  # beside its offset a memory may move by less than a rounding
             return Verdict(0.0, "edge")
-        return Verdict(0.0 if turns(wanted) else np.inf, "refused")
+        return Verdict(0.0 if turns(wanted) or is_stiff(wanted) else np.inf, "refused")
     if not all(np.isfinite(u).all() for u in (coarse, some, fine)):
         return Verdict(np.inf, "refused")
     ratio = distance(wanted, (coarse, some, fine), allowed(wanted, fine, NOTHING))
@@ -264,6 +264,16 @@ def turns(wanted: Wanted) -> bool:
     )
     seen = np.minimum(np.abs(ahead), np.abs(back)) > SOLVED * UNIT * abs(wanted.y0)
     return bool(np.sum(seen) >= SEEN and (ahead[seen] * back[seen] > 0.0).all())
+
+
+def is_stiff(wanted: Wanted) -> bool:
+    """Whether the law is refused on a stroke that a search may try: twice as long as the one sought, in one piece."""
+    try:
+        u = inputs_for(wanted, wanted.y)[-1]
+        wanted.law.response([wanted.u0, 2.0 * u - wanted.u0])
+    except hs.SimulationError as error:
+        return "stiff" in str(error)
+    return False
 
 
 def nearest_spread(case: Case) -> Spread:
