@@ -62,7 +62,6 @@ def main(smoke: bool = False) -> list[Row]:
         "in_time": time.perf_counter() - begin < MOST,
     }
     print(table.to_text())
-    print(f"{numbers['seconds']:.1f} s, {numbers['processor_seconds']:.1f} s of all threads")
     if not smoke:
         write_results(RESULTS, rows_of(table), draw, numbers)
     return rows_of(table)

@@ -178,7 +178,6 @@ def main(smoke: bool = False, n_cases: int = N_CASES, folder: str | None = None)
             "  ".join(f"{name} {value:.2g}" if isinstance(value, float) else f"{value}" for name, value in row.items())
         )
     numbers = {name: sum(int(row[name]) for row in rows) for name in ("cases", "violations")}
-    print(f"{numbers['violations']} violations in {numbers['cases']} comparisons")
     if not smoke:
         write_results(RESULTS, rows, draw, {"cases_per_family": n_cases, **numbers})
     return rows

@@ -314,8 +314,6 @@ def main(smoke: bool = False) -> list[Row]:
     for line in wrong:
         print(f"wrong: {line['set']}, {line['kind']}, {line['waveform']}, {line['rates']} rates: {line['verdict']}")
     numbers = summary(rows)
-    for name, counts in numbers.items():
-        print(f"{name}: {counts}")
     if smoke and wrong:
         raise AssertionError(f"{len(wrong)} of {len(rows)} verdicts are wrong")
     if not smoke:

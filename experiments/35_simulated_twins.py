@@ -299,8 +299,6 @@ def main(smoke: bool = False, resume: bool = False) -> list[Row]:
             file.write(json.dumps(rows[-1]) + "\n")
     rows.sort(key=lambda row: (row["seed"], list(DEVICES).index(row["device"])))
     numbers = summary(rows)
-    for name, value in numbers.items():
-        print(name, value)
     write_results(RESULTS, rows, draw, numbers)
     stored.unlink()
     return rows

@@ -187,8 +187,6 @@ def main(smoke: bool = False, folder: Path | None = None, resume: bool = False, 
         append(stored, rows[-1])
     left_out = dict.fromkeys(f"{device} {record.name}" for device, record, _ in missing) if only_report else {}
     numbers = {**summary(rows), "cases_left_out": len(cases) - len(rows), "records_left_out": list(left_out)}
-    for name, value in numbers.items():
-        print(name, value)
     write_results(RESULTS, rows, draw, numbers)
     stored.unlink()
     return rows

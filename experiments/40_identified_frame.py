@@ -127,8 +127,6 @@ def main(smoke: bool = False) -> list[Row]:
         rows.append(case(seed))
         print(line_of(rows[-1]), flush=True)
     numbers = summary(rows)
-    for name, value in numbers.items():
-        print(name, value)
     write_results(RESULTS, rows, draw, numbers)
     return rows
 

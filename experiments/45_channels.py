@@ -296,7 +296,6 @@ def main(smoke: bool = False, folder: Path | None = None) -> list[Row]:
     write_results(RESULTS, rows, lambda _: draw(first), numbers)
     for row in rows:
         print(row)
-    print(numbers)
     return rows
 
 

@@ -226,7 +226,6 @@ def main(smoke: bool = False, file: Path | None = None) -> list[Row]:
     write_results(RESULTS, rows, lambda _: draw(cases), numbers)
     for row in rows:
         print(row)
-    print(numbers)
     return rows
 
 

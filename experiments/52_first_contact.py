@@ -280,8 +280,6 @@ def main(smoke: bool = False, folder: Path | None = None) -> list[Row]:
     if smoke:
         return rows
     numbers = summary(rows)
-    for name, value in numbers.items():
-        print(name, value)
     write_results(RESULTS, rows, draw, numbers)
     return rows
 

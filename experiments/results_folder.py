@@ -17,7 +17,9 @@ Row = TypeVar("Row", bound=Mapping[str, Any])
 def write_results(
     folder: Path, rows: list[Row], draw: Callable[[list[Row]], Figure], numbers: Mapping[str, Any]
 ) -> None:
-    """Write table.csv, figure.svg, and result.json with `numbers` before the rows, into `folder`."""
+    """Print `numbers`, and write table.csv, figure.svg, and result.json with them before the rows, into `folder`."""
+    for name, value in numbers.items():
+        print(name, value)
     folder.mkdir(parents=True, exist_ok=True)
     with (folder / "table.csv").open("w", newline="", encoding="utf-8") as file:
         table = csv.DictWriter(file, rows[0], lineterminator="\n")
