@@ -605,8 +605,8 @@ def test_the_command_prints_and_stores_the_lobes(tmp_path, monkeypatch, capsys):
     hs.save_record(record, "butterfly.csv")
     assert main(["metrics", "butterfly.csv"]) == 0
     printed = capsys.readouterr().out
-    assert re.search(r"^crosses itself +at .* V$", printed, re.MULTILINE)
-    assert re.search(r"^lobe 2 +counterclockwise, area 0.25\d* um V, max width 0.48 um, from .* to 1 V$", printed, re.M)
+    assert re.match(r"LoopMetrics: loop that crosses itself at u = .* V, ", printed)
+    assert re.search(r"; u of .* to 1 V:\s+counterclockwise, area 0.25\d* um V, width 0.48 um", printed)
     assert main(["metrics", "butterfly.csv", "--json"]) == 0
     lobes = json.loads(capsys.readouterr().out)["lobes"]
     assert [lobe["orientation"] for lobe in lobes] == ["clockwise", "counterclockwise"]

@@ -90,8 +90,8 @@ def test_the_test_record_of_a_comparison_is_not_cut(folder):
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        (("--from", "60"), "0 of 60 samples between 0 and 5.9 s remain by --from: a record needs at least 2"),
-        (("--from", "3", "--to", "4"), "1 of 60 samples between 0 and 5.9 s remain by --from and --to"),
+        (("--from", "60"), "0 of 60 samples between 0 and 5.9 s remain by --from, --to and --every: a record needs"),
+        (("--from", "3", "--to", "4"), "1 of 60 samples between 0 and 5.9 s remain by --from, --to"),
         (("--no-t", "--to", "1s"), "--to 1s needs a time: name its column by --t, or give a number"),
     ],
 )

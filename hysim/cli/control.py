@@ -40,21 +40,15 @@ def control(
     from hysim.cli import designs
     from hysim.models.storage import to_json
 
-    source = Path(c or "")
-    header = None if c is None else str(source.with_suffix(".h"))
-    if c is not None and source.suffix != ".c":
-        raise ValueError(f"C code is a file and its header beside it: call the file .c, got {c}")
-    outputs.keep([model, settings.record, settings.reference], [header])
-
     def code(controller: Any) -> Any:
-        return None if c is None else hs.to_c(controller, settings.sample_time, name=source.stem)
+        return None if c is None else hs.to_c(controller, settings.sample_time, name=Path(c).stem)
 
     design = designs.designed(model, settings, code)
     written = code(design.controller)
     files: outputs.Files = {
         out: lambda: to_json(design.controller, units=design.units),
         c: lambda: written.source,
-        header: lambda: written.header,
+        c and str(Path(c).with_suffix(".h")): lambda: written.header,
         plot: lambda: designs.picture(design),
     }
     outputs.write(files, lambda: designs.text(design), lambda: designs.document(design))

@@ -5,7 +5,7 @@ the middle 80 % of the displacements that the plant reaches within the limits.
 """
 
 import math
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import asdict, is_dataclass, replace
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -16,12 +16,11 @@ from scipy.optimize import brentq
 import hysim as hs
 from hysim._basics.frozen import FloatArray
 from hysim._basics.prefixes import label
-from hysim._basics.printing import extent, folded, quantity
+from hysim._basics.printing import extent, quantity
 from hysim.cli import models, outputs
 from hysim.cli.models import DesignOptions
-from hysim.cli.options import Pair, positive
+from hysim.cli.options import Pair
 from hysim.control import HysteresisAssessment, StepAssessment, as_actuator, assess_hysteresis, assess_step, driven_by
-from hysim.models.model import in_brief
 from hysim.models.protocols import needs_time
 from hysim.models.storage import to_document
 from hysim.records import step_if_even
@@ -60,7 +59,6 @@ class Task(NamedTuple):
 class Design(NamedTuple):
     """A controller, its tuning if it has gains, and its achievements."""
 
-    actuator: hs.Actuator
     controller: Any
     tuning: hs.Tuning | None
     task: Task
@@ -69,17 +67,7 @@ class Design(NamedTuple):
     file_rms: float
     fit_percent: float
     units: Mapping[str, str]
-    reference: str
-    limits_from: str | None
-
-    @property
-    def last_cycle(self) -> slice:
-        return slice(-self.task.samples_per_cycle - 1, None)
-
-    @property
-    def open_tracking_rms(self) -> float:
-        """Rms error of the open loop, driven by reference / secant gain, over the last cycle of the triangle."""
-        return hs.metrics.rmse(self.triangle.closed.reference[self.last_cycle], self.triangle.open_y[self.last_cycle])
+    options: DesignOptions
 
 
 def designed(path: str, options: DesignOptions, exported: Callable[[Any], object]) -> Design:
@@ -91,7 +79,7 @@ def designed(path: str, options: DesignOptions, exported: Callable[[Any], object
         record = in_units(record, signals_in, str(options.record))
         units = {**units, **record.units}
     actuator, kind = plant(model, options), options.controller
-    within = limits(options, record)
+    within = options.limits or (None if record is None else (float(record.u.min()), float(record.u.max())))
     todo = task(actuator, options, within)
     template = feedback(actuator, kind, within)
     made = controller(actuator, kind, within, template or hs.PID(kp=1.0, limits=within), preview=options.preview)
@@ -108,20 +96,19 @@ def designed(path: str, options: DesignOptions, exported: Callable[[Any], object
             u0=u0 if options.reference == "step" else 0.0,
         )  # fmt: skip
         made = controller(actuator, kind, within, tuning.controller, preview=options.preview)
+    triangle = assess_hysteresis(actuator, made, low=low, high=high, period=period, sample_time=h, cycles=_CYCLES)
+    answer = assess_step(actuator, made, step=step, duration=duration, sample_time=h, u0=u0)
     is_file = options.reference not in ("triangle", "step")  # which have measures of their own
-    rms = hs.metrics.rmse(values, hs.close_loop(actuator, made, t, values).y) if is_file else math.nan
     return Design(
-        actuator=actuator,
         controller=made,
         tuning=tuning,
         task=todo,
-        triangle=assess_hysteresis(actuator, made, low=low, high=high, period=period, sample_time=h, cycles=_CYCLES),
-        step=assess_step(actuator, made, step=step, duration=duration, sample_time=h, u0=u0),
-        file_rms=rms,
+        triangle=replace(triangle, closed=replace(triangle.closed, units=units)),
+        step=replace(answer, closed=replace(answer.closed, units=units)),
+        file_rms=hs.metrics.rmse(values, hs.close_loop(actuator, made, t, values).y) if is_file else math.nan,
         fit_percent=fit_percent(model, record),
         units=units,
-        reference=Path(options.reference).name,
-        limits_from=Path(options.record).name if options.record and options.limits is None else None,
+        options=options,
     )
 
 
@@ -142,35 +129,21 @@ def plant(model: Any, options: DesignOptions) -> hs.Actuator:
 def variations(actuator: hs.Actuator, percent: float | None) -> list[hs.Actuator]:
     if percent is None:
         return []
-    if not 0.0 < percent < 100.0:
-        raise ValueError(f"--vary-mode must be above 0 and below 100, got {percent}")
     frequency, ratio = _only_mode(actuator, "--vary-mode")
     gain = 1.0 if actuator.vibration is None else actuator.vibration.dc_gain
     factors = 1.0 - percent / 100.0, 1.0 + percent / 100.0
     return [replace(actuator, vibration=hs.mode(factor * frequency, ratio, gain)) for factor in factors]
 
 
-def limits(options: DesignOptions, record: hs.Record | None) -> Pair | None:
-    """Limits of the command: those of the options, or the extremes of the measured input."""
-    if options.limits is not None:
-        low, high = options.limits
-        if not low < high:
-            raise ValueError(f"--limits must be LOW,HIGH with LOW below HIGH, got {low:g},{high:g}")
-        return low, high
-    return None if record is None else (float(record.u.min()), float(record.u.max()))
-
-
 def task(actuator: hs.Actuator, options: DesignOptions, within: Pair | None) -> Task:
-    """The task of the loop; a ValueError if no option limits the range, or a number is outside its bounds."""
-    h = positive("--sample-time", options.sample_time)
+    """The task of the loop; a ValueError if the range is unknown, the step is none, or the loop takes too long."""
+    h, poles = options.sample_time, _poles(actuator)
     low, high = options.range or _reach(actuator, within)
-    if not low < high:
-        raise ValueError(f"the range must be LOW,HIGH with LOW below HIGH, got {low:g},{high:g}")
-    frequency = min(1.0 / (_SAMPLES * h), _slow(actuator)) if options.frequency is None else options.frequency
-    half = max(1, round(0.5 / (positive("--frequency", frequency) * h)))
-    rests = max(_SAMPLES * h, _AT_REST / _slowest_decay(actuator))
-    duration = rests if options.duration is None else options.duration
-    longest = max(_CYCLES * 2 * half, positive("--duration", duration) / h)
+    periods = [2.0 * math.pi / abs(pole) * (_SLOWER_THAN_MODE if pole.imag else _SLOWER_THAN_LAG) for pole in poles]
+    half = max(1, round(0.5 * (1.0 / options.frequency if options.frequency else max([_SAMPLES * h, *periods])) / h))
+    decays = [_AT_REST / -pole.real for pole in poles if pole.real < 0.0]
+    duration = options.duration or float(max([_SAMPLES * h, *decays]))
+    longest = max(_CYCLES * 2 * half, duration / h)
     if longest > _CYCLES * _MOST_SAMPLES:
         raise ValueError(
             f"the loop would take {longest:.2g} samples: the plant is slow beside the sample time; give --frequency "
@@ -293,29 +266,17 @@ def _only_mode(actuator: hs.Actuator, user: str) -> tuple[float, float]:
     return modes[0]
 
 
-def _slow(actuator: hs.Actuator) -> float:
-    """A frequency beside which the plant is fast [Hz]; infinite for a plant without vibration."""
-    slower = {True: _SLOWER_THAN_LAG, False: _SLOWER_THAN_MODE}
-    frequencies = (abs(pole) / (2.0 * math.pi * slower[pole.imag == 0.0]) for pole in _poles(actuator))
-    return float(min(frequencies, default=math.inf))
-
-
-def _slowest_decay(actuator: hs.Actuator) -> float:
-    """The smallest decay rate of a free motion [1/s]; infinite for a plant without vibration."""
-    return float(min((-pole.real for pole in _poles(actuator) if pole.real < 0.0), default=math.inf))
-
-
 def document(design: Design) -> dict[str, Any]:
     triangle, reduction, task = design.triangle, design.step.reduction, design.task
     return {
-        "plant": to_document(design.actuator),
+        "plant": to_document(triangle.closed.conditions["plant"]),
         "controller": to_document(design.controller),
         "units": design.units,
         "record_fit_percent": design.fit_percent,
         "tuning": design.tuning and outputs.fields_of(design.tuning, _TUNED),
         "triangle": {
             "low": task.low, "high": task.high, "period": task.period, "cycles": _CYCLES,
-            **outputs.scalars(triangle), "open_tracking_rms": design.open_tracking_rms, "stable": triangle.loop.stable,
+            **outputs.scalars(triangle), "stable": triangle.loop.stable,
         },
         "step": {
             "u0": task.u0, "height": task.step, "duration": task.duration,
@@ -328,26 +289,26 @@ def document(design: Design) -> dict[str, Any]:
 
 
 def text(design: Design) -> str:
-    lines = [*_head(design), *_triangle(design), *_step(design), *_conditions(design)]
-    return "\n".join(part for line in lines for part in folded(line, indent=12 * " "))
-
-
-def _head(design: Design) -> Iterator[str]:
-    yield f"plant       {in_brief(design.actuator)}"
-    yield f"controller  {in_brief(design.controller)}"
+    """What is asked of the loop, and the printed results: the tuning, what the loop achieves, and its conditions."""
+    options, task, closed = design.options, design.task, design.triangle.closed
+    u, y = (design.units.get(name, "") for name in "uy")
+    lines = []
     if not math.isnan(design.fit_percent):
-        yield f"record      the model fits the {_signal(design, 'y')} by {design.fit_percent:.2f} %"
-    if (tuning := design.tuning) is not None:
-        bounds = "within the bounds" if tuning.success else "NOT within the bounds"
-        yield f"tuning      {bounds}: {tuning.message}"
-        margins = f"gain {tuning.gain_margin:.4g}, phase {tuning.phase_margin:.4g} degrees"
-        yield f"margins     {margins}, maximum sensitivity {tuning.max_sensitivity:.4g}"
-    source = f"{design.reference}, second column" if not math.isnan(design.file_rms) else design.reference
-    rms = f", tracking rms {quantity(design.file_rms, design.units.get('y', ''))}"
-    yield f"reference   {_signal(design, 'y')}: {source}{rms * (not math.isnan(design.file_rms))}"
-    if (limits := design.triangle.closed.conditions["limits"]) is not None:
-        extremes = f", the extremes of {design.limits_from}" * (design.limits_from is not None)
-        yield f"command     {_signal(design, 'u')}: {extent(limits, design.units.get('u', ''))}{extremes}"
+        lines.append(f"record      the model fits the {_signal(design, 'y')} by {design.fit_percent:.2f} %")
+    lines.append(f"reference   {_signal(design, 'y')}: {Path(options.reference).name}")
+    if not math.isnan(design.file_rms):
+        lines[-1] += f", second column, tracking rms {quantity(design.file_rms, y)}"
+    limits = closed.conditions["limits"]
+    lines.append(f"command     {_signal(design, 'u')}: {'no limits' if limits is None else extent(limits, u)}")
+    if options.record and not options.limits:
+        lines[-1] += f", the extremes of {Path(options.record).name}"
+    lines += [
+        f"triangle    {extent((task.low, task.high), y)}, {1.0 / task.period:.4g} Hz, cycle {_CYCLES}",
+        f"step        {quantity(task.step, y)} from rest at {quantity(task.u0, u)}",
+        "conditions  simulated, with the model as the plant",
+    ]
+    results = (design.tuning, design.triangle, design.step, closed)
+    return "\n".join([*lines, *(str(each) for each in results if each is not None)])
 
 
 def _signal(design: Design, name: str) -> str:
@@ -355,63 +316,10 @@ def _signal(design: Design, name: str) -> str:
     return text[0].lower() + text[1:]
 
 
-def _triangle(design: Design) -> Iterator[str]:
-    result, task, y = design.triangle, design.task, design.units.get("y", "")
-    driven = driven_by(result.closed)
-    is_lag = result.is_lag
-    reduction = result.lag_reduction_percent if is_lag else result.hysteresis_reduction_percent
-    yield f"triangle    {task.low:.4g} to {quantity(task.high, y)}, {1.0 / task.period:.4g} Hz, cycle {_CYCLES}"
-    yield _row(
-        f"{'lag' if is_lag else 'hysteresis'} reduction",
-        f"{reduction:.2f} %" if result.loop.stable else f"none: {result.loop.message}",
-    )
-    yield _row("width", f"open {result.open_width:.4g}, {driven} {quantity(result.closed_width, y)}")
-    if not is_lag:
-        yield _row(
-            "width without the memory", f"open {result.open_lag_width:.4g}, {driven} {quantity(result.lag_width, y)}"
-        )
-    yield _row("tracking rms", f"open {design.open_tracking_rms:.4g}, {driven} {quantity(result.tracking_rms, y)}")
-    yield _row("closure gap", quantity(result.closure_gap, y))
-
-
-def _step(design: Design) -> Iterator[str]:
-    reduction, u = design.step.reduction, design.units.get("u", "")
-    height = quantity(design.task.step, design.units.get("y", ""))
-    yield f"step        {height} from rest at {quantity(design.task.u0, u)}"
-    if design.step.loop.message:
-        yield _row("no reduction", design.step.loop.message)
-    for name, value in outputs.scalars(reduction).items():
-        percent = "does not exist" if math.isnan(value) else f"{value:.2f} %"
-        yield _row(name.removesuffix("_percent").replace("_", " "), percent)
-    for name, response in (("open", reduction.open), (driven_by(design.step.closed), reduction.closed)):
-        times = f"98 % after {response.t98:.4g} s, settled after {response.settling_time:.4g} s"
-        yield _row(name, f"overshoot {response.overshoot:.2f} %, {times}")
-
-
-def _row(name: str, value: str) -> str:
-    return f"  {name:<27}{value}"
-
-
-def _conditions(design: Design) -> Iterator[str]:
-    conditions, u, y = design.triangle.closed.conditions, design.units.get("u", ""), design.units.get("y", "")
-    limits = "none" if conditions["limits"] is None else extent(conditions["limits"], u)
-    times = ", ".join(
-        f"{name.replace('_', ' ')} {conditions[name]:.4g} s" for name in ("sample_time", "delay", "preview")
-    )
-    noise = f"sensor noise {quantity(conditions['noise'], y)} rms (seed {conditions['seed']})"
-    yield "conditions  simulated, with the model as the plant"
-    yield f"            {times}, limits {limits}"
-    yield f"            {noise}, quantum {quantity(conditions['sensor_quantum'], y)}"
-    for name, closed in (("triangle", design.triangle.closed), ("step", design.step.closed)):
-        limited = f"limited at {closed.conditions['limited_samples']} of {closed.t.size} samples"
-        rms = quantity(closed.conditions["voltage_noise_rms"], u)
-        yield f"            {name}: voltage {extent(closed.u, u)}, {limited}, noise {rms} rms"
-
-
 def picture(design: Design) -> Any:
     """Displacement against reference in open and closed loop, and both steps against time."""
-    triangle, last, units = design.triangle, design.last_cycle, {"t": "s", **design.units}
-    reference = triangle.closed.reference[last]
+    triangle, units = design.triangle, {"t": "s", **design.units}
+    last = slice(-design.task.samples_per_cycle - 1, None)
     both = {"u": units["y"], "y": units["y"]} if "y" in units else {}
     t = design.step.closed.t
     driven = {"closed": "closed loop"}.get(driven_by(triangle.closed), "inverse")
@@ -420,6 +328,7 @@ def picture(design: Design) -> Any:
 
     def draw(canvas: Any) -> None:
         upper, lower = canvas.subplots(2)
+        reference = triangle.closed.reference[last]
         curves = (hs.Simulation(u=reference, y=y[last], units=both, name=name) for name, y in loops.items())
         hs.plot.loop(*curves, ax=upper)
         upper.set_xlabel("Reference" + "".join(upper.get_ylabel().partition(" [")[1:]))

@@ -74,8 +74,8 @@ def identify(
     result = hs.identify(
         subject,
         [measured, *further] if further else measured,
-        bounds=dict(bounds),
-        depends=dict(depends) or None,
+        bounds={name: (low, high) for name, low, high in bounds},
+        depends={name: (channel, degree) for name, channel, degree in depends} or None,
         weights=weights,
         intervals=intervals,
         cross_validate=cross_validate,
@@ -135,7 +135,13 @@ def posterior(
         Path(out).mkdir(parents=True, exist_ok=True)
     result = hs.identify(subject, measured, **fit.for_identify())
     draws = hs.sample_posterior(
-        result, measured, initial=fit.initial, noise=fit.noise, priors=dict(prior), samples=samples, seed=fit.seed
+        result,
+        measured,
+        initial=fit.initial,
+        noise=fit.noise,
+        priors={name: (low, high) for name, low, high in prior},
+        samples=samples,
+        seed=fit.seed,
     )
     rows = _rows(draws)
     conditions = outputs.fields_of(draws, ("noise", "resolution", "priors", "n_evaluations", "seed", "warnings"))

@@ -1,6 +1,6 @@
 """`hysim columns`, `metrics`, `plot` and `measure`: what files and camera frames hold."""
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable
 from dataclasses import replace
 from typing import Annotated, Any, Literal, NamedTuple
 
@@ -26,7 +26,7 @@ def columns(file: options.RecordIn, *, settings: records.TextOptions, json: bool
     hysim columns rig.mat
     hysim columns export.csv --encoding latin-1
     """
-    listed = hs.list_columns(records.source_of(file), **settings.for_load())
+    listed = hs.list_columns(records.source_of(file)(), **settings.for_load())
     width = max((len(column.name) for column in listed), default=0)
     lines = [
         f"{'' if column.number is None else column.number:>3}  {column.name:<{width}}  {_content(column)}"
@@ -76,6 +76,8 @@ def metrics(
     hysim metrics damper.csv --cycles --csv cycles.csv
     hysim metrics loop.csv --from 2s --to 4s --plot loop.svg
     """
+    from hysim._basics.printing import quantity
+
     if csv is not None and cycles:
         raise ValueError("--csv writes the table of every cycle: give --cycles without a number too")
     record = records.read(settings, file)
@@ -84,132 +86,83 @@ def metrics(
     measured: Any
     if cycles:
         measured = hs.loop_metrics(record.u, record.y, cycles=cycles, **accuracy)
-        lines = [*_lines(measured, record.units)]
         lobes = [lobe._asdict() for lobe in measured.lobes]
         document = outputs.scalars(measured) | {"crossings": list(measured.crossings), "lobes": lobes}
     else:
         measured = hs.cycle_metrics(record.u, record.y, **accuracy)
-        lines = [measured.to_text(record.units)]
         document = {"cycles": measured.rows(), "level": measured.level, "energy_outside": measured.energy_outside}
         files[csv] = lambda: measured.to_csv(record.units)
     document |= {"sign_convention": measured.sign_convention, "units": record.units}
 
     def text() -> str:
-        return "\n".join([*lines, *_step(record)])
+        step = record.detect_resolution() if record.resolution is None else None
+        steps = f"the output has steps of {step and quantity(step, record.units.get('y', ''))}"
+        return str(measured.to_text(record.units)) + (f"\n{steps}: --resolution detect takes them" if step else "")
 
     files[out] = lambda: outputs.printed(text, lambda: document)
     outputs.write(files, text, lambda: document)
     return 0
 
 
-def _lines(loop: "hs.LoopMetrics", units: Mapping[str, str]) -> Iterator[str]:
-    from hysim._basics.printing import folded, quantity
-
-    u, y = (units.get(signal, "") for signal in ("u", "y"))
-    product, ratio = (f"{y} {u}", f"{y}/{u}") if u and y else ("", "")
-    values = {
-        "max width": f"{quantity(loop.max_width, y)} at {loop.max_width_at:.6g} {u}",
-        "mean width": quantity(loop.mean_width, y),
-        "width at mid span": quantity(loop.mid_width, y),
-        "relative width": f"{100 * loop.relative_width:.2f} % of the stroke",
-        "stroke": quantity(loop.stroke, y),
-        "area": quantity(loop.area, product),
-        "orientation": loop.orientation,
-        "crosses itself": f"at {', '.join(f'{at:.6g}' for at in loop.crossings)} {u}" if loop.crossings else "",
-    }
-    for k, lobe in enumerate(loop.lobes if loop.crossings else (), 1):
-        values[f"lobe {k}"] = (
-            f"{lobe.orientation}, area {quantity(lobe.area, product)}, max width {quantity(lobe.max_width, y)}, "
-            f"from {lobe.low:.6g} to {lobe.high:.6g} {u}"
-        )
-    values |= {
-        "closure gap": quantity(loop.closure_gap, y),
-        "energy": quantity(loop.energy, product),
-        "secant stiffness": f"{loop.secant_stiffness:.4g} {ratio}",
-        "equivalent damping": f"{100 * abs(loop.equivalent_damping):.2f} %",
-        "cycles": f"{loop.n_cycles}",
-    }
-    width = max(map(len, values))
-    yield from (f"{name:<{width}}  {value.rstrip()}" for name, value in values.items() if value)
-    if loop.orientation == "counterclockwise":
-        yield from folded(loop.sign_convention)
-
-
-def _step(record: "hs.Record") -> Iterator[str]:
-    if record.resolution is None and (step := record.detect_resolution()) is not None:
-        unit = record.units.get("y", "")
-        yield f"the output has steps of {f'{step:.6g} {unit}'.rstrip()}: --resolution detect takes them"
-
-
-class Contents(NamedTuple):
-    """Contents of a picture: records, models by name, and their free runs over the input of the first record."""
-
-    measured: "list[hs.Record]"
-    laws: dict[str, Any]
-    simulated: "list[hs.Simulation]"
-
-    @property
-    def results(self) -> "list[Any]":
-        named = zip(self.laws, self.simulated, strict=True)
-        return [*self.measured, *(replace(run, name=name) for name, run in named)]
+Results = list[Any]
+"""Records, and named free runs of models over the input of the first."""
 
 
 class Kind(NamedTuple):
     """A kind of picture: its description, its drawing, and bounds of the numbers of records and models."""
 
     shows: str
-    draw: Callable[[Any, Contents], object]
+    draw: Callable[[Any, Results, dict[str, Any]], object]
     records: tuple[int, int] = (1, _MANY)
     models: tuple[int, int] = (0, _MANY)
 
 
-def _history(canvas: Any, contents: Contents) -> None:
+def _history(canvas: Any, results: Results, _: dict[str, Any]) -> None:
     panels = hs.plot.panels(canvas, 2)
-    for result in contents.results:
+    for result in results:
         hs.plot.history(result, panels)
         panels[0].lines[-1].set_label(result.name)
-    if len(contents.results) > 1:
+    if len(results) > 1:
         panels[0].legend()
 
 
-def _each(name: str) -> Callable[[Any, Contents], None]:
-    def draw(canvas: Any, contents: Contents) -> None:
-        for result, ax in zip(contents.results, hs.plot.panels(canvas, len(contents.results)), strict=True):
+def _each(name: str) -> Callable[[Any, Results, dict[str, Any]], None]:
+    def draw(canvas: Any, results: Results, _: dict[str, Any]) -> None:
+        for result, ax in zip(results, hs.plot.panels(canvas, len(results)), strict=True):
             vars(hs.plot)[name](result, ax)
             ax.set_title(result.name)
 
     return draw
 
 
-def _describing_function(canvas: Any, contents: Contents) -> None:
+def _describing_function(canvas: Any, results: Results, laws: dict[str, Any]) -> None:
     import numpy as np
 
-    record = contents.measured[0]
+    record = results[0]
     lowest, highest = float(record.u.min()), float(record.u.max())
     amplitudes = np.linspace(0.0, 0.5 * (highest - lowest), _AMPLITUDES + 1)[1:]
     middle, axes = 0.5 * (lowest + highest), hs.plot.panels(canvas, 2)
-    hs.plot.describing_function(contents.laws, amplitudes, axes, mean=middle, units=record.units)
-
-
-def _residual_map(canvas: Any, contents: Contents) -> None:
-    hs.plot.residual_map(contents.measured[0], contents.simulated[0], canvas.subplots(1, 2, sharey=True))
+    hs.plot.describing_function(laws, amplitudes, axes, mean=middle, units=record.units)
 
 
 KINDS = {
-    "loop": Kind("output against input", lambda canvas, c: hs.plot.loop(*c.results, ax=canvas.add_subplot())),
+    "loop": Kind("output against input", lambda canvas, runs, _: hs.plot.loop(*runs, ax=canvas.add_subplot())),
     "history": Kind("output and input against time", _history),
     "width": Kind(
         "width of the last cycle against the input",
-        lambda canvas, c: hs.plot.width(*c.results, ax=canvas.add_subplot()),
+        lambda canvas, runs, _: hs.plot.width(*runs, ax=canvas.add_subplot()),
     ),
     "cycles": Kind("each cycle in a colour, from the first, dark, to the last, light", _each("cycles")),
     "minor-loops": Kind("each cycle as a loop, the smaller the darker", _each("minor_loops")),
     "residual-map": Kind(
-        "measured minus model over input and cycles; one file, one model", _residual_map, (1, 1), (1, 1)
+        "measured minus model over input and cycles; one file, one model",
+        lambda canvas, runs, _: hs.plot.residual_map(runs[0], runs[1], canvas.subplots(1, 2, sharey=True)),
+        records=(1, 1),
+        models=(1, 1),
     ),
     "forc": Kind(
         "density of relays, from first-order reversal curves; one file",
-        lambda canvas, c: hs.plot.forc(c.measured[0], canvas.add_subplot()),
+        lambda canvas, runs, _: hs.plot.forc(runs[0], canvas.add_subplot()),
         records=(1, 1),
         models=(0, 0),
     ),
@@ -255,11 +208,13 @@ def plot(
         raise ValueError("the standard input holds one record or one model, not both: give files for the others")
     measured = [records.read(settings, path) for path in files]
     read = {models.name_of(path): models.read(path) for path in model}
-    runs = [models.simulated(law, measured[0], {**measured[0].units, **units}) for law, units in read.values()]
-    laws = {name: law for name, (law, _) in read.items()}
-    named = laws if len(laws) > 1 else {type(law).__name__: law for law in laws.values()}
-    contents = Contents(measured, named, runs)
-    outputs.write({out: lambda: outputs.drawn(lambda canvas: chosen.draw(canvas, contents))})
+    laws = {name if len(read) > 1 else type(law).__name__: law for name, (law, _) in read.items()}
+    units = [{**measured[0].units, **own} for _, own in read.values()]
+    runs = [
+        replace(models.simulated(law, measured[0], labels), name=name)
+        for (name, law), labels in zip(laws.items(), units, strict=True)
+    ]
+    outputs.write({out: lambda: outputs.drawn(lambda canvas: chosen.draw(canvas, [*measured, *runs], laws))})
     return 0
 
 
@@ -272,7 +227,7 @@ def measure(
     direction: options.Angle | None = None,
     reference: options.Frame = "first",
     method: Literal["subpixel", "whole-pixel"] = "subpixel",
-    frame_rate: float | None = None,
+    frame_rate: options.Positive | None = None,
     voltage: options.RecordIn | None = None,
     u: options.Column | None = None,
     t: options.Column | None = None,
@@ -318,8 +273,6 @@ def measure(
     """
     import numpy as np
 
-    if frame_rate is not None:
-        options.positive("--frame-rate", frame_rate)
     if voltage is None and (u is not None or t is not None):
         raise ValueError("--u and --t are columns of a file with voltages: give --voltage FILE")
     if voltage is not None and u is None:
@@ -342,10 +295,8 @@ def measure(
 def _table(motion: Any, log: "hs.Record | None", times: Any, on_lost: Any) -> tuple[dict[str, Any], dict[str, str]]:
     import numpy as np
 
-    unit = motion.units["y"]
-    quality = {"uncertainty": motion.uncertainty, "quality": motion.quality}
-    units = {"t": "s", "y": unit, "uncertainty": unit}
-    columns: dict[str, Any] = {"t": times, "y": motion.y, **quality}
+    units, is_kept = {"t": "s", "y": motion.units["y"], "uncertainty": motion.units["y"]}, np.full(len(motion), True)
+    columns = {"t": times, "y": motion.y}
     if log is not None:
         record = motion.record(
             log.u,
@@ -355,10 +306,9 @@ def _table(motion: Any, log: "hs.Record | None", times: Any, on_lost: Any) -> tu
             on_lost=on_lost,
             units={signal: unit for signal, unit in log.units.items() if signal != "y"},
         )
-        measured = np.isfinite(motion.y)
-        columns = {"t": record.t, "u": record.u, "y": record.y}
-        columns |= {name: values[measured] for name, values in quality.items()}
+        columns, is_kept = {"t": record.t, "u": record.u, "y": record.y}, np.isfinite(motion.y)
         units |= dict(record.units)
+    columns |= {"uncertainty": motion.uncertainty[is_kept], "quality": motion.quality[is_kept]}
     return {name: values for name, values in columns.items() if values is not None}, units
 
 

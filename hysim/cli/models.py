@@ -234,17 +234,17 @@ class DesignOptions:
     quantum: float | None = None
     delay: float | None = None
     controller: Annotated[str, options.one_of(CONTROLLERS)] = "pid"
-    sample_time: float
+    sample_time: options.Positive
     limits: options.Pair | None = None
     max_sensitivity: float = 2.0
     max_voltage_noise: float | None = None
-    vary_mode: float | None = None
+    vary_mode: options.Percent | None = None
     preview: bool = False
     reference: Annotated[str, options.file("triangle|step|FILE", options.INPUT)] = "triangle"
     range: options.Pair | None = None
-    frequency: float | None = None
+    frequency: options.Positive | None = None
     step: float | None = None
-    duration: float | None = None
+    duration: options.Positive | None = None
     record: options.RecordIn | None = None
     u: options.Column | None = None
     y: options.Column | None = None

@@ -19,21 +19,25 @@ own docstring. Any other section of a docstring is a group of options with this 
 
 import dataclasses
 import inspect
+import math
 import re
 import types
 import typing
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import suppress
 from dataclasses import KW_ONLY, dataclass
-from typing import Annotated, Any, Literal, NamedTuple
+from typing import Annotated, Any, Literal, NamedTuple, TypeVar
 
 import click
 from click.shell_completion import CompletionItem
 
 from hysim.cli.words import suggestion
 
-INPUT, RESULT, PRINTED, PICTURE, TABLE, MODEL = "input", "result", "printed result", "picture", "table", "model"
-"""Roles of files: read, written, written with what is printed too, drawn, written as columns, written as a model."""
+T = TypeVar("T")
+
+INPUT, RESULT, PRINTED, PICTURE = "input", "result", "printed result", "picture"
+TABLE, MODEL, SOURCE = "table", "model", "source"
+"""Roles of files: read, written, written with what is printed too, drawn; columns, models and C code as written."""
 
 _FORMS = {
     PICTURE: "; written as SVG, PNG or PDF by its ending; - writes SVG to the standard output",
@@ -183,31 +187,35 @@ def one_of(words: Mapping[str, str]) -> Value:
 
 def at_least(least: int) -> Callable[[str], Any]:
     """A reader of whole numbers that are not below a least one."""
-
-    def read(text: str) -> int:
-        if (value := int(text)) < least:
-            raise ValueError(text)
-        return value
-
-    return read
+    return lambda text: _checked(int(text), text, holds=int(text) >= least)
 
 
-def matched(pattern: str, *readers: Callable[[str], Any]) -> Callable[[str], Any]:
-    """A reader of texts of a pattern, each group of which has its own reader."""
+def between(low: float, high: float) -> Callable[[str], Any]:
+    """A reader of numbers above one and below another."""
+    return lambda text: _checked(float(text), text, holds=low < float(text) < high)
+
+
+def _checked(value: T, text: str, *, holds: bool) -> T:
+    if not holds:
+        raise ValueError(text)
+    return value
+
+
+def parts(form: str, *readers: Callable[[str], Any], expected: str = "") -> Value:
+    """A value of several parts, such as NAME=LOW:HIGH, each with its reader, and LOW below HIGH."""
+    pattern = re.sub("[A-Z]+", "(.+)", form).replace("(.+)", "(.+?)", 1)
+    is_range = form.endswith("HIGH")
 
     def read(text: str) -> tuple[Any, ...]:
         match = re.fullmatch(pattern, text, re.DOTALL)
-        if match is None:
-            raise ValueError(text)
-        return tuple(each(part) for each, part in zip(readers, match.groups(), strict=True))
+        values = tuple(each(part) for each, part in zip(readers, match.groups() if match else (), strict=True))
+        return _checked(values, text, holds=not is_range or values[-2] < values[-1])
 
-    return read
+    return Value(form, read, expected or f"{form} with numbers{', LOW below HIGH' * is_range}")
 
 
-def positive(option: str, value: float) -> float:
-    if not 0.0 < value < float("inf"):
-        raise ValueError(f"{option} must be positive, got {value:g}")
-    return value
+def _signal(text: str) -> str:
+    return _checked(text, text, holds=text in ("t", "u", "y"))
 
 
 def exclusive(**values: Any) -> None:
@@ -225,7 +233,8 @@ Place = tuple[float, str]
 
 
 def _place(text: str) -> Place:
-    number, unit = matched(r"(.*?)((?:[mun]?s)?)", str, str)(text)
+    unit = next((each for each in ("ms", "us", "ns", "s") if text.endswith(each)), "")
+    number = text.removesuffix(unit)
     return (float(number) if unit else at_least(0)(number)), unit
 
 
@@ -254,35 +263,22 @@ _PLAIN = {
 _CYCLES = "a number of cycles, at least 1; the table needs the file before --cycles"
 _MODEL = f"model file as identify writes it, - for the standard input, or {OWN}"
 _RECORD = "text with one sample a line, NPZ, NPY, MAT or HDF5; or - for the standard input"
-_bounds, _degree = matched("(.*):(.*)", float, float), matched("(.+):(.*)", str, int)
 _PLACE = "the number of a sample from 0, or a time with its unit such as 2.5s or 300ms"
 
 Column = Annotated[str | int, Value("COLUMN", column)]
 Count = Annotated[int, Value("COUNT", at_least(1), "a number from 1 on")]
-Pair = Annotated[tuple[float, float], Value("LOW,HIGH", matched("(.*),(.*)", float, float), "LOW,HIGH with numbers")]
-Mode = Annotated[
-    tuple[float, float],
-    Value("FREQUENCY,DAMPING", matched("(.*),(.*)", float, float), "FREQUENCY,DAMPING with numbers"),
-]
-Region = Annotated[
-    tuple[int, int, int, int],
-    Value("T,B,L,R", matched("(.*),(.*),(.*),(.*)", int, int, int, int), "T,B,L,R with numbers"),
-]
-Fixed = Annotated[
-    tuple[str, float], Value("NAME=VALUE", matched("([^=]+)=(.*)", str, float), "NAME=VALUE with numbers")
-]
-Range = Annotated[
-    tuple[str, tuple[float, float]],
-    Value("NAME=LOW:HIGH", matched("([^=]+)=(.*)", str, _bounds), "NAME=LOW:HIGH with numbers"),
-]
+Positive = Annotated[float, Value("NUMBER", between(0.0, math.inf), "a positive number without a unit")]
+Percent = Annotated[float, Value("NUMBER", between(0.0, 100.0), "a number above 0 and below 100")]
+Pair = Annotated[tuple[float, float], parts("LOW,HIGH", float, float)]
+Mode = Annotated[tuple[float, float], parts("FREQUENCY,DAMPING", float, float)]
+Region = Annotated[tuple[int, int, int, int], parts("T,B,L,R", int, int, int, int)]
+Fixed = Annotated[tuple[str, float], parts("NAME=VALUE", str, float)]
+Range = Annotated[tuple[str, float, float], parts("NAME=LOW:HIGH", str, float, float)]
 PlaceIn = Annotated[Place, Value("PLACE", _place, _PLACE)]
-Unit = Annotated[tuple[str, str], Value("SIGNAL=UNIT", matched("([tuy])=(.*)", str, str), "t=, u= or y= and a unit")]
-Channel = Annotated[
-    tuple[str, str | int], Value("CHANNEL=COLUMN", matched("([^=]+)=(.+)", str, column), "CHANNEL=COLUMN")
-]
+Unit = Annotated[tuple[str, str], parts("SIGNAL=UNIT", _signal, str, expected="t=, u= or y= and a unit")]
+Channel = Annotated[tuple[str, str | int], parts("CHANNEL=COLUMN", str, column, expected="CHANNEL=COLUMN")]
 Depends = Annotated[
-    tuple[str, tuple[str, int]],
-    Value("NAME=CHANNEL:DEGREE", matched("([^=]+)=(.*)", str, _degree), "NAME=CHANNEL:DEGREE, such as gain=T:1"),
+    tuple[str, str, int], parts("NAME=CHANNEL:DEGREE", str, str, int, expected="NAME=CHANNEL:DEGREE, such as gain=T:1")
 ]
 Sensor = Annotated[tuple[str, str | int], Value("SENSOR=COLUMN", _sensor, "SENSOR=COLUMN, or the name of both")]
 Quantum = Annotated[float | str, Value("QUANTUM", float, "a number or detect", words=("detect",))]
@@ -307,4 +303,4 @@ Picture = Annotated[str, file("PICTURE.svg", PICTURE)]
 Table = Annotated[str, file("TABLE.csv", TABLE)]
 ModelOut = Annotated[str, file("MODEL.json", MODEL)]
 Page = Annotated[str, file("PAGE.html")]
-Source = Annotated[str, file("MODEL.c")]
+Source = Annotated[str, file("MODEL.c", SOURCE)]

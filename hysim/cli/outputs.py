@@ -14,14 +14,21 @@ import click
 
 import hysim as hs
 from hysim._basics.atomic import write_all
-from hysim.cli.options import INPUT, MODEL, PICTURE, PRINTED, TABLE
+from hysim.cli.options import INPUT, MODEL, PICTURE, PRINTED, SOURCE, TABLE
 from hysim.cli.records import STANDARD
 from hysim.cli.words import in_shell_words
 
 Files = Mapping[str | None, Callable[[], Any]]
 """Functions of the contents of files, which are texts, bytes or figures, by the paths; None stands for no file."""
 
-_ENDINGS = (".svg", ".png", ".pdf")
+_FORMS = {
+    PICTURE: ("pictures are SVG, PNG or PDF: call the file .svg, .png or .pdf", (".svg", ".png", ".pdf")),
+    MODEL: ("models are JSON: call the file .json", (".json",)),
+    SOURCE: ("C code is a file with its header beside it: call the file .c", (".c",)),
+}
+"""What is said of a wrong ending, and the endings that a file of a role may have."""
+
+_BESIDE_SOURCE = (".h", "_main.c")
 _LOOPS_IN_A_ROW = 3
 
 
@@ -31,31 +38,32 @@ def check(files: Sequence[tuple[str, str]], *, prints: bool) -> None:
     `files` are paths and their roles, no two of which may be equal; `prints` is whether a document is printed.
     """
     results = [(path, role) for path, role in files if role != INPUT]
-    for path, role in results:
-        if path != STANDARD:
-            _check_path(path, role)
     streams = [role for path, role in results if path == STANDARD]
     if len(streams) + (prints and PRINTED not in streams) > 1:
         raise ValueError("two results would go to the standard output: write one of them to a file, or leave it out")
     if len({os.path.realpath(path) for path, _ in results}) < len(results):
         raise ValueError(f"two results would go to one file, {results[0][0]}")
-    keep([path for path, role in files if role == INPUT], [path for path, _ in results])
+    beside = [
+        str(Path(path).with_suffix("")) + end for path, role in results if role == SOURCE for end in _BESIDE_SOURCE
+    ]
+    keep([path for path, role in files if role == INPUT], [*(path for path, _ in results), *beside])
     for path, role in results:
-        if role == MODEL and path != STANDARD and Path(path).suffix != ".json":
-            raise ValueError(f"models are JSON: call the file .json, got {path}")
+        if path != STANDARD or role == SOURCE:
+            _check_path(Path(path), role)
 
 
-def _check_path(path: str, role: str) -> None:
-    if Path(path).is_dir() or not Path(path).parent.is_dir():
+def _check_path(path: Path, role: str) -> None:
+    if path.is_dir() or not path.parent.is_dir():
         raise ValueError(f"cannot write {path}: it is a folder, or its folder does not exist")
-    if not os.access(Path(path).parent, os.W_OK):
+    if not os.access(path.parent, os.W_OK):
         raise ValueError(f"cannot write {path}: its folder may not be written to")
     if role == TABLE:
         from hysim.files import ending
 
-        ending(path)
-    if role == PICTURE and Path(path).suffix.lower() not in _ENDINGS:
-        raise ValueError(f"pictures are SVG, PNG or PDF: call the file .svg, .png or .pdf, got {path}")
+        ending(str(path))
+    own = path.suffix.lower() if role == PICTURE else path.suffix
+    if role in _FORMS and own not in _FORMS[role][1]:
+        raise ValueError(f"{_FORMS[role][0]}, got {path}")
 
 
 def keep(inputs: Iterable[str | None], results: Iterable[str | None]) -> None:
@@ -120,9 +128,7 @@ def _jsonable(value: Any) -> Any:
 
 
 def scalars(result: Any) -> dict[str, Any]:
-    from hysim._basics.frozen import items
-
-    return {name: value for name, value in items(result).items() if isinstance(value, (str, int, float))}
+    return {name: value for name, value in vars(result).items() if isinstance(value, (str, int, float))}
 
 
 def fields_of(result: Any, names: Iterable[str]) -> dict[str, Any]:

@@ -3,7 +3,7 @@
 import io
 import os
 import sys
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable
 from contextlib import nullcontext
 from dataclasses import dataclass, replace
 from typing import Any, Literal
@@ -66,7 +66,7 @@ class InputOptions(TextOptions):
     u: options.Column | None = None
     t: options.Column | None = None
     no_t: bool = False
-    sample_time: float | None = None
+    sample_time: options.Positive | None = None
     on_missing: Literal["error", "drop"] = "error"
     resolution: options.Quantum | None = None
     unit: tuple[options.Unit, ...] = ()
@@ -112,6 +112,25 @@ class WeighedOptions(RecordOptions):
     sensor: tuple[options.Sensor, ...] = ()
 
 
+Source = Callable[[], Any]
+"""A function that returns a file, or all that a stream holds, from its begin each time."""
+
+
+def source_of(path: str) -> Source:
+    if path != STANDARD and (os.path.isfile(path) or not os.path.exists(path)):
+        return lambda: path
+    standard = sys.stdin.buffer if isinstance(sys.stdin, io.TextIOWrapper) else sys.stdin
+    with nullcontext(standard) if path == STANDARD else open(path, "rb") as stream:  # else a pipe
+        content = stream.read()
+
+    def begin() -> Any:
+        copy: Any = io.BytesIO(content.encode() if isinstance(content, str) else content)
+        copy.name = "<stdin>" if path == STANDARD else path
+        return copy
+
+    return begin
+
+
 def read(settings: InputOptions, path: str, *, uncut: bool = False) -> "hs.Record":
     """The record that the settings describe, y = u without an output; `uncut` ignores --from, --to and --every."""
     return _read(settings, path, source_of(path), uncut=uncut)
@@ -121,7 +140,7 @@ def read_input(settings: InputOptions, path: str, *, of_the_ground: bool) -> "hs
     """The input as a record with y = u; a ground motion [m/s^2] from AT2, or `of_the_ground` from a file without u."""
     from hysim.files import column_names, is_at2
 
-    source = _repeatable(path)
+    source = source_of(path)
     if is_at2(source(), settings.encoding):
         if settings.u is not None or settings.t is not None or settings.no_t:
             raise ValueError(f"{path} is an AT2 file, which has no columns: leave out --u, --t and --no-t")
@@ -135,7 +154,7 @@ def read_input(settings: InputOptions, path: str, *, of_the_ground: bool) -> "hs
             return cut(_ground_motion(settings, source), settings)
     if settings.u is None:
         settings.u = _only_column(settings, source(), "u")
-    return _read(settings, path, source())
+    return _read(settings, path, source)
 
 
 def read_with_weights(settings: WeighedOptions, path: str) -> "tuple[hs.Record, Any]":
@@ -143,34 +162,22 @@ def read_with_weights(settings: WeighedOptions, path: str) -> "tuple[hs.Record, 
     if settings.sensor and settings.y is None:
         settings.y = settings.sensor[0][1]
     settings.channel += settings.sensor
-    if settings.weights is None:
-        return read(settings, path), None
-    source = _repeatable(path)
-    weights = _read(replace(settings, y=settings.weights, resolution=None), path, source()).y
-    return _read(settings, path, source()), weights
-
-
-def source_of(path: str) -> Any:
-    if path != STANDARD:
-        return path
-    return sys.stdin.buffer if isinstance(sys.stdin, io.TextIOWrapper) else sys.stdin
+    source, weights = source_of(path), None
+    if settings.weights is not None:
+        weights = _read(replace(settings, y=settings.weights, resolution=None), path, source).y
+    return _read(settings, path, source), weights
 
 
 def cut(record: "hs.Record", settings: InputOptions) -> "hs.Record":
     """The part of the record that the settings name; a ValueError if fewer than two samples are in it."""
-    used = {"--from": settings.from_, "--to": settings.to, "--every": settings.every}
-    names = [name for name, value in used.items() if value is not None]
-    if not names:
-        return record
     part = slice(_sample(record, settings.from_, "--from"), _sample(record, settings.to, "--to"), settings.every)
     n = len(range(*part.indices(len(record))))
     if n < 2:
         t, unit = record.t, record.units.get("t", "")
         extent = "" if t is None else f" between {t[0]:g} and {t[-1]:g} {unit}".rstrip()
-        raise ValueError(
-            f"{n} of {len(record)} samples{extent} remain by {' and '.join(names)}: a record needs at least 2"
-        )
-    return record[part]
+        options_used = "--from, --to and --every"
+        raise ValueError(f"{n} of {len(record)} samples{extent} remain by {options_used}: a record needs at least 2")
+    return record if part == slice(None) else record[part]
 
 
 def _sample(record: "hs.Record", place: options.Place | None, option: str) -> int | None:
@@ -188,9 +195,11 @@ def _sample(record: "hs.Record", place: options.Place | None, option: str) -> in
     return int(np.searchsorted(record.t, value * seconds - tolerance))
 
 
-def of_structure(structure: Any, record: "hs.Record", columns: Mapping[str, Any]) -> "hs.StructureRecord":
+def of_structure(structure: Any, record: "hs.Record", columns: Iterable[str]) -> "hs.StructureRecord":
     """The record of a structure with these channels as sensors; ValueError if a name or the time is missing."""
     import numpy as np
+
+    from hysim.simulation import columns_of
 
     if not isinstance(structure, hs.Structure):
         name = structure.__name__ if isinstance(structure, type) else type(structure).__name__
@@ -198,65 +207,47 @@ def of_structure(structure: Any, record: "hs.Record", columns: Mapping[str, Any]
     if record.t is None:
         raise ValueError("a structure needs the times of its record: name their column by --t, or use --sample-time")
     sizes = dict.fromkeys(_OF_NODES, structure.n_nodes) | dict.fromkeys(_OF_ELEMENTS, len(structure.elements))
-    names = {  # masses are counted from 1
-        signal: [f"{signal}_{k + (signal in _OF_NODES)}" for k in range(size)] for signal, size in sizes.items()
-    }
-    signals: dict[str, Any] = {}
+    signals = {name: np.full((len(record), size), np.nan) for name, size in sizes.items()}
+    places = {signal: columns_of(signal, values) for signal, values in signals.items()}
     for name in columns:
         signal = name.rpartition("_")[0]
-        if name not in names.get(signal, ()):
-            known = ", ".join(f"{each[0]} to {each[-1]}" for each in names.values())
+        if name not in places.get(signal, ()):
+            known = ", ".join(" to ".join([*names][:: max(len(names) - 1, 1)]) for names in places.values())
             raise ValueError(f"the structure has no signal {name!r}: its signals are {known}")
-        values = signals.setdefault(signal, np.full((len(record), sizes[signal]), np.nan))
-        values[:, names[signal].index(name)] = record.channel(name)
-    return hs.StructureRecord(t=record.t, u=record.u, name=record.name, **signals)
+        places[signal][name][:] = record.channel(name)
+    measured = {name: values for name, values in signals.items() if not np.isnan(values).all()}
+    return hs.StructureRecord(t=record.t, u=record.u, name=record.name, **measured)
 
 
-def _ground_motion(settings: InputOptions, source: Callable[[], Any]) -> "hs.Record":
+def _ground_motion(settings: InputOptions, source: Source) -> "hs.Record":
     """A ground motion; a step is that of a list without times, or new even steps for one with times."""
     arguments = {"t": settings.t, "units": dict(settings.unit).get("u"), **settings.for_load()}
     del arguments["thousands"]
-    step = None if settings.sample_time is None else options.positive("--sample-time", settings.sample_time)
-    has_times = True
+    step = settings.sample_time
     try:
         t, acceleration = hs.load_ground_motion(source(), **arguments)
     except ValueError:
         if step is None:
             raise
-        has_times = False
         t, acceleration = hs.load_ground_motion(source(), sample_time=step, **arguments)
+        step = None
     motion = hs.Record(t=t, u=acceleration, y=acceleration, units={"t": "s", "u": "m/s^2"})
-    return motion.resample(step) if step is not None and has_times else motion
+    return motion if step is None else motion.resample(step)
 
 
-def _repeatable(path: str) -> Callable[[], Any]:
-    """A function that returns the file, or all that a stream holds, from its begin each time."""
-    if path != STANDARD and (os.path.isfile(path) or not os.path.exists(path)):
-        return lambda: path
-    with nullcontext(source_of(path)) if path == STANDARD else open(path, "rb") as stream:  # else a pipe
-        content = stream.read()
-
-    def begin() -> Any:
-        copy: Any = io.BytesIO(content.encode() if isinstance(content, str) else content)
-        copy.name = "<stdin>" if path == STANDARD else path
-        return copy
-
-    return begin
-
-
-def _read(settings: InputOptions, path: str, source: Any, *, uncut: bool = False) -> "hs.Record":
+def _read(settings: InputOptions, path: str, source: Source, *, uncut: bool = False) -> "hs.Record":
     import numpy as np
 
     u = "u" if settings.u is None else settings.u
-    step = None if settings.sample_time is None else options.positive("--sample-time", settings.sample_time)
-    if isinstance(settings, RecordOptions) and settings.y_file is not None:
+    step = settings.sample_time
+    if not isinstance(settings, RecordOptions):
+        record = _loaded(settings, path, source(), u, u)
+    elif settings.y_file is not None:
         record = _from_two_files(settings, path, source, settings.y_file)
-    elif isinstance(settings, RecordOptions):
-        if u == ("y" if settings.y is None else settings.y):
-            raise ValueError(f"the input and the output are both the column {u}: name them by --u and --y")
-        record = _loaded(settings, path, source, settings.u, settings.y)
+    elif u == ("y" if settings.y is None else settings.y):
+        raise ValueError(f"the input and the output are both the column {u}: name them by --u and --y")
     else:
-        record = _loaded(settings, path, source, u, u)
+        record = _loaded(settings, path, source(), settings.u, settings.y)
     if step is not None and record.t is None:
         record, step = replace(record, t=step * np.arange(float(len(record)))), None
     record = record if uncut else cut(record, settings)
@@ -274,13 +265,13 @@ def _loaded(settings: InputOptions, path: str, source: Any, u: Any, y: Any, **ch
     return record
 
 
-def _from_two_files(settings: RecordOptions, path: str, source: Any, y_file: str) -> "hs.Record":
+def _from_two_files(settings: RecordOptions, path: str, source: Source, y_file: str) -> "hs.Record":
     """The record of an input in one file and an output in another; a file's only column need not be named."""
-    first, second = (_repeatable(path) if path == STANDARD else lambda: source, _repeatable(y_file))
-    u = _only_column(settings, first(), "u") if settings.u is None else settings.u
-    y = _only_column(settings, second(), "y") if settings.y is None else settings.y
-    drive = _loaded(settings, path, first(), u, u, resolution=None)
-    return hs.join_records(drive, _loaded(settings, y_file, second(), y, y))
+    other = source_of(y_file)
+    u = _only_column(settings, source(), "u") if settings.u is None else settings.u
+    y = _only_column(settings, other(), "y") if settings.y is None else settings.y
+    drive = _loaded(settings, path, source(), u, u, resolution=None)
+    return hs.join_records(drive, _loaded(settings, y_file, other(), y, y))
 
 
 def _only_column(settings: InputOptions, source: Any, name: str) -> str:

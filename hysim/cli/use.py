@@ -113,7 +113,7 @@ def c(
     *,
     out: options.Source,
     inverse: bool = False,
-    sample_time: float | None = None,
+    sample_time: options.Positive | None = None,
     u0: float = 0.0,
 ) -> int:
     """Write a model, or its inverse, as C99 for the device that it runs on.
@@ -136,14 +136,10 @@ def c(
     hysim c law.json --inverse --out inverse.c
     """
     path = Path(out)
-    if path.suffix != ".c":
-        raise ValueError(f"--out is a C source, and its header stands beside it: call the file .c, got {out}")
-    paths = {end: str(path.with_name(path.stem + end)) for end in (".h", ".c", "_main.c")}
-    outputs.keep([model], paths.values())
     law, _ = models.read(model)
-    step = None if sample_time is None else options.positive("--sample-time", sample_time)
-    code = hs.to_c(hs.InverseFeedforward(law=law) if inverse else law, step, name=path.stem, u0=u0)
+    code = hs.to_c(hs.InverseFeedforward(law=law) if inverse else law, sample_time, name=path.stem, u0=u0)
     texts = {".h": code.header, ".c": code.source, "_main.c": code.main}
+    paths = {end: str(path.with_name(path.stem + end)) for end in texts}
     write_all({paths[end]: text for end, text in texts.items()})
     print(f"wrote {', '.join(paths.values())}; a program that reads one input in each line is compiled by")
     print(f"  cc -std=c99 -O2 -ffp-contract=off {paths['.c']} {paths['_main.c']} -lm -o {path.with_suffix('')}")
@@ -162,7 +158,7 @@ def fmu(
     *,
     out: Annotated[str, options.file("MODEL.fmu")],
     version: Literal["2.0", "3.0"] = "2.0",
-    sample_time: float | None = None,
+    sample_time: options.Positive | None = None,
     name: str | None = None,
     unit: tuple[options.Unit, ...] = (),
     u0: float = 0.0,
@@ -193,7 +189,6 @@ def fmu(
     hysim fmu actuator.json --sample-time 1e-4 --version 3.0 --out actuator.fmu
     """
     law, units = models.read(model)
-    step = None if sample_time is None else options.positive("--sample-time", sample_time)
     units |= dict(unit)
-    hs.to_fmu(law, out, version, step, name=name, units=units, platforms=platforms, u0=u0, y0=y0)
+    hs.to_fmu(law, out, version, sample_time, name=name, units=units, platforms=platforms, u0=u0, y0=y0)
     return 0

@@ -29,8 +29,6 @@ OF_OTHER_COMMANDS = {
 
 _PHRASES = {
     r"hs\.load\(\.\.\.\)\.resample\(([^)]*)\)": r"--t, --u and --sample-time \1",
-    r"bounds of '([^']+)' must be \(lower, upper\) with lower < upper, got \(([^,]+), ([^)]+)\)":
-        r"--bounds \1=LOW:HIGH needs LOW below HIGH, got \2:\3",
     r', on_missing="split" cuts the record there': "",
     r"hysim\.loop_metrics\(tolerance=\.\.\.\)": "hysim metrics --tolerance",
     r"hysim\.cycle_metrics": "hysim metrics --cycles",

@@ -222,8 +222,8 @@ class HysteresisAssessment:
         Largest widths [unit of y].
     open_lag_width, lag_width : float
         The same with the law replaced by a line of its secant gain [unit of y].
-    tracking_rms, closure_gap : float
-        Rms error, and displacement at the end minus at the start [unit of y].
+    open_tracking_rms, tracking_rms, closure_gap : float
+        Rms errors, and displacement at the end minus at the start [unit of y].
     secant_gain : float
         Secant gain of the open loop [unit of y / unit of u].
     open_u, open_y, closed, loop
@@ -236,6 +236,7 @@ class HysteresisAssessment:
     closed_width: float
     open_lag_width: float
     lag_width: float
+    open_tracking_rms: float
     tracking_rms: float
     closure_gap: float
     secant_gain: float
@@ -252,15 +253,19 @@ class HysteresisAssessment:
     def __str__(self) -> str:
         what = "lag" if self.is_lag else "hysteresis"
         reduction = self.lag_reduction_percent if self.is_lag else self.hysteresis_reduction_percent
+        drive, y = driven_by(self.closed), self.closed.units.get("y", "")
         return summary_text(
             [f"HysteresisAssessment: {what} reduction {reduction:.2f} %, tracking rms {self.tracking_rms:.4g}"],
             {
                 "not stable": self.loop.message,
-                "open width": f"{self.open_width:.4g}, without the memory {self.open_lag_width:.4g}",
-                f"{driven_by(self.closed)} width": f"{self.closed_width:.4g}, without the memory {self.lag_width:.4g}",
-                "closure gap": f"{self.closure_gap:.4g}",
+                "width": f"open {self.open_width:.4g}, {drive} {quantity(self.closed_width, y)}",
+                "width without the memory": ""
+                if self.is_lag
+                else f"open {self.open_lag_width:.4g}, {drive} {quantity(self.lag_width, y)}",
+                "tracking rms": f"open {self.open_tracking_rms:.4g}, {drive} {quantity(self.tracking_rms, y)}",
+                "closure gap": quantity(self.closure_gap, y),
                 "secant gain": f"{self.secant_gain:.4g}",
-                "voltage": extent(self.closed.u),
+                "voltage": extent(self.closed.u, self.closed.units.get("u", "")),
             },
         )
 
@@ -284,9 +289,12 @@ class StepAssessment:
     loop: LoopAssessment
 
     def __str__(self) -> str:
-        ends = f"from {self.closed.y[0]:.4g} to {self.closed.reference[-1]:.4g}"
-        lines = [f"StepAssessment {ends}, voltage {extent(self.closed.u)}", f"  {self.reduction}"]
-        return summary_text(lines, {"not stable": self.loop.message})
+        u, y = (self.closed.units.get(signal, "") for signal in "uy")
+        ends = f"from {self.closed.y[0]:.4g} to {quantity(self.closed.reference[-1], y)}"
+        return summary_text(
+            [f"StepAssessment {ends}, voltage {extent(self.closed.u, u)}", f"  {self.reduction}"],
+            {"at a limit": f"{self.loop.limited_percent:.3g} % of the samples", "not stable": self.loop.message},
+        )
 
 
 @printed
@@ -398,6 +406,7 @@ def assess_hysteresis(
         closed_width=after.max_width,
         open_lag_width=opened.loop_of(line.driven(opened.u)).max_width,
         lag_width=opened.loop_of(line.run(controller, reference).y).max_width,
+        open_tracking_rms=rmse(opened.cycle, opened.last(opened.y)),
         tracking_rms=loop.tracking_rms,
         closure_gap=after.closure_gap,
         secant_gain=opened.secant_gain,

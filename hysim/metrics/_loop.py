@@ -43,7 +43,7 @@ The branches are those of `hysim.loop_metrics`. Source of the terms: IEC 60050-1
 """
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from itertools import groupby, pairwise
 from typing import Literal, NamedTuple, overload
 
@@ -51,7 +51,7 @@ import numpy as np
 import numpy.typing as npt
 
 from hysim._basics.frozen import FloatArray, check_positive, frozen, items, vectors
-from hysim._basics.printing import extent, printed, summary_text
+from hysim._basics.printing import extent, printed, quantity, summary_text
 from hysim._columns.excursions import measured_cycles
 from hysim._columns.turning import ROUNDING, TOLERANCE, Cycle, settled, turns
 
@@ -161,25 +161,31 @@ class LoopMetrics:
         return tuple(lobe.high for lobe in self.lobes[:-1])
 
     def __str__(self) -> str:
+        return self.to_text()
+
+    def to_text(self, units: Mapping[str, str] | None = None) -> str:
+        """The text of ``str``, with the units of ``"u"`` and ``"y"``."""
+        u, y = ((units or {}).get(signal, "") for signal in "uy")
+        product, ratio = (f"{y} {u}", f"{y}/{u}") if u and y else ("", "")
         loop = "no loop" if self.orientation == "none" else f"{self.orientation} loop"
         if self.crossings:
-            loop = f"loop that crosses itself at u = {', '.join(f'{u:.4g}' for u in self.crossings)}"
+            loop = f"loop that crosses itself at u = {', '.join(quantity(at, u) for at in self.crossings)}"
         cycles = "the last cycle" if self.n_cycles == 1 else f"the mean of {self.n_cycles} cycles"
         return summary_text(
-            [f"LoopMetrics: {loop}, {cycles}, largest width {self.max_width:.4g}"],
+            [f"LoopMetrics: {loop}, {cycles}, largest width {quantity(self.max_width, y)}"],
             {
-                "largest width": f"{self.max_width:.4g} at u = {self.max_width_at:.6g}"
+                "largest width": f"{quantity(self.max_width, y)} at u = {f'{self.max_width_at:.6g} {u}'.rstrip()}"
                 + (f", {100.0 * self.relative_width:.2f} % of the stroke" if self.stroke > 0.0 else ""),
-                "mean width": f"{self.mean_width:.4g}, at mid span {self.mid_width:.4g}",
-                "stroke": f"{self.stroke:.4g} over u of {extent(self.u)}",
-                "area": f"{self.area:.4g}, energy {self.energy:.4g}",
+                "mean width": f"{quantity(self.mean_width, y)}, at mid span {quantity(self.mid_width, y)}",
+                "stroke": f"{quantity(self.stroke, y)} over u of {extent(self.u, u)}",
+                "area": f"{quantity(self.area, product)}, energy {quantity(self.energy, product)}",
                 "lobes": "; ".join(
-                    f"u of {lobe.low:.4g} to {lobe.high:.4g}: {lobe.orientation}, area {lobe.area:.4g}, "
-                    f"width {lobe.max_width:.4g}"
+                    f"u of {extent((lobe.low, lobe.high), u)}: {lobe.orientation}, "
+                    f"area {quantity(lobe.area, product)}, width {quantity(lobe.max_width, y)}"
                     for lobe in (self.lobes if self.crossings else ())
                 ),
-                "closure gap": f"{self.closure_gap:.4g}",
-                "stiffness": f"{self.secant_stiffness:.4g}, {self._damping_in_words()}",
+                "closure gap": quantity(self.closure_gap, y),
+                "stiffness": f"{quantity(self.secant_stiffness, ratio)}, {self._damping_in_words()}",
                 "sign": self.sign_convention if self.orientation == "counterclockwise" else "",
             },
         )

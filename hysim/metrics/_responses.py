@@ -180,12 +180,14 @@ class VibrationReduction:
     closed: StepMetrics
 
     def __str__(self) -> str:
+        figures = {
+            "overshoot": self.overshoot_reduction_percent,
+            "residual rms": self.residual_rms_reduction_percent,
+            "settling time": self.settling_time_reduction_percent,
+        }
+        words = (f"{name} {'undefined' if math.isnan(each) else f'{each:.2f} %'}" for name, each in figures.items())
         return summary_text(
-            [
-                f"VibrationReduction: overshoot {self.overshoot_reduction_percent:.2f} %, residual rms "
-                f"{self.residual_rms_reduction_percent:.2f} %, settling time "
-                f"{self.settling_time_reduction_percent:.2f} %"
-            ],
+            [f"VibrationReduction: {', '.join(words)}"],
             {"open loop": _in_words(self.open), "closed loop": _in_words(self.closed)},
         )
 
