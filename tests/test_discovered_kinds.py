@@ -216,7 +216,7 @@ def test_initial_states_are_counted_as_parameters_where_they_are_free(kinds):
         (["--route", "memory", "--mass", "2"], "--mass is not used by --route memory: leave it out"),
         (["--mass", "2", "--library", "duhem"], "--library is not used by an oscillator: leave it out"),
         (["--route", "oscillator", "--cross-validate", "3"], "--cross-validate is not used by an oscillator"),
-        (["--route", "oscillator", "--symmetry", "even"], "--symmetry even is not used by an oscillator"),
+        (["--route", "oscillator", "--symmetry", "even"], '--symmetry must be None or "odd"'),
         (["--library", "u',|u'| z", "--degree", "2"], "--degree is not used with a library of names: leave it out"),
     ],
 )
@@ -230,8 +230,8 @@ def test_a_known_mass_means_an_oscillator(tmp_path, capsys, kinds, monkeypatch):
     found, record = kinds["n held"]
     arguments = []
 
-    def verb(record, **options):
-        arguments.append(options)
+    def verb(record, *, seed, mass, degree):
+        arguments.append({"mass": mass, "degree": degree, "seed": seed})
         return found
 
     monkeypatch.setattr("hysim.discover_oscillator", verb)

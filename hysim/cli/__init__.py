@@ -34,7 +34,7 @@ GROUPS: Mapping[str, Mapping[str, str]] = {
 COMMANDS = {name: module for commands in GROUPS.values() for name, module in commands.items()}
 """Module of every command by its name."""
 
-DONE, BAD_INPUT = 0, 2
+DONE, NOT_REACHED, BAD_INPUT = 0, 1, 2
 _SETTINGS = {"help_option_names": ["-h", "--help"], "max_content_width": 120}
 
 
@@ -85,7 +85,7 @@ class Command(click.Command):
         try:
             with np.errstate(all="ignore"), reporting:  # an overflow is inf or nan: null in JSON
                 outputs.check(files, prints=values.get("json", False))
-                return options.call(self.function, values)
+                return NOT_REACHED if options.call(self.function, values) is False else DONE
         except (ValueError, TypeError, SimulationError) as error:
             words = in_shell_words(str(error) or type(error).__name__, outputs.flags(self))
             raise ValueError(words) from error

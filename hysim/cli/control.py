@@ -6,8 +6,6 @@ from typing import Any
 import hysim as hs
 from hysim.cli import models, options, outputs
 
-SUCCESS, NOT_WITHIN_BOUNDS = 0, 1
-
 
 def control(
     model: options.ModelIn,
@@ -17,7 +15,7 @@ def control(
     c: options.Source | None = None,
     plot: options.Picture | None = None,
     json: bool = False,
-) -> int:
+) -> bool:
     """Design a controller for a model, and print what it achieves.
 
     Tune a sampled controller on a model's simulated loop, and measure what it achieves.
@@ -52,4 +50,4 @@ def control(
         plot: lambda: designs.picture(design),
     }
     outputs.write(files, lambda: designs.text(design), lambda: designs.document(design))
-    return SUCCESS if design.tuning is None or design.tuning.success else NOT_WITHIN_BOUNDS
+    return design.tuning is None or design.tuning.success

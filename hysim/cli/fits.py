@@ -1,5 +1,6 @@
 """`hysim identify`, `posterior`, `compare` and `discover`: from records in files to models."""
 
+import inspect
 import sys
 from collections.abc import Callable
 from pathlib import Path
@@ -8,8 +9,6 @@ from typing import Any, Literal
 import hysim as hs
 from hysim.cli import models, options, outputs, records
 from hysim.errors import Interrupted
-
-SUCCESS, NOT_CONVERGED, NO_MODEL = 0, 1, 1
 
 _FOLDER = ("parameters.csv", "samples.csv", "corner.svg", "posterior.json")
 _IDENTIFIED = (
@@ -34,7 +33,7 @@ def identify(
     out: options.ModelOut | None = None,
     plot: options.Picture | None = None,
     json: bool = False,
-) -> int:
+) -> bool:
     """Identify a model on a file of your own.
 
     Identify a model's parameters by its error in free run, and print them with their standard errors.
@@ -92,7 +91,7 @@ def identify(
     files: outputs.Files = {out: lambda: to_json(result, units=record.units), plot: picture}
     family = {"family": type(result.model).__name__}
     outputs.write(files, result.summary, lambda: family | outputs.fields_of(result, _IDENTIFIED))
-    return SUCCESS if result.success else NOT_CONVERGED
+    return bool(result.success)
 
 
 def posterior(
@@ -105,7 +104,7 @@ def posterior(
     samples: options.Count = 10000,
     out: str | None = None,
     json: bool = False,
-) -> int:
+) -> bool:
     """Draw the distribution of a model's parameters given a file.
 
     Identify a model, draw its parameters from their posterior distribution, and print medians and intervals at 95 %.
@@ -130,8 +129,9 @@ def posterior(
     subject = models.to_identify(fit)
     measured: Any = [records.read(settings, path) for path in (file, *others)]
     measured = measured if others else measured[0]
+    paths = [] if out is None else [str(Path(out, name)) for name in _FOLDER]
+    outputs.keep([file, *others, fit.model], paths)
     if out is not None:
-        outputs.keep([file, *others, fit.model], [str(Path(out, name)) for name in _FOLDER])
         Path(out).mkdir(parents=True, exist_ok=True)
     result = hs.identify(subject, measured, **fit.for_identify())
     draws = hs.sample_posterior(
@@ -143,31 +143,18 @@ def posterior(
         samples=samples,
         seed=fit.seed,
     )
-    rows = _rows(draws)
+    rows = draws.rows()
     conditions = outputs.fields_of(draws, ("noise", "resolution", "priors", "n_evaluations", "seed", "warnings"))
     document = {"family": type(draws.model).__name__, "parameters": rows, **conditions}
-    contents: dict[str, Callable[[], Any]] = {
-        "parameters.csv": lambda: csv_text([rows[0], *(row.values() for row in rows)]),
-        "samples.csv": draws.to_csv,
-        "corner.svg": lambda: _corner(draws),
-        "posterior.json": lambda: outputs.to_json(document),
-    }
-    files: outputs.Files = {} if out is None else {str(Path(out, name)): contents[name] for name in _FOLDER}
+    contents: tuple[Callable[[], Any], ...] = (
+        lambda: csv_text([rows[0], *(row.values() for row in rows)]),
+        draws.to_csv,
+        lambda: _corner(draws),
+        lambda: outputs.to_json(document),
+    )
+    files: outputs.Files = dict(zip(paths, contents, strict=bool(paths)))
     outputs.write(files, draws.summary, lambda: document)
-    return NOT_CONVERGED if draws.warnings or not result.success else SUCCESS
-
-
-def _rows(posterior: "hs.Posterior") -> list[dict[str, Any]]:
-    columns: dict[str, Any] = {
-        "median": posterior.median,
-        "lower": {name: low for name, (low, _) in posterior.interval().items()},
-        "upper": {name: high for name, (_, high) in posterior.interval().items()},
-        "mean": {name: float(draws.mean()) for name, draws in posterior.samples.items()},
-        "standard_deviation": {name: float(draws.std(ddof=1)) for name, draws in posterior.samples.items()},
-        "effective_samples": posterior.effective_samples,
-        "rhat": posterior.rhat,
-    }
-    return [{"name": name, **{key: column[name] for key, column in columns.items()}} for name in posterior.samples]
+    return bool(result.success) and not draws.warnings
 
 
 def _corner(posterior: "hs.Posterior") -> Any:
@@ -192,7 +179,7 @@ def compare(
     out: options.ModelOut | None = None,
     plot: options.Picture | None = None,
     json: bool = False,
-) -> int:
+) -> None:
     """Compare models on a file of your own.
 
     Identify models on a record, all by the same protocol, and print them side by side.
@@ -235,15 +222,19 @@ def compare(
         if not json:
             print(interrupt.finished.to_text())
         raise
+    rows = min(4, len(table.rows))
+
+    def draw(canvas: Any) -> None:
+        hs.plot.comparison(table, axes=hs.plot.panels(canvas, 3 * rows, columns=3))
+
     files: outputs.Files = {
         out: lambda: _best(table),
         csv: lambda: table.to_csv(),
         markdown: lambda: table.to_markdown() + "\n",
         latex: lambda: table.to_latex() + "\n",
-        plot: lambda: _picture(table),
+        plot: lambda: outputs.drawn(draw, 9.0, 2.2 * rows),
     }
-    outputs.write(files, lambda: table.to_text(), lambda: _document(table))
-    return SUCCESS
+    outputs.write(files, table.to_text, lambda: _document(table))
 
 
 def _subjects(name: str) -> dict[str, Any]:
@@ -277,16 +268,6 @@ def _document(table: "hs.Comparison") -> dict[str, Any]:
     return {"record": table.record.name, "units": table.record.units, **verdict, "rows": rows, "failed": table.failed}
 
 
-def _picture(table: "hs.Comparison") -> Any:
-    rows = min(4, len(table.rows))
-    return outputs.drawn(
-        lambda canvas: hs.plot.comparison(table, axes=hs.plot.panels(canvas, 3 * rows, columns=3)), 9.0, 2.2 * rows
-    )
-
-
-PLANT, WITHOUT_PLANT = (("mass", "damping", "stiffness"), ("library", "cross_validate", "initial"))
-
-
 def discover(
     file: options.RecordIn,
     *,
@@ -304,7 +285,7 @@ def discover(
     out: options.ModelOut | None = None,
     plot: options.Picture | None = None,
     json: bool = False,
-) -> int:
+) -> bool:
     """Find the law of the memory in a file of your own.
 
     Find the law of a memory by sparse regression (PySINDy) and free runs, and print it with its verdict.
@@ -333,40 +314,25 @@ def discover(
     """
     from hysim.models.storage import to_json
 
-    values = {
-        "mass": mass, "damping": damping, "stiffness": stiffness, "library": library,
-        "cross_validate": cross_validate, "initial": initial, "degree": degree, "symmetry": symmetry,
-    }  # fmt: skip
-    used: dict[str, Any] = {name: value for name, value in values.items() if value is not None}
-    is_oscillator = _is_oscillator(route, used)
+    of_plant = {"mass": mass, "damping": damping, "stiffness": stiffness}
+    others = {"library": library, "cross_validate": cross_validate, "degree": degree, "symmetry": symmetry}
+    values = of_plant | others | {"initial": initial}
+    is_oscillator = route == "oscillator" or (route == "auto" and {*of_plant.values()} != {None})
+    verb: Any = hs.discover_oscillator if is_oscillator else hs.discover
+    used = {name: value for name, value in values.items() if value is not None}
+    if unused := used.keys() - inspect.signature(verb).parameters.keys():
+        user = "an oscillator" if is_oscillator else f"--route {route}"
+        raise ValueError(f"{' and '.join(map(options.flag, sorted(unused)))} is not used by {user}: leave it out")
     record = records.read(settings, file)
-    if is_oscillator:
-        result: Any = hs.discover_oscillator(record, seed=seed, **used)
-    else:
-        result = hs.discover(record, seed=seed, route=route, **used)
+    result = verb(record, seed=seed, **used, **({} if is_oscillator else {"route": route}))
     model = result.model
     files: dict[str | None, Any] = {
         out: lambda: to_json(model, units=record.units),
         plot: lambda: outputs.loop(record, model),
     }
-    if model is None:
-        files = {path: lambda: "" for path in files if path == records.STANDARD}
-    outputs.write(files, result.to_json if json else result.summary)
     unwritten = [name for name, path in (("--out", out), ("--plot", plot)) if path and model is None]
     if unwritten:
+        files = {path: lambda: "" for path in files if path == records.STANDARD}
         print(f"hysim: {' and '.join(unwritten)} not written: {result.warnings[0]}", file=sys.stderr)
-    return NO_MODEL if unwritten else SUCCESS
-
-
-def _is_oscillator(route: str, used: dict[str, Any]) -> bool:
-    """Whether the record is an oscillator's; options that are not used by it are refused."""
-    is_oscillator = route == "oscillator" or (route == "auto" and any(name in used for name in PLANT))
-    for name in WITHOUT_PLANT if is_oscillator else PLANT:
-        if name in used:
-            user = "an oscillator" if is_oscillator else f"--route {route}"
-            raise ValueError(f"--{name.replace('_', '-')} is not used by {user}: leave it out")
-    if is_oscillator and used.get("symmetry") == "even":
-        raise ValueError("--symmetry even is not used by an oscillator: leave it out, or use --symmetry odd")
-    if "degree" in used and isinstance(used.get("library"), list):
-        raise ValueError("--degree is not used with a library of names: leave it out")
-    return is_oscillator
+    outputs.write(files, result.to_json if json else result.summary)
+    return not unwritten

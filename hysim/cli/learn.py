@@ -14,7 +14,6 @@ import hysim as hs
 from hysim.cli import options, outputs
 from hysim.cli.records import STANDARD
 
-SUCCESS, NOT_CONVERGED = 0, 1
 _SEED = 1
 
 
@@ -76,7 +75,7 @@ Kind = Annotated[str, options.one_of({name: device.what for name, device in DEVI
 _SCRIPTS = {"bash": BashComplete, "zsh": ZshComplete, "fish": FishComplete}
 
 
-def example(path: options.Table | None = None, *, device: Kind = "piezo") -> int:
+def example(path: options.Table | None = None, *, device: Kind = "piezo") -> None:
     """Write a file to try the other commands on.
 
     Write a record as a file like one of your own.
@@ -113,10 +112,9 @@ def example(path: options.Table | None = None, *, device: Kind = "piezo") -> int
         *(f"  hysim {line.format(out)}" for line in tries),
     ]
     outputs.write({out: lambda: content}, lambda: "\n".join(lines))
-    return SUCCESS
 
 
-def explore(*, out: options.Page | None = None, no_browser: bool = False) -> int:
+def explore(*, out: options.Page | None = None, no_browser: bool = False) -> None:
     """Play with the families of laws in a browser.
 
     Open a page with a choice of families and devices, whose loops follow sliders. It works offline.
@@ -139,10 +137,9 @@ def explore(*, out: options.Page | None = None, no_browser: bool = False) -> int
     print(page)
     if not no_browser:
         webbrowser.open(page.resolve().as_uri())
-    return SUCCESS
 
 
-def reproduce(*, out: str = "reproduction", quick: bool = False, page: bool = False, json: bool = False) -> int:
+def reproduce(*, out: str = "reproduction", quick: bool = False, page: bool = False, json: bool = False) -> bool:
     """Rebuild the paper's results and write a report.
 
     Identify, discover and compare models on the 52 voltage-displacement points of the paper.
@@ -169,7 +166,7 @@ def reproduce(*, out: str = "reproduction", quick: bool = False, page: bool = Fa
         print((result.folder / "summary.json").read_text(encoding="utf-8"), end="")
     else:
         print(*_lines(study), *_verdicts(result.findings.claims), f"report: {result.folder / 'report.html'}", sep="\n")
-    return SUCCESS if all(fit.success for fit in study.fits.values()) else NOT_CONVERGED
+    return all(fit.success for fit in study.fits.values())
 
 
 def _lines(study: Any) -> Iterator[str]:
@@ -193,7 +190,7 @@ def _verdicts(claims: Sequence[Any]) -> Iterator[str]:
             yield f"{claim.id}: {claim.recomputed:.1f} % where the paper says {claim.printed:g} %, {claim.verdict}"
 
 
-def completion(shell: Literal["bash", "zsh", "fish"]) -> int:
+def completion(shell: Literal["bash", "zsh", "fish"]) -> None:
     """Write a script by which a shell completes commands and options.
 
     Write a script for a shell to the standard output.
@@ -211,4 +208,3 @@ def completion(shell: Literal["bash", "zsh", "fish"]) -> int:
     hysim completion fish
     """
     print(_SCRIPTS[shell](click.get_current_context().find_root().command, {}, "hysim", "_HYSIM_COMPLETE").source())
-    return SUCCESS

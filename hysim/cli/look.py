@@ -10,7 +10,7 @@ from hysim.cli import models, options, outputs, records
 _MANY, _AMPLITUDES = 100, 50
 
 
-def columns(file: options.RecordIn, *, settings: records.TextOptions, json: bool = False) -> int:
+def columns(file: options.RecordIn, *, settings: records.TextOptions, json: bool = False) -> None:
     """List what a file holds.
 
     List the columns of a file, with units, numbers of samples and ranges.
@@ -34,7 +34,6 @@ def columns(file: options.RecordIn, *, settings: records.TextOptions, json: bool
     ]
     text = "\n".join(lines) or "the file holds no columns"
     outputs.write({}, lambda: text, lambda: {"columns": [column._asdict() for column in listed]})
-    return 0
 
 
 def _content(column: Any) -> str:
@@ -55,7 +54,7 @@ def metrics(
     csv: options.Result | None = None,
     plot: options.Picture | None = None,
     json: bool = False,
-) -> int:
+) -> None:
     """Measure the loop in a file of your own.
 
     Measure the loop of the input's last complete cycle, the average loop of the last few, or every cycle.
@@ -101,7 +100,6 @@ def metrics(
 
     files[out] = lambda: outputs.printed(text, lambda: document)
     outputs.write(files, text, lambda: document)
-    return 0
 
 
 Results = list[Any]
@@ -181,7 +179,7 @@ def plot(
     kind: Annotated[str, options.one_of({name: kind.shows for name, kind in KINDS.items()})] = "loop",
     model: tuple[options.ModelIn, ...] = (),
     out: options.Picture,
-) -> int:
+) -> None:
     """Draw files of your own.
 
     Draw records over each other, and the free run of models over the input of the first.
@@ -215,7 +213,6 @@ def plot(
         for (name, law), labels in zip(laws.items(), units, strict=True)
     ]
     outputs.write({out: lambda: outputs.drawn(lambda canvas: chosen.draw(canvas, [*measured, *runs], laws))})
-    return 0
 
 
 def measure(
@@ -235,7 +232,7 @@ def measure(
     out: options.Table,
     plot: options.Picture | None = None,
     json: bool = False,
-) -> int:
+) -> None:
     """Measure the displacement in camera frames.
 
     Measure the displacement of the picture in each frame, to a fraction of a pixel, and write it as columns.
@@ -289,7 +286,6 @@ def measure(
         plot: lambda: outputs.drawn(lambda canvas: hs.plot.displacement(motion, ax=canvas.add_subplot())),
     }
     outputs.write(files, motion.summary, lambda: _document(motion))
-    return 0
 
 
 def _table(motion: Any, log: "hs.Record | None", times: Any, on_lost: Any) -> tuple[dict[str, Any], dict[str, str]]:

@@ -17,8 +17,8 @@ from hysim.cli.records import STANDARD
 from hysim.cli.words import suggestion
 
 _PLANTS = ("oscillator", "actuator")
-_ARGUMENTS = {"plays": ("plays", "elements"), "relay_intervals": ("intervals",)}
-"""Arguments of a structure that an option of another name stands for."""
+_OPTIONS = {"elements": "plays", "intervals": "relay_intervals"}
+"""Arguments of a structure whose option has another name, and that name."""
 
 _NEEDED = ("poles", "zeros", "degree")
 
@@ -34,16 +34,14 @@ def names() -> list[str]:
     """Names of all families that can be compared without further arguments; loads every family."""
     from hysim.models.model import candidates
 
-    families = dict.fromkeys(name.split()[0] for name in candidates() if name.split()[0] in hs.__all__)
-    return _short(families)
+    return _short(name.split()[0] for name in candidates() if name.split()[0] in hs.__all__)
 
 
 def names_to_identify() -> list[str]:
     """Names of all models that `hysim identify` takes: those to compare, further laws and plants."""
-    from hysim.models.model import every_family, is_identifiable
+    from hysim.models.model import is_identifiable
 
-    own = {name: law for name, law in every_family().items() if law.__module__.startswith("hysim.laws.")}
-    laws = _short(name for name, law in own.items() if is_identifiable(law))
+    laws = _short(name for name, law in hs.families().items() if is_identifiable(law))
     return [*dict.fromkeys([*names(), *laws, *_PLANTS])]
 
 
@@ -58,17 +56,7 @@ def _short(families: Iterable[str]) -> list[str]:
     from hysim.models.model import short_names
 
     short = {family: name for name, family in short_names().items()}
-    return [short.get(name, _hyphenated(name)) for name in families]
-
-
-def _is_family(name: str) -> bool:
-    from hysim.models.model import family_named
-
-    try:
-        family_named(name)
-    except ValueError:
-        return False
-    return True
+    return [short.get(name, _hyphenated(name)) for name in dict.fromkeys(families)]
 
 
 def _hyphenated(name: str) -> str:
@@ -79,15 +67,16 @@ def _hyphenated(name: str) -> str:
 FORMS = f"name of a family, such as bouc-wen; MODEL.json; or {options.OWN}"
 """Values of an option for models."""
 
-_NOTE = "A structure is a model in a file."
 
+def _named(known: Callable[[], list[str]], more: str = "") -> options.Value:
+    def note() -> str:
+        return f"Names of models: {', '.join(known())}.{more}"
 
-def _named(note: Callable[[], str]) -> options.Value:
     return options.Value("MODEL", role=options.INPUT, offers=_offered, help=FORMS, note=note)
 
 
-ToCompare = Annotated[str, _named(lambda: f"Names of models: {', '.join(names())}.")]
-ToIdentify = Annotated[str, _named(lambda: f"Names of models: {', '.join(names_to_identify())}. {_NOTE}")]
+ToCompare = Annotated[str, _named(names)]
+ToIdentify = Annotated[str, _named(names_to_identify, " A structure is a model in a file.")]
 Law = Annotated[str, options.Value("MODEL", offers=_offered)]
 
 
@@ -267,7 +256,7 @@ def family(name: str) -> Any:
 
 def resolved(path: str) -> Any:
     """The object at an import path, `module:name`, the current folder included; ValueError if there is none."""
-    module, _, _ = path.partition(":")
+    module, _, name = path.partition(":")
     if os.getcwd() not in sys.path:
         sys.path.insert(0, os.getcwd())  # as `python -m hysim` has it
     try:
@@ -277,7 +266,7 @@ def resolved(path: str) -> Any:
             raise  # the module is there, and imports another one that is missing
         raise ValueError(f"there is no module {module!r} in {os.getcwd()} or among the installed packages") from None
     except AttributeError:
-        raise ValueError(f"{sys.modules[module]!r} has no {path.partition(':')[2]!r}") from None
+        raise ValueError(f"{sys.modules[module]!r} has no {name!r}") from None
 
 
 def is_import_path(text: str) -> bool:
@@ -308,29 +297,27 @@ def model_or_family(text: str) -> Any:
 
 def to_identify(chosen: FitOptions) -> Any:
     """The argument of `identify`; `initial` becomes None where the structure takes it. ValueError on a wrong option."""
-    from hysim.models.model import FAMILIES
-
-    name, of_actuator, used = (chosen.model, _used(chosen, ActuatorOptions), _used(chosen, StructureOptions))
-    if foreign := [*used] if name == "actuator" else [*of_actuator]:
-        raise ValueError(f"{options.flag(foreign[0])} is no option of the model {name}")
+    name, of_actuator, used = chosen.model, _used(chosen, ActuatorOptions), _used(chosen, StructureOptions)
     if name == "actuator":
+        _refuse(used, name)
         return _actuator(chosen)
+    _refuse(of_actuator, name)
     model = model_or_family(name)
-    oscillator, linear = (FAMILIES.get(each) for each in ("BoucWenOscillator", "TransferFunction"))  # if it is loaded
-    if oscillator is not None and isinstance(model, oscillator):  # its numbers are searched anew, in the same setting
-        used = {"excitation": vars(model)["excitation"], "hold": vars(model)["hold"]} | used
-        model = oscillator
-    taken = {each.name: argument for each in fields(StructureOptions) if (argument := _argument(model, each.name))}
+    kind = model if isinstance(model, type) else type(model)
+    is_oscillator = kind.__name__ == "BoucWenOscillator"
+    if is_oscillator and model is not kind:  # its numbers are searched anew, in the same setting
+        used = {"excitation": model.excitation, "hold": model.hold} | used
+        model = kind
+    taken = _arguments(model)
     if foreign := [each for each in used if each not in taken]:
-        others = [each for each in names_to_identify() if _argument(family(each), foreign[0])]
-        raise ValueError(f"{options.flag(foreign[0])} is no option of the model {name}, but of {', '.join(others)}")
+        others = [each for each in names_to_identify() if foreign[0] in _arguments(family(each))]
+        _refuse(foreign, f"{name}, but of {', '.join(others)}")
     if missing := [each for each in _NEEDED if each in taken and each not in used]:
         raise ValueError(f"the model {name} needs {options.flag(missing[0])}")
     structure = {taken[each]: value == "yes" if each == "one_signed" else value for each, value in used.items()}
-    if model is oscillator and chosen.initial is not None:
-        structure["initial"], chosen.initial = (chosen.initial, None)  # its structure says how the record begins
-    is_structure_needed = structure or any(model is each for each in (oscillator, linear))
-    return model.structure(**structure) if is_structure_needed else model
+    if is_oscillator and chosen.initial is not None:
+        structure["initial"], chosen.initial = chosen.initial, None  # its structure says how the record begins
+    return model.structure(**structure) if structure or is_oscillator else model
 
 
 def _used(chosen: FitOptions, group: type[StructureOptions | ActuatorOptions]) -> dict[str, Any]:
@@ -338,12 +325,16 @@ def _used(chosen: FitOptions, group: type[StructureOptions | ActuatorOptions]) -
     return {name: value for name, value in values.items() if value is not None and value is not False}
 
 
-def _argument(model: Any, option: str) -> str | None:
-    """The argument of a family's structure for which an option stands; None if it takes none such."""
+def _refuse(foreign: Iterable[str], name: str) -> None:
+    for each in foreign:
+        raise ValueError(f"{options.flag(each)} is no option of the model {name}")
+
+
+def _arguments(model: Any) -> dict[str, str]:
+    """Arguments of a family's structure, if it has one, by the options that stand for them."""
     if not (isinstance(model, type) and isinstance(model, _Structured)):
-        return None
-    arguments = inspect.signature(model.structure).parameters
-    return next((name for name in _ARGUMENTS.get(option, (option,)) if name in arguments), None)
+        return {}
+    return {_OPTIONS.get(name, name): name for name in inspect.signature(model.structure).parameters}
 
 
 def _actuator(chosen: ActuatorOptions) -> Any:
@@ -368,7 +359,7 @@ def read(path: str) -> tuple[Any, dict[str, str]]:
             raise ValueError(f"{path} needs values for its parameters: give an instance ({error})") from None
     if path == STANDARD:
         return from_json(sys.stdin.read(), "the standard input")
-    if not Path(path).exists() and _is_family(path):
+    if not Path(path).exists() and path in names_to_identify():
         raise ValueError(f"{path} is a family without numbers: write a model of it by hysim identify --out {path}.json")
     return from_json(Path(path).read_bytes(), path)
 

@@ -1,6 +1,6 @@
 """Options and arguments of the commands, which follow from signatures, annotations and docstrings.
 
-    def simulate(model: ModelIn, file: RecordIn, *, options: InputOptions, out: Table | None = None) -> int:
+    def simulate(model: ModelIn, file: RecordIn, *, options: InputOptions, out: Table | None = None) -> None:
         '''Drive a model with the input in a file.
 
         Parameters
@@ -34,6 +34,8 @@ from click.shell_completion import CompletionItem
 from hysim.cli.words import suggestion
 
 T = TypeVar("T")
+Command = Callable[..., bool | None]
+"""A function behind a command: false if a result was not reached, as a search that did not converge."""
 
 INPUT, RESULT, PRINTED, PICTURE = "input", "result", "printed result", "picture"
 TABLE, MODEL, SOURCE = "table", "model", "source"
@@ -95,14 +97,14 @@ class Parameter(NamedTuple):
     title: str
 
 
-def parameters(function: Callable[..., int]) -> Iterator[Parameter]:
+def parameters(function: Command) -> Iterator[Parameter]:
     """Arguments and options of a command, in the order of its docstrings."""
     yield from _declared(function, documented(function))
     quiet = inspect.Parameter("quiet", inspect.Parameter.KEYWORD_ONLY, default=False, annotation=bool)
     yield _parameter(quiet, "Options", "")
 
 
-def call(function: Callable[..., int], values: Mapping[str, Any]) -> int:
+def call(function: Command, values: Mapping[str, Any]) -> bool | None:
     arguments = {}
     for name, hint in typing.get_type_hints(function).items():
         if dataclasses.is_dataclass(hint):

@@ -20,7 +20,6 @@ from hysim._basics.libraries import optional
 from hysim.cli import models, options, outputs
 from hysim.cli.records import STANDARD
 
-SUCCESS, SOME_FAILED = 0, 1
 _SPACES = ("grid", "list", "sample")
 
 
@@ -38,7 +37,7 @@ def sweep(
     plot: options.Picture | None = None,
     of: str | None = None,
     json: bool = False,
-) -> int:
+) -> bool:
     """Compute a study over many parameters, or continue one.
 
     Compute a task for many sets of parameters, as a TOML file says, and keep every finished row in a database.
@@ -97,7 +96,7 @@ def sweep(
             )
     pictures: outputs.Files = {csv: result.to_csv, plot: lambda: _picture(result, of)}
     outputs.write(pictures, result.summary, lambda: _document(result))
-    return SOME_FAILED if result.errors and show is None else SUCCESS
+    return show is not None or not result.errors
 
 
 @contextmanager

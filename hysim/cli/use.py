@@ -21,7 +21,7 @@ def simulate(
     out: options.Table | None = None,
     plot: options.Picture | None = None,
     json: bool = False,
-) -> int:
+) -> None:
     """Drive a model with the input in a file of your own.
 
     Simulate a model in free run, and write its signals as columns.
@@ -65,7 +65,6 @@ def simulate(
         path = out or records.STANDARD
         files[path] = lambda: outputs.table(path, columns, labels)
     outputs.write(files, (lambda: "") if json else None, document)
-    return 0
 
 
 def page(
@@ -76,7 +75,7 @@ def page(
     between: options.Pair | None = None,
     title: str | None = None,
     settings: records.RecordOptions,
-) -> int:
+) -> None:
     """Write a law with sliders as a page for a browser.
 
     Write a page on which the loop of a law follows sliders, one HTML file that works offline.
@@ -100,7 +99,6 @@ def page(
     record = None if data is None else records.read(settings, data)
     units |= ({} if record is None else dict(record.units)) | dict(settings.unit)
     hs.to_page(law, out, record, between=between, units=units, title=title)
-    return 0
 
 
 def _one_standard_input(model: str, record: str | None) -> None:
@@ -115,7 +113,7 @@ def c(
     inverse: bool = False,
     sample_time: options.Positive | None = None,
     u0: float = 0.0,
-) -> int:
+) -> None:
     """Write a model, or its inverse, as C99 for the device that it runs on.
 
     Write a law, a sum, a cascade or a plant as C99 with math.h alone.
@@ -143,7 +141,6 @@ def c(
     write_all({paths[end]: text for end, text in texts.items()})
     print(f"wrote {', '.join(paths.values())}; a program that reads one input in each line is compiled by")
     print(f"  cc -std=c99 -O2 -ffp-contract=off {paths['.c']} {paths['_main.c']} -lm -o {path.with_suffix('')}")
-    return 0
 
 
 Platform = Literal["linux", "windows", "mac"]
@@ -164,7 +161,7 @@ def fmu(
     u0: float = 0.0,
     y0: float = 0.0,
     platforms: Annotated[tuple[Platform, ...], options.Value("PLATFORMS", _platforms)] | None = None,
-) -> int:
+) -> None:
     """Write a model as a functional mock-up unit for Simulink, Modelica and other tools.
 
     Write a model as a functional mock-up unit (FMU) for co-simulation.
@@ -191,4 +188,3 @@ def fmu(
     law, units = models.read(model)
     units |= dict(unit)
     hs.to_fmu(law, out, version, sample_time, name=name, units=units, platforms=platforms, u0=u0, y0=y0)
-    return 0

@@ -226,15 +226,24 @@ class Posterior:
                 return arviz.from_dict(posterior=posterior, sample_stats=stats)
             return arviz.from_dict({"posterior": posterior, "sample_stats": stats})
 
+    def rows(self) -> list[dict[str, Any]]:
+        """Name, median, lower and upper, mean, standard_deviation, effective_samples and rhat of each parameter."""
+        ends, median = self.interval(), self.median
+        return [
+            {
+                "name": name, "median": median[name], "lower": ends[name][0], "upper": ends[name][1],
+                "mean": float(draws.mean()), "standard_deviation": float(draws.std(ddof=1)),
+                "effective_samples": self.effective_samples[name], "rhat": self.rhat[name],
+            }
+            for name, draws in self.samples.items()
+        ]  # fmt: skip
+
     def summary(self) -> str:
         """All parameters with median, interval, mean, standard deviation, effective samples and R-hat."""
-        ends, median = self.interval(), self.median
         table = [["parameter", "median", "interval at 95 %", "mean", "deviation", "effective", "R-hat"]]
-        for name, draws in self.samples.items():
-            low, high = ends[name]
-            values = f"{median[name]:.5g}", f"{low:.5g} to {high:.5g}", f"{draws.mean():.5g}"
-            trust = f"{draws.std(ddof=1):.2g}", f"{self.effective_samples[name]:.0f}", f"{self.rhat[name]:.3f}"
-            table.append([name, *values, *trust])
+        for name, median, low, high, mean, deviation, effective, rhat in map(dict.values, self.rows()):
+            values = f"{median:.5g}", f"{low:.5g} to {high:.5g}", f"{mean:.5g}", f"{deviation:.2g}"
+            table.append([name, *values, f"{effective:.0f}", f"{rhat:.3f}"])
         lines = [self._head(), *aligned(table), *(f"  prior of {name}: {words}" for name, words in self.priors.items())]
         return "\n".join([*lines, *(["Warnings"] if self.warnings else []), *(f"  {each}" for each in self.warnings)])
 
