@@ -47,7 +47,7 @@ def test_every_promised_file_is_there(reproduction):
 
 def test_stdout_holds_the_table_and_stderr_the_progress(reproduction, again):
     _, out, err = again
-    assert "0.232 um wide at 35 V" in out
+    assert "largest width  0.232 um at u = 35 V" in out
     assert all(name in out for name in MODELS)
     assert re.search(r"\d+ claims: \d+ agrees, ", out)
     assert re.search(r"hysteresis-90-bouc-wen: 9\d\.\d % where the paper says 90 %, reached", out)

@@ -23,8 +23,8 @@ from hysim.errors import SimulationError
 GROUPS: Mapping[str, Mapping[str, str]] = {
     "look at a file": {"example": "learn", "columns": "look", "metrics": "look", "plot": "look"},
     "from a file to a model": dict.fromkeys(("identify", "posterior", "compare", "discover"), "fits"),
-    "use a model": {"simulate": "use", "control": "control", "page": "use"},
-    "take a model elsewhere": {"c": "use", "fmu": "use"},
+    "use a model": dict.fromkeys(("simulate", "control", "page"), "use"),
+    "take a model elsewhere": dict.fromkeys(("c", "fmu"), "use"),
     "many simulations": {"sweep": "sweep"},
     "camera frames": {"measure": "look"},
     "learn and set up": dict.fromkeys(("explore", "reproduce", "completion"), "learn"),

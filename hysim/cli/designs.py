@@ -114,16 +114,13 @@ def designed(path: str, options: DesignOptions, exported: Callable[[Any], object
 
 def plant(model: Any, options: DesignOptions) -> hs.Actuator:
     actuator = as_actuator(model)
-    stages: dict[str, Any] = {}
     if options.mode is not None:
         frequency, ratio = options.mode
-        stages["vibration"] = hs.mode(2.0 * math.pi * frequency, ratio)
+        actuator = replace(actuator, vibration=hs.mode(2.0 * math.pi * frequency, ratio))
     if options.creep is not None:
-        stages["creep"] = hs.Creep.per_decade(options.creep)
+        actuator = replace(actuator, creep=hs.Creep.per_decade(options.creep))
     settings = {name: vars(options)[name] for name in ("noise", "quantum", "delay") if vars(options)[name] is not None}
-    if settings:
-        stages["sensor"] = replace(actuator.sensor or hs.Sensor(), **settings)
-    return replace(actuator, **stages)
+    return replace(actuator, sensor=replace(actuator.sensor or hs.Sensor(), **settings)) if settings else actuator
 
 
 def variations(actuator: hs.Actuator, percent: float | None) -> list[hs.Actuator]:

@@ -3,7 +3,7 @@
 import os
 import tempfile
 from collections import Counter
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Annotated, Any, Literal, NamedTuple
 
@@ -93,23 +93,17 @@ def example(path: options.Table | None = None, *, device: Kind = "piezo") -> Non
     hysim example damper.csv --device damper
     hysim example curves.mat --device magnet
     """
-    import numpy as np
-
-    from hysim.files import Notes, packed
-
     out = f"{device}.csv" if path is None else path
     if out != STANDARD and os.path.exists(out):
         raise ValueError(f"{out} is there already: give another name, as in hysim example mine.csv")
     what, make, tries = DEVICES[device]
     record = make()
-    columns = {} if record.t is None else {"t": np.asarray(record.t)}
-    columns |= {"u": record.u, "y": record.y}
-    notes = Notes(record.units, record.resolution, record.name)
-    content = packed(columns, "example.csv" if out == STANDARD else out, notes)
+    columns = {name: values for name in "tuy" if (values := vars(record)[name]) is not None}
+    content = outputs.table(out, columns, record.units, resolution=record.resolution, name=record.name)
     names = ", ".join(f"{name} [{record.units[name]}]" for name in columns)
     lines = [
         f"{out}: {len(record)} samples of {names}: {what}. Try:",
-        *(f"  hysim {line.format(out)}" for line in tries),
+        *(f"  hysim {each.format(out)}" for each in tries),
     ]
     outputs.write({out: lambda: content}, lambda: "\n".join(lines))
 
@@ -161,28 +155,21 @@ def reproduce(*, out: str = "reproduction", quick: bool = False, page: bool = Fa
     from hysim import paper
 
     result = paper.reproduce(out, quick=quick, page=page)
-    study = result.findings.study
     if json:
         print((result.folder / "summary.json").read_text(encoding="utf-8"), end="")
     else:
-        print(*_lines(study), *_verdicts(result.findings.claims), f"report: {result.folder / 'report.html'}", sep="\n")
-    return all(fit.success for fit in study.fits.values())
+        print(*_lines(result.findings), f"report: {result.folder / 'report.html'}", sep="\n")
+    return all(fit.success for fit in result.findings.study.fits.values())
 
 
-def _lines(study: Any) -> Iterator[str]:
-    comparison, loop = study.comparison, study.comparison.loop
-    yield (
-        f"Table 1: {len(comparison.record)} points, stroke {loop.stroke:.3f} um; the loop is {loop.max_width:.3f} um "
-        f"wide at {loop.max_width_at:g} V, {loop.mean_width:.4f} um on average, area {loop.area:.2f} um V"
-    )
+def _lines(findings: Any) -> Iterator[str]:
+    study, claims, comparison = findings.study, findings.claims, findings.study.comparison
+    yield f"Table 1: {len(comparison.record)} points. {comparison.loop.to_text(comparison.record.units)}"
     yield comparison.to_text()
     for name, fit in study.fits.items():
         for region, best in fit.regions.items():
             yield f"{name}: the best {region} law fits {best.fit_percent:.2f} %"
     yield f"sindy: {study.discovery.equation}  ({study.discovery.verdict})"
-
-
-def _verdicts(claims: Sequence[Any]) -> Iterator[str]:
     counts = Counter(claim.verdict for claim in claims)
     yield f"{len(claims)} claims: " + ", ".join(f"{number} {verdict}" for verdict, number in counts.most_common())
     for claim in claims:

@@ -135,12 +135,12 @@ def fields_of(result: Any, names: Iterable[str]) -> dict[str, Any]:
     return {name: attrgetter(name)(result) for name in names}
 
 
-def table(path: str, columns: Mapping[str, Any], units: Mapping[str, str]) -> bytes:
+def table(path: str, columns: Mapping[str, Any], units: Mapping[str, str], **notes: Any) -> bytes:
     """Columns in the format of the path's ending, CSV on standard output; ValueError if it is unknown."""
     from hysim.files import Notes, packed
 
-    notes = Notes({name: units[name] for name in columns if name in units})
-    return packed(columns, "output.csv" if path == STANDARD else path, notes)
+    known = {name: units[name] for name in columns if name in units}
+    return packed(columns, "output.csv" if path == STANDARD else path, Notes(known, **notes))
 
 
 def drawn(draw: Callable[[Any], object], width: float = 6.0, height: float = 4.0) -> Any:
@@ -163,8 +163,8 @@ def picture_of(run: "hs.Simulation") -> Any:
         return loop(run)
     n = run.signals["drift"].shape[1]
     columns, rows = min(n, _LOOPS_IN_A_ROW), math.ceil(n / _LOOPS_IN_A_ROW)
-    return drawn(
-        lambda canvas: hs.plot.element_loops(run, hs.plot.panels(canvas, n, columns=columns, sharex=False)),
-        width=3.0 * columns + 1.0,
-        height=3.0 * rows,
-    )
+
+    def draw(canvas: Any) -> None:
+        hs.plot.element_loops(run, hs.plot.panels(canvas, n, columns=columns, sharex=False))
+
+    return drawn(draw, 3.0 * columns + 1.0, 3.0 * rows)

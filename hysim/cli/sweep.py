@@ -110,21 +110,9 @@ def _executor(dask: str | None, processes: bool) -> Iterator[Any]:
 
 
 def _document(result: "hs.Sweep") -> dict[str, Any]:
-    import numpy as np
-
-    finite = {name: values[np.isfinite(values)] for name, values in result.outputs.items()}
-    return {
-        "n_tasks": result.n_tasks,
-        "n_done": len(result),
-        "parameters": list(result.parameters),
-        "errors": {str(place): message for place, message in result.errors.items()},
-        "outputs": {
-            name: dict(zip(("lowest", "median", "highest"), np.quantile(values, [0.0, 0.5, 1.0]).tolist(), strict=True))
-            | {"not_finite": len(result) - values.size}
-            for name, values in finite.items()
-            if values.size
-        },
-    }
+    errors = {str(place): message for place, message in result.errors.items()}
+    done = {"n_tasks": result.n_tasks, "n_done": len(result), "parameters": list(result.parameters)}
+    return done | {"errors": errors, "outputs": result.ranges}
 
 
 def _picture(result: "hs.Sweep", output: str | None) -> Any:
@@ -164,28 +152,19 @@ class FileTask:
 
     def __init__(self, path: str, name: str) -> None:
         self.path, self.name = path, name
-        function = vars(_module(path)).get(name)
-        if not callable(function):
+        spec: Any = importlib.util.spec_from_file_location(f"hysim_study_{Path(path).stem}", path)
+        sys.modules[spec.name] = module = importlib.util.module_from_spec(spec)
+        spec.loader.exec_module(module)
+        self.function: Any = vars(module).get(name)
+        if not callable(self.function):
             raise ValueError(f"{path} has no function {name!r}")
-        self.function: Callable[..., Any] = function
-        functools.update_wrapper(self, function)  # with its attribute `batch`, if it has one
+        functools.update_wrapper(self, self.function)  # with its attribute `batch`, if it has one
 
     def __call__(self, *arguments: Any, **named: Any) -> Any:
         return self.function(*arguments, **named)
 
     def __reduce__(self) -> tuple[Any, ...]:
         return FileTask, (self.path, self.name)
-
-
-def _module(path: str) -> Any:
-    name = f"hysim_study_{Path(path).stem}"
-    spec = importlib.util.spec_from_file_location(name, path)
-    if spec is None or spec.loader is None:
-        raise ValueError(f"{path} is no Python file")
-    module = importlib.util.module_from_spec(spec)
-    sys.modules[name] = module
-    spec.loader.exec_module(module)
-    return module
 
 
 def _function(text: str, folder: Path) -> Any:
@@ -215,7 +194,6 @@ def _space(kind: str, content: Any) -> Any:
         return {name: _values(values) for name, values in content.items()}
     if kind == "list":
         return content
-    _check(content, {"n", "method", "seed", "distributions"}, "[sample]")
     distributions = {name: _distribution(value) for name, value in content["distributions"].items()}
     return hs.Sample(**{**content, "distributions": distributions})
 

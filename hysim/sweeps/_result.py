@@ -118,17 +118,26 @@ class Sweep:
         }
         return xarray.Dataset(variables, coords=coordinates)
 
+    @property
+    def ranges(self) -> dict[str, dict[str, float]]:
+        """Lowest, median and highest value of each output, and not_finite, the number of values that are left out."""
+        finite = {name: values[np.isfinite(values)] for name, values in self.outputs.items()}
+        return {
+            name: dict(zip(("lowest", "median", "highest"), np.quantile(values, [0.0, 0.5, 1.0]).tolist(), strict=True))
+            | {"not_finite": len(self) - values.size}
+            for name, values in finite.items()
+            if values.size
+        }
+
     def summary(self) -> str:
         """Numbers of tasks that are done and that failed, the commonest errors, and the range of every output."""
         n = len(self)
         lines = [f"{n} of {self.n_tasks} tasks: {n - len(self.errors)} succeeded, {len(self.errors)} failed"]
         for message, number in Counter(self.errors.values()).most_common(5):
             lines.append(f"  {number} x {message}")
-        for name, values in self.outputs.items():
-            finite = values[np.isfinite(values)]
-            if finite.size:
-                low, middle, high = np.quantile(finite, [0.0, 0.5, 1.0])
-                lines.append(f"{name}: {low:.4g} to {high:.4g}, median {middle:.4g}, {n - finite.size} not finite")
+        for name, each in self.ranges.items():
+            values = f"{each['lowest']:.4g} to {each['highest']:.4g}, median {each['median']:.4g}"
+            lines.append(f"{name}: {values}, {each['not_finite']} not finite")
         return "\n".join(lines)
 
     def _along_axes(self, values: Column) -> Column:
