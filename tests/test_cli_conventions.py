@@ -96,7 +96,7 @@ def declared(
     others: tuple[options.RecordIn, ...] = (),
     *,
     group: Group,
-    unit: tuple[options.Unit, ...] = (),
+    units: options.Units | None = None,
     no_t: bool = False,
     cycles: Annotated[int, options.Value("CYCLES", lambda text: 0 if text == "all" else int(text), bare="all")] = 1,
     plot: options.Picture | None = None,
@@ -108,13 +108,13 @@ def declared(
     ----------
     file : an argument
     others : more of them
-    unit : more than once
+    units : more than once
     no_t : without a value
     cycles : with or without a number
     plot : a picture
     scale : a number
     """
-    return file, others, group, unit, no_t, cycles, plot, scale
+    return file, others, group, units, no_t, cycles, plot, scale
 
 
 def test_options_follow_from_signature_annotations_and_docstring():
@@ -125,9 +125,9 @@ def test_options_follow_from_signature_annotations_and_docstring():
         return options.call(declared, command.make_context("try", ["a", "--scale", "3", *arguments]).params)
 
     used = ("b", "c", "--limits", "-1,2", "--unit", "u=V", "--unit", "y=m", "--no-t", "--cycles", "--plot", "x.svg")
-    units = (("u", "V"), ("y", "m"))
+    units = {"u": "V", "y": "m"}
     assert called(*used) == ("a", ("b", "c"), Group(limits=(-1.0, 2.0)), units, True, 0, "x.svg", 3.0)
-    assert called() == ("a", (), Group(), (), False, 1, None, 3.0)
+    assert called() == ("a", (), Group(), None, False, 1, None, 3.0)
     roles = {name: each.value.role for name, each in parameters.items() if each.value.role}
     assert roles == {"file": "input", "others": "input", "plot": "picture"}
     assert {each.title for each in parameters.values()} == {"Arguments", "some numbers", "Options"}

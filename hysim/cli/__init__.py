@@ -17,7 +17,7 @@ from click.shell_completion import shell_complete
 from hysim import __version__
 from hysim._basics.progress import silent
 from hysim.cli import options, outputs, signals
-from hysim.cli.words import OTHER_NAMES, in_shell_words, suggestion
+from hysim.cli.words import flag, in_shell_words, suggestion
 from hysim.errors import SimulationError
 
 GROUPS: Mapping[str, Mapping[str, str]] = {
@@ -187,8 +187,7 @@ def _advice(error: click.UsageError) -> str:
     if not isinstance(error, click.NoSuchOption) or error.ctx is None:
         return error.format_message()
     word = error.option_name
-    name = word.lstrip("-").partition("=")[0].replace("-", "_")
-    meant = f"--{OTHER_NAMES.get(name, name).replace('_', '-')}"
+    meant = flag(word.lstrip("-").partition("=")[0].replace("-", "_"))
     known = [each for option in error.ctx.command.get_params(error.ctx) for each in option.opts]
     near = f"did you mean {meant}?" if meant in known else suggestion(word, known)
     return f"there is no option {word}" + (near and f": {near}")

@@ -3,11 +3,13 @@
 import inspect
 import sys
 from collections.abc import Callable
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal
 
 import hysim as hs
 from hysim.cli import models, options, outputs, records
+from hysim.cli.words import flag
 from hysim.errors import Interrupted
 
 _FOLDER = ("parameters.csv", "samples.csv", "corner.svg", "posterior.json")
@@ -18,18 +20,36 @@ _IDENTIFIED = (
 )  # fmt: skip
 
 
+@dataclass(kw_only=True)
+class IdentifyOptions(models.FitOptions):
+    """Options of `identify` alone.
+
+    Parameters
+    ----------
+    model :
+    bounds : bounds of a parameter: beta=0:2 [unit of the parameter]
+    depends : parameter that is a polynomial in a channel: gain=T:1
+    intervals : method of the 95 % intervals
+    cross_validate : leave out one sample at a time, one cycle, or one of K blocks
+    max_evaluations : most parameter sets that the search simulates; a fit that ends by it is partial
+    admissible : whether the law must be safe on smaller cycles, whatever its fit (default: where noise and creep allow
+        the loss of fit)
+    """
+
+    bounds: options.Ranges | None = None
+    depends: options.Depends | None = None
+    intervals: Literal["linear", "profile", "bootstrap"] = "linear"
+    cross_validate: options.Folds | None = None
+    max_evaluations: int | None = None
+    admissible: options.YesNo | None = None
+
+
 def identify(
     file: options.RecordIn,
     others: tuple[options.RecordIn, ...] = (),
     *,
     settings: records.WeighedOptions,
-    fit: models.FitOptions,
-    bounds: tuple[options.Range, ...] = (),
-    depends: tuple[options.Depends, ...] = (),
-    intervals: Literal["linear", "profile", "bootstrap"] = "linear",
-    cross_validate: options.Folds | None = None,
-    max_evaluations: int | None = None,
-    admissible: Literal["yes", "no"] | None = None,
+    fit: IdentifyOptions,
     out: options.ModelOut | None = None,
     plot: options.Picture | None = None,
     json: bool = False,
@@ -43,13 +63,6 @@ def identify(
     Parameters
     ----------
     others : further records with the same columns, such as those of other rates
-    bounds : bounds of a parameter: beta=0:2 [unit of the parameter]
-    depends : parameter that is a polynomial in a channel: gain=T:1
-    intervals : method of the 95 % intervals
-    cross_validate : leave out one sample at a time, one cycle, or one of K blocks
-    max_evaluations : most parameter sets that the search simulates; a fit that ends by it is partial
-    admissible : whether the law must be safe on smaller cycles, whatever its fit (default: where noise and creep allow
-        the loss of fit)
     out : write the model; - writes it to the standard output
     plot : draw the record and the model
 
@@ -68,23 +81,12 @@ def identify(
         raise ValueError("--weights, --sensor and --y-file are for one file: leave out the others, or use Python")
     record, weights = records.read_with_weights(settings, file)
     further = [records.read(settings, path) for path in others]
-    sensors = dict(settings.sensor)
-    measured: Any = records.of_structure(subject, record, sensors) if sensors else record
-    result = hs.identify(
-        subject,
-        [measured, *further] if further else measured,
-        bounds={name: (low, high) for name, low, high in bounds},
-        depends={name: (channel, degree) for name, channel, degree in depends} or None,
-        weights=weights,
-        intervals=intervals,
-        cross_validate=cross_validate,
-        max_evaluations=max_evaluations,
-        admissible=None if admissible is None else admissible == "yes",
-        **fit.for_identify(),
-    )
+    measured: Any = records.of_structure(subject, record, settings.sensor) if settings.sensor else record
+    measured = [measured, *further] if further else measured
+    result = hs.identify(subject, measured, weights=weights, **options.taken(hs.identify, fit))
 
     def picture() -> Any:
-        if sensors:  # the record of one sensor is not the output of the structure
+        if settings.sensor:  # the record of one sensor is not the output of the structure
             return outputs.picture_of(hs.simulate(result, record.t, record.u))
         return outputs.loop(record, result)
 
@@ -100,7 +102,7 @@ def posterior(
     *,
     settings: records.RecordOptions,
     fit: models.FitOptions,
-    prior: tuple[options.Range, ...] = (),
+    priors: options.Ranges | None = None,
     samples: options.Count = 10000,
     out: str | None = None,
     json: bool = False,
@@ -114,7 +116,7 @@ def posterior(
     Parameters
     ----------
     others : further records with the same columns, such as those of other rates
-    prior : flat prior of a parameter, or of sigma: n=1:3 (default: the box of the search) [unit of the parameter]
+    priors : flat prior of a parameter, or of sigma: n=1:3 (default: the box of the search) [unit of the parameter]
     samples : effective draws of each parameter
     out : folder to write into: parameters.csv, samples.csv, corner.svg and posterior.json
 
@@ -133,13 +135,13 @@ def posterior(
     outputs.keep([file, *others, fit.model], paths)
     if out is not None:
         Path(out).mkdir(parents=True, exist_ok=True)
-    result = hs.identify(subject, measured, **fit.for_identify())
+    result = hs.identify(subject, measured, **options.taken(hs.identify, fit))
     draws = hs.sample_posterior(
         result,
         measured,
         initial=fit.initial,
         noise=fit.noise,
-        priors={name: (low, high) for name, low, high in prior},
+        priors=priors or {},
         samples=samples,
         seed=fit.seed,
     )
@@ -322,7 +324,7 @@ def discover(
     used = {name: value for name, value in values.items() if value is not None}
     if unused := used.keys() - inspect.signature(verb).parameters.keys():
         user = "an oscillator" if is_oscillator else f"--route {route}"
-        raise ValueError(f"{' and '.join(map(options.flag, sorted(unused)))} is not used by {user}: leave it out")
+        raise ValueError(f"{' and '.join(map(flag, sorted(unused)))} is not used by {user}: leave it out")
     record = records.read(settings, file)
     result = verb(record, seed=seed, **used, **({} if is_oscillator else {"route": route}))
     model = result.model

@@ -26,7 +26,7 @@ def columns(file: options.RecordIn, *, settings: records.TextOptions, json: bool
     hysim columns rig.mat
     hysim columns export.csv --encoding latin-1
     """
-    listed = hs.list_columns(records.source_of(file)(), **settings.for_load())
+    listed = hs.list_columns(records.source_of(file)(), **options.taken(hs.list_columns, settings))
     width = max((len(column.name) for column in listed), default=0)
     lines = [
         f"{'' if column.number is None else column.number:>3}  {column.name:<{width}}  {_content(column)}"

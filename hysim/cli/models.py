@@ -14,7 +14,7 @@ import hysim as hs
 from hysim._names import MODULE_OF
 from hysim.cli import options
 from hysim.cli.records import STANDARD
-from hysim.cli.words import suggestion
+from hysim.cli.words import flag, suggestion
 
 _PLANTS = ("oscillator", "actuator")
 _OPTIONS = {"elements": "plays", "intervals": "relay_intervals"}
@@ -133,7 +133,7 @@ class StructureOptions:
 
     plays: options.Count | None = None
     relay_intervals: options.Count | None = None
-    one_signed: Literal["yes", "no"] | None = None
+    one_signed: options.YesNo | None = None
     degree: options.Count | None = None
     poles: int | None = None
     zeros: int | None = None
@@ -151,7 +151,7 @@ class FitOptions(StructureOptions, ActuatorOptions):
     Parameters
     ----------
     model :
-    fix : parameter that is not free: n=1 [unit of the parameter]
+    fixed : parameter that is not free: n=1 [unit of the parameter]
     free : parameter that is free, where it is fixed by default
     initial : state at the first sample (default: chosen by the BIC, or free)
     noise : noise of the output; quantised needs --resolution (default: gaussian)
@@ -159,16 +159,11 @@ class FitOptions(StructureOptions, ActuatorOptions):
     """
 
     model: ToIdentify
-    fix: tuple[options.Fixed, ...] = ()
+    fixed: options.Fixed | None = None
     free: tuple[str, ...] = ()
     initial: Literal["free", "rest", "still", "periodic"] | None = None
     noise: Literal["gaussian", "quantised", "robust"] | None = None
     seed: int = 0
-
-    def for_identify(self) -> dict[str, Any]:
-        """Arguments of `hysim.identify` beside the model, of which `to_identify` may have taken `initial`."""
-        others = {name: vars(self)[name] for name in ("free", "initial", "noise", "seed")}
-        return {"fixed": dict(self.fix), **others}
 
 
 CONTROLLERS = {
@@ -313,21 +308,20 @@ def to_identify(chosen: FitOptions) -> Any:
         others = [each for each in names_to_identify() if foreign[0] in _arguments(family(each))]
         _refuse(foreign, f"{name}, but of {', '.join(others)}")
     if missing := [each for each in _NEEDED if each in taken and each not in used]:
-        raise ValueError(f"the model {name} needs {options.flag(missing[0])}")
-    structure = {taken[each]: value == "yes" if each == "one_signed" else value for each, value in used.items()}
+        raise ValueError(f"the model {name} needs {flag(missing[0])}")
+    structure = {taken[each]: value for each, value in used.items()}
     if is_oscillator and chosen.initial is not None:
         structure["initial"], chosen.initial = chosen.initial, None  # its structure says how the record begins
     return model.structure(**structure) if structure or is_oscillator else model
 
 
 def _used(chosen: FitOptions, group: type[StructureOptions | ActuatorOptions]) -> dict[str, Any]:
-    values = {each.name: vars(chosen)[each.name] for each in fields(group)}
-    return {name: value for name, value in values.items() if value is not None and value is not False}
+    return {each.name: value for each in fields(group) if (value := vars(chosen)[each.name]) != each.default}
 
 
 def _refuse(foreign: Iterable[str], name: str) -> None:
     for each in foreign:
-        raise ValueError(f"{options.flag(each)} is no option of the model {name}")
+        raise ValueError(f"{flag(each)} is no option of the model {name}")
 
 
 def _arguments(model: Any) -> dict[str, str]:

@@ -13,8 +13,8 @@
         '''
 
 A parameter before the star is an argument by its place, and one behind it an option: a `bool` without a value, a tuple
-one that may be used more than once, a `Literal` one that takes some words. A dataclass stands for its fields, with its
-own docstring. Any other section of a docstring is a group of options with this title.
+or a dict one that may be used more than once, a `Literal` one that takes some words. A dataclass stands for its fields,
+with its own docstring. Any other section of a docstring is a group of options with this title.
 """
 
 import dataclasses
@@ -31,7 +31,7 @@ from typing import Annotated, Any, Literal, NamedTuple, TypeVar
 import click
 from click.shell_completion import CompletionItem
 
-from hysim.cli.words import suggestion
+from hysim.cli.words import flag, suggestion
 
 T = TypeVar("T")
 Command = Callable[..., bool | None]
@@ -115,6 +115,12 @@ def call(function: Command, values: Mapping[str, Any]) -> bool | None:
     return function(**arguments)
 
 
+def taken(verb: Callable[..., Any], settings: Any) -> dict[str, Any]:
+    """Values of the fields of a dataclass that have the name of an argument of a function."""
+    arguments = inspect.signature(verb).parameters
+    return {name: value for name, value in vars(settings).items() if name in arguments}
+
+
 def sections(subject: Any) -> dict[str, str]:
     """Sections of a docstring by their titles; what stands before the first is the section without a title."""
     first, *others = re.split(r"^(.+)\n---+\n", inspect.cleandoc(subject.__doc__ or ""), flags=re.MULTILINE)
@@ -144,8 +150,8 @@ def _declared(subject: Any, texts: Mapping[str, tuple[str, str]]) -> Iterator[Pa
 
 
 def _parameter(own: inspect.Parameter, title: str, text: str) -> Parameter:
-    hint, is_multiple = _of_one(own.annotation)
-    value, is_argument = _value(hint), own.kind is not inspect.Parameter.KEYWORD_ONLY
+    hint, several = _of_one(own.annotation)
+    value, is_multiple, is_argument = _value(hint), several is not None, own.kind is not inspect.Parameter.KEYWORD_ONLY
     text = (text or value.help or _HELP.get(own.name, "")) + _FORMS.get(value.role, "")
     settings: dict[str, Any] = {"type": value.convert, "shell_complete": value.complete, "metavar": value.name}
     settings["required"] = own.default is own.empty
@@ -159,20 +165,20 @@ def _parameter(own: inspect.Parameter, title: str, text: str) -> Parameter:
         settings = {"is_flag": True}
     elif value.bare is not None:
         settings |= {"is_flag": False, "flag_value": value.bare, "metavar": f"[{value.name}]"}
+    if several is dict:
+        settings["callback"] = lambda _context, _parameter, pairs: dict(pairs) or None
     option = click.Option([flag(own.name), own.name], help=text, multiple=is_multiple, **settings)
     return Parameter(option, value, text, title)
 
 
-def flag(name: str) -> str:
-    """The option for an argument, such as ``--sample-time``."""
-    return f"--{name.rstrip('_').replace('_', '-')}"
-
-
-def _of_one(hint: Any) -> tuple[Any, bool]:
-    """A type without None, that of each item of a tuple, and whether there may be several."""
+def _of_one(hint: Any) -> tuple[Any, type | None]:
+    """A type without None, that of each item of a tuple or dict, and the type of several values."""
     if typing.get_origin(hint) in (typing.Union, types.UnionType):
         (hint,) = (each for each in typing.get_args(hint) if each is not types.NoneType)
-    return (typing.get_args(hint)[0], True) if typing.get_origin(hint) is tuple else (hint, False)
+    several = typing.get_origin(hint)
+    if several not in (tuple, dict):
+        return hint, None
+    return typing.get_args(hint)[several is dict], several
 
 
 def _value(hint: Any) -> Value:
@@ -204,14 +210,15 @@ def _checked(value: T, text: str, *, holds: bool) -> T:
 
 
 def parts(form: str, *readers: Callable[[str], Any], expected: str = "") -> Value:
-    """A value of several parts, such as NAME=LOW:HIGH, each with its reader, and LOW below HIGH."""
+    """A value of several parts, each with its reader, and LOW below HIGH; of NAME=LOW:HIGH a name and its value."""
     pattern = re.sub("[A-Z]+", "(.+)", form).replace("(.+)", "(.+?)", 1)
     is_range = form.endswith("HIGH")
 
     def read(text: str) -> tuple[Any, ...]:
         match = re.fullmatch(pattern, text, re.DOTALL)
         values = tuple(each(part) for each, part in zip(readers, match.groups() if match else (), strict=True))
-        return _checked(values, text, holds=not is_range or values[-2] < values[-1])
+        _checked(values, text, holds=not is_range or values[-2] < values[-1])
+        return (values[0], values[1] if len(values) == 2 else values[1:]) if "=" in form else values
 
     return Value(form, read, expected or f"{form} with numbers{', LOW below HIGH' * is_range}")
 
@@ -267,6 +274,8 @@ _MODEL = f"model file as identify writes it, - for the standard input, or {OWN}"
 _RECORD = "text with one sample a line, NPZ, NPY, MAT or HDF5; or - for the standard input"
 _PLACE = "the number of a sample from 0, or a time with its unit such as 2.5s or 300ms"
 
+_DELIMITERS = {"tab": "\t", "semicolon": ";", "comma": ",", "blank": " "}
+Delimiter = Annotated[str, Value("TEXT", lambda text: _DELIMITERS.get(text, text))]
 Column = Annotated[str | int, Value("COLUMN", column)]
 Count = Annotated[int, Value("COUNT", at_least(1), "a number from 1 on")]
 Positive = Annotated[float, Value("NUMBER", between(0.0, math.inf), "a positive number without a unit")]
@@ -274,21 +283,23 @@ Percent = Annotated[float, Value("NUMBER", between(0.0, 100.0), "a number above 
 Pair = Annotated[tuple[float, float], parts("LOW,HIGH", float, float)]
 Mode = Annotated[tuple[float, float], parts("FREQUENCY,DAMPING", float, float)]
 Region = Annotated[tuple[int, int, int, int], parts("T,B,L,R", int, int, int, int)]
-Fixed = Annotated[tuple[str, float], parts("NAME=VALUE", str, float)]
-Range = Annotated[tuple[str, float, float], parts("NAME=LOW:HIGH", str, float, float)]
+Fixed = dict[str, Annotated[float, parts("NAME=VALUE", str, float)]]
+Ranges = dict[str, Annotated[tuple[float, float], parts("NAME=LOW:HIGH", str, float, float)]]
 PlaceIn = Annotated[Place, Value("PLACE", _place, _PLACE)]
-Unit = Annotated[tuple[str, str], parts("SIGNAL=UNIT", _signal, str, expected="t=, u= or y= and a unit")]
-Channel = Annotated[tuple[str, str | int], parts("CHANNEL=COLUMN", str, column, expected="CHANNEL=COLUMN")]
-Depends = Annotated[
-    tuple[str, str, int], parts("NAME=CHANNEL:DEGREE", str, str, int, expected="NAME=CHANNEL:DEGREE, such as gain=T:1")
-]
-Sensor = Annotated[tuple[str, str | int], Value("SENSOR=COLUMN", _sensor, "SENSOR=COLUMN, or the name of both")]
+Units = dict[str, Annotated[str, parts("SIGNAL=UNIT", _signal, str, expected="t=, u= or y= and a unit")]]
+Channels = dict[str, Annotated[str | int, parts("CHANNEL=COLUMN", str, column, expected="CHANNEL=COLUMN")]]
+_DEPENDS = parts("NAME=CHANNEL:DEGREE", str, str, int, expected="NAME=CHANNEL:DEGREE, such as gain=T:1")
+Depends = dict[str, Annotated[tuple[str, int], _DEPENDS]]
+Sensors = dict[str, Annotated[str | int, Value("SENSOR=COLUMN", _sensor, "SENSOR=COLUMN, or the name of both")]]
 Quantum = Annotated[float | str, Value("QUANTUM", float, "a number or detect", words=("detect",))]
 Cycles = Annotated[int, Value("CYCLES", lambda text: 0 if text == "all" else at_least(1)(text), _CYCLES, bare="all")]
 Folds = Annotated[
     str | int, Value("loo|cycles|K", at_least(0), "loo, cycles or a number of blocks", words=("loo", "cycles"))
 ]
 Blocks = Annotated[str | int, Value("loo|K", at_least(2), "loo or a number of blocks from 2 on", words=("loo",))]
+YesNo = Annotated[
+    bool, Value("[yes|no]", lambda text: bool(("no", "yes").index(text)), "yes or no", offers=lambda: ("yes", "no"))
+]
 Terms = Annotated[str | list[str], Value("NAME|TERMS", _terms)]
 Angle = Annotated[
     float | Literal["x", "y"], Value("x|y|DEGREES", float, "x, y or an angle in degrees", words=("x", "y"))

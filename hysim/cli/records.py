@@ -15,7 +15,6 @@ from hysim.cli import options
 STANDARD = "-"
 """Stands for the standard input or output."""
 
-_DELIMITERS = {"tab": "\t", "semicolon": ";", "comma": ",", "blank": " "}
 _ROUNDING = 1e-9  # of the record's time: 0.3 s is found among times that were added up
 _OF_NODES, _OF_ELEMENTS = (("displacement", "velocity", "acceleration"), ("drift", "force"))
 
@@ -33,15 +32,11 @@ class TextOptions:
     encoding : encoding of a text, such as latin-1 (default: UTF-8, -16 or -32)
     """
 
-    delimiter: str | None = None
+    delimiter: options.Delimiter | None = None
     decimal: Literal[".", ","] | None = None
     thousands: str | None = None
     skip: int = 0
     encoding: str | None = None
-
-    def for_load(self) -> dict[str, Any]:
-        others = {name: vars(self)[name] for name in ("decimal", "thousands", "skip", "encoding")}
-        return {"delimiter": _DELIMITERS.get(self.delimiter or "", self.delimiter), **others}
 
 
 @dataclass(kw_only=True)
@@ -57,7 +52,7 @@ class InputOptions(TextOptions):
         linearly to even times with this step
     on_missing : samples without a value
     resolution : resolution of the output's sensor [unit of y]; or detect: the step of which all outputs are multiples
-    unit : label of the unit of t, u or y, as in u=V; no value is converted
+    units : label of the unit of t, u or y, as in u=V; no value is converted
     from_ : first sample to use: its number from 0, or its time with a unit, as in 2.5s
     to : first sample behind those to use, likewise
     every : use each N-th of these samples only: a turn between two of them is lost
@@ -69,7 +64,7 @@ class InputOptions(TextOptions):
     sample_time: options.Positive | None = None
     on_missing: Literal["error", "drop"] = "error"
     resolution: options.Quantum | None = None
-    unit: tuple[options.Unit, ...] = ()
+    units: options.Units | None = None
     from_: options.PlaceIn | None = None
     to: options.PlaceIn | None = None
     every: options.Count | None = None
@@ -101,15 +96,15 @@ class WeighedOptions(RecordOptions):
     record
     ------
     weights : weight of each sample in the sum of squares, 0 to leave it out: name or number of its column
-    channel : further quantity, such as a temperature, and its column: T=temp (default: those of a file that hysim has
+    channels : further quantity, such as a temperature, and its column: T=temp (default: those of a file that hysim has
         saved)
     sensor : what a sensor on a structure measured, by the names of hysim simulate, and its column: drift_0, or
         acceleration_2=roof (default: the structure's own output, in the column --y)
     """
 
     weights: options.Column | None = None
-    channel: tuple[options.Channel, ...] = ()
-    sensor: tuple[options.Sensor, ...] = ()
+    channels: options.Channels | None = None
+    sensor: options.Sensors | None = None
 
 
 Source = Callable[[], Any]
@@ -147,7 +142,7 @@ def read_input(settings: InputOptions, path: str, *, of_the_ground: bool) -> "hs
         return cut(_ground_motion(settings, source), settings)
     if of_the_ground and settings.u is None and not settings.no_t:
         try:
-            names = column_names(source(), **settings.for_load())
+            names = column_names(source(), **options.taken(hs.list_columns, settings))
         except ValueError:
             names = ()  # a list, or a fault that is named where the file is read
         if "u" not in names:
@@ -160,8 +155,8 @@ def read_input(settings: InputOptions, path: str, *, of_the_ground: bool) -> "hs
 def read_with_weights(settings: WeighedOptions, path: str) -> "tuple[hs.Record, Any]":
     """The record, with columns of sensors as channels (the first is y if none is named), and the column of weights."""
     if settings.sensor and settings.y is None:
-        settings.y = settings.sensor[0][1]
-    settings.channel += settings.sensor
+        settings.y = next(iter(settings.sensor.values()))
+    settings.channels = {**(settings.channels or {}), **(settings.sensor or {})} or None
     source, weights = source_of(path), None
     if settings.weights is not None:
         weights = _read(replace(settings, y=settings.weights, resolution=None), path, source).y
@@ -221,15 +216,14 @@ def of_structure(structure: Any, record: "hs.Record", columns: Iterable[str]) ->
 
 def _ground_motion(settings: InputOptions, source: Source) -> "hs.Record":
     """A ground motion; a step is that of a list without times, or new even steps for one with times."""
-    arguments = {"t": settings.t, "units": dict(settings.unit).get("u"), **settings.for_load()}
-    del arguments["thousands"]
-    step = settings.sample_time
+    step, unit = settings.sample_time, (settings.units or {}).get("u")
+    arguments = options.taken(hs.load_ground_motion, settings) | {"units": unit, "sample_time": None}
     try:
         t, acceleration = hs.load_ground_motion(source(), **arguments)
     except ValueError:
         if step is None:
             raise
-        t, acceleration = hs.load_ground_motion(source(), sample_time=step, **arguments)
+        t, acceleration = hs.load_ground_motion(source(), **arguments | {"sample_time": step})
         step = None
     motion = hs.Record(t=t, u=acceleration, y=acceleration, units={"t": "s", "u": "m/s^2"})
     return motion if step is None else motion.resample(step)
@@ -255,13 +249,9 @@ def _read(settings: InputOptions, path: str, source: Source, *, uncut: bool = Fa
 
 
 def _loaded(settings: InputOptions, path: str, source: Any, u: Any, y: Any, **changed: Any) -> "hs.Record":
-    channels = dict(settings.channel) if isinstance(settings, WeighedOptions) else {}
-    arguments = {
-        "t": False if settings.no_t else settings.t, "units": dict(settings.unit), "on_missing": settings.on_missing,
-        "name": "record" if path == STANDARD else None, "channels": channels or None,
-        "resolution": settings.resolution, **settings.for_load(), **changed,
-    }  # fmt: skip
-    record: hs.Record = hs.load(source, u=u, y=y, **arguments)
+    time = False if settings.no_t else settings.t
+    own = {"u": u, "y": y, "t": time, "name": "record" if path == STANDARD else None, **changed}
+    record: hs.Record = hs.load(source, **options.taken(hs.load, settings) | own)
     return record
 
 
@@ -278,7 +268,11 @@ def _only_column(settings: InputOptions, source: Any, name: str) -> str:
     """This name, or that of the only column beside the time; a ValueError if there are several others."""
     from hysim.files import column_names
 
-    others = [each for each in column_names(source, **settings.for_load()) if each not in ("t", settings.t)]
+    others = [
+        each
+        for each in column_names(source, **options.taken(hs.list_columns, settings))
+        if each not in ("t", settings.t)
+    ]
     if name in others or not others:
         return name
     if len(others) > 1:

@@ -51,7 +51,7 @@ def simulate(
     law, units = models.read(model)
     of_the_ground = isinstance(law, _Shaken) and law.excitation == "base"
     record = records.read_input(settings, file, of_the_ground=of_the_ground)
-    units |= dict(settings.unit) | {signal: unit for signal, unit in record.units.items() if signal != "y"}
+    units |= (settings.units or {}) | {signal: unit for signal, unit in record.units.items() if signal != "y"}
     simulation = models.simulated(law, record, units)
     columns, named = simulation.columns, [item for item in simulation.signals.items() if item[0] in units]
     labels = {column: units[name] for name, values in named for column in columns_of(name, values)}
@@ -143,7 +143,7 @@ def page(
     _one_standard_input(model, data)
     law, units = models.read(model)
     record = None if data is None else records.read(settings, data)
-    units |= ({} if record is None else dict(record.units)) | dict(settings.unit)
+    units |= ({} if record is None else dict(record.units)) | (settings.units or {})
     hs.to_page(law, out, record, between=between, units=units, title=title)
 
 
@@ -203,7 +203,7 @@ def fmu(
     version: Literal["2.0", "3.0"] = "2.0",
     sample_time: options.Positive | None = None,
     name: str | None = None,
-    unit: tuple[options.Unit, ...] = (),
+    units: options.Units | None = None,
     u0: float = 0.0,
     y0: float = 0.0,
     platforms: Annotated[tuple[Platform, ...], options.Value("PLATFORMS", _platforms)] | None = None,
@@ -220,7 +220,7 @@ def fmu(
     version : version of FMI
     sample_time : time between two samples of a plant or a controller [s]
     name : name of the model, a name in C (default: that of its class)
-    unit : unit of u or y, such as u=V (default: those in the model's file)
+    units : unit of u or y, such as u=V (default: those in the model's file)
     u0 : input at which a law rests before the simulation, command at which a controller starts [unit of u]
     y0 : displacement at which a controller starts [unit of y]
     platforms : linux, windows, mac, with commas between them, for which it holds a shared library, or none (default:
@@ -231,6 +231,6 @@ def fmu(
     hysim fmu law.json --out law.fmu
     hysim fmu actuator.json --sample-time 1e-4 --version 3.0 --out actuator.fmu
     """
-    law, units = models.read(model)
-    units |= dict(unit)
-    hs.to_fmu(law, out, version, sample_time, name=name, units=units, platforms=platforms, u0=u0, y0=y0)
+    law, own = models.read(model)
+    labels = {**own, **(units or {})}
+    hs.to_fmu(law, out, version, sample_time, name=name, units=labels, platforms=platforms, u0=u0, y0=y0)

@@ -18,13 +18,19 @@ OTHER_NAMES = {
 }  # fmt: skip
 """Arguments whose option has another name, and that name."""
 
+
+def flag(name: str) -> str:
+    """The option for an argument, such as ``--sample-time``."""
+    return f"--{OTHER_NAMES.get(name, name).rstrip('_').replace('_', '-')}"
+
+
 _OF_IDENTIFY = (
     "bounds", "cross_validate", "free", "initial", "max_evaluations", "weights", "excitation", "resolution", "t",
     "admissible", "channels", "fixed",
 )  # fmt: skip
-OF_OTHER_COMMANDS = {
-    name: f"hysim identify --{OTHER_NAMES.get(name, name).replace('_', '-')}" for name in _OF_IDENTIFY
-} | {"priors": "hysim posterior --prior"}
+OF_OTHER_COMMANDS = {name: f"hysim identify {flag(name)}" for name in _OF_IDENTIFY} | {
+    "priors": "hysim posterior --prior"
+}
 """Arguments that a message names to readers of a command without such an option, and the option that stands for it."""
 
 _PHRASES = {
@@ -56,7 +62,7 @@ def in_shell_words(message: str, flags: Mapping[str, str]) -> str:
         message = re.sub(phrase, words, message)
     if not flags:
         return message
-    options = {**flags, **{name: flags[other] for name, other in OTHER_NAMES.items() if other in flags}}
+    options = {**flags, **{name: flag(name) for name in OTHER_NAMES if flag(name) in flags.values()}}
     known = {**OF_OTHER_COMMANDS, **options}
     texts = _CALL.split(message)  # every other one is a call
     texts[::2] = [
