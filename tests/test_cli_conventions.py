@@ -334,7 +334,7 @@ def test_a_controller_goes_from_model_to_files_and_does_what_is_printed(run, tmp
     assert controller.limits == (0.0, 100.0)
     assert {path.name for path in tmp_path.iterdir()} == {"c.json", "stage.c", "stage.h", "loop.svg"}
     assert "Reference [µm]" in files[2].read_text()
-    assert "record      the model fits the displacement [µm] by 100.00 %" in out
+    assert "record     the model fits the displacement [µm] by 100.00 %" in out
     plant = hs.Actuator(hysteresis=LAW, vibration=hs.mode(10.0 * np.pi, 0.05))
     assert controller.model == plant
     low, high, hertz = map(float, re.search(r"triangle +([\d.]+) to ([\d.]+) um, ([\d.]+) Hz", out).groups())
@@ -374,9 +374,9 @@ def test_control_names_the_quantities_that_drive_and_takes_them_in_the_units_of_
     design = ("control", tmp_path / "stack.json", "--record", tmp_path / "cycle.csv", "--sample-time", "1e-3")
     code, out, _ = run(*design, "--controller", "inverse", "--reference", tmp_path / "way.csv")
     assert code == 0
-    assert "record      the model fits the displacement [µm] by 100.00 %\n" in out
-    assert "reference   displacement [µm]: way.csv, second column, tracking rms 0." in out
-    assert "command     voltage [V]: 0 to 100 V, the extremes of cycle.csv\n" in out
+    assert "record     the model fits the displacement [µm] by 100.00 %\n" in out
+    assert "reference  displacement [µm]: way.csv, second column, tracking rms 0." in out
+    assert "command    voltage [V]: 0 to 100 V, the extremes of cycle.csv\n" in out
     for name, unit in (("way.csv", "V"), ("cycle.csv", "N")):
         path = tmp_path / name
         path.write_text(path.read_text().replace("[mm]", f"[{unit}]").replace("[kV]", f"[{unit}]"))

@@ -16,7 +16,7 @@ from scipy.optimize import brentq
 import hysim as hs
 from hysim._basics.frozen import FloatArray
 from hysim._basics.prefixes import label
-from hysim._basics.printing import extent, quantity
+from hysim._basics.printing import extent, quantity, summary_text
 from hysim.cli import models, outputs
 from hysim.cli.models import DesignOptions
 from hysim.cli.options import Pair
@@ -287,30 +287,21 @@ def document(design: Design) -> dict[str, Any]:
 
 def text(design: Design) -> str:
     """What is asked of the loop, and the printed results: the tuning, what the loop achieves, and its conditions."""
-    options, task, closed = design.options, design.task, design.triangle.closed
-    u, y = (design.units.get(name, "") for name in "uy")
-    lines = []
-    if not math.isnan(design.fit_percent):
-        lines.append(f"record      the model fits the {_signal(design, 'y')} by {design.fit_percent:.2f} %")
-    lines.append(f"reference   {_signal(design, 'y')}: {Path(options.reference).name}")
-    if not math.isnan(design.file_rms):
-        lines[-1] += f", second column, tracking rms {quantity(design.file_rms, y)}"
+    options, task, closed, units = design.options, design.task, design.triangle.closed, design.units
+    u, y = (units.get(name, "") for name in "uy")
+    driven, moved = (label(units, name)[0].lower() + label(units, name)[1:] for name in "uy")
     limits = closed.conditions["limits"]
-    lines.append(f"command     {_signal(design, 'u')}: {'no limits' if limits is None else extent(limits, u)}")
-    if options.record and not options.limits:
-        lines[-1] += f", the extremes of {Path(options.record).name}"
-    lines += [
-        f"triangle    {extent((task.low, task.high), y)}, {1.0 / task.period:.4g} Hz, cycle {_CYCLES}",
-        f"step        {quantity(task.step, y)} from rest at {quantity(task.u0, u)}",
-        "conditions  simulated, with the model as the plant",
-    ]
-    results = (design.tuning, design.triangle, design.step, closed)
-    return "\n".join([*lines, *(str(each) for each in results if each is not None)])
-
-
-def _signal(design: Design, name: str) -> str:
-    text = label(design.units, name)
-    return text[0].lower() + text[1:]
+    followed = "" if math.isnan(design.file_rms) else f", second column, tracking rms {quantity(design.file_rms, y)}"
+    source = f", the extremes of {Path(options.record).name}" if options.record and not options.limits else ""
+    rows = {
+        "record": "" if math.isnan(design.fit_percent) else f"the model fits the {moved} by {design.fit_percent:.2f} %",
+        "reference": f"{moved}: {Path(options.reference).name}{followed}",
+        "command": f"{driven}: {'no limits' if limits is None else extent(limits, u)}{source}",
+        "triangle": f"{extent((task.low, task.high), y)}, {1.0 / task.period:.4g} Hz, cycle {_CYCLES}",
+        "step": f"{quantity(task.step, y)} from rest at {quantity(task.u0, u)}",
+    }
+    results = filter(None, (design.tuning, design.triangle, design.step, closed))
+    return "\n".join([summary_text(["Design, simulated with the model as the plant"], rows), *map(str, results)])
 
 
 def picture(design: Design) -> Any:

@@ -136,15 +136,8 @@ def posterior(
     if out is not None:
         Path(out).mkdir(parents=True, exist_ok=True)
     result = hs.identify(subject, measured, **options.taken(hs.identify, fit))
-    draws = hs.sample_posterior(
-        result,
-        measured,
-        initial=fit.initial,
-        noise=fit.noise,
-        priors=priors or {},
-        samples=samples,
-        seed=fit.seed,
-    )
+    chosen = options.taken(hs.sample_posterior, fit)
+    draws = hs.sample_posterior(result, measured, priors=priors or {}, samples=samples, **chosen)
     rows = draws.rows()
     conditions = outputs.fields_of(draws, ("noise", "resolution", "priors", "n_evaluations", "seed", "warnings"))
     document = {"family": type(draws.model).__name__, "parameters": rows, **conditions}
@@ -231,7 +224,7 @@ def compare(
 
     files: outputs.Files = {
         out: lambda: _best(table),
-        csv: lambda: table.to_csv(),
+        csv: table.to_csv,
         markdown: lambda: table.to_markdown() + "\n",
         latex: lambda: table.to_latex() + "\n",
         plot: lambda: outputs.drawn(draw, 9.0, 2.2 * rows),

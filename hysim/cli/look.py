@@ -246,7 +246,7 @@ def measure(
     scale : length of a pixel [unit of y]
     unit : unit of the scale
     region : rows and columns of the moving part [pixel]
-    direction : direction of options.positive y (default: that of the motion)
+    direction : direction of positive y (default: that of the motion)
     reference : frame from which displacements are measured
     method : whether fractions of a pixel are measured
     frame_rate : frames per second: frame k is at the time k / frame rate [Hz]
@@ -294,14 +294,9 @@ def _table(motion: Any, log: "hs.Record | None", times: Any, on_lost: Any) -> tu
     units, is_kept = {"t": "s", "y": motion.units["y"], "uncertainty": motion.units["y"]}, np.full(len(motion), True)
     columns = {"t": times, "y": motion.y}
     if log is not None:
-        record = motion.record(
-            log.u,
-            t=log.t if times is None else None,
-            frame_times=times,
-            u_times=None if times is None else log.t,
-            on_lost=on_lost,
-            units={signal: unit for signal, unit in log.units.items() if signal != "y"},
-        )
+        at = {"t": log.t} if times is None else {"frame_times": times, "u_times": log.t}
+        labels = {signal: unit for signal, unit in log.units.items() if signal != "y"}
+        record = motion.record(log.u, **at, on_lost=on_lost, units=labels)
         columns, is_kept = {"t": record.t, "u": record.u, "y": record.y}, np.isfinite(motion.y)
         units |= dict(record.units)
     columns |= {"uncertainty": motion.uncertainty[is_kept], "quality": motion.quality[is_kept]}

@@ -13,9 +13,6 @@ from collections.abc import Iterator
 from types import FrameType
 from typing import Any, NoReturn
 
-INTERRUPTED = 128 + signal.SIGINT
-"""Exit code after Ctrl-C; after any signal it is 128 plus its number, as in shells."""
-
 PATIENCE = 1.3
 """Seconds in which a command can end in order."""
 
