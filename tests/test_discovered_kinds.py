@@ -216,7 +216,7 @@ def test_initial_states_are_counted_as_parameters_where_they_are_free(kinds):
         (["--route", "memory", "--mass", "2"], "--mass is not used by --route memory: leave it out"),
         (["--mass", "2", "--library", "duhem"], "--library is not used by an oscillator: leave it out"),
         (["--route", "oscillator", "--cross-validate", "3"], "--cross-validate is not used by an oscillator"),
-        (["--route", "oscillator", "--symmetry", "even"], '--symmetry must be None or "odd"'),
+        (["--route", "oscillator", "--symmetry", "even"], '--symmetry must be left out or "odd"'),
         (["--library", "u',|u'| z", "--degree", "2"], "--degree is not used with a library of names: leave it out"),
     ],
 )

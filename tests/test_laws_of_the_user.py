@@ -76,8 +76,8 @@ def test_a_study_of_data_executes_no_code(run, tmp_path):
 @pytest.mark.parametrize(
     ("model", "message"),
     [
-        ("nowhere:law", "there is no module 'nowhere' in "),
-        ("my_laws:lore", "my_laws.py'> has no 'lore'"),
+        ("nowhere:law", "nowhere:law is not there: No module named 'nowhere'"),
+        ("my_laws:lore", "module 'my_laws' has no attribute 'lore'"),
         ("my_laws:number", "my_laws:number is no law: expected a model, or a class of models, with a response; got 3"),
         ("my_laws:controller", "my_laws:controller is no law"),
         ("broken_laws:law", "No module named 'a_module_that_nobody_has'"),

@@ -346,7 +346,7 @@ def rows(path):
         ("task = 'none'", "give one of grid, list, sample"),
         ("task = 'none'\n[grid]\na = [1]", "file.py:function"),
         ("tusk = 'none'\n[grid]\na = [1]", "a study has no tusk"),
-        ("task = 'math:hippo'\n[grid]\na = [1]", "has no 'hippo'"),
+        ("task = 'math:hippo'\n[grid]\na = [1]", "has no attribute 'hippo'"),
         ("[response]\nlaw = 'bouc-wen'\n[grid]\nbeta = [1]", "'record' is missing"),
         ("task = 'math:sin'\n[sample]\nn = 3\ndistributions.x = [0, 1]", "take 2 or 4"),
         ("task = ", "study.toml"),

@@ -66,9 +66,9 @@ class Command(click.Command):
                 formatter.write_dl(rows)
 
     def format_epilog(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
-        for note in {each.value.note for each in self.declared if each.value.note is not None}:
+        for models in {each.value.models for each in self.declared if each.value.models is not None}:
             formatter.write("\n")
-            formatter.write_text(note())
+            formatter.write_text(f"Names of models: {', '.join(models())}.")
         with formatter.section("Examples"):
             for line in self.sections["Examples"].splitlines():
                 formatter.write(f"  {line}\n")

@@ -104,15 +104,30 @@ def metrics(
 
 Results = list[Any]
 """Records, and named free runs of models over the input of the first."""
+Draw = Callable[[Any, Results, dict[str, Any]], object]
+"""A function that draws results, or models by name, on a figure."""
 
 
 class Kind(NamedTuple):
     """A kind of picture: its description, its drawing, and bounds of the numbers of records and models."""
 
     shows: str
-    draw: Callable[[Any, Results, dict[str, Any]], object]
+    draw: Draw
     records: tuple[int, int] = (1, _MANY)
     models: tuple[int, int] = (0, _MANY)
+
+
+def _together(name: str) -> Draw:
+    return lambda canvas, results, _: vars(hs.plot)[name](*results, ax=canvas.add_subplot())
+
+
+def _each(name: str) -> Draw:
+    def draw(canvas: Any, results: Results, _: dict[str, Any]) -> None:
+        for result, ax in zip(results, hs.plot.panels(canvas, len(results)), strict=True):
+            vars(hs.plot)[name](result, ax)
+            ax.set_title(result.name)
+
+    return draw
 
 
 def _history(canvas: Any, results: Results, _: dict[str, Any]) -> None:
@@ -124,46 +139,28 @@ def _history(canvas: Any, results: Results, _: dict[str, Any]) -> None:
         panels[0].legend()
 
 
-def _each(name: str) -> Callable[[Any, Results, dict[str, Any]], None]:
-    def draw(canvas: Any, results: Results, _: dict[str, Any]) -> None:
-        for result, ax in zip(results, hs.plot.panels(canvas, len(results)), strict=True):
-            vars(hs.plot)[name](result, ax)
-            ax.set_title(result.name)
-
-    return draw
+def _residual_map(canvas: Any, results: Results, _: dict[str, Any]) -> None:
+    hs.plot.residual_map(results[0], results[1], canvas.subplots(1, 2, sharey=True))
 
 
 def _describing_function(canvas: Any, results: Results, laws: dict[str, Any]) -> None:
-    import numpy as np
-
-    record = results[0]
-    lowest, highest = float(record.u.min()), float(record.u.max())
-    amplitudes = np.linspace(0.0, 0.5 * (highest - lowest), _AMPLITUDES + 1)[1:]
-    middle, axes = 0.5 * (lowest + highest), hs.plot.panels(canvas, 2)
-    hs.plot.describing_function(laws, amplitudes, axes, mean=middle, units=record.units)
+    lowest, highest = float(results[0].u.min()), float(results[0].u.max())
+    middle, reach = 0.5 * (lowest + highest), 0.5 * (highest - lowest)
+    amplitudes = [reach * k / _AMPLITUDES for k in range(1, _AMPLITUDES + 1)]
+    axes = hs.plot.panels(canvas, 2)
+    hs.plot.describing_function(laws, amplitudes, axes, mean=middle, units=results[0].units)
 
 
 KINDS = {
-    "loop": Kind("output against input", lambda canvas, runs, _: hs.plot.loop(*runs, ax=canvas.add_subplot())),
+    "loop": Kind("output against input", _together("loop")),
     "history": Kind("output and input against time", _history),
-    "width": Kind(
-        "width of the last cycle against the input",
-        lambda canvas, runs, _: hs.plot.width(*runs, ax=canvas.add_subplot()),
-    ),
+    "width": Kind("width of the last cycle against the input", _together("width")),
     "cycles": Kind("each cycle in a colour, from the first, dark, to the last, light", _each("cycles")),
     "minor-loops": Kind("each cycle as a loop, the smaller the darker", _each("minor_loops")),
     "residual-map": Kind(
-        "measured minus model over input and cycles; one file, one model",
-        lambda canvas, runs, _: hs.plot.residual_map(runs[0], runs[1], canvas.subplots(1, 2, sharey=True)),
-        records=(1, 1),
-        models=(1, 1),
+        "measured minus model over input and cycles; one file, one model", _residual_map, records=(1, 1), models=(1, 1)
     ),
-    "forc": Kind(
-        "density of relays, from first-order reversal curves; one file",
-        lambda canvas, runs, _: hs.plot.forc(runs[0], canvas.add_subplot()),
-        records=(1, 1),
-        models=(0, 0),
-    ),
+    "forc": Kind("density of relays, from first-order reversal curves; one file", _together("forc"), (1, 1), (0, 0)),
     "describing-function": Kind(
         "gain and phase of models over the amplitudes in the file", _describing_function, models=(1, _MANY)
     ),

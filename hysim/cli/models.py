@@ -5,7 +5,7 @@ import os
 import pkgutil
 import re
 import sys
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Annotated, Any, Literal, Protocol, runtime_checkable
@@ -64,19 +64,11 @@ def _hyphenated(name: str) -> str:
     return re.sub(r"(?<=[a-z])(?=[A-Z])", "-", name).lower()
 
 
-FORMS = f"name of a family, such as bouc-wen; MODEL.json; or {options.OWN}"
-"""Values of an option for models."""
-
-
-def _named(known: Callable[[], list[str]], more: str = "") -> options.Value:
-    def note() -> str:
-        return f"Names of models: {', '.join(known())}.{more}"
-
-    return options.Value("MODEL", role=options.INPUT, offers=_offered, help=FORMS, note=note)
-
-
-ToCompare = Annotated[str, _named(names)]
-ToIdentify = Annotated[str, _named(names_to_identify, " A structure is a model in a file.")]
+_FORMS = f"name of a family, such as bouc-wen; MODEL.json, as that of a structure; or {options.OWN}"
+ToCompare = Annotated[str, options.Value("MODEL", role=options.INPUT, offers=_offered, help=_FORMS, models=names)]
+ToIdentify = Annotated[
+    str, options.Value("MODEL", role=options.INPUT, offers=_offered, help=_FORMS, models=names_to_identify)
+]
 Law = Annotated[str, options.Value("MODEL", offers=_offered)]
 
 
@@ -251,17 +243,13 @@ def family(name: str) -> Any:
 
 def resolved(path: str) -> Any:
     """The object at an import path, `module:name`, the current folder included; ValueError if there is none."""
-    module, _, name = path.partition(":")
     if os.getcwd() not in sys.path:
         sys.path.insert(0, os.getcwd())  # as `python -m hysim` has it
     try:
         return pkgutil.resolve_name(path)
-    except ModuleNotFoundError as error:
-        if error.name is None or module.split(".")[0] != error.name.split(".")[0]:
-            raise  # the module is there, and imports another one that is missing
-        raise ValueError(f"there is no module {module!r} in {os.getcwd()} or among the installed packages") from None
-    except AttributeError:
-        raise ValueError(f"{sys.modules[module]!r} has no {name!r}") from None
+    except (ModuleNotFoundError, AttributeError) as error:
+        places = f"modules are looked for in {os.getcwd()} and among the installed packages"
+        raise ValueError(f"{path} is not there: {error}; {places}") from None
 
 
 def is_import_path(text: str) -> bool:

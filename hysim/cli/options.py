@@ -59,7 +59,7 @@ class Value:
     """The value of an option: its name, how it is read, what is expected, and the role of a file that it names.
 
     `words` are taken as they are, and `bare` is the text if the value is left out. `offers` are what a shell completes
-    beside files, `note` is a paragraph for the end of the help, and `help` stands for a docstring that says nothing.
+    beside files, `models` are named at the end of the help, and `help` stands for a docstring that says nothing.
     """
 
     name: str
@@ -70,7 +70,7 @@ class Value:
     words: tuple[str, ...] = ()
     bare: str | None = None
     offers: Callable[[], Iterable[str]] = tuple
-    note: Callable[[], str] | None = None
+    models: Callable[[], Iterable[str]] | None = None
     help: str = ""
 
     def convert(self, text: Any) -> Any:
@@ -193,6 +193,11 @@ def one_of(words: Mapping[str, str]) -> Value:
     return Value(f"[{'|'.join(words)}]", None, ", ".join(words), words=(*words,), help=text)
 
 
+def either(form: str, read: Callable[[str], Any], expected: str) -> Value:
+    """One of the words with small letters in a form such as x|y|DEGREES, or another value."""
+    return Value(form, read, expected, words=tuple(word for word in form.split("|") if word.islower()))
+
+
 def at_least(least: int) -> Callable[[str], Any]:
     """A reader of whole numbers that are not below a least one."""
     return lambda text: _checked(int(text), text, holds=int(text) >= least)
@@ -220,11 +225,16 @@ def parts(form: str, *readers: Callable[[str], Any], expected: str = "") -> Valu
         _checked(values, text, holds=not is_range or values[-2] < values[-1])
         return (values[0], values[1] if len(values) == 2 else values[1:]) if "=" in form else values
 
-    return Value(form, read, expected or f"{form} with numbers{', LOW below HIGH' * is_range}")
+    numbers = " with numbers" * (float in readers) + ", LOW below HIGH" * is_range
+    return Value(form, read, expected or form + numbers)
 
 
 def _signal(text: str) -> str:
     return _checked(text, text, holds=text in ("t", "u", "y"))
+
+
+def _sensor(text: str) -> Any:
+    return _CHANNEL.convert(text if "=" in text else f"{text}={text}")
 
 
 def exclusive(**values: Any) -> None:
@@ -245,13 +255,6 @@ def _place(text: str) -> Place:
     unit = next((each for each in ("ms", "us", "ns", "s") if text.endswith(each)), "")
     number = text.removesuffix(unit)
     return (float(number) if unit else at_least(0)(number)), unit
-
-
-def _sensor(text: str) -> tuple[str, str | int]:
-    name, equals, key = text.partition("=")
-    if not name or (equals and not key):
-        raise ValueError(text)
-    return name, column(key) if equals else name
 
 
 def _terms(text: str) -> str | list[str]:
@@ -287,27 +290,21 @@ Fixed = dict[str, Annotated[float, parts("NAME=VALUE", str, float)]]
 Ranges = dict[str, Annotated[tuple[float, float], parts("NAME=LOW:HIGH", str, float, float)]]
 PlaceIn = Annotated[Place, Value("PLACE", _place, _PLACE)]
 Units = dict[str, Annotated[str, parts("SIGNAL=UNIT", _signal, str, expected="t=, u= or y= and a unit")]]
-Channels = dict[str, Annotated[str | int, parts("CHANNEL=COLUMN", str, column, expected="CHANNEL=COLUMN")]]
-_DEPENDS = parts("NAME=CHANNEL:DEGREE", str, str, int, expected="NAME=CHANNEL:DEGREE, such as gain=T:1")
-Depends = dict[str, Annotated[tuple[str, int], _DEPENDS]]
-Sensors = dict[str, Annotated[str | int, Value("SENSOR=COLUMN", _sensor, "SENSOR=COLUMN, or the name of both")]]
+_CHANNEL = parts("CHANNEL=COLUMN", str, column)
+Channels = dict[str, Annotated[str | int, _CHANNEL]]
+Depends = dict[str, Annotated[tuple[str, int], parts("NAME=CHANNEL:DEGREE", str, str, int)]]
+_SENSOR = "SENSOR=COLUMN, or the name of both"
+Sensors = dict[str, Annotated[str | int, Value("SENSOR=COLUMN", _sensor, _SENSOR)]]
 Quantum = Annotated[float | str, Value("QUANTUM", float, "a number or detect", words=("detect",))]
 Cycles = Annotated[int, Value("CYCLES", lambda text: 0 if text == "all" else at_least(1)(text), _CYCLES, bare="all")]
-Folds = Annotated[
-    str | int, Value("loo|cycles|K", at_least(0), "loo, cycles or a number of blocks", words=("loo", "cycles"))
-]
-Blocks = Annotated[str | int, Value("loo|K", at_least(2), "loo or a number of blocks from 2 on", words=("loo",))]
-YesNo = Annotated[
-    bool, Value("[yes|no]", lambda text: bool(("no", "yes").index(text)), "yes or no", offers=lambda: ("yes", "no"))
-]
-Terms = Annotated[str | list[str], Value("NAME|TERMS", _terms)]
-Angle = Annotated[
-    float | Literal["x", "y"], Value("x|y|DEGREES", float, "x, y or an angle in degrees", words=("x", "y"))
-]
+Folds = Annotated[str | int, either("loo|cycles|K", at_least(0), "loo, cycles or a number of blocks")]
+Blocks = Annotated[str | int, either("loo|K", at_least(2), "loo or a number of blocks from 2 on")]
+Angle = Annotated[float | Literal["x", "y"], either("x|y|DEGREES", float, "x, y or an angle in degrees")]
 Frame = Annotated[
-    int | Literal["first", "running"],
-    Value("first|running|N", at_least(0), "first, running or the number of a frame", words=("first", "running")),
+    int | Literal["first", "running"], either("first|running|N", at_least(0), "first, running or a number")
 ]
+YesNo = Annotated[bool, Value("[yes|no]", ("no", "yes").index, "yes or no", offers=lambda: ("yes", "no"))]
+Terms = Annotated[str | list[str], Value("NAME|TERMS", _terms)]
 RecordIn = Annotated[str, file("FILE", INPUT, _RECORD)]
 ModelIn = Annotated[str, file("MODEL", INPUT, _MODEL)]
 Result = Annotated[str, file("FILE")]

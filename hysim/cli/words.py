@@ -48,6 +48,7 @@ _PHRASES = {
     r"hs\.PrandtlIshlinskii or hs\.Preisach": "prandtl-ishlinskii or preisach",
     r"Take hs\.PrandtlIshlinskii": "Take prandtl-ishlinskii",
     r"hysim\.to_c and hysim\.to_fmu": "hysim c and hysim fmu",
+    "must be None or": "must be left out or",
     ", names as in Structure.scalars": "",
 }  # fmt: skip
 _CALL = re.compile(r"(\b[A-Za-z_]\w*\((?:[^()]|\([^()]*\))*\))")
