@@ -277,8 +277,7 @@ def document(design: Design) -> dict[str, Any]:
         },
         "step": {
             "u0": task.u0, "height": task.step, "duration": task.duration,
-            **outputs.scalars(reduction), "open": asdict(reduction.open), "closed": asdict(reduction.closed),
-            "stable": design.step.loop.stable,
+            **asdict(reduction), "stable": design.step.loop.stable,
         },
         "reference_tracking_rms": design.file_rms,
         "conditions": {name: value for name, value in triangle.closed.conditions.items() if not is_dataclass(value)},

@@ -1,5 +1,6 @@
 """`hysim identify`, `posterior`, `compare` and `discover`: from records in files to models."""
 
+import functools
 import inspect
 import sys
 from collections.abc import Callable
@@ -312,14 +313,14 @@ def discover(
     of_plant = {"mass": mass, "damping": damping, "stiffness": stiffness}
     others = {"library": library, "cross_validate": cross_validate, "degree": degree, "symmetry": symmetry}
     values = of_plant | others | {"initial": initial}
-    is_oscillator = route == "oscillator" or (route == "auto" and {*of_plant.values()} != {None})
-    verb: Any = hs.discover_oscillator if is_oscillator else hs.discover
     used = {name: value for name, value in values.items() if value is not None}
+    is_oscillator = route == "oscillator" or (route == "auto" and bool(of_plant.keys() & used.keys()))
+    verb: Any = hs.discover_oscillator if is_oscillator else functools.partial(hs.discover, route=route)
     if unused := used.keys() - inspect.signature(verb).parameters.keys():
         user = "an oscillator" if is_oscillator else f"--route {route}"
         raise ValueError(f"{' and '.join(map(flag, sorted(unused)))} is not used by {user}: leave it out")
     record = records.read(settings, file)
-    result = verb(record, seed=seed, **used, **({} if is_oscillator else {"route": route}))
+    result = verb(record, seed=seed, **used)
     model = result.model
     files: dict[str | None, Any] = {
         out: lambda: to_json(model, units=record.units),

@@ -49,7 +49,7 @@ def metrics(
     *,
     settings: records.RecordOptions,
     cycles: options.Cycles = 1,
-    tolerance: float | None = None,
+    tolerance: float = 0.01,
     out: options.Copy | None = None,
     csv: options.Result | None = None,
     plot: options.Picture | None = None,
@@ -64,7 +64,7 @@ def metrics(
     Parameters
     ----------
     cycles : print a table with one row a cycle; with a number, the average loop of so many last cycles
-    tolerance : reversals smaller than this fraction of the input's span are noise [1] (default: 0.01)
+    tolerance : reversals smaller than this fraction of the input's span are noise [1]
     out : write the printed result into a file too
     csv : with --cycles, write the table; - writes it to the standard output
     plot : draw the loop
@@ -80,15 +80,14 @@ def metrics(
     if csv is not None and cycles:
         raise ValueError("--csv writes the table of every cycle: give --cycles without a number too")
     record = records.read(settings, file)
-    accuracy = {} if tolerance is None else {"tolerance": tolerance}
     files: dict[str | None, Any] = {plot: lambda: outputs.loop(record)}
     measured: Any
     if cycles:
-        measured = hs.loop_metrics(record.u, record.y, cycles=cycles, **accuracy)
+        measured = hs.loop_metrics(record.u, record.y, cycles=cycles, tolerance=tolerance)
         lobes = [lobe._asdict() for lobe in measured.lobes]
         document = outputs.scalars(measured) | {"crossings": list(measured.crossings), "lobes": lobes}
     else:
-        measured = hs.cycle_metrics(record.u, record.y, **accuracy)
+        measured = hs.cycle_metrics(record.u, record.y, tolerance=tolerance)
         document = {"cycles": measured.rows(), "level": measured.level, "energy_outside": measured.energy_outside}
         files[csv] = lambda: measured.to_csv(record.units)
     document |= {"sign_convention": measured.sign_convention, "units": record.units}

@@ -87,12 +87,16 @@ def write(
     files: Files, text: Callable[[], str] | None = None, document: Callable[[], Mapping[str, Any]] | None = None
 ) -> None:
     """Write all files or none, and print `text`, or `document` with ``--json``, unless a path is standard output."""
-    contents = {path: _encoded(path, content()) for path, content in files.items() if path is not None}
+    contents: dict[Any, bytes] = {
+        path: _encoded(path, content()) for path, content in files.items() if path is not None
+    }
     if text is not None and STANDARD not in contents:
         contents[STANDARD] = printed(text, document).encode()
-    write_all({path: content for path, content in contents.items() if path != STANDARD})
-    if STANDARD in contents:
-        print(contents[STANDARD].decode(), end="", flush=True)
+    standard = contents.pop(STANDARD, None)
+    if contents:
+        write_all(contents)
+    if standard is not None:
+        print(standard.decode(), end="", flush=True)
 
 
 def _encoded(path: str, content: Any) -> bytes:

@@ -126,9 +126,24 @@ def source_of(path: str) -> Source:
     return begin
 
 
-def read(settings: InputOptions, path: str, *, uncut: bool = False) -> "hs.Record":
+def read(settings: InputOptions, path: str, source: Source | None = None, *, uncut: bool = False) -> "hs.Record":
     """The record that the settings describe, y = u without an output; `uncut` ignores --from, --to and --every."""
-    return _read(settings, path, source_of(path), uncut=uncut)
+    import numpy as np
+
+    source, step = source or source_of(path), settings.sample_time
+    u = "u" if settings.u is None else settings.u
+    if not isinstance(settings, RecordOptions):
+        record = _loaded(settings, path, source(), u, u)
+    elif settings.y_file is not None:
+        record = _from_two_files(settings, path, source, settings.y_file)
+    elif u == ("y" if settings.y is None else settings.y):
+        raise ValueError(f"the input and the output are both the column {u}: name them by --u and --y")
+    else:
+        record = _loaded(settings, path, source(), settings.u, settings.y)
+    if step is not None and record.t is None:
+        record, step = replace(record, t=step * np.arange(float(len(record)))), None
+    record = record if uncut else cut(record, settings)
+    return record if step is None else record.resample(step)
 
 
 def read_input(settings: InputOptions, path: str, *, of_the_ground: bool) -> "hs.Record":
@@ -149,7 +164,7 @@ def read_input(settings: InputOptions, path: str, *, of_the_ground: bool) -> "hs
             return cut(_ground_motion(settings, source), settings)
     if settings.u is None:
         settings.u = _only_column(settings, source(), "u")
-    return _read(settings, path, source)
+    return read(settings, path, source)
 
 
 def read_with_weights(settings: WeighedOptions, path: str) -> "tuple[hs.Record, Any]":
@@ -159,8 +174,8 @@ def read_with_weights(settings: WeighedOptions, path: str) -> "tuple[hs.Record, 
     settings.channels = {**(settings.channels or {}), **(settings.sensor or {})} or None
     source, weights = source_of(path), None
     if settings.weights is not None:
-        weights = _read(replace(settings, y=settings.weights, resolution=None), path, source).y
-    return _read(settings, path, source), weights
+        weights = read(replace(settings, y=settings.weights, resolution=None), path, source).y
+    return read(settings, path, source), weights
 
 
 def cut(record: "hs.Record", settings: InputOptions) -> "hs.Record":
@@ -227,25 +242,6 @@ def _ground_motion(settings: InputOptions, source: Source) -> "hs.Record":
         step = None
     motion = hs.Record(t=t, u=acceleration, y=acceleration, units={"t": "s", "u": "m/s^2"})
     return motion if step is None else motion.resample(step)
-
-
-def _read(settings: InputOptions, path: str, source: Source, *, uncut: bool = False) -> "hs.Record":
-    import numpy as np
-
-    u = "u" if settings.u is None else settings.u
-    step = settings.sample_time
-    if not isinstance(settings, RecordOptions):
-        record = _loaded(settings, path, source(), u, u)
-    elif settings.y_file is not None:
-        record = _from_two_files(settings, path, source, settings.y_file)
-    elif u == ("y" if settings.y is None else settings.y):
-        raise ValueError(f"the input and the output are both the column {u}: name them by --u and --y")
-    else:
-        record = _loaded(settings, path, source(), settings.u, settings.y)
-    if step is not None and record.t is None:
-        record, step = replace(record, t=step * np.arange(float(len(record)))), None
-    record = record if uncut else cut(record, settings)
-    return record if step is None else record.resample(step)
 
 
 def _loaded(settings: InputOptions, path: str, source: Any, u: Any, y: Any, **changed: Any) -> "hs.Record":
