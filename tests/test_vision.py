@@ -244,7 +244,7 @@ def test_files_of_every_kind_show_the_same(stairs, name):
         ("png --voltage few.csv --u u", "there are 3 voltages for 11 frames: give one for each frame"),
         ("png --voltage few.csv", "--voltage needs --u COLUMN"),
         ("png --u u", "--u and --t are columns of a file with voltages"),
-        ("png --frame-rate 0", "--frame-rate must be positive"),
+        ("png --frame-rate 0", "'--frame-rate': expected a positive number"),
         ("png --reference 11", "there is no frame 11 to be the reference"),
     ],
 )

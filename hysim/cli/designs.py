@@ -137,10 +137,10 @@ def task(actuator: hs.Actuator, options: DesignOptions, within: Pair | None) -> 
     h, poles = options.sample_time, _poles(actuator)
     low, high = options.range or _reach(actuator, within)
     periods = [2.0 * math.pi / abs(pole) * (_SLOWER_THAN_MODE if pole.imag else _SLOWER_THAN_LAG) for pole in poles]
-    half = max(1, round(0.5 * (1.0 / options.frequency if options.frequency else max([_SAMPLES * h, *periods])) / h))
+    period = 1.0 / options.frequency if options.frequency else float(max([_SAMPLES * h, *periods]))
     decays = [_AT_REST / -pole.real for pole in poles if pole.real < 0.0]
     duration = options.duration or float(max([_SAMPLES * h, *decays]))
-    longest = max(_CYCLES * 2 * half, duration / h)
+    longest = max(_CYCLES * period, duration) / h
     if longest > _CYCLES * _MOST_SAMPLES:
         raise ValueError(
             f"the loop would take {longest:.2g} samples: the plant is slow beside the sample time; give --frequency "
@@ -150,6 +150,7 @@ def task(actuator: hs.Actuator, options: DesignOptions, within: Pair | None) -> 
     if not step or not math.isfinite(step):
         raise ValueError(f"--step must be a number that is not zero, got {step}")
     begin = low + (0.25 if step > 0.0 else 0.75) * (high - low)
+    half = max(1, round(0.5 * period / h))
     return Task(low, high, 2 * half * h, _resting_voltage(actuator, begin, within), step, duration, h)
 
 

@@ -281,7 +281,7 @@ def measure(
         out: lambda: outputs.table(out, table, units),
         plot: lambda: outputs.drawn(lambda canvas: hs.plot.displacement(motion, ax=canvas.add_subplot())),
     }
-    outputs.write(files, motion.summary, lambda: _document(motion))
+    outputs.write(files, motion.summary, motion.figures)
 
 
 def _table(motion: Any, log: "hs.Record | None", times: Any, on_lost: Any) -> tuple[dict[str, Any], dict[str, str]]:
@@ -297,18 +297,3 @@ def _table(motion: Any, log: "hs.Record | None", times: Any, on_lost: Any) -> tu
         units |= dict(record.units)
     columns |= {"uncertainty": motion.uncertainty[is_kept], "quality": motion.quality[is_kept]}
     return {name: values for name, values in columns.items() if values is not None}, units
-
-
-def _document(motion: Any) -> dict[str, Any]:
-    import numpy as np
-
-    measured = np.isfinite(motion.y)
-    return {
-        "frames": len(motion),
-        **{status: motion.status.count(status) for status in ("ok", "blurred", "lost")},
-        **outputs.fields_of(motion, ("direction", "scale", "resolution")),
-        "lowest": float(np.min(motion.y, where=measured, initial=np.inf)),
-        "highest": float(np.max(motion.y, where=measured, initial=-np.inf)),
-        "uncertainty": float(np.median(motion.uncertainty[measured])) if measured.any() else None,
-        "units": dict(motion.units),
-    }

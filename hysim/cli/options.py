@@ -216,7 +216,7 @@ def _checked(value: T, text: str, *, holds: bool) -> T:
 
 def parts(form: str, *readers: Callable[[str], Any], expected: str = "") -> Value:
     """A value of several parts, each with its reader, and LOW below HIGH; of NAME=LOW:HIGH a name and its value."""
-    pattern = re.sub("[A-Z]+", "(.+)", form).replace("(.+)", "(.+?)", 1)
+    pattern = re.sub("[A-Z]+", "(.*)", form).replace("(.*)", "(.+?)", 1)  # the first sign parts a name from its value
     is_range = form.endswith("HIGH")
 
     def read(text: str) -> tuple[Any, ...]:

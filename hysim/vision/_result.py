@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import field
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 import numpy.typing as npt
@@ -66,16 +66,29 @@ class Displacement:
     def __len__(self) -> int:
         return self.y.size
 
+    def figures(self) -> dict[str, Any]:
+        """Frames in all and by status, and extremes and median standard error of the displacement, if any is known."""
+        is_located = np.isfinite(self.y)
+        y, error = self.y[is_located], self.uncertainty[is_located]
+        return {
+            "frames": len(self),
+            **{status: self.status.count(status) for status in STATUSES},
+            "direction": self.direction, "scale": self.scale, "resolution": self.resolution,
+            "lowest": float(y.min()) if y.size else None,
+            "highest": float(y.max()) if y.size else None,
+            "uncertainty": float(np.median(error)) if y.size else None,
+            "units": dict(self.units),
+        }  # fmt: skip
+
     def summary(self) -> str:
         """Frames by status, the range of the displacement and its median standard error, in words."""
-        counts = ", ".join(f"{n} {status}" for status in STATUSES if (n := self.status.count(status)))
+        known, unit = self.figures(), self.units["y"]
+        counts = ", ".join(f"{known[status]} {status}" for status in STATUSES if known[status])
         lines = [f"{len(self)} frames: {counts}", f"direction {self.direction:.2f} degrees from the right, downwards"]
-        is_located = np.isfinite(self.y)
-        if is_located.any():
-            error = float(np.median(self.uncertainty[is_located]))
+        if (error := known["uncertainty"]) is not None:
             lines += [
-                f"displacement from {self.y[is_located].min():.6g} to {self.y[is_located].max():.6g} {self.units['y']}",
-                f"standard error {error:.2g} {self.units['y']}, {error / self.scale:.2g} pixel",
+                f"displacement from {known['lowest']:.6g} to {known['highest']:.6g} {unit}",
+                f"standard error {error:.2g} {unit}, {error / self.scale:.2g} pixel",
             ]
         return "\n".join(lines)
 
