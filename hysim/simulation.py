@@ -1,6 +1,6 @@
 """The verb `simulate`: the output of a plant for an input in time."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import field, replace
 from typing import Any, Protocol, runtime_checkable
 
@@ -109,9 +109,8 @@ class Simulation:
 
 def frame_of_signals(columns: Mapping[str, FloatArray], units: Mapping[str, str]) -> Any:
     """Columns as a `pandas.DataFrame` with t as its index, and units by the columns' names in ``attrs["units"]``."""
-    known = {label: unit for label in columns if (unit := _unit_of(label, units)) is not None}
     others = {label: values for label, values in columns.items() if label != "t"}
-    return frame(others, index=("t", columns["t"]) if "t" in columns else None, units=known)
+    return frame(others, index=("t", columns["t"]) if "t" in columns else None, units=column_units(columns, units))
 
 
 def dataset_of_signals(signals: Mapping[str, FloatArray], units: Mapping[str, str]) -> Any:
@@ -130,6 +129,11 @@ def dataset_of_signals(signals: Mapping[str, FloatArray], units: Mapping[str, st
 def _second_axis(name: str) -> str:
     signal = name.removeprefix(_PEAK)
     return "node" if signal in _BY_NODE else "element" if signal in _BY_ELEMENT else f"{name}_0"
+
+
+def column_units(columns: Iterable[str], units: Mapping[str, str]) -> dict[str, str]:
+    """Units of columns by their labels, where they are known: drift_0 has that of the signal drift."""
+    return {label: unit for label in columns if (unit := _unit_of(label, units)) is not None}
 
 
 def _unit_of(label: str, units: Mapping[str, str]) -> str | None:

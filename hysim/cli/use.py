@@ -43,7 +43,7 @@ def simulate(
     hysim simulate frame.json quake.at2 --out response.csv --plot loops.svg
     hysim simulate law.json loop.csv | hysim plot - --out loop.svg
     """
-    from hysim.simulation import columns_of
+    from hysim.simulation import column_units
 
     _one_standard_input(model, file)
     if file.endswith(".json") and model.endswith((".csv", ".tsv", ".txt", ".npz", ".mat", ".h5")):
@@ -53,12 +53,11 @@ def simulate(
     record = records.read_input(settings, file, of_the_ground=of_the_ground)
     units |= (settings.units or {}) | {signal: unit for signal, unit in record.units.items() if signal != "y"}
     simulation = models.simulated(law, record, units)
-    columns, named = simulation.columns, [item for item in simulation.signals.items() if item[0] in units]
-    labels = {column: units[name] for name, values in named for column in columns_of(name, values)}
+    columns = simulation.columns
+    labels = column_units(columns, units)
 
     def document() -> dict[str, Any]:
-        values = {name: column.tolist() for name, column in columns.items()}
-        return {"units": {name: labels[name] for name in columns if name in labels}, "columns": values}
+        return {"units": labels, "columns": {name: column.tolist() for name, column in columns.items()}}
 
     files: dict[str | None, Any] = {plot: lambda: outputs.picture_of(simulation)}
     if out is not None or not json:
