@@ -117,7 +117,6 @@ HYSIM = click.version_option(__version__, message="hysim %(version)s")(
         epilog="Each command has its own help: hysim COMMAND --help. To begin: hysim example.",
         context_settings=_SETTINGS,
         subcommand_metavar="COMMAND ...",
-        add_help_option=True,
     )
 )
 """The whole command line."""
@@ -136,8 +135,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return request.exit_code
     except click.UsageError as error:
         path = error.ctx.command_path if error.ctx else "hysim"
-        print(f"{path}: error: {one_line(_advice(error))} (see {path} --help)", file=sys.stderr)
-        return BAD_INPUT
+        return _failed(BAD_INPUT, f"error: {one_line(_advice(error))} (see {path} --help)", path)
     except BrokenPipeError:  # the reader of the output has closed it
         return _discard(DONE)
     except MemoryError:
@@ -167,9 +165,9 @@ def _ended(request: "KeyboardInterrupt | signals.Ended") -> int:
     return _failed(128 + number, signals.message(number))
 
 
-def _failed(code: int, text: str) -> int:
+def _failed(code: int, text: str, program: str = "hysim") -> int:
     start = "\r\x1b[K" if sys.stderr.isatty() else ""
-    print(f"{start}hysim: {text}", file=sys.stderr)
+    print(f"{start}{program}: {text}", file=sys.stderr)
     try:
         print(end="", flush=True)
     except OSError:
