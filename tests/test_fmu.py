@@ -620,7 +620,7 @@ def test_a_unit_is_written_from_the_command_line(run):
         (("law.json", "--out", "law.fmu", "--version", "1.0"), "expected 2.0, 3.0, got '1.0'"),
         (("law.json", "--out", "law.fmu", "--platforms", "linux,amiga"), "got 'amiga'"),
         (("law.json", "--out", "law.fmu", "--name", "my law"), "name must be letters"),
-        (("law.json", "--out", "law.fmu", "--sample-time", "0"), "--sample-time must be positive"),
+        (("law.json", "--out", "law.fmu", "--sample-time", "0"), "'--sample-time': expected a positive number"),
         (("pid.json", "--out", "pid.fmu"), "sample"),
         (("loop.csv", "--out", "law.fmu"), "does not hold a model"),
         (("none.json", "--out", "law.fmu"), "No such file"),
