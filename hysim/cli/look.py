@@ -57,9 +57,8 @@ def metrics(
 ) -> None:
     """Measure the loop in a file of your own.
 
-    Measure the loop of the input's last complete cycle, the average loop of the last few, or every cycle.
-
-    The table of every cycle is of growing protocols, and of 0, max, min, 0.
+    Measure the loop of the input's last complete cycle, the average loop of the last few, or every cycle. The table of
+    every cycle is of growing protocols, and of 0, max, min, 0.
 
     Parameters
     ----------
@@ -183,8 +182,6 @@ def plot(
     Parameters
     ----------
     others : more files with the same columns
-    model : model file as identify writes it, - for the standard input, or module:name of your own, which executes
-        ./module.py or an installed module; once or more
     out : the picture
 
     Examples

@@ -21,12 +21,11 @@ from hysim.cli.words import in_shell_words
 Files = Mapping[str | None, Callable[[], Any]]
 """Functions of the contents of files, which are texts, bytes or figures, by the paths; None stands for no file."""
 
-_FORMS = {
+_FORMS = {  # by role: what is said of a wrong ending, and the right ones
     PICTURE: ("pictures are SVG, PNG or PDF: call the file .svg, .png or .pdf", (".svg", ".png", ".pdf")),
     MODEL: ("models are JSON: call the file .json", (".json",)),
     SOURCE: ("C code is a file with its header beside it: call the file .c", (".c",)),
 }
-"""What is said of a wrong ending, and the endings that a file of a role may have."""
 
 _BESIDE_SOURCE = (".h", "_main.c")
 _LOOPS_IN_A_ROW = 3
