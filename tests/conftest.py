@@ -4,6 +4,7 @@ import contextlib
 import gc
 import hashlib
 import importlib
+import io
 import os
 import pickle
 import sqlite3
@@ -116,6 +117,23 @@ def pyplot_keeps_no_figure():
 def no_call_is_long_enough_to_report(monkeypatch):
     """A slow machine would write progress where a test expects nothing on the standard error."""
     monkeypatch.setattr("hysim._basics.progress._SILENT", float("inf"))
+
+
+@pytest.fixture
+def shell(monkeypatch, capsys):
+    """Run hysim's command line with these words: exit code, standard output, standard error."""
+    from hysim.cli import main
+
+    def run(*words, stdin=None):
+        if stdin is not None:
+            monkeypatch.setattr("sys.stdin", io.StringIO(stdin))
+        try:
+            code = main([*map(str, words)])
+        except SystemExit as exit_:
+            code = exit_.code
+        return code, *capsys.readouterr()
+
+    return run
 
 
 def once_for_all_processes(tmp_path_factory, name, compute):

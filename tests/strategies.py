@@ -26,6 +26,15 @@ def bounded_laws(draw) -> hs.BoucWen:
     )
 
 
+def assert_cut_and_continued_gives_the_same_bits(law, u, cut, **time) -> None:
+    """Outputs and the state at the end are those of the uncut input."""
+    head, state = law.advance(u[:cut], **time) if cut else (np.empty(0), None)
+    tail, end = law.advance(u[cut:], state, **time)
+    whole, whole_end = law.advance(u, **time)
+    assert np.array_equal(np.concatenate([head, tail]), whole)
+    assert end == whole_end
+
+
 @st.composite
 def short_inputs(draw, amplitude: float = 0.4) -> np.ndarray:
     """Random walks with plateaus that stay where no law above escapes."""

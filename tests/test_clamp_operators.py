@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from strategies import short_inputs
+from strategies import assert_cut_and_continued_gives_the_same_bits, short_inputs
 
 import hysim as hs
 from hysim.kernels.stepping import drive
@@ -178,12 +178,7 @@ def test_loops_between_the_same_inputs_are_congruent(first, second):
 @pytest.mark.parametrize("law", LAWS, ids=family)
 @given(u=short_inputs(1.0), data=st.data())
 def test_cut_and_continue_gives_the_same_bits(law, u, data):
-    cut = data.draw(st.integers(0, u.size))
-    head, state = law.advance(u[:cut]) if cut else (np.empty(0), None)
-    tail, end = law.advance(u[cut:], state)
-    whole, whole_end = law.advance(u)
-    assert np.array_equal(np.concatenate([head, tail]), whole)
-    assert end == whole_end
+    assert_cut_and_continued_gives_the_same_bits(law, u, data.draw(st.integers(0, u.size)))
 
 
 @pytest.mark.parametrize("law", LAWS, ids=family)

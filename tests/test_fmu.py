@@ -16,7 +16,6 @@ import pytest
 from square_dahl import SquareDahl
 
 import hysim as hs
-from hysim.cli import main
 from hysim.export import _compilers, _fmu
 from hysim.export._fmu import field_unit
 from hysim.export._program import Field, Program
@@ -580,23 +579,19 @@ def test_a_model_that_diverges_ends_the_simulation(tmp_path, version):
 
 
 @pytest.fixture
-def run(tmp_path, monkeypatch, capsys):
+def run(tmp_path, monkeypatch, shell):
     """Run `hysim fmu` in a folder with a law and a record: exit code and standard error."""
     monkeypatch.chdir(tmp_path)
     hs.save(LAW, "law.json", units={"u": "mm", "y": "N"})
     hs.save(hs.PID(kp=1.0), "pid.json")
     Path("loop.csv").write_text("u,y\n0,0\n1,1\n")
 
-    def command(*arguments):
-        try:
-            code = main(["fmu", *arguments])
-        except SystemExit as exit_:
-            code = exit_.code
-        out, err = capsys.readouterr()
+    def fmu(*arguments):
+        code, out, err = shell("fmu", *arguments)
         assert out == ""
         return code, err
 
-    return command
+    return fmu
 
 
 def test_a_unit_is_written_from_the_command_line(run):

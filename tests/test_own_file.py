@@ -35,20 +35,11 @@ def folder(tmp_path_factory):
 
 
 @pytest.fixture
-def run(folder, monkeypatch, capsys):
+def run(folder, monkeypatch, shell):
     """Run a command in that folder: exit code, standard output, standard error."""
     monkeypatch.chdir(folder)
 
-    def command(*arguments, stdin=None):
-        if stdin is not None:
-            monkeypatch.setattr("sys.stdin", io.StringIO(stdin))
-        try:
-            code = main([*map(str, arguments)])
-        except SystemExit as exit_:
-            code = exit_.code
-        return code, *capsys.readouterr()
-
-    return command
+    return shell
 
 
 def test_a_record_goes_from_file_to_model_to_simulation_to_picture(run, folder, tmp_path):

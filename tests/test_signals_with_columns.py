@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 
 import hysim as hs
-from hysim.cli import main
 
 PLANT = '''
 import numpy as np
@@ -39,7 +38,7 @@ G = 9.80665
 
 
 @pytest.fixture
-def run(tmp_path, monkeypatch, capsys):
+def run(tmp_path, monkeypatch, shell):
     """Run a command in a folder with a plant and ground motions: exit code, standard output, standard error."""
     monkeypatch.chdir(tmp_path)
     (tmp_path / "floors.py").write_text(PLANT)
@@ -52,16 +51,7 @@ def run(tmp_path, monkeypatch, capsys):
         plant = hs.BoucWenOscillator(mass=1.0, damping=0.6, stiffness=20.0, law=law, excitation=excitation)
         hs.save(plant, tmp_path / f"{excitation}.json", units={"y": "m"})
 
-    def command(*arguments, stdin=None):
-        if stdin is not None:
-            monkeypatch.setattr("sys.stdin", io.StringIO(stdin))
-        try:
-            code = main([*map(str, arguments)])
-        except SystemExit as exit_:
-            code = exit_.code
-        return code, *capsys.readouterr()
-
-    return command
+    return shell
 
 
 @pytest.fixture
