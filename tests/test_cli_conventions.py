@@ -228,7 +228,7 @@ class Terminal(io.StringIO):
 
 
 def test_a_reproduction_is_told_as_json(run, tmp_path, monkeypatch):
-    def reproduce(out, *, quick, page):
+    def reproduce(out, *, quick, page, thorough):
         fits = {"model": SimpleNamespace(success=True)}
         return SimpleNamespace(folder=tmp_path, findings=SimpleNamespace(study=SimpleNamespace(fits=fits)))
 

@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 
 from hysim.cli import main
+from hysim.paper.search import stored_starts
 
 MODELS = ["eq1-printed", "tf-identified", "bouc-wen", "bouc-wen-asymmetric", "sindy", "line", "single-valued"]
 FIGURES = [
@@ -189,6 +190,21 @@ def test_another_process_writes_the_same_bytes(reproduction, again):
     first, second = ({path.relative_to(top): path.read_bytes() for path in top.rglob("*.*")} for top in folders)
     assert first.keys() == second.keys()
     assert [name for name in first if first[name] != second[name]] == []
+
+
+def test_full_searches_come_to_the_same_verdicts(summary, tmp_path):
+    command = [sys.executable, "-W", "error", "-m", "hysim", "reproduce", "--thorough", "--quick", "--json", "--out"]
+    thorough = json.loads(subprocess.run([*command, str(tmp_path)], capture_output=True, text=True, check=True).stdout)
+    verdicts, stored = ([(each["id"], each["verdict"]) for each in of["claims"]] for of in (thorough, summary))
+    assert verdicts == stored
+    loops, stored = ([row for rows in of["control"].values() for row in rows] for of in (thorough, summary))
+    assert {row.get("searched", "a full")[:6] for row in loops} == {"a full"}
+    assert {row.get("searched", "the stored")[:10] for row in stored} == {"the stored"}
+    optima = json.loads((tmp_path / "optima.json").read_text())["optima"]
+    assert optima.keys() == stored_starts().keys()
+    for name, start in stored_starts().items():
+        # on the machine that stored them they are equal; the rounding of another one leads the searches elsewhere
+        assert "camera" in name or optima[name]["cost"] == pytest.approx(start["cost"], rel=0.02)
 
 
 @pytest.mark.parametrize("name", ["file/in/the/way", "file"])

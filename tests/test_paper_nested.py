@@ -15,14 +15,10 @@ def test_the_stored_errors_are_those_of_the_experiment():
     stored = nested_errors()
     assert [(each.model, each.start) for each in stored] == [(row["model"], row["start"]) for row in rows]
     for each, row in zip(stored, rows, strict=True):
-        assert each.left_out_rmse == row["left_out_rmse_um"]
-        assert (each.n_parameters, each.folds, each.same_structure) == (
-            row["n_parameters"],
-            row["folds"],
-            row["same_structure"],
+        assert (each.left_out_rmse, each.behind) == (row["left_out_rmse_um"], row["behind_in_stderr"])
+        assert all(
+            each._asdict()[name] == row[name] for name in ("n_parameters", "folds", "same_structure", "terms_kept")
         )
-        assert each.behind == row["behind_in_stderr"]
-        assert each.terms_kept == row["terms_kept"]
 
 
 def test_rows_stand_in_the_order_of_their_errors_and_the_best_that_was_searched_again_is_behind_none():

@@ -6,16 +6,19 @@ import numpy as np
 import pytest
 
 import hysim as hs
-from hysim.paper.camera import _width, needed
+from hysim.paper.camera import _width, needed, vibration_cameras
 from hysim.paper.equations import EQUATION_1, EQUATION_4
 from hysim.paper.loops import law_plant
 from hysim.paper.search import (
     Gains,
     Robustness,
     _Tried,
+    confirmed,
+    optimum,
     search,
     slopes_along,
     step_task,
+    stored_starts,
     triangle_task,
     volts_per_pixel,
 )
@@ -24,11 +27,13 @@ KNOWN = hs.PID(
     kp=-327.968, ki=-851.54, kd=-22.132, derivative_filter=0.0336, setpoint_weight=0.2455, derivative_weight=0.8569,
     limits=(-16.0, 16.0),
 )  # fmt: skip
+NAME = "eq4, step within 16 V"
 
 
 @pytest.fixture(scope="module")
 def step():
-    return step_task(EQUATION_4, step=-1.0, limits=(-16.0, 16.0), duration=200.0, sample_time=0.025)
+    task = step_task(EQUATION_4, step=-1.0, limits=(-16.0, 16.0), duration=200.0, sample_time=0.025)
+    return replace(task, name=NAME)
 
 
 def test_the_cost_of_a_step_is_the_least_of_the_three_reductions(step):
@@ -72,6 +77,49 @@ def test_an_unstable_loop_is_not_simulated(step):
 def test_a_search_without_generations_needs_a_start(step):
     with pytest.raises(ValueError, match="controllers to start from"):
         search(step, generations=0)
+
+
+def test_a_stored_optimum_is_proved_by_its_own_loop(step):
+    found = optimum(step, stored_starts(), generations=0)  # a full search like this would fail
+    run = hs.close_loop(EQUATION_4, found.controller, 0.025 * np.arange(step.reference.size), step.reference)
+    assert step.cost(run.y) == found.cost
+    assert found.max_sensitivity <= 2.0
+    assert found.with_delay <= 2.5
+    assert found.searched == f"the stored optimum of a full search, and beside it {found.controllers} PIDs"
+
+
+@pytest.mark.parametrize("wrong", ["a weaker controller", "another cost", "an unstable loop", "another task"])
+def test_a_start_that_is_no_optimum_ends_in_the_full_search(step, wrong):
+    start = stored_starts()[NAME]
+    shift = {"a weaker controller": -0.1, "an unstable loop": 2.0}.get(wrong, 0.0)  # of log10 |kp G(0)|
+    tried, point = _Tried(step, 2.0, exact=True), start["point"] + shift * np.eye(6)[0]
+    tried.is_polished = True
+    cost = tried.cost(point) * (1.02 if wrong == "another cost" else 1.0)  # else the one that it has
+    assert (cost < 1e3) == (wrong != "an unstable loop")
+    starts = {"" if wrong == "another task" else NAME: {"point": point.tolist(), "cost": cost}}
+    assert confirmed(step, starts) is None
+    effort = {"generations": 1, "population": 1, "polish": 4}
+    assert optimum(step, starts, **effort) == search(step, **effort)
+    assert search(step, **effort).searched.startswith("a full search of")
+
+
+@pytest.mark.parametrize(("name", "value"), [("MAX_SENSITIVITY", 3.0), ("BOX", ((-3.0, 4.0),)), ("WITH_DELAY", 2.0)])
+def test_starts_of_another_search_are_not_used(monkeypatch, name, value):
+    monkeypatch.setattr(f"hysim.paper.search.{name}", value)
+    assert stored_starts() == {}
+
+
+def test_one_camera_without_an_optimum_has_all_searched_anew(monkeypatch):
+    monkeypatch.setattr("hysim.paper.camera.FRAME_RATES", (10.0,))
+    monkeypatch.setattr("hysim.paper.camera.SENSORS", ((0.0, 0.0), (0.1, 0.0)))
+    starts = dict(stored_starts())
+    stored = vibration_cameras(starts)
+    assert all(each.found.is_stored for each in stored)
+    name = stored[1].found.name
+    starts[name] = {**starts[name], "cost": 1.02 * starts[name]["cost"]}
+    anew = vibration_cameras(starts)
+    assert not any(each.found.is_stored for each in anew)
+    assert anew[0].found.controller == stored[0].found.controller
 
 
 def test_the_bounds_hold_at_the_laws_own_slopes():

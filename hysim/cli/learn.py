@@ -133,7 +133,9 @@ def explore(*, out: options.Page | None = None, no_browser: bool = False) -> Non
         webbrowser.open(page.resolve().as_uri())
 
 
-def reproduce(*, out: str = "reproduction", quick: bool = False, page: bool = False, json: bool = False) -> bool:
+def reproduce(
+    *, out: str = "reproduction", quick: bool = False, thorough: bool = False, page: bool = False, json: bool = False
+) -> bool:
     """Rebuild the paper's results and write a report.
 
     Identify, discover and compare models on the 52 voltage-displacement points of the paper.
@@ -144,6 +146,7 @@ def reproduce(*, out: str = "reproduction", quick: bool = False, page: bool = Fa
     ----------
     out : folder to write into
     quick : skip the cross-validation
+    thorough : search all controllers without their stored optima, and write these as optima.json
     page : also write table1.html, a page for a browser: the identified Bouc-Wen law with sliders over the 52 points
     json : print summary.json instead of the short table
 
@@ -154,7 +157,7 @@ def reproduce(*, out: str = "reproduction", quick: bool = False, page: bool = Fa
     """
     from hysim import paper
 
-    result = paper.reproduce(out, quick=quick, page=page)
+    result = paper.reproduce(out, quick=quick, page=page, thorough=thorough)
     if json:
         print((result.folder / "summary.json").read_text(encoding="utf-8"), end="")
     else:

@@ -5,10 +5,10 @@ A camera gives one frame after the other, each read one frame late, in whole pix
     reading = quantum floor((y(t - 1 / frame rate) + noise) / quantum + 1/2),    noise white and normal, rms = shake
 
 The controller runs once a frame. It is searched for every camera anew, in the loop with that noise, within a maximum
-sensitivity of 2, the frame of delay included. The figures come from another noise than the search's, of the true
-displacement and of the measured one: the triangle's from the mean width of the last `MEASURED` of ten cycles, since the
-width of a single noisy one is an accident; the step's is the median over `NOISES` noises of the least of its three
-reductions.
+sensitivity of 2, the frame of delay included; a search begins in its stored optimum, as `hysim.paper.search` says. The
+figures come from another noise than the search's, of the true displacement and of the measured one: the triangle's from
+the mean width of the last `MEASURED` of ten cycles, since the width of a single noisy one is an accident; the step's is
+the median over `NOISES` noises of the least of its three reductions.
 
 The reduction of the hysteresis also depends on the triangle's period and on the controller's sample time, so that it is
 a curve and not a number: the largest closed width sits in the corner where the triangle turns, and is about the
@@ -16,7 +16,7 @@ reference's rate times the time that the loop needs. A slower triangle, or a fas
 """
 
 import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -30,7 +30,7 @@ from hysim.metrics import VibrationReduction, loop_metrics, reduction_percent, r
 from hysim.paper.equations import EQUATION_4
 from hysim.paper.loops import ABOUT_34_V, HIGH, PERIOD, REDUCTIONS, SAMPLE_TIME, SUPPLY, HysteresisCase, law_plant
 from hysim.paper.reidentification import SAMPLE_SECONDS
-from hysim.paper.search import Found, Task, search, step_task, triangle_task
+from hysim.paper.search import Effort, Found, Starts, Task, confirmed, search, step_task, triangle_task
 from hysim.plants.sensor import Sensor
 
 FRAME_RATES = (10.0, 30.0, 100.0, 1000.0)
@@ -45,12 +45,13 @@ PERIODS = (13.0, 26.0, 52.0, 104.0, 260.0, 520.0)
 TARGETS = {"bouc-wen+eq7": ("90 % of the hysteresis", 89.5), "eq4": ("97 % of the vibration", 96.5)}
 """The two headline figures by their plant, and what rounds to them [%]."""
 
-_Effort = tuple[int, int, int]
-_FIRST: _Effort = (30, 6, 250)  # generations, population and polish of an ideal sensor's search
-_NEXT: _Effort = (5, 4, 50)  # of the others', from their neighbours
-_FAST: _Effort = (0, 4, 30)  # of the camera of 1000 Hz, whose simulations take long
-_COMPARED: _Effort = (0, 4, 0)  # of the controllers of all sensors, in the end
+_FIRST: Effort = (30, 6, 250)  # of an ideal sensor's search
+_NEXT: Effort = (5, 4, 50)  # of the others', from their neighbours
+_FAST: Effort = (0, 4, 30)  # of the camera of 1000 Hz, whose simulations take long
+_COMPARED: Effort = (0, 4, 0)  # of the controllers of all sensors, in the end
+_CHECKED: Effort = (1, 2, 0)  # beside a stored optimum
 _SHORT, _SKIPPED = 0.005, 2.0  # frames that leave time for one cycle only, and its begin that does not count [s]
+_Camera = tuple[float, float, float]  # frame rate, quantum and shake
 _SCALES = (1.0, 0.4)  # gains of the starts over those of a neighbour
 _RECORD = 160.0  # of a step [samples of Table 2]
 _SEED = 10  # of the first noise that is measured; the search has those from 0 on
@@ -92,7 +93,7 @@ class CameraLoop:
     saturated_percent: float
 
 
-def hysteresis_cameras(law: Any) -> list[CameraLoop]:
+def hysteresis_cameras(law: Any, starts: Starts) -> list[CameraLoop]:
     """Every camera on the hysteresis of a law before (7); laws as `loops` takes them."""
     plant = law_plant(law)
     in_a_cycle = round(PERIOD / SAMPLE_TIME)
@@ -118,10 +119,10 @@ def hysteresis_cameras(law: Any) -> list[CameraLoop]:
             "saturated_percent": 100.0 * float(np.mean(run.drive != run.command)),
         }
 
-    return _cameras("bouc-wen+eq7", 1.0, 1, task, measured)
+    return _cameras("bouc-wen+eq7", 1.0, 1, task, measured, starts)
 
 
-def vibration_cameras() -> list[CameraLoop]:
+def vibration_cameras(starts: Starts) -> list[CameraLoop]:
     """Every camera on the vibration of (4)."""
     plant = as_actuator(EQUATION_4)
     decay = float(np.min(-EQUATION_4.poles.real))
@@ -145,7 +146,7 @@ def vibration_cameras() -> list[CameraLoop]:
             "saturated_percent": 100.0 * float(np.mean(run.drive != run.command)),
         }
 
-    return _cameras("eq4", SAMPLE_SECONDS, _FEW, task, measured)
+    return _cameras("eq4", SAMPLE_SECONDS, _FEW, task, measured, starts)
 
 
 def camera_rows(loops: Sequence[CameraLoop]) -> list[dict[str, Any]]:
@@ -232,16 +233,41 @@ def _cameras(
     noises: int,
     make_task: Callable[[float], Task],
     measured: Callable[[Task, PID], dict[str, float]],
+    starts: Starts,
 ) -> list[CameraLoop]:
-    """Every frame rate with every sensor, in a unit of time [s]; each controller is searched near its neighbours'.
-
-    In the end the best of all that were found is taken, behind several noises.
-    """
+    """Every frame rate with every sensor, in a unit of time [s]."""
+    ideals = {rate: replace(make_task(1.0 / (rate * unit)), with_delay=False) for rate in FRAME_RATES}
+    tasks = {
+        (rate, *sensor): replace(
+            _behind(ideal, sensor, _FEW if rate > 100.0 else _AGAIN),
+            name=f"{plant}, camera of {rate:g} Hz, steps of {sensor[0]:g} px, shake {sensor[1]:g} px",
+        )
+        for rate, ideal in ideals.items()
+        for sensor in SENSORS
+    }
+    found: dict[_Camera, Found] = {}
+    for camera, task in tasks.items():
+        best = confirmed(task, starts, exact=False, check=_CHECKED)
+        if best is None:
+            found = _searched_all(ideals, tasks, noises)
+            break
+        found[camera] = best
     loops: list[CameraLoop] = []
+    for (rate, quantum, shake), best in found.items():
+        task = _behind(ideals[rate], (quantum, shake), NOISES, seed=_SEED)
+        figures, step = measured(task, best.controller), quantum * PIXEL
+        loops.append(CameraLoop(plant=plant, frame_rate=rate, quantum=step, shake=shake, found=best, **figures))
+    return loops
+
+
+def _searched_all(ideals: Mapping[float, Task], tasks: Mapping[_Camera, Task], noises: int) -> dict[_Camera, Found]:
+    """The best controller of each camera; it is searched near its neighbours', behind a few noises where they are slow.
+
+    In the end the best of all that were found is taken, by its task behind several noises.
+    """
+    found: dict[_Camera, Found] = {}
     slower: list[PID] = []  # controllers of the camera of a smaller rate
-    for rate in FRAME_RATES:
-        frame = 1.0 / (rate * unit)
-        ideal, is_fast = replace(make_task(frame), with_delay=False), rate > 100.0
+    for rate, ideal in ideals.items():
         pids: list[PID] = []
         for k, sensor in enumerate(SENSORS):
             neighbours = [*pids[:1], *pids[-1:], *slower[k : k + 1], *slower[:1]]
@@ -250,17 +276,18 @@ def _cameras(
                 for part in _SCALES
                 for pid in neighbours
             ]
-            effort = _FAST if is_fast else _NEXT if pids else _FIRST
+            effort = _FAST if rate > 100.0 else _NEXT if pids else _FIRST
             pids.append(_searched(_behind(ideal, sensor, 1 if rate >= 100.0 else noises), starts, effort).controller)
-        tasks = [_behind(ideal, sensor, _FEW if is_fast else _AGAIN) for sensor in SENSORS]
-        found = [_searched(task, [*pids, *slower[k : k + 1]], _COMPARED) for k, task in enumerate(tasks)]
-        pids = [best.controller for best in found]  # next the derivative as smooth, at many times the rate
-        slower = [replace(pid, derivative_filter=pid.derivative_filter + 0.7 * frame) for pid in pids]
-        for (quantum, shake), best in zip(SENSORS, found, strict=True):
-            task = _behind(ideal, (quantum, shake), NOISES, seed=_SEED)
-            figures, step = measured(task, best.controller), quantum * PIXEL
-            loops.append(CameraLoop(plant=plant, frame_rate=rate, quantum=step, shake=shake, found=best, **figures))
-    return loops
+        best = {
+            (rate, *sensor): _searched(tasks[rate, *sensor], [*pids, *slower[k : k + 1]], _COMPARED)
+            for k, sensor in enumerate(SENSORS)
+        }
+        found |= best
+        slower = [  # next the derivative as smooth, at many times the rate
+            replace(each.controller, derivative_filter=each.controller.derivative_filter + 0.7 * ideal.sample_time)
+            for each in best.values()
+        ]
+    return found
 
 
 def _behind(task: Task, sensor: tuple[float, float], noises: int, seed: int = 0) -> Task:
@@ -276,7 +303,7 @@ def _behind(task: Task, sensor: tuple[float, float], noises: int, seed: int = 0)
     return replace(task, plant=first, again=tuple(others))
 
 
-def _searched(task: Task, starts: Sequence[PID], effort: _Effort) -> Found:
+def _searched(task: Task, starts: Sequence[PID], effort: Effort) -> Found:
     generations, population, polish = effort
     return search(task, starts=starts, exact=False, generations=generations, population=population, polish=polish)
 

@@ -480,7 +480,7 @@ def _reached(text: str, best: tuple[Mapping[str, float], Loop] | None, key: str)
     figures, row = best
     value = figures.get(key, min(figures.values()))
     enough = value >= float(text) - half_unit(text)
-    said = _conditions(row) if enough else f"{row.get('searched', '')} Best: {_conditions(row)}".strip()
+    said = _conditions(row) if enough else f"Searched: {row['conditions']['box']} Best: {_conditions(row)}"
     names = {name: name.removesuffix("_reduction_percent").replace("_", " ") for name in figures}
     together = ", ".join(f"{names[name]} {figure:.1f} %" for name, figure in figures.items())
     return Value(value, enough, {"loop": said, "together": together})

@@ -1,15 +1,17 @@
 """Everything that `reproduce` computes, before any of it is written."""
 
 from collections.abc import Mapping
+from typing import Any
 
 from hysim._basics.frozen import frozen
 from hysim._basics.parallel import awaited, second_process
 from hysim.paper.camera import CameraLoop, hysteresis_cameras, period_rows, vibration_cameras
 from hysim.paper.claims import Claim, claims, evidence
-from hysim.paper.equations import Approximation, Characteristics, approximations, printed_characteristics
-from hysim.paper.loops import Loops, control_measures, law_plant, loops, on_equations
+from hysim.paper.equations import Approximation, Characteristics, printed_characteristics
+from hysim.paper.loops import Case, Loops, control_measures, law_plant, on_equations, with_law
 from hysim.paper.reidentification import Reidentification, reidentify
-from hysim.paper.study import Progress, Study, asymmetric_law, dwell_rows, study
+from hysim.paper.search import Found, stored_starts
+from hysim.paper.study import Progress, Study, asymmetric_law, dwell_rows, study, symmetric_law
 
 
 @frozen
@@ -48,37 +50,47 @@ class Findings:
     approximations: tuple[Approximation, ...]
     equations: Mapping[str, Characteristics]
 
+    @property
+    def searches(self) -> list[Found]:
+        """The search of every controller; some controllers run in several loops."""
+        cases: tuple[Case[Any], ...] = (*self.loops.hysteresis, *self.loops.steps, *self.loops.squares)
+        return [*(case.found for case in cases), *(camera.found for camera in self.cameras)]
 
-def find(*, quick: bool = False, progress: Progress | None = None) -> Findings:
+
+def find(*, quick: bool = False, thorough: bool = False, progress: Progress | None = None) -> Findings:
     """Compute everything.
 
     Parameters
     ----------
     quick : bool
         Leave the cross-validation out.
+    thorough : bool
+        Search all controllers without their stored optima.
     progress : callable, optional
         Called as ``progress(done, total, what)`` before each step.
     """
-    say = progress or (lambda done, total, what: None)
+    say, last = progress or (lambda done, total, what: None), 9
+    starts = {} if thorough else stored_starts()
     with second_process() as beside:
         asymmetric = beside.submit(asymmetric_law, quick)
-        equations = beside.submit(on_equations)
-        vibration = beside.submit(vibration_cameras)
+        symmetric = beside.submit(symmetric_law, quick)
+        equations = beside.submit(on_equations, starts)
+        say(0, last, "cameras")
+        on_vibration = vibration_cameras(starts)
         models = study(
             quick=quick,
-            progress=lambda done, total, what: say(done, total + 2, what),
+            progress=lambda done, total, what: say(done, last, what),
             asymmetric=lambda _: awaited(asymmetric),
+            symmetric=lambda _: awaited(symmetric),
         )
         again = beside.submit(reidentify, models.fits["tf-identified"])
-        last = len(models.comparison.rows) + 2
         say(last - 1, last, "closed loops")
         asymmetric_model = models.fits["bouc-wen-asymmetric"].model
-        on_hysteresis = hysteresis_cameras(asymmetric_model)
-        closed = loops(asymmetric_model, lambda: awaited(equations))
-        cameras = (*on_hysteresis, *awaited(vibration))
+        cameras = (*hysteresis_cameras(asymmetric_model, starts), *on_vibration)
+        closed = with_law(awaited(equations), asymmetric_model, starts)
         reidentification = awaited(again)
     say(last, last, "claims")
-    law = models.fits["bouc-wen"].model
+    law, of = models.fits["bouc-wen"].model, evidence(models, reidentification, control_measures(closed))
     return Findings(
         study=models,
         reidentification=reidentification,
@@ -86,7 +98,7 @@ def find(*, quick: bool = False, progress: Progress | None = None) -> Findings:
         cameras=cameras,
         periods=period_rows(asymmetric_model, closed.hysteresis[0], cameras),
         dwell=dwell_rows(law, law_plant(law)),
-        claims=claims(evidence(models, reidentification, control_measures(closed))),
-        approximations=approximations(),
+        claims=claims(of),
+        approximations=tuple(of.approximations.values()),
         equations=printed_characteristics(),
     )

@@ -11,7 +11,6 @@ The paper prints no gains: they come from `hysim.paper.search`, one search for e
 """
 
 import math
-from collections.abc import Callable
 from dataclasses import replace
 from typing import Any, Generic, NamedTuple, TypeVar
 
@@ -29,7 +28,7 @@ from hysim.control import (
 )
 from hysim.metrics import VibrationReduction, loop_metrics, reduction_percent
 from hysim.paper.equations import EQUATION_1, EQUATION_4, EQUATION_6, EQUATION_7
-from hysim.paper.search import Found, Limits, Task, search, step_task, triangle_task, volts_per_pixel
+from hysim.paper.search import Found, Limits, Starts, Task, optimum, step_task, triangle_task, volts_per_pixel
 from hysim.plants.actuator import Actuator
 from hysim.plants.transfer_function import TransferFunction
 
@@ -102,7 +101,7 @@ class Loops:
     law_width: float
 
 
-def on_equations() -> Loops:
+def on_equations(starts: Starts) -> Loops:
     """Search the controllers of (1), (4) and (6), and close their loops; there is no law."""
     steps, squares = [], []
     for name, plant in (("eq4", EQUATION_4), ("eq6", EQUATION_6)):
@@ -110,32 +109,29 @@ def on_equations() -> Loops:
             step_task(plant, step=-1.0, limits=limits, duration=0.5 * DURATION, sample_time=UNIT_STEP)
             for limits in (ABOUT_34_V, SUPPLY)
         )
-        within, beyond = search(about), _longer_search(supply, seed=2) if name == "eq4" else search(supply)
+        within = optimum(replace(about, name=f"{name}, step within 16 V"), starts)
+        supply = replace(supply, name=f"{name}, step within the supply")
+        beyond = optimum(supply, starts, **(_longer(seed=2) if name == "eq4" else {}))
         cases = ((-1.0, SUPPLY, beyond), (-1.0, ABOUT_34_V, within), (1.0, ABOUT_34_V, within), (-1.0, None, within))
         steps += [_step(name, plant, found, size, limits, DURATION, UNIT_STEP) for size, limits, found in cases]
         squares += [_square(name, plant, within, period) for period in SQUARE_PERIODS]
     task = step_task(EQUATION_1, step=1.0, limits=SUPPLY, duration=40.0, sample_time=SAMPLE_TIME)
-    steps.append(_step("eq1", EQUATION_1, _longer_search(task, seed=6), 1.0, SUPPLY, 60.0, SAMPLE_TIME))
+    found = optimum(replace(task, name="eq1, step"), starts, **_longer(seed=6))
+    steps.append(_step("eq1", EQUATION_1, found, 1.0, SUPPLY, 60.0, SAMPLE_TIME))
     alone = Actuator(vibration=EQUATION_1)
-    found = _longer_search(_triangle_task(alone, 0.0, cycles=3), seed=3, generations=60)
+    found = optimum(_triangle_task("eq1", alone, 0.0, cycles=3), starts, **_longer(seed=3, generations=60))
     triangles = tuple(_triangle("eq1", alone, found, 0.0, limits) for limits in (SUPPLY, None))
     return Loops(hysteresis=triangles, steps=tuple(steps), squares=tuple(squares), law_width=math.nan)
 
 
-def loops(law: Any, equations: Callable[[], Loops] = on_equations) -> Loops:
-    """Search the controllers, and close every loop.
+def with_law(others: Loops, law: Any, starts: Starts) -> Loops:
+    """Search the controller of a law, and close its loops in front of those of the equations.
 
-    Parameters
-    ----------
-    law : law
-        The hysteresis, from voltage [V] to displacement [um], bounded over repeated cycles.
-    equations : callable
-        Gives the loops around the equations, perhaps from where they have been computed meanwhile.
+    The law gives the displacement [um] for the voltage [V], bounded over repeated cycles.
     """
     plant = law_plant(law)
-    found = search(_triangle_task(plant, 0.1, cycles=2))
+    found = optimum(_triangle_task("bouc-wen+eq7", plant, 0.1, cycles=2), starts)
     on_law = tuple(_triangle("bouc-wen+eq7", plant, found, low, SUPPLY) for low in (0.1, 0.0))
-    others = equations()
     width = _width_of_law(law, on_law[0].assessment)
     return replace(others, hysteresis=(*on_law, *others.hysteresis), law_width=width)
 
@@ -164,16 +160,17 @@ def law_plant(law: Any) -> Actuator:
     return Actuator(hysteresis=law, vibration=DYNAMICS_7)
 
 
-def _longer_search(task: Task, seed: int, generations: int = 40) -> Found:
-    """Search from one of several seeds, whose results differ by some percent on (1), by hundredths for steps of (4)."""
-    return search(task, generations=generations, polish=600, seed=seed)
+def _longer(seed: int, generations: int = 40) -> dict[str, int]:
+    """Effort from one of several seeds, whose results differ by some percent on (1), by hundredths for steps of (4)."""
+    return {"generations": generations, "polish": 600, "seed": seed}
 
 
-def _triangle_task(plant: Actuator, low: float, cycles: int) -> Task:
+def _triangle_task(name: str, plant: Actuator, low: float, cycles: int) -> Task:
     """Within the supply only: beyond the measured voltages a polynomial law means nothing."""
-    return triangle_task(
+    task = triangle_task(
         plant, low=low, high=HIGH, period=PERIOD, limits=SUPPLY, sample_time=SAMPLE_TIME, cycles=cycles
     )
+    return replace(task, name=f"{name}, triangle")
 
 
 def _triangle(name: str, plant: Actuator, found: Found, low: float, limits: Limits) -> HysteresisCase:
@@ -224,6 +221,7 @@ def _head(case: Case[Any]) -> Row:
         "conditions": {
             "gains": {name: vars(pid)[name] for name in GAINS},
             "max_sensitivity": case.found.max_sensitivity,
+            "box": case.found.box,
             "time_unit": "s" if case.plant in ("eq1", "bouc-wen+eq7") else "sample of Table 2",
             **{key: conditions[key] for key in ("sample_time", "delay", "sensor_quantum", "noise", "seed")},
             "lowest_u_V": conditions["lowest_u"],

@@ -163,6 +163,7 @@ def _gains(cases: Sequence[Case[Any]]) -> list[Row]:
             "plant": _PLANTS[case.plant],
             "limits": _volts(pid.limits or ()),
             **{name: vars(pid)[name] for name in GAINS},
+            "search": "from its stored optimum" if case.found.is_stored else "full",
             "controllers": case.found.controllers,
             "simulations": case.found.simulations,
         }

@@ -28,6 +28,7 @@ from hysim.paper.findings import Findings, find
 from hysim.paper.loops import control_measures
 from hysim.paper.preference import preference_measures, preference_rows, stored_evidence
 from hysim.paper.report import report_page
+from hysim.paper.search import as_stored
 from hysim.paper.study import Progress, Study, model_measures
 from hysim.plot import Figure, to_svg
 
@@ -57,6 +58,7 @@ def reproduce(
     *,
     quick: bool = False,
     page: bool = False,
+    thorough: bool = False,
     progress: Progress | Literal[False] | None = None,
 ) -> Reproduction:
     """Reproduce the paper on its 52 points, and write the report.
@@ -69,6 +71,9 @@ def reproduce(
         Leave the cross-validation out.
     page : bool
         Also write ``table1.html``: the identified Bouc-Wen law with sliders over the points, for a browser.
+    thorough : bool
+        Search all controllers without their stored optima, and also write ``optima.json``, in which later searches
+        begin.
     progress : callable or False, optional
         Called as ``progress(done, total, what)``.
         By default calls beyond 2 s report on the standard error; False turns this off.
@@ -87,8 +92,9 @@ def reproduce(
     with tempfile.TemporaryFile(dir=folder):
         pass
     with one_blas_thread():
-        computed = find(quick=quick, progress=progress or None)
+        computed = find(quick=quick, thorough=thorough, progress=progress or None)
         files = contents(computed) | (browser_page(computed) if page else {})
+        files |= {"optima.json": as_stored(computed.searches)} if thorough else {}
     for name in files:
         (folder / name).parent.mkdir(exist_ok=True)
     write_all({folder / name: text for name, text in files.items()})

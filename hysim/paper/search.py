@@ -10,12 +10,20 @@ with Ti = kp / ki and Td = kd / kp. A controller whose loop is unstable, or exce
 sensitivity, is never simulated: its cost grows with its distance from the bounds alone. All others run in the sampled
 loop with their limits. The bounds hold at the least and at the largest slope of a law, and with one sample more of
 delay, in which a computer would work.
+
+A search begins in the optimum that the last full one has left in `hysim/data/paper_optima.json`: a point of the box,
+and its cost. The point is taken if it is proved anew: its loop keeps the bounds, its cost is the stored one to 1 %, and
+neither a short differential evolution, with other random numbers, nor a simplex around it finds a cost that is less by
+1 %. Otherwise the full search runs. `hysim reproduce --thorough` runs all full searches, and writes their optima as
+``optima.json``, from which the stored file is copied.
 """
 
+import json
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
 from functools import cached_property
+from importlib.resources import files
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -30,6 +38,10 @@ from hysim.metrics import step_metrics
 from hysim.plants.actuator import Actuator
 
 Limits = tuple[float, float] | None
+Starts = Mapping[str, Mapping[str, Any]]
+"""Point and cost of a stored optimum by the name of its task."""
+Effort = tuple[int, int, int]
+"""Generations and population of a differential evolution, and controllers that the simplex may try."""
 ComplexArray = npt.NDArray[np.complex128]
 
 MAX_SENSITIVITY = 2.0
@@ -50,6 +62,9 @@ _REFINED = {True: 1.0005, False: 1.01}  # margin for what lies between the frequ
 _FINE, _SLOWEST = 1200, 1e-4  # frequencies of the fine grid, and the lowest in units of the highest
 _SHARP = 2.5  # bound above which peaks may be too sharp for a grid
 _AT_ONCE = 500_000  # samples of the loops that are simulated together
+_CHECKED: Effort = (4, 4, 60)  # beside a stored optimum
+_CHECK_SEED = 100  # of no full search
+_EQUAL = 0.01  # part by which costs of one optimum may differ: 0.1 % of a loop's width, 0.02 % of a step's figures
 
 
 @frozen
@@ -73,6 +88,8 @@ class Task:
         Whether the loop has to bear one sample more of delay; a camera's frame of delay is in the plant.
     again : tuple of Actuator
         The plant behind other noises of its sensor; the cost is the mean.
+    name : str
+        Of its stored optimum.
     """
 
     plant: Actuator
@@ -83,6 +100,7 @@ class Task:
     slopes: tuple[float, ...] = (1.0,)
     with_delay: bool = True
     again: tuple[Actuator, ...] = ()
+    name: str = ""
 
 
 class Found(NamedTuple):
@@ -97,6 +115,13 @@ class Found(NamedTuple):
         Bound on the first.
     controllers, simulations : int
         Number of controllers judged, and of those simulated.
+    name : str
+        Of the task.
+    point : tuple of float
+        The controller as a point of the box.
+    cost : float
+    is_stored : bool
+        Whether the search began in the stored optimum, and found none that is better.
     """
 
     controller: PID
@@ -105,14 +130,24 @@ class Found(NamedTuple):
     bound: float
     controllers: int
     simulations: int
+    name: str
+    point: tuple[float, ...]
+    cost: float
+    is_stored: bool = False
 
     @property
     def searched(self) -> str:
         """Extent of the search, in words."""
+        where = "the stored optimum of a full search, and beside it" if self.is_stored else "a full search of"
+        return f"{where} {self.controllers} PIDs"
+
+    @property
+    def box(self) -> str:
+        """Controllers among which was searched, in words."""
         return (
-            f"Searched: {self.controllers} PIDs, kp G(0) 0.001 to 1000, Ti 0.01 to 100, Td 0.001 to 100, filter 0.0001 "
-            f"to 10 Td, both weights 0 to 1, maximum sensitivity at most {self.bound:g}, and "
-            f"{WITH_DELAY * self.bound:g} with one sample more of delay."
+            f"PIDs of kp G(0) 0.001 to 1000, Ti 0.01 to 100, Td 0.001 to 100, filter 0.0001 to 10 Td, both weights 0 "
+            f"to 1, maximum sensitivity at most {self.bound:g}, and {WITH_DELAY * self.bound:g} with one sample more "
+            "of delay."
         )
 
 
@@ -188,6 +223,43 @@ def _grid(loop: LinearLoop, frequencies: FloatArray) -> tuple[ComplexArray, Comp
     return np.exp(1j * frequencies * loop.sample_time), loop.plant_at(frequencies)
 
 
+def stored_starts() -> Starts:
+    """The stored optima; none if they belong to another box or another bound."""
+    stored = json.loads((files("hysim") / "data" / "paper_optima.json").read_text(encoding="utf-8"))
+    optima: Starts = stored.pop("optima")
+    return optima if stored == _limits_of_search() else {}
+
+
+def as_stored(every: Iterable[Found]) -> str:
+    """The optima of full searches as they are stored."""
+    optima = {found.name: {"point": found.point, "cost": found.cost} for found in every}
+    return json.dumps({**_limits_of_search(), "optima": optima}, indent=1) + "\n"
+
+
+def _limits_of_search() -> dict[str, Any]:
+    return {"box": [list(side) for side in BOX], "max_sensitivity": MAX_SENSITIVITY, "with_delay": WITH_DELAY}
+
+
+def optimum(task: Task, starts: Starts, **effort: Any) -> Found:
+    """The stored optimum of a task if it still is one, else that of a full search with some effort."""
+    return confirmed(task, starts) or search(task, **effort)
+
+
+def confirmed(task: Task, starts: Starts, *, exact: bool = True, check: Effort = _CHECKED) -> Found | None:
+    """The stored optimum of a task if it still is one; otherwise None, also without one."""
+    if task.name not in starts:
+        return None
+    tried, stored = _Tried(task, MAX_SENSITIVITY, exact), starts[task.name]
+    tried.is_polished = True
+    point, (generations, population, polish) = np.array(stored["point"]), check
+    cost = tried.cost(point)
+    if not (cost < _BEYOND and math.isclose(cost, stored["cost"], rel_tol=_EQUAL)):
+        return None
+    others = [tried.evolved(point, generations, population, _CHECK_SEED).fun]
+    others += [tried.descended(point, polish)[1]] if polish else []
+    return tried.found(point, cost)._replace(is_stored=True) if min(others) >= (1.0 - _EQUAL) * cost else None
+
+
 def search(
     task: Task,
     *,
@@ -223,22 +295,11 @@ def search(
         points = np.stack([tried.point(pid) for pid in starts], axis=1)
         start = points[:, int(np.argmin(tried.costs(points)))]
     if generations:
-        start = differential_evolution(
-            tried.costs,
-            BOX,
-            maxiter=generations,
-            popsize=population,
-            x0=start,
-            seed=seed,
-            tol=0.0,
-            polish=False,
-            vectorized=True,
-            updating="deferred",
-        ).x
+        start = tried.evolved(start, generations, population, seed).x
     if start is None:
         raise ValueError("a search without generations needs controllers to start from")
     tried.is_polished = True
-    return tried.descended(start, polish)
+    return tried.found(*tried.descended(start, polish))
 
 
 class _Tried:
@@ -265,8 +326,29 @@ class _Tried:
         x = [*np.log10(np.maximum([kp * self.gain, *times], 1e-9)), pid.setpoint_weight, pid.derivative_weight]
         return np.asarray(np.clip(x, _LOW, _HIGH))
 
-    def descended(self, start: FloatArray, polish: int) -> Found:
-        """The best controller that the simplex finds from a point; it begins anew once, on a smaller scale."""
+    def evolved(self, start: FloatArray | None, generations: int, population: int, seed: int) -> Any:
+        """What differential evolution finds, from a point and random ones."""
+        return differential_evolution(
+            self.costs,
+            BOX,
+            maxiter=generations,
+            popsize=population,
+            x0=start,
+            seed=seed,
+            tol=0.0,
+            polish=False,
+            vectorized=True,
+            updating="deferred",
+        )
+
+    def found(self, point: FloatArray, cost: float) -> Found:
+        controller = self.controller(point)
+        tried = (self.controllers, self.simulations)
+        sensitivities = self.robustness.of(controller)
+        return Found(controller, *sensitivities, self.bound, *tried, self.task.name, tuple(point.tolist()), cost)
+
+    def descended(self, start: FloatArray, polish: int) -> tuple[FloatArray, float]:
+        """The best point that the simplex finds from another, and its cost; it begins anew once, on a smaller scale."""
         best, least = start, self.cost(start)
         for scale in _SIMPLEXES if polish else ():
             step = scale * (_HIGH - _LOW) * np.where(best > 0.5 * (_LOW + _HIGH), -1.0, 1.0)
@@ -274,9 +356,8 @@ class _Tried:
             options = {"maxfev": polish // 2, "xatol": 1e-5, "fatol": 1e-9, "initial_simplex": simplex}
             end = minimize(self.cost, best, method="Nelder-Mead", bounds=BOX, options=options)
             if end.fun < least:
-                best, least = end.x, end.fun
-        controller = self.controller(best)
-        return Found(controller, *self.robustness.of(controller), self.bound, self.controllers, self.simulations)
+                best, least = end.x, float(end.fun)
+        return best, least
 
     def cost(self, x: FloatArray) -> float:
         return float(self.costs(x[:, np.newaxis])[0])

@@ -115,11 +115,17 @@ def asymmetric_law(quick: bool) -> Identification:
     return identify(PolynomialBoucWen, table1(), fixed={"n": 1.0}, cross_validate=folds, admissible=False)
 
 
+def symmetric_law(quick: bool) -> Identification:
+    """The Bouc-Wen law on Table 1."""
+    return identify(BoucWen, table1(), cross_validate=None if quick else "loo", admissible=False)
+
+
 def study(
     *,
     quick: bool = False,
     progress: Progress = lambda done, total, what: None,
     asymmetric: Callable[[bool], Identification] = asymmetric_law,
+    symmetric: Callable[[bool], Identification] = symmetric_law,
 ) -> Study:
     """Identify, discover and compare on Table 1.
 
@@ -129,8 +135,8 @@ def study(
         Leave the cross-validation out. That of the discovered law is stored in any case (`hysim.paper.preference`).
     progress : callable
         Called as ``progress(done, total, what)`` before each step.
-    asymmetric : callable
-        Gives the asymmetric law, perhaps from where it has been computed meanwhile.
+    asymmetric, symmetric : callable
+        Give these laws, perhaps from where they have been computed meanwhile.
     """
     record = table1()
     folds = None if quick else "loo"
@@ -138,7 +144,7 @@ def study(
     subjects: dict[str, Callable[[], Any]] = {
         "eq1-printed": printed_model,
         "tf-identified": lambda: identify(structure, record, cross_validate=folds),
-        "bouc-wen": lambda: identify(BoucWen, record, cross_validate=folds, admissible=False),
+        "bouc-wen": lambda: symmetric(quick),
         "bouc-wen-asymmetric": lambda: asymmetric(quick),
         "sindy": lambda: discover(record, library="duhem"),
         "line": lambda: identify(Line, record, cross_validate=folds),
