@@ -11,7 +11,7 @@ from hysim.paper.equations import Approximation, Characteristics, printed_charac
 from hysim.paper.loops import Case, Loops, control_measures, law_plant, on_equations, with_law
 from hysim.paper.reidentification import Reidentification, reidentify
 from hysim.paper.search import Found, stored_starts
-from hysim.paper.study import Progress, Study, asymmetric_law, dwell_rows, study, symmetric_law
+from hysim.paper.study import Progress, Study, bouc_wen, dwell_rows, study
 
 
 @frozen
@@ -72,16 +72,14 @@ def find(*, quick: bool = False, thorough: bool = False, progress: Progress | No
     say, last = progress or (lambda done, total, what: None), 9
     starts = {} if thorough else stored_starts()
     with second_process() as beside:
-        asymmetric = beside.submit(asymmetric_law, quick)
-        symmetric = beside.submit(symmetric_law, quick)
+        laws = {name: beside.submit(bouc_wen, name, quick) for name in ("bouc-wen-asymmetric", "bouc-wen")}
         equations = beside.submit(on_equations, starts)
         say(0, last, "cameras")
         on_vibration = vibration_cameras(starts)
         models = study(
             quick=quick,
             progress=lambda done, total, what: say(done, last, what),
-            asymmetric=lambda _: awaited(asymmetric),
-            symmetric=lambda _: awaited(symmetric),
+            law=lambda name, _: awaited(laws[name]),
         )
         again = beside.submit(reidentify, models.fits["tf-identified"])
         say(last - 1, last, "closed loops")

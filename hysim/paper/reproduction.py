@@ -20,7 +20,6 @@ from hysim._basics.parallel import awaited, second_process
 from hysim._basics.printing import csv_text
 from hysim._basics.progress import reports
 from hysim.datasets import table2
-from hysim.export import Shown, page_text
 from hysim.paper import figures
 from hysim.paper.camera import camera_rows
 from hysim.paper.equations import EQUATION_1, EQUATION_4, EQUATION_6, EQUATION_7, step_response
@@ -117,6 +116,8 @@ def contents(computed: Findings) -> dict[str, str]:
 
 def browser_page(computed: Findings) -> dict[str, str]:
     """The page of the identified Bouc-Wen law over the points of Table 1, by its name."""
+    from hysim.export import Shown, page_text  # whose kernels no other file needs
+
     study = computed.study
     shown = Shown(study.fits["bouc-wen"].model)
     title = "Table 1 and the identified Bouc-Wen law"

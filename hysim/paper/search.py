@@ -233,7 +233,8 @@ def stored_starts() -> Starts:
 def as_stored(every: Iterable[Found]) -> str:
     """The optima of full searches as they are stored."""
     optima = {found.name: {"point": found.point, "cost": found.cost} for found in every}
-    return json.dumps({**_limits_of_search(), "optima": optima}, indent=1) + "\n"
+    lines = ",\n".join(f"{json.dumps(name)}: {json.dumps(start)}" for name, start in optima.items())
+    return f'{json.dumps(_limits_of_search())[:-1]}, "optima": {{\n{lines}\n}}}}\n'
 
 
 def _limits_of_search() -> dict[str, Any]:

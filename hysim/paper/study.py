@@ -13,6 +13,7 @@ staircase, however long the dwell.
 
 import math
 from collections.abc import Callable, Mapping
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -109,23 +110,17 @@ class Study:
     discovery: Discovery
 
 
-def asymmetric_law(quick: bool) -> Identification:
-    """The Bouc-Wen law with n = 1 and a quadratic input on Table 1."""
-    folds = None if quick else "loo"
-    return identify(PolynomialBoucWen, table1(), fixed={"n": 1.0}, cross_validate=folds, admissible=False)
-
-
-def symmetric_law(quick: bool) -> Identification:
-    """The Bouc-Wen law on Table 1."""
-    return identify(BoucWen, table1(), cross_validate=None if quick else "loo", admissible=False)
+def bouc_wen(name: str, quick: bool) -> Identification:
+    """The Bouc-Wen law on Table 1, or the asymmetric one with n = 1 and a quadratic input."""
+    family, fixed = (PolynomialBoucWen, {"n": 1.0}) if name == "bouc-wen-asymmetric" else (BoucWen, {})
+    return identify(family, table1(), fixed=fixed, cross_validate=None if quick else "loo", admissible=False)
 
 
 def study(
     *,
     quick: bool = False,
     progress: Progress = lambda done, total, what: None,
-    asymmetric: Callable[[bool], Identification] = asymmetric_law,
-    symmetric: Callable[[bool], Identification] = symmetric_law,
+    law: Callable[[str, bool], Identification] = bouc_wen,
 ) -> Study:
     """Identify, discover and compare on Table 1.
 
@@ -135,8 +130,8 @@ def study(
         Leave the cross-validation out. That of the discovered law is stored in any case (`hysim.paper.preference`).
     progress : callable
         Called as ``progress(done, total, what)`` before each step.
-    asymmetric, symmetric : callable
-        Give these laws, perhaps from where they have been computed meanwhile.
+    law : callable
+        Gives the Bouc-Wen laws as `bouc_wen`, perhaps from where they have been computed meanwhile.
     """
     record = table1()
     folds = None if quick else "loo"
@@ -144,16 +139,17 @@ def study(
     subjects: dict[str, Callable[[], Any]] = {
         "eq1-printed": printed_model,
         "tf-identified": lambda: identify(structure, record, cross_validate=folds),
-        "bouc-wen": lambda: symmetric(quick),
-        "bouc-wen-asymmetric": lambda: asymmetric(quick),
+        **{name: partial(law, name, quick) for name in ("bouc-wen", "bouc-wen-asymmetric")},
         "sindy": lambda: discover(record, library="duhem"),
         "line": lambda: identify(Line, record, cross_validate=folds),
         "single-valued": lambda: level_means(record, leave_one_out=not quick),
     }
-    results = {}
-    for done, (name, make) in enumerate(subjects.items()):
+    results: dict[str, Any] = dict.fromkeys(subjects)
+    for done, name in enumerate(
+        sorted(subjects, key=lambda name: name.startswith("bouc-wen"))
+    ):  # these may take longest
         progress(done, len(subjects), name)
-        results[name] = make()
+        results[name] = subjects[name]()
     progress(len(subjects), len(subjects), "comparison")
     return Study(
         comparison=compare(results, record),
