@@ -7,8 +7,11 @@ import importlib
 import io
 import os
 import pickle
+import signal
 import sqlite3
 import sys
+import tomllib
+from collections import defaultdict
 from importlib.util import find_spec
 from pathlib import Path
 
@@ -33,6 +36,11 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 # Some thirty tests start a Python of their own, which without bytecode would compile every module anew.
 os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
 sys.dont_write_bytecode = False
+
+if (
+    signal.getsignal(signal.SIGINT) == signal.SIG_IGN
+):  # as under nohup: what the tests start would not hear of it either
+    signal.signal(signal.SIGINT, signal.default_int_handler)
 
 import hypothesis  # noqa: E402  numba must not be imported before the cache folder is set
 import pytest  # noqa: E402
@@ -97,9 +105,50 @@ def pytest_collection_finish():
     gc.set_threshold(20_000, 20, 20)
 
 
-def pytest_collection_modifyitems(items):
-    """Skip tests that need missing packages."""
-    for item in items:
+CIRCLES = tomllib.loads((ROOT / "tests" / "circles.toml").read_text())
+purposes = {name: purpose for purpose, names in CIRCLES.items() for name in names}
+begun = pytest.StashKey[float]()
+
+
+def cpu_seconds():
+    """Of this process and of those that it has waited for."""
+    return sum(os.times()[:4])
+
+
+@pytest.hookimpl(tryfirst=True)
+def pytest_runtest_setup(item):
+    item.stash[begun] = cpu_seconds()
+
+
+@pytest.hookimpl(tryfirst=True)
+def pytest_runtest_makereport(item, call):
+    """Report the CPU seconds of a test with its fixtures; what it is the first to call is compiled in them, too."""
+    if call.when == "teardown":
+        item.user_properties.append(("cpu", cpu_seconds() - item.stash[begun]))
+
+
+def pytest_terminal_summary(terminalreporter):
+    """Say which tests belong into the second circle."""
+    slow = defaultdict(float)
+    for report in (each for reports in terminalreporter.stats.values() for each in reports):
+        name = getattr(report, "nodeid", "").partition("[")[0].removeprefix("tests/")
+        if name not in purposes:
+            slow[name] = max(
+                [slow[name], *(value for key, value in getattr(report, "user_properties", ()) if key == "cpu")]
+            )
+    for name in [name for name in sorted(slow, key=slow.__getitem__, reverse=True) if slow[name] > 2.0][:10]:
+        terminalreporter.write_line(f"{slow[name]:5.1f} CPU s  {name}")
+
+
+@pytest.hookimpl(tryfirst=True)
+def pytest_collection_modifyitems(session, items):
+    """Mark the second circle, and skip tests that need missing packages."""
+    names = [item.nodeid.partition("[")[0].removeprefix("tests/") for item in items]
+    if session.config.args_source is session.config.ArgsSource.TESTPATHS and (lost := purposes.keys() - {*names}):
+        raise pytest.UsageError(f"tests/circles.toml names what is no test: {', '.join(sorted(lost))}")
+    for name, item in zip(names, items, strict=True):
+        if name in purposes:
+            item.add_marker(purposes[name])
         wanted = {package for mark in item.iter_markers("extra") for package in mark.args}
         if missing := sorted(package for package in wanted if find_spec(package) is None):
             item.add_marker(pytest.mark.skip(reason=f"needs {', '.join(missing)}"))
