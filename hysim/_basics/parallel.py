@@ -162,6 +162,7 @@ class _Threads(Executor):
     def __init__(self, number: int) -> None:
         self._work: queue.SimpleQueue[tuple[Future[Any], Callable[[], Any]] | None] = queue.SimpleQueue()
         self._is_shut = False
+        self._serving: set[int] = set()  # threads in which an exception is caught, by their identity
         self._threads = [threading.Thread(target=self._serve, daemon=True) for _ in range(number)]
         for thread in self._threads:
             thread.start()
@@ -175,36 +176,42 @@ class _Threads(Executor):
 
     def shutdown(self, wait: bool = True, *, cancel_futures: bool = False) -> None:
         self._is_shut = True
-        while cancel_futures:
-            try:
-                waiting = self._work.get_nowait()
-            except queue.Empty:
-                break
-            if waiting is not None:
-                waiting[0].cancel()
+        if cancel_futures:
+            self._cancel()
         for _ in self._threads:
             self._work.put(None)
         for thread in self._threads if wait else ():
             while thread.is_alive():
                 thread.join(GLANCE)
 
+    def _cancel(self) -> None:
+        """Cancel work that has not begun."""
+        with contextlib.suppress(queue.Empty):
+            while True:
+                if (waiting := self._work.get_nowait()) is not None:
+                    waiting[0].cancel()
+
     def stop(self, patience: float) -> None:
         """Cancel work that has not begun, raise an exception in every thread, and wait so many seconds for them."""
-        for thread in self._threads:
-            if thread.ident is not None:
-                ctypes.pythonapi.PyThreadState_SetAsyncExc(ctypes.c_ulong(thread.ident), ctypes.py_object(_Stopped))
-        self.shutdown(wait=False, cancel_futures=True)
+        self._cancel()
+        serving, self._serving = self._serving, set()
+        for ident in serving:
+            ctypes.pythonapi.PyThreadState_SetAsyncExc(ctypes.c_ulong(ident), ctypes.py_object(_Stopped))
+        self.shutdown(wait=False)
         deadline = time.monotonic() + patience
         for thread in self._threads:
             thread.join(max(0.0, deadline - time.monotonic()))
 
     def _serve(self) -> None:
-        try:
+        with contextlib.suppress(_Stopped):
+            self._serving.add(threading.get_ident())
             while (item := self._work.get()) is not None:
                 self._compute(*item)
                 del item  # an idle thread would keep the last result
-        except _Stopped:
-            pass
+            self._end()  # a call of Python's: an exception that is waiting for this thread is raised there, not later
+
+    def _end(self) -> None:
+        self._serving.discard(threading.get_ident())
 
     @staticmethod
     def _compute(future: Future[Any], work: Callable[[], Any]) -> None:
