@@ -337,5 +337,6 @@ def close_each(
             controller, parameters[i], states[i], law, law_parameters, law_state, plant, plant_state, inputs, 0, n,
             samples, path,
         )  # fmt: skip
-        displacements[i] = samples[2]
+        for k in range(n):  # a slice would compile two seconds longer, for the text of an error
+            displacements[i, k] = samples[2, k]
     return 0
