@@ -10,31 +10,24 @@ from pathlib import Path
 
 import numba
 import pytest
-from numba.core.caching import IndexDataCacheFile
+from numba.core.caching import CacheImpl, IndexDataCacheFile
+from numba.core.codegen import JITCPUCodegen
+
+from hysim.kernels import _compile
 
 compiled = pytest.mark.skipif(bool(numba.config.DISABLE_JIT), reason="nothing is compiled")
 
-SOURCE = """
-from numba import float64
-
+SOURCE = """from numba import float64
 from hysim.kernels._compile import inner, kernel, signed_kernel
-
-
 @inner
 def times(x, k, doubled):
     return 2.0 * k * x if doubled else k * x
-
-
 @kernel
 def twice(x):
     return 2.0 * x
-
-
 @kernel
 def halved(x):
     return 0.5 * times(x, 1, False) + 0.0 * times(x, 2, True)
-
-
 @signed_kernel(float64(float64))
 def thrice(x):
     return twice(x) + x
@@ -89,26 +82,18 @@ def test_a_pointer_gets_no_code_with_another_result(kernels):
     assert found.signature.return_type == numba.float64
 
 
+CUTS = [(end, lambda old, kept=kept: old[: int(kept * len(old))]) for end in ("nbi", "nbc") for kept in (0, 0.5, 0.99)]
+NEW = [("nb?", lambda _, b=b: b) for b in (b"no pickle", b"cos\\nnothing\\n.", b"\x80\x04\x8c\xff", b"\x80\x05N.")]
+
+
 @compiled
-@pytest.mark.parametrize("ending", ["nbi", "nbc"])
-@pytest.mark.parametrize("kept", [0.0, 0.5, 0.99])
-def test_a_file_that_is_cut_is_written_anew(kernels, tmp_path, ending, kept):
+@pytest.mark.parametrize(("ending", "content"), CUTS + NEW)
+def test_a_file_that_is_cut_or_holds_something_else_is_written_anew(kernels, tmp_path, ending, content):
     assert hits(kernels()) == [0, 0]
     files = sorted(tmp_path.rglob(f"*.{ending}"))
-    assert len(files) == 2
+    assert len(files) == (4 if ending == "nb?" else 2)
     for file in files:
-        content = file.read_bytes()
-        file.write_bytes(content[: int(kept * len(content))])
-    assert hits(kernels()) == [0, 0]
-    assert hits(kernels()) == [1, 1]
-
-
-@compiled
-@pytest.mark.parametrize("content", [b"no pickle", b"cos\\nnothing\\n.", b"\x80\x04\x8c\xff", b"\x80\x05N."])
-def test_a_file_that_holds_something_else_is_written_anew(kernels, tmp_path, content):
-    kernels()
-    for file in tmp_path.rglob("*.nb?"):
-        file.write_bytes(content)
+        file.write_bytes(content(file.read_bytes()))
     assert hits(kernels()) == [0, 0]
     assert hits(kernels()) == [1, 1]
 
@@ -141,21 +126,47 @@ def test_a_file_where_the_folder_should_be_is_done_without(kernels, tmp_path, mo
     assert (tmp_path / "cache").read_text() == "in the way"
 
 
+TRIPLE = numba.core.registry.cpu_target.target_context.codegen().magic_tuple()[0]
+NOTHING = lambda *_: None  # noqa: E731
+V3 = (TRIPLE, "a processor", ",".join([*sorted(_compile._V3), "-avx512f"]))
+CASES = [
+    (V3, NOTHING, 1),
+    (V3, lambda patch, _: patch.setattr(CacheImpl, "_locator_classes", []), 1),  # no folder may be written
+    (V3, lambda patch, _: patch.setattr(numba, "__version__", "0.61.0"), 0),
+    (V3, lambda _, folder: (folder / "callee.py").write_text("factor = 2.0"), 0),
+    (V3, lambda _, folder: [file.write_bytes(b"no pickle") for file in folder.rglob("*.nb?")], 0),
+    (V3, lambda _, folder: [file.rename(f"{file}".replace(".py3", ".py2")) for file in folder.rglob("*.nb?")], 0),
+    ((TRIPLE, "a processor", V3[2].replace("+fma", "-fma")), NOTHING, 0),
+    ((TRIPLE, "generic", ""), NOTHING, 0),
+    (("aarch64-apple-darwin22.6.0", *V3[1:]), NOTHING, 0),
+]
+
+
+@compiled
+@pytest.mark.parametrize(("machine", "change", "wanted"), CASES)
+def test_code_of_a_wheel_is_used_where_all_agrees(kernels, tmp_path, monkeypatch, machine, change, wanted):
+    monkeypatch.setattr(_compile, "PACKAGE", tmp_path)
+    monkeypatch.setattr(_compile, "SHIPPED", tmp_path / "compiled")
+    _compile.SHIPPED.mkdir()
+    with monkeypatch.context() as build:
+        build.setattr(numba.config, "CACHE_LOCATOR_CLASSES", "hysim.kernels._compile.Shipped", raising=False)
+        build.setattr(JITCPUCodegen, "magic_tuple", lambda _: (TRIPLE, _compile.SHIPPED_CPU, ""))
+        assert hits(kernels()) == [0, 0]
+    _compile._hash_of_sources.cache_clear()
+    monkeypatch.setattr(JITCPUCodegen, "magic_tuple", lambda _: machine)
+    change(monkeypatch, tmp_path)
+    assert hits(kernels()) == [wanted, wanted]
+    assert any((tmp_path / "cache").rglob("*.nbc")) != wanted
+
+
 @compiled
 def test_a_process_that_may_write_no_byte_computes(tmp_path):
     (tmp_path / "own_kernels.py").write_text(SOURCE)
-    run = "import own_kernels; print(own_kernels.thrice(1.5))"
+    path = os.pathsep.join([str(tmp_path), str(Path(__file__).parent.parent), *sys.path])
     done = subprocess.run(
-        [sys.executable, "-W", "error", "-c", run],
-        cwd=tmp_path,
-        env={
-            **os.environ,
-            "NUMBA_CACHE_DIR": str(tmp_path / "cache"),
-            "PYTHONPATH": os.pathsep.join([str(tmp_path), str(Path(__file__).parent.parent), *sys.path]),
-        },
-        preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (0, 0)),
-        capture_output=True,
-        text=True,
-    )
+        [sys.executable, "-W", "error", "-c", "import own_kernels; print(own_kernels.thrice(1.5))"],
+        cwd=tmp_path, env=os.environ | {"NUMBA_CACHE_DIR": str(tmp_path / "cache"), "PYTHONPATH": path},
+        preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (0, 0)), capture_output=True, text=True,
+    )  # fmt: skip
     assert (done.returncode, done.stdout, done.stderr) == (0, "4.5\n", "")
     assert not [file for file in tmp_path.rglob("*.nb?") if file.stat().st_size]

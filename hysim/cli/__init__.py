@@ -27,7 +27,7 @@ GROUPS: Mapping[str, Mapping[str, str]] = {
     "take a model elsewhere": dict.fromkeys(("c", "fmu"), "use"),
     "many simulations": {"sweep": "sweep"},
     "camera frames": {"measure": "look"},
-    "learn and set up": dict.fromkeys(("explore", "reproduce", "completion"), "learn"),
+    "learn and set up": {**dict.fromkeys(("explore", "reproduce", "completion"), "learn"), "warm-up": "warm_up"},
 }
 """Module of every command, in groups as the help shows them; it is loaded when the command runs, or for the help."""
 
@@ -42,7 +42,7 @@ class Command(click.Command):
     """A command from a function of the same name, whose help ends with the names of models and with examples."""
 
     def __init__(self, name: str) -> None:
-        self.function = vars(importlib.import_module(f"hysim.cli.{COMMANDS[name]}"))[name]
+        self.function = vars(importlib.import_module(f"hysim.cli.{COMMANDS[name]}"))[name.replace("-", "_")]
         self.declared = [*options.parameters(self.function)]
         self.sections = options.sections(self.function)
         summary = self.sections[""].partition(".\n")[0]

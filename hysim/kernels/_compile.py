@@ -1,20 +1,23 @@
 """How a kernel is compiled: one decorator, so that every kernel is compiled alike.
 
-The compiled code is cached beside the source file, or in the user's cache folder. Where neither is
-writable, the disk is full or a file of the cache is damaged, the function is compiled anew. It releases
-the interpreter lock, and it follows IEEE 754 (a division by zero is an infinity): kernels raise nothing,
-they return codes.
+The compiled code is cached beside the source file, or in the user's cache folder. What neither holds is taken from the
+wheel, if it brings code for this version of numba, or compiled anew; also where no folder is writable, the disk is full
+or a file is damaged. The code releases the interpreter lock, and it follows IEEE 754 (a division by zero is an
+infinity): kernels raise nothing, they return codes.
 """
 
 import contextlib
 import functools
+import hashlib
 import os
 from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+from types import SimpleNamespace
 from typing import Any, TypeVar
 
 import numba
 from numba.core import cgutils, types
-from numba.core.caching import FunctionCache
+from numba.core.caching import CompileResultCacheImpl, FunctionCache, InTreeCacheLocator, NullCache
 from numba.core.dispatcher import Dispatcher
 from numba.core.sigutils import normalize_signature
 from numba.experimental.function_type import _get_wrapper_address
@@ -26,6 +29,10 @@ sources: dict[Any, str] = {}
 """Text of the functions that stand in no file."""
 
 _NO_ENTRY = {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}
+
+PACKAGE = Path(__file__).parent.parent
+SHIPPED, SHIPPED_CPU = PACKAGE / "kernels" / "compiled", "x86-64-v3"
+_V3 = {"+avx2", "+bmi", "+bmi2", "+cx16", "+f16c", "+fma", "+lzcnt", "+movbe", "+popcnt", "+sahf", "+sse4.2", "+xsave"}
 
 
 def kernel(function: F) -> F:
@@ -39,10 +46,8 @@ def inner(function: F) -> F:
 
 
 def uncounted(function: F) -> F:
-    """As `inner`, for a function that allocates nothing: it does not count the owners of arrays, its caller holds them.
-
-    Each array that is taken out of a tuple or cut would otherwise be counted, which takes longer than short loops.
-    """
+    """As `inner`, for a function that allocates nothing: its caller holds all arrays, whose owners are not counted."""
+    # Each array that is taken out of a tuple or cut would otherwise be counted, which takes longer than short loops.
     return _compiled(function, (), _nrt=False, **_NO_ENTRY)
 
 
@@ -128,8 +133,7 @@ def _compiled(function: F, signatures: Sequence[Any] = (), **others: Any) -> F:
     is_compiled = isinstance(compiled, Dispatcher)  # and not the function, where numba is told to compile nothing
     if is_compiled:
         compiled.get_call_template = _without_constants(compiled.get_call_template)
-        with contextlib.suppress(OSError, RuntimeError):  # numba found no writable folder
-            compiled._cache = _cache(function)
+        compiled._cache = _cache(function)
         for signature in signatures:
             compiled.compile(signature)
         if signatures:
@@ -148,28 +152,69 @@ def _without_constants(template_of: Callable[..., Any]) -> Callable[..., Any]:
     return template
 
 
-def _cache(function: Any) -> Any:
-    """numba's cache of a function, which is as if it were empty where it cannot be read, and is left where it is full.
+class Shipped(InTreeCacheLocator):
+    """Where a wheel holds compiled code: numba's own files, written there where NUMBA_CACHE_LOCATOR_CLASSES says so."""
 
-    In place of numba's own ``cache=True``, which ends in an error there. What is compiled is found by the types of its
-    arguments, as in one process: numba's key has the type of the result where a pointer asks for it, so that another
-    process would compile the function once more for a call.
-    """
-    maker: Any = FunctionCache
-    cache = maker(function)
-    load, save = cache.load_overload, cache.save_overload
+    def get_cache_path(self) -> str:
+        return str(SHIPPED / Path(self._py_file).relative_to(PACKAGE).parent)
+
+    def get_source_stamp(self) -> str:  # of all files: the code of a function contains that of others
+        return _hash_of_sources(PACKAGE)
+
+    @classmethod
+    def from_function(cls, py_func: Any, py_file: str) -> Any:
+        return cls(py_func, py_file) if SHIPPED.exists() and Path(py_file).is_relative_to(PACKAGE) else None
+
+
+@functools.cache
+def _hash_of_sources(folder: Path) -> str:
+    return hashlib.sha256(b"".join(path.read_bytes() for path in sorted(folder.rglob("*.py")))).hexdigest()
+
+
+class _ShippedFiles(CompileResultCacheImpl):
+    _locator_classes = [Shipped]  # noqa: RUF012
+
+
+class _ShippedCache(FunctionCache):
+    _impl_class = _ShippedFiles
+
+    def _index_key(self, sig: Any, codegen: Any) -> Any:
+        triple, _, features = codegen.magic_tuple()
+        theirs = SimpleNamespace(magic_tuple=lambda: (triple, SHIPPED_CPU, ""))
+        # The bits are those of code for this processor: LLVM contracts and reorders nothing.
+        return FunctionCache._index_key(self, sig, theirs) if _V3.issubset(features.split(",")) else None
+
+
+def _load_shipped(function: Any, *key: Any) -> Any:
+    cache: Any = _ShippedCache
+    return cache(function).load_overload(*key)
+
+
+def _cache(function: Any) -> Any:
+    """numba's cache of a function, then the wheel's: as if empty where it cannot be read, and left where it is full."""
+    # In place of numba's own ``cache=True``, which ends in an error there. What is compiled is found by the types of
+    # its arguments, as in one process: numba's key has the type of the result where a pointer asks for it, so that
+    # another process would compile the function once more for a call.
+    try:
+        maker: Any = FunctionCache
+        cache = maker(function)
+    except (OSError, RuntimeError):  # numba found no writable folder
+        cache = NullCache()
+    save, loads = cache.save_overload, (cache.load_overload, functools.partial(_load_shipped, function))
 
     def loaded(signature: Any, context: Any) -> Any:
         arguments, result = normalize_signature(signature)
-        try:
-            data = load(arguments, context)
-        except Exception:  # what unpickling raises depends on where the file was cut
-            return None
-        return data if data is None or result in (None, data.signature.return_type) else None
+        for load in loads:
+            with contextlib.suppress(Exception):  # what unpickling raises depends on where the file was cut
+                data = load(arguments, context)
+                if data is not None and result in (None, data.signature.return_type):
+                    return data
+        return None
 
     def saved(signature: Any, data: Any) -> None:
         arguments, _ = normalize_signature(signature)
         with contextlib.suppress(Exception):
+            data = data._replace(type_annotation="")  # a listing of the source, a quarter of the file
             try:
                 save(arguments, data)
             except Exception:
@@ -190,8 +235,6 @@ def borrowed(array: Any) -> Any:
 
 
 def _borrowed(_: Any, array: Any) -> Any:
-    """Type and code of `borrowed`."""
-
     def code(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
         view = context.make_array(signature.return_type)(context, builder, value=arguments[0])
         view.meminfo = cgutils.get_null_value(view.meminfo.type)

@@ -185,7 +185,6 @@ def _seen(C: FloatArray, D: float, x: FloatArray, through: float) -> float:
 def _advance(
     A: FloatArray, B0: FloatArray, B1: FloatArray, begin: float, end: float, x: FloatArray, moved: FloatArray
 ) -> None:
-    """One piece of a step."""
     for row in range(x.size):
         total = B0[row] * begin + B1[row] * end
         for column in range(x.size):

@@ -734,7 +734,6 @@ class Law(Placed, ABC):
 
 @lru_cache(maxsize=256)
 def _with_tolerance(family: type[Law], tolerance: float) -> type[Law]:
-    """The family with another tolerance of its integrator."""
     return type(family.__name__, (family,), {"tolerance": tolerance})
 
 
