@@ -7,6 +7,7 @@ import pickle
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
+from strategies import assert_cut_and_continued_gives_the_same_bits
 
 import hysim as hs
 from hysim.errors import SimulationError
@@ -88,9 +89,7 @@ def test_rests_change_nothing():
 
 @pytest.mark.parametrize("cut", range(PATH.size + 1))
 def test_cut_at_a_sample_and_continued_is_the_same_bits(cut):
-    first, state = GENERAL.advance(PATH[:cut])
-    second, _ = GENERAL.advance(PATH[cut:], state if cut else None)
-    assert np.array_equal(np.concatenate([first, second]), GENERAL.response(PATH))
+    assert_cut_and_continued_gives_the_same_bits(GENERAL, PATH, cut)
 
 
 def test_batch_is_the_path_to_the_bit():

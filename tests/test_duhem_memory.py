@@ -7,6 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
+from strategies import assert_cut_and_continued_gives_the_same_bits
 
 import hysim as hs
 from hysim.errors import SimulationError
@@ -132,9 +133,7 @@ def test_an_odd_law_is_odd_to_the_bit(u):
 
 @pytest.mark.parametrize("cut", range(PATH.size + 1))
 def test_cut_at_a_sample_and_continued_is_the_same_bits(cut):
-    first, state = MIXED.advance(PATH[:cut])
-    second, _ = MIXED.advance(PATH[cut:], state if cut else None)
-    assert np.array_equal(np.concatenate([first, second]), MIXED.response(PATH))
+    assert_cut_and_continued_gives_the_same_bits(MIXED, PATH, cut)
 
 
 def test_the_compiled_step_is_the_path_to_the_bit():

@@ -185,7 +185,6 @@ class _Threads(Executor):
                 thread.join(GLANCE)
 
     def _cancel(self) -> None:
-        """Cancel work that has not begun."""
         with contextlib.suppress(queue.Empty):
             while True:
                 if (waiting := self._work.get_nowait()) is not None:

@@ -64,7 +64,7 @@ def compilation(progress: Progress | None = None) -> int:
     return len(every)
 
 
-def warm_up() -> int:
+def warm_up() -> None:
     """Compile in advance what first calls would compile.
 
     Make short calls of most functions, which takes minutes; their code is kept on disk for later processes.
@@ -74,4 +74,3 @@ def warm_up() -> int:
     hysim warm-up
     """
     print(f"{compilation()} calls have been compiled")
-    return 0

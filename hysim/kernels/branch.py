@@ -8,8 +8,7 @@ state comes to: the largest of its values, and of what the rest of the stroke wo
 have a corner where its first state is zero, as `|z|^n` has, so a step that changes the sign of z is repeated until it
 ends at z = 0. What is not smooth elsewhere makes the steps short, as a power of z does near zero.
 
-A law that diverges is `inf`: its steps become a rounding of the way behind them while z grows. One that needs more than
-MAX_STEPS steps, or is undefined, is `nan`.
+A law that diverges is `inf`: its steps become a rounding of the way while z grows. A stiff or undefined one is `nan`.
 """
 
 import math
