@@ -33,12 +33,13 @@ def copy_with_code(package: Path, parent: Path) -> Path:
     A second run loads what the first has compiled. What it does not ask for is part of other functions, and is removed.
     """
     shutil.copytree(package, parent / "hysim", ignore=shutil.ignore_patterns("__pycache__", "compiled"))
-    folder, used = parent / COMPILED, set[Path]()
+    folder, used = parent.resolve() / COMPILED, set[Path]()
     folder.mkdir()
     for action in ("saved to", "loaded from"):
         command = [sys.executable, "-m", "hysim", "warm-up", "--quiet"]
-        environment = os.environ | SETTINGS | {"PYTHONPATH": os.pathsep.join([str(parent), *sys.path])}
-        run = subprocess.run(command, cwd=parent, env=environment, stdout=subprocess.PIPE, text=True, check=True)
+        environment = os.environ | SETTINGS | {"PYTHONPATH": os.pathsep.join(sys.path)}
+        place = folder.parent.parent.parent
+        run = subprocess.run(command, cwd=place, env=environment, stdout=subprocess.PIPE, text=True, check=True)
         used = {Path(path) for path in re.findall(rf"\[cache\] data {action} '(.*)'", run.stdout)}
         if not used:
             raise RuntimeError(f"nothing was {action} {folder}: are numba's messages others?")
@@ -58,7 +59,7 @@ class Hook(BuildHookInterface):
         if platform.machine().lower() not in ("x86_64", "amd64"):
             raise RuntimeError(f"compiled code is for x86-64, and this is {platform.machine()}")
         self.parent = tempfile.TemporaryDirectory()
-        folder = copy_with_code(Path(self.root) / "hysim", Path(self.parent.name).resolve())
+        folder = copy_with_code(Path(self.root) / "hysim", Path(self.parent.name))
         build_data["force_include"][str(folder)] = COMPILED
         build_data["pure_python"] = False
         if sys.platform == "linux":  # it is linked by numba when it is loaded, and needs no library of this machine

@@ -179,14 +179,13 @@ def batch(result: Result) -> list[str]:
 
 
 def cold_start(result: Result) -> list[str]:
-    """The first call, compiled and from the cache."""
+    """The first call, compiled, from a wheel and from the cache."""
     rows = result["rows"]
-    empty, full = (column(rows, name) for name in ("empty", "full"))
-    slowest = max(rows, key=lambda row: row["empty"])
+    seconds = [column(rows, name) for name in ("compiled", "from a wheel", "from the cache")]
+    compiled, wheel, cached = (f"{number(median(each), 2)} s and {number(max(each), 2)} s" for each in seconds)
     return [
-        f"Of {len(rows)} functions the first call on an empty cache takes {number(median(empty))} s of processor "
-        f"time in the median and {number(max(empty))} s at worst (`{slowest['function']}`); in later processes "
-        f"{number(median(full), 2)} s and {number(max(full), 2)} s. Imports are not counted.",
+        f"The first of {len(rows)} calls takes, in the median and at worst, {compiled} of processor time where it is "
+        f"compiled, {wheel} with the code of a wheel, and {cached} in later processes.",
     ]
 
 
