@@ -151,7 +151,6 @@ def family_rows(family: str, chunks: list[dict[str, Any]]) -> list[Row]:
                 "violations": int(np.sum(values > 1.0)),
                 "worst": float(np.max(values)),
                 "median": float(np.median(values)),
-                "grown": ends["grown"],
                 "escaped": ends["escaped"],
                 "undecided": ends["edge"],
                 "refused": ends["refused"],

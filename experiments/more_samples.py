@@ -11,7 +11,7 @@ rounding    closed forms: what the rounding of each step comes to. A step rounds
             rounding of 2^-53, is what one rounding in each step comes to.
 integrated  1e-9 of the range of the output on the branch (a law by its slope), and what the tolerance of a step comes
             to, 1e-12 of the state, measured in the same way: a law may let it grow, or move by less than 1e-3 of its
-            state. A case that needs this counts as grown. Jiles-Atherton: roundings, and 1e-11 of the range.
+            state. Jiles-Atherton: roundings, and 1e-11 of the range.
 
 A law that escapes is to escape in all runs, and in every form: the path kernels, batches, the compiled step. Only where
 rounding decides is a difference no fault, and that is measured too: all samples are gone through again with the state
@@ -302,7 +302,7 @@ class Verdict(NamedTuple):
     """How a case ended: its worst distance over what is allowed; or why there is none."""
 
     ratio: float
-    end: str  # "compared", "grown", "escaped", "refused", "partly refused", "edge" (rounding decides about an escape)
+    end: str  # "compared", "escaped", "refused", "partly refused", "edge" (rounding decides whether it escapes)
 
 
 def judged(case: Case, found: list[Run], errors: Callable[[], Spread] | None) -> Verdict:
@@ -316,14 +316,13 @@ def judged(case: Case, found: list[Run], errors: Callable[[], Spread] | None) ->
     if errors is None:
         return Verdict(to_the_bit(case, found), "compared")
     ratio = compared(case, found, NOTHING)
-    end = "grown" if ratio > 1.0 and left_out(case.law) == TOLERANCE else "compared"
     if ratio > WELL_INSIDE:
         ratio = compared(case, found, errors())
     if ratio > 1.0:  # close to an unstable balance, at less than 2^-36 of it, only roundings themselves go the same way
         ratio = min(ratio, compared(case, found, spread(case, max(NEAREST, left_out(case.law)))))
     if ratio > 1.0:
         ratio = min(ratio, compared(case, found, spread_through_peaks(case)))
-    return Verdict(ratio, end)
+    return Verdict(ratio, "compared")
 
 
 def apart_in_escape(case: Case, may_round: bool) -> Verdict:
