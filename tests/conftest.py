@@ -132,22 +132,17 @@ def pytest_terminal_summary(terminalreporter):
     slow = defaultdict(float)
     for report in (each for reports in terminalreporter.stats.values() for each in reports):
         name = getattr(report, "nodeid", "").partition("[")[0].removeprefix("tests/")
-        if name not in purposes:
-            slow[name] = max(
-                [slow[name], *(value for key, value in getattr(report, "user_properties", ()) if key == "cpu")]
-            )
+        cpu = [seconds for key, seconds in getattr(report, "user_properties", ()) if key == "cpu"]
+        slow[name] = max([slow[name], *cpu]) if name not in purposes else 0.0
     for name in [name for name in sorted(slow, key=slow.__getitem__, reverse=True) if slow[name] > 2.0][:10]:
         terminalreporter.write_line(f"{slow[name]:5.1f} CPU s  {name}")
 
 
 @pytest.hookimpl(tryfirst=True)
-def pytest_collection_modifyitems(session, items):
+def pytest_collection_modifyitems(items):
     """Mark the second circle, and skip tests that need missing packages."""
-    names = [item.nodeid.partition("[")[0].removeprefix("tests/") for item in items]
-    if session.config.args_source is session.config.ArgsSource.TESTPATHS and (lost := purposes.keys() - {*names}):
-        raise pytest.UsageError(f"tests/circles.toml names what is no test: {', '.join(sorted(lost))}")
-    for name, item in zip(names, items, strict=True):
-        if name in purposes:
+    for item in items:
+        if (name := item.nodeid.partition("[")[0].removeprefix("tests/")) in purposes:
             item.add_marker(purposes[name])
         wanted = {package for mark in item.iter_markers("extra") for package in mark.args}
         if missing := sorted(package for package in wanted if find_spec(package) is None):

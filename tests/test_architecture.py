@@ -2,7 +2,10 @@
 
 import ast
 import graphlib
+import itertools
+import re
 import runpy
+import tomllib
 from functools import cache
 from pathlib import Path
 
@@ -179,3 +182,11 @@ def test_abilities_are_asked_for_by_protocols_and_not_by_names():
     ]
     assert sorted(set(calls)) == ["_basics/frozen.py", "plants/state_space.py", "sweeps/_sweep.py"]
     assert len(calls) <= 20
+
+
+def test_the_second_circle_names_tests():
+    tests = Path(__file__).parent
+    for name in itertools.chain(*tomllib.loads((tests / "circles.toml").read_text()).values()):
+        path, _, test = name.partition("::")
+        folder = tests.parent if path.startswith("hysim/") else tests
+        assert re.search(rf"(def|class) {test.rpartition('.')[2]}\(", (folder / path).read_text()), name
