@@ -37,10 +37,9 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
 sys.dont_write_bytecode = False
 
-if (
-    signal.getsignal(signal.SIGINT) == signal.SIG_IGN
-):  # as under nohup: what the tests start would not hear of it either
-    signal.signal(signal.SIGINT, signal.default_int_handler)
+for number, usual in ((signal.SIGINT, signal.default_int_handler), (signal.SIGHUP, signal.SIG_DFL)):
+    if signal.getsignal(number) == signal.SIG_IGN:  # as under nohup: what the tests start would not hear of it either
+        signal.signal(number, usual)
 
 import hypothesis  # noqa: E402  numba must not be imported before the cache folder is set
 import pytest  # noqa: E402
