@@ -76,7 +76,7 @@ def draw(rows: list[Row]) -> Figure:
         ax.barh([place + shift for place in places], [row[cache] for row in rows], 0.27, label=cache)
     ax.set_yticks(list(places), [str(row["function"]) for row in rows])
     ax.set(xlabel="First call [s of one processor]")
-    ax.legend(loc="lower right")
+    ax.legend(loc="upper right")
     return canvas
 
 
