@@ -38,7 +38,7 @@ INTEGRATED, SERIES = 1e-9, 1e-11
 ROUNDINGS = 16.0
 LAST_SUM = 4.0
 OFF, NEAREST = 2.0**-36, 2.0**-51
-UNIT, TOLERANCE = 2.0**-53, 1e-12
+UNIT = 2.0**-53
 SMALLEST = 2.0**-1022
 PEAK_ROUNDS, PEAK_PIECES = 40, 8
 BITS = ("Play", "Stop", "PrandtlIshlinskii", "ModifiedPrandtlIshlinskii", "MaxwellSlip",
@@ -246,7 +246,7 @@ def promised(law: Any) -> float:
 
 def left_out(law: Any) -> float:
     """Part of the state that a step leaves out: the tolerance of an integrated law, else a rounding."""
-    return TOLERANCE if promised(law) == INTEGRATED else UNIT
+    return hs.Law.tolerance if promised(law) == INTEGRATED else UNIT
 
 
 # ---------------------------------------------------------------------------------- the runs
