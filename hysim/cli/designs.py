@@ -286,7 +286,7 @@ def document(design: Design) -> dict[str, Any]:
 
 
 def text(design: Design) -> str:
-    """What is asked of the loop, and the printed results: the tuning, what the loop achieves, and its conditions."""
+    """The printed design: the task of the loop, the tuning, the results and their conditions."""
     options, task, closed, units = design.options, design.task, design.triangle.closed, design.units
     u, y = (units.get(name, "") for name in "uy")
     driven, moved = (label(units, name)[0].lower() + label(units, name)[1:] for name in "uy")

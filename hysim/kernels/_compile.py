@@ -153,7 +153,7 @@ def _without_constants(template_of: Callable[..., Any]) -> Callable[..., Any]:
 
 
 class Shipped(InTreeCacheLocator):
-    """Where a wheel holds compiled code: numba's own files, written there where NUMBA_CACHE_LOCATOR_CLASSES says so."""
+    """The folder of a wheel's compiled code: numba's own files, written by the build (NUMBA_CACHE_LOCATOR_CLASSES)."""
 
     def get_cache_path(self) -> str:
         return str(SHIPPED / Path(self._py_file).relative_to(PACKAGE).parent)

@@ -328,7 +328,7 @@ class _Tried:
         return np.asarray(np.clip(x, _LOW, _HIGH))
 
     def evolved(self, start: FloatArray | None, generations: int, population: int, seed: int) -> Any:
-        """What differential evolution finds, from a point and random ones."""
+        """The result of differential evolution, which begins in a point and in random ones."""
         return differential_evolution(
             self.costs,
             BOX,
