@@ -9,7 +9,7 @@ import pytest
 import hysim as hs
 from hysim.identification._assumptions import decided
 from hysim.identification._problem import Setting, problem, problems
-from hysim.identification._search import descended, optima, polish
+from hysim.identification._search import optima, polish
 from hysim.models.law import Law
 from hysim.models.model import every_family
 from hysim.models.search_space import Freedom
@@ -147,14 +147,6 @@ def test_what_holds_parameters_of_a_family_passes_its_stages_on():
         assert (each.rough() is each) == (each is chain[0].simpler)
 
 
-def test_amended_slopes_of_the_rough_law_lead_as_low_as_slopes_of_the_law():
-    _, worn, *_ = problems(hs.BoucWenBaberNoori(), [RECORDS["pinching"]], Freedom(), None)
-    starts = worn.begun(np.array([[0.3, 0.2, np.log(1.2), 0.4], [0.8, -0.3, 0.0, 0.0]])[:, : worn.simpler.n_x])
-    by_law = worn.costs(descended(worn, starts, exact=True).theta[:, : worn.n_x])
-    by_rough = [each.cost for each in polish(worn, starts)]
-    assert min(by_rough) <= by_law.min() * (1.0 + ROUNDING)
-
-
 def test_a_polish_takes_the_law_itself_only_for_the_costs_of_its_ends(monkeypatch):
     _, worn, *_ = problems(hs.BoucWenBaberNoori(), [RECORDS["pinching"]], Freedom(), None)
     starts = worn.begun(np.array([[0.3, 0.2, np.log(1.2), 0.4], [0.8, -0.3, 0.0, 0.0]])[:, : worn.simpler.n_x])
@@ -167,13 +159,13 @@ def test_a_polish_takes_the_law_itself_only_for_the_costs_of_its_ends(monkeypatc
     monkeypatch.setattr(hs.BoucWenBaberNoori, "pack", classmethod(counted))
     assert len(polish(worn, starts)) == len(starts)
     assert taken[hs.BoucWenBaberNoori.tolerance] == len(starts)
-    assert min(taken[1e-8], taken[1e-4]) > 10 * len(starts)
+    assert taken[1e-8] > 10 * len(starts)
 
 
 def test_the_close_law_of_a_close_law_is_itself():
     held = next(iter(hs.BoucWenBaberNoori.candidates().values()))
-    assert held.close().close() == held.close() != held
-    assert hs.BoucWen().close() == hs.BoucWen()
+    assert held.known_to(1e-8).known_to(1e-8) == held.known_to(1e-8) != held
+    assert hs.BoucWen().known_to(1e-8) == hs.BoucWen()
 
 
 def test_the_rough_law_of_a_search_is_near_the_law():
@@ -187,4 +179,4 @@ def test_the_rough_law_of_a_search_is_near_the_law():
             law = hs.BoucWenBaberNoori(beta=0.4, gamma=0.3, n=n, **own)
             y = law.response(u)
             # steps that leave out 1e-4 of the memory, some hundreds of times
-            assert np.abs(law.rough().response(u) - y).max() <= 0.02 * np.ptp(y)
+            assert np.abs(law.known_to(1e-4).response(u) - y).max() <= 0.02 * np.ptp(y)

@@ -28,7 +28,7 @@ from hysim.identification._search import brief_optima, brief_optimum, optima
 from hysim.laws.operators.reversal_filter import ReversalFilter
 from hysim.metrics.criteria import information
 from hysim.models.dependent_structure import DependentStructure
-from hysim.models.protocols import LongerPast, PartByPart, Rescalable, Undecided, Variant
+from hysim.models.protocols import PartByPart, Rescalable, Variant
 from hysim.models.search_space import SearchSpace
 from hysim.records import Record
 from hysim.simulation import free_run
@@ -189,17 +189,16 @@ def decided(family: Any, setting: Setting) -> Decision:
 
 
 def _decided(family: Any, setting: Setting) -> Decision:
-    given: Any = family
-    if not isinstance(family, Undecided):
-        return Decision(setting.problems(given))
+    if not decides(family, setting.records):
+        return Decision(setting.problems(family))
+    variants = family.variants() or (Variant(family, ""),)
     records, freedom, initial = setting.records, setting.freedom, setting.initial
     states, is_told = [_State(initial)], False
     if initial in (None, "free"):
-        plain = problem(given, records, freedom, initial)
+        plain = problem(family, records, freedom, initial)
         is_told = bool({*freedom.fixed, *freedom.free, *freedom.bounds} & set(plain.own.state))
     if initial is None and not is_told:
         states = [_State(each) for each in _possible(family, records)] or states
-    variants = family.variants() or (Variant(family, ""),)
     may_be_longer = _State("free") in states and len(records) == 1 and not is_told
     longest = _longer_pasts(variants[-1].family) if may_be_longer else 0
     if len(states) == len(variants) == 1 and not longest:
@@ -241,7 +240,7 @@ def _decided(family: Any, setting: Setting) -> Decision:
 
 def _longer_pasts(family: Any) -> int:
     """Number of times that the past of a family can be made longer."""
-    longer = family.longer_past() if isinstance(family, LongerPast) else None
+    longer = family.longer_past()
     return 0 if longer is None else 1 + _longer_pasts(longer)
 
 
@@ -251,7 +250,12 @@ def _longer(variant: Variant, times: int) -> Variant:
     return variant
 
 
-def _possible(family: Undecided, records: Sequence[Record]) -> list[str]:
+def decides(family: Any, records: Sequence[Record]) -> bool:
+    """Whether a family leaves something to these records."""
+    return bool(family.variants() or family.longer_past() or any(family.assumed_states(each) for each in records))
+
+
+def _possible(family: Any, records: Sequence[Record]) -> list[str]:
     named = [family.assumed_states(record) for record in records]
     return [
         state

@@ -51,19 +51,13 @@ class Reached(NamedTuple):
 
 @dataclass(frozen=True)
 class Descent:
-    """Outputs `targets` to be met with `weights`, (n_sets or 1, n_samples); `projected` solves for b at each step.
-
-    `nearly`, if given, is a problem with the same box from which slopes are taken, and `amended` what is added to them
-    in each set, (n_sets, n_samples, n_x).
-    """
+    """Outputs `targets` to be met with `weights`, (n_sets or 1, n_samples); `projected` solves for b at each step."""
 
     problem: Problem
     noise: Noise
     targets: FloatArray
     weights: FloatArray
     projected: bool = False
-    nearly: Problem | None = None  # where slopes cost less, with nearly the same outputs
-    amended: FloatArray | None = None
 
     def run(
         self,
@@ -72,12 +66,8 @@ class Descent:
         constraint: Constraint | None = None,
         tolerance: float = 1e-5,
         steps: int = N_STEPS,
-        hopeless: float = np.inf,
     ) -> Reached:
-        """Descend from `theta` (n_sets, n_theta) until a step lowers the loss by less than `tolerance`.
-
-        A set also ends where the steps that remain would not bring it below `hopeless`.
-        """
+        """Descend from `theta` (n_sets, n_theta) until a step lowers the loss by less than `tolerance`."""
         targets, weights = (np.broadcast_to(each, (len(theta), each.shape[1])) for each in (self.targets, self.weights))
         sets = _Sets(self, targets, weights * self.problem.weights, constraint)
         theta = np.clip(theta, *self.box())
@@ -85,8 +75,8 @@ class Descent:
             theta = self.restored(theta, constraint, self.pivots(theta, constraint)[0])
         if (budget := self.problem.budget) is not None:
             steps = budget.steps(steps, len(theta) * (self.problem.n_x + _TRIALS), self.problem.y.size)
-        bend = sets.bent if self.nearly is None and constraint is None else None
-        reached = descend(sets, theta, tolerance=tolerance, steps=steps, hopeless=hopeless, bend=bend)
+        bend = sets.bent if constraint is None else None
+        reached = descend(sets, theta, tolerance=tolerance, steps=steps, bend=bend)
         return Reached(reached.x, reached.loss, reached.evaluated[2][:, 0], reached.at_rest)
 
     def box(self) -> tuple[FloatArray, FloatArray]:
@@ -94,22 +84,19 @@ class Descent:
         return np.concatenate([space.lower, linear[0]]), np.concatenate([space.upper, linear[1]])
 
     def slopes(self, theta: FloatArray, outputs: FloatArray, columns: FloatArray) -> FloatArray:
-        """dm/dtheta, (n_sets, n_samples, n_theta), at points with these `outputs` and `columns`, as `nearly` has it."""
+        """dm/dtheta, (n_sets, n_samples, n_theta), at points with these `outputs` and `columns`."""
         n_sets, n_x = len(theta), self.problem.n_x
         if not n_x:
             return columns
         x = theta[:, :n_x]
         ends, steps = self.problem.beside(x)
         every: Sets = np.indices(steps.shape).reshape(2, -1)
-        if self.nearly is not None:
-            changes = _changes(self.nearly, theta, self.nearly.model(theta), ends, every)
-        else:
-            changes = _changes(self.problem, theta, outputs, ends, every)
-            stiff, shares = self._stiff(changes, outputs[every[0]])
-            places = every[:, stiff]
-            ends[tuple(places)] = x[places[0]] + shares[:, np.newaxis] * (ends[tuple(places)] - x[places[0]])
-            steps[tuple(places)] = ends[(*places, places[1])] - x[tuple(places)]
-            changes[stiff] = _changes(self.problem, theta, outputs, ends, places)
+        changes = _changes(self.problem, theta, outputs, ends, every)
+        stiff, shares = self._stiff(changes, outputs[every[0]])
+        places = every[:, stiff]
+        ends[tuple(places)] = x[places[0]] + shares[:, np.newaxis] * (ends[tuple(places)] - x[places[0]])
+        steps[tuple(places)] = ends[(*places, places[1])] - x[tuple(places)]
+        changes[stiff] = _changes(self.problem, theta, outputs, ends, places)
         with np.errstate(over="ignore", invalid="ignore"):
             by_x = changes.reshape(n_sets, n_x, -1) / steps[..., np.newaxis]
         by_x[~np.isfinite(by_x)] = 0.0
@@ -190,10 +177,7 @@ class _Sets:
         _, slope, curvature = self.descent.noise.terms(self.targets[sets] - outputs, sigma)
         root = self._root(sets, curvature, sigma)
         goal = -self.weights[sets] * slope / np.where(root > 0.0, root, 1.0)
-        slopes = self.descent.slopes(x, outputs, columns)
-        if self.descent.amended is not None:
-            slopes[:, :, : self.descent.problem.n_x] += self.descent.amended[sets]
-        return root[..., np.newaxis] * slopes, goal
+        return root[..., np.newaxis] * self.descent.slopes(x, outputs, columns), goal
 
     def _root(self, sets: Sets, curvature: FloatArray, sigma: FloatArray) -> FloatArray:
         return np.asarray(np.sqrt(self.weights[sets] * np.maximum(curvature, 1e-12 / sigma**2)))

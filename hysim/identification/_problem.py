@@ -22,7 +22,7 @@ from hysim._columns.channels import taken
 from hysim._columns.repeats import repeated_cycle
 from hysim._names import meant
 from hysim.identification.marquardt import Settled, least_squares, triangle
-from hysim.models.protocols import Forgetting, Identifiable, Staged, placed
+from hysim.models.protocols import Identifiable, placed
 from hysim.models.search_space import STATES, STATES_IN_WORDS, Freedom, Parameters, SearchSpace
 from hysim.models.stages import BASE, Stage
 from hysim.records import Record
@@ -61,7 +61,7 @@ _LARGEST = 1e150  # beyond it squares overflow: such a set counts as one that ha
 _FEWEST = 2  # samples of a record
 _MOST_OF_SPAN = 0.8
 _TURN = 0.01  # of the span: smaller reversals are noise, or change little
-_CLOSE = 1e-8  # accuracy of a close law, at worst
+_ROUGH, _CLOSE = 1e-4, 1e-8  # of the range: of differences over 1e-6 of the box only the second leaves slopes
 _DIFFERENCE = 1e-6  # step of a central difference in units of the box: truncation and rounding both ~1e-10
 
 
@@ -161,8 +161,6 @@ class Problem:
         """This problem with the rows that may stand for samples: the `known` ones of a problem of the same columns."""
         if known is not None and known.names == self.space.linear:
             return replace(self, settled=known)
-        if not isinstance(self.family, Forgetting):
-            return self
         records = [part.record for part in self.parts]
         first = tuple(max(_FEWEST, self.family.forgotten(record, self.own)) for record in records)
         if sum(len(record) - k for record, k in zip(records, first, strict=True)) < 2 * (len(self.space.linear) + 1):
@@ -218,19 +216,14 @@ class Problem:
         return np.asarray(np.clip(begun, self.space.lower, self.space.upper))
 
     def rough(self) -> "Problem":
-        """This problem with nearly the same outputs, cheaper to compute."""
-        family = self.family.rough() if isinstance(self.family, Staged) else self.family
+        """This problem with nearly the same outputs, cheaper to compute, which rank points."""
+        family = self.family.known_to(_ROUGH)
         return self if family is self.family else replace(self, family=family)
 
     def close(self) -> "Problem":
         """This problem with the same outputs to what a search can tell, cheaper to compute."""
-        family = self.family.close() if isinstance(self.family, Staged) else self.family
+        family = self.family.known_to(_CLOSE)
         return self if family is self.family else replace(self, family=family, accuracy=_CLOSE)
-
-    def quick(self) -> "Problem":
-        """The rough problem, or the close one where the law has no rough one."""
-        rough = self.rough()
-        return self.close() if rough is self else rough
 
     def completed(self, x: FloatArray) -> FloatArray:
         """Theta (n_sets, n_theta): the coordinates `x` and the best linear parameters."""
@@ -417,17 +410,17 @@ def problem(family: Identifiable, records: Sequence[Record], freedom: Freedom, i
     """
     family = placed(family, None)
     alone = _alone(family, records, freedom, initial)
-    simple = family.simpler() if isinstance(family, Staged) else None
+    simple = family.simpler()
     if simple is None or alone.own.encoded is None:
         return alone
     simpler = problem(simple.family, records, simple.reduced(freedom), initial)
     return replace(alone, simpler=simpler, enlarged=simple.enlarged)
 
 
-def problems(family: Identifiable, records: Sequence[Record], freedom: Freedom, initial: Initial) -> list[Problem]:
+def problems(family: Any, records: Sequence[Record], freedom: Freedom, initial: Initial) -> list[Problem]:
     """The problems of a search in stages, the simplest first, among which a criterion may choose; else one problem."""
-    stages = [each for each in family.stages if each.is_open(freedom)] if isinstance(family, Staged) else []
-    if not isinstance(family, Staged) or not stages:
+    stages = [each for each in family.freed_in_turn() if each.is_open(freedom)]
+    if not stages:
         return [problem(family, records, freedom, initial)]
     simplest = problem(family, records, _at_stage(stages, 0, freedom, family.scalars), initial)
     chain, first = [replace(simplest, stage=None if simplest.simpler is None else BASE)], 0

@@ -5,7 +5,7 @@ projected Levenberg-Marquardt steps in one batch. The best distinct optima desce
 """
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -31,7 +31,7 @@ N_POLISHED = 8  # by hand
 N_POLISHING = 200  # by hand: most polishes rest long before
 N_POLISHING_ALONE = 1000  # by hand: of the best optimum in a narrow bent valley, where it is not at rest
 N_NESTED = 3  # by hand: optima of a simpler family that are starts
-N_STAGED = 3  # by hand: points of a stage that are polished
+N_STAGED = 6  # points of a stage that are polished: 2 of 3 seeds then find the best law of a steel coupon, none with 3
 N_POLISHED_WHOLE = 3  # by hand: optima of a thinned record that descend on all samples, of which each is dear
 N_BRIEF_SCREENED = 512  # by hand: an eighth of a full search
 N_BRIEF_DESCENDING = 12  # by hand: about a fifth of a full search
@@ -44,16 +44,8 @@ _SAME = 0.01  # by hand: likewise of two points after the descent, which are nea
 _GAIN = 1e-5  # by hand: share of the sum of squares; a descent that gains less rests, and ranks are known
 _TOLERANCE = 2e-8  # likewise of a polish: far less than a likelihood can tell on records of some 1e5 samples
 _HOPELESS = 3.0  # by hand: times the least sum of squares on a thinned record, beyond which an optimum is no rival
-_BRIEF = 25  # by hand: steps on a thinned record
-_PASS = 60  # by hand: steps of a pass, in which the slopes of a law are those of the rough one, amended
-_PASSES_OF_ALL = 2  # by hand
-_PASSES = 3  # by hand: of the best alone
-_LAST = 25  # by hand: steps with exact slopes, which end what the amended ones have left
-_PASSED = 1e-6  # by hand: share of the sum of squares; a step that gains less ends a pass, a pass the polish
-_RIVAL = 20.0  # log-likelihood below the best optimum's: far outside the region at 95 % of a dozen parameters, 10.5
 _WIDENINGS = 4  # by hand: of a box, each by a quarter of its width, in all to 2.4 times it
 _ROUGH = 0.1  # by hand: share of the cost by which the rough law's may differ; beyond, it does not say what stays
-BRIEFLY, NEARLY, FULLY = range(3)  # as far as optima of a law with a rough one are polished
 _FAR_FROM_CLOSE = 100.0  # by hand: times the accuracy of a close law; a residual of this size is fitted as well by it
 PERFECT = 1e-14  # smallest sigma, in units of the output's size: about the rounding of a sum of some products
 
@@ -84,13 +76,13 @@ def chosen(
         if n_names > n_samples and problem is not problems[0]:
             break
         may_end = problem is not problems[0]
-        known = optima(problem, seed=seed, progress=progress, known=known, may_end=may_end, to=NEARLY)
+        known = optima(problem, seed=seed, progress=progress, known=known, may_end=may_end)
         if known:
             cost = max(known[0].cost, n_samples * (PERFECT * problem.scale) ** 2)
             criterion = information(cost / n_samples, n_samples, n_names)
             best = min(best, (criterion, problem, known), key=lambda each: each[0])
     _, problem, likely = best
-    return problem, polish_on(problem, likely)
+    return problem, likely
 
 
 def widened(problem: Problem, optima: Sequence[Optimum]) -> tuple[Problem, list[Optimum]]:
@@ -132,23 +124,22 @@ def optima(
     progress: Progress | None = None,
     known: Sequence[Optimum] | None = None,
     may_end: bool = False,
-    to: int = FULLY,
 ) -> list[Optimum]:
     """Distinct local optima, best first; empty if every parameter set diverges.
 
     `known` are those of the simpler problem, which is searched without them. If it `may_end`, a stage that will not
-    lower the Bayesian information criterion is not searched to its end. `to` is that of `polish`.
+    lower the Bayesian information criterion is not searched to its end.
     """
 
     def search() -> list[Optimum]:
-        return _found(problem, seed, progress, known, may_end, to)
+        return _found(problem, seed, progress, known, may_end)
 
     is_whole = known is None and not may_end and problem.rough() is problem
     return once(problem, seed, search) if is_whole else search()
 
 
 def _found(
-    problem: Problem, seed: int, progress: Progress | None, known: Sequence[Optimum] | None, may_end: bool, to: int
+    problem: Problem, seed: int, progress: Progress | None, known: Sequence[Optimum] | None, may_end: bool
 ) -> list[Optimum]:
     space = problem.space
     if not space.coordinates:
@@ -159,14 +150,12 @@ def _found(
             polish(condensed, apart(space, problem.ends, condensed.costs(problem.ends), _SAME, N_POLISHED_WHOLE))
         )
     if problem.y.size > _LONG and (short := problem.thinned(_SHORT) or problem.beginning(_FIRST)) is not None:
-        likely = optima(short, seed=seed, progress=progress, known=known, may_end=may_end, to=BRIEFLY)[
-            :N_POLISHED_WHOLE
-        ]
+        likely = optima(short, seed=seed, progress=progress, known=known, may_end=may_end)[:N_POLISHED_WHOLE]
         if problem.stage is not None and problem.rough() is not problem:  # each costs much to polish
             likely = [each for each in likely if each.cost <= _HOPELESS * likely[0].cost]
         if likely and likely[0].is_simpler:
             return _as_they_are(problem, np.array([each.x for each in likely]))
-        return _distinct(polish(problem, np.array([each.x for each in likely]), to)) if likely else []
+        return _distinct(polish(problem, np.array([each.x for each in likely]))) if likely else []
     problem = problem.condensed()
     if known is None and problem.simpler is not None:
         known = optima(problem.simpler, seed=seed)
@@ -175,20 +164,20 @@ def _found(
         points = _staged(problem, problem.stage, begun, seed)
         if may_end and len(begun) and not _may_stay(problem, begun, points):
             return _as_they_are(problem, begun)
-        return _distinct(polish(problem, points, to))
+        return _distinct(polish(problem, points))
     share = min(1.0, _LONG / problem.y.size)
     screened = max(256, round(N_SCREENED * share)) if space.screened is None else space.screened
     n_starts = max(16, round(N_DESCENDING * share))
     if begun.size and space.screened is not None and problem.y.size >= _SHORT:
         n_starts = N_DESCENDING_BESIDE
-    starts = _starts(problem.quick(), screened, seed, n_starts, np.concatenate([space.starts, begun]))
+    starts = _starts(problem.rough(), screened, seed, n_starts, np.concatenate([space.starts, begun]))
     if not len(starts):
         return []
     reached = descended(problem.close(), starts, exact=False)
     best = apart(space, reached.theta[:, : problem.n_x], reached.loss, _SAME, N_POLISHED)
     report = progress or (lambda done, total: None)
     report(1, 2)
-    polished = polish(problem, best, to) if len(best) else []
+    polished = polish(problem, best) if len(best) else []
     report(2, 2)
     return _distinct(polished)
 
@@ -227,7 +216,7 @@ def brief_optima(problem: Problem) -> tuple[FloatArray, FloatArray]:
     if not space.coordinates:
         return np.empty((1, 0)), condensed.costs(np.empty((1, 0)))
     screened = N_BRIEF_SCREENED if space.screened is None else min(space.screened, N_BRIEF_SCREENED)
-    best = _starts(condensed.quick(), screened, 0, N_BRIEF_DESCENDING, space.starts, are_kept=False)
+    best = _starts(condensed.rough(), screened, 0, N_BRIEF_DESCENDING, space.starts, are_kept=False)
     if not len(best):
         return 0.5 * (space.lower + space.upper)[np.newaxis], np.array([math.inf])
     reached = descended(problem, best, exact=False)
@@ -235,46 +224,27 @@ def brief_optima(problem: Problem) -> tuple[FloatArray, FloatArray]:
     return (ends, problem.costs(ends)) if len(ends) else (best[:1], np.array([math.inf]))
 
 
-def polish(problem: Problem, starts: FloatArray, to: int = FULLY) -> list[Optimum]:
-    """The ends of descents from `starts` (n_sets, n_x); in stages with a rough law, `to` says how far they go."""
+def polish(problem: Problem, starts: FloatArray) -> list[Optimum]:
+    """The ends of descents from `starts` (n_sets, n_x): on the close law, and on the law itself where it fits as well.
+
+    That is as well as the two laws agree.
+    """
     problem = problem.condensed()
-    rough = problem.rough()
-    if rough is problem or problem.stage is None or not len(starts):
-        return _closely(problem, starts, _polished)
-    gain, steps = (_GAIN, _BRIEF) if to == BRIEFLY else (_PASSED, _PASS)
-
-    def ends(law: Problem, x: FloatArray) -> Reached:
-        reached = descended(law, x, exact=True, nearly=rough, gain=gain, steps=steps)
-        return _amended(law, rough, reached.theta) if to == FULLY else reached
-
-    return _closely(problem, starts, ends)
+    close = problem.close()
+    found = _optima(problem, _polished(close, starts))
+    least = min((each.cost for each in found), default=math.inf)
+    if close is problem or least > problem.y.size * (_FAR_FROM_CLOSE * close.accuracy * problem.scale) ** 2:
+        return found
+    return _optima(problem, _polished(problem, np.array([each.x for each in found])))
 
 
 def _polished(problem: Problem, starts: FloatArray) -> Reached:
     reached = descended(problem, starts, exact=True)
     if len(starts) and not reached.at_rest[best := int(reached.loss.argmin())]:
-        alone = reached.theta[[best], : problem.n_x]
-        _replace(reached, [best], descended(problem, alone, exact=True, steps=N_POLISHING_ALONE))
+        alone = descended(problem, reached.theta[[best], : problem.n_x], exact=True, steps=N_POLISHING_ALONE)
+        for values, there in zip(reached, alone, strict=True):
+            values[[best]] = there
     return reached
-
-
-def polish_on(problem: Problem, optima: Sequence[Optimum]) -> list[Optimum]:
-    """The optima that were polished nearly, now fully."""
-    rough = problem.rough()
-    if rough is problem or problem.stage is None or not optima:
-        return list(optima)
-    starts = np.array([each.x for each in optima])
-    return _distinct(_closely(problem, starts, lambda law, x: _amended(law, rough, law.completed(x))))
-
-
-def _closely(problem: Problem, starts: FloatArray, ends: Callable[[Problem, FloatArray], Reached]) -> list[Optimum]:
-    """The `ends` of a polish on the close law, and on the law itself where it fits as well as the two laws agree."""
-    close = problem.close()
-    found = _optima(problem, ends(close, starts))
-    least = min((each.cost for each in found), default=math.inf)
-    if close is problem or least > problem.y.size * (_FAR_FROM_CLOSE * close.accuracy * problem.scale) ** 2:
-        return found
-    return _optima(problem, ends(problem, np.array([each.x for each in found])))
 
 
 def _optima(problem: Problem, reached: Reached) -> list[Optimum]:
@@ -283,46 +253,6 @@ def _optima(problem: Problem, reached: Reached) -> list[Optimum]:
     return [
         Optimum(x[k], float(costs[k]), bool(reached.at_rest[k])) for k in np.flatnonzero(np.isfinite(costs)).tolist()
     ]
-
-
-def _amended(problem: Problem, rough: Problem, theta: FloatArray) -> Reached:
-    """Ends of passes with the slopes of the rough law, plus those of the law minus those of the rough at the start.
-
-    A step of a pass needs one exact set, and the beginning of a pass one for each coordinate. After the first passes
-    the best optimum descends alone, at last with its own slopes.
-    """
-    reached = _pass(problem, rough, theta, gain=_PASSED)
-    for _ in range(_PASSES_OF_ALL - 1):
-        hopeless = float(reached.loss.min()) + _RIVAL
-        reached = _pass(problem, rough, reached.theta, gain=_PASSED, hopeless=hopeless)
-    best = [int(reached.loss.argmin())]
-    for _ in range(_PASSES):
-        before = float(reached.loss[best[0]])
-        _replace(reached, best, _pass(problem, rough, reached.theta[best], gain=_TOLERANCE))
-        if not float(reached.loss[best[0]]) < before - 0.5 * problem.y.size * _PASSED:
-            break
-    rested = reached.at_rest[best]
-    _replace(reached, best, descended(problem, reached.theta[best, : problem.n_x], exact=True, steps=_LAST))
-    reached.at_rest[best] |= rested
-    return reached
-
-
-def _replace(reached: Reached, places: list[int], others: Reached) -> None:
-    for values, there in zip(reached, others, strict=True):
-        values[places] = there
-
-
-def _pass(problem: Problem, rough: Problem, theta: FloatArray, *, gain: float, hopeless: float = math.inf) -> Reached:
-    amended = _slopes(problem, theta) - _slopes(rough, theta)
-    x = theta[:, : problem.n_x]
-    return descended(problem, x, exact=True, nearly=rough, amended=amended, gain=gain, steps=_PASS, hopeless=hopeless)
-
-
-def _slopes(problem: Problem, theta: FloatArray) -> FloatArray:
-    """Slopes of the outputs by the coordinates, (n_sets, n_samples, n_x)."""
-    descent = Descent(problem, Gaussian(0.0), problem.y[np.newaxis], np.ones((1, problem.y.size)))
-    nothing = np.empty((len(theta), problem.y.size, 0))
-    return descent.slopes(theta, problem.model(theta), nothing)
 
 
 def _staged(problem: Problem, stage: Stage, begun: FloatArray, seed: int) -> FloatArray:
@@ -357,22 +287,11 @@ def _may_stay(problem: Problem, begun: FloatArray, points: FloatArray) -> bool:
     return is_rough or n * (math.log(before) - math.log(after)) > 0.5 * freed * math.log(n)
 
 
-def descended(
-    problem: Problem,
-    starts: FloatArray,
-    *,
-    exact: bool,
-    steps: int | None = None,
-    nearly: Problem | None = None,
-    amended: FloatArray | None = None,
-    gain: float | None = None,
-    hopeless: float = np.inf,
-) -> Reached:
+def descended(problem: Problem, starts: FloatArray, *, exact: bool, steps: int | None = None) -> Reached:
     noise, everything = Gaussian(floor=max(PERFECT, problem.accuracy) * problem.scale), np.ones((1, problem.y.size))
-    descent = Descent(problem, noise, problem.y[np.newaxis], everything, not problem.space.bounds, nearly, amended)
+    descent = Descent(problem, noise, problem.y[np.newaxis], everything, not problem.space.bounds)
     least, most = (_TOLERANCE, N_POLISHING) if exact else (_GAIN, N_STEPS)
-    tolerance = 0.5 * problem.y.size * (gain or least)
-    return descent.run(problem.completed(starts), tolerance=tolerance, steps=steps or most, hopeless=hopeless)
+    return descent.run(problem.completed(starts), tolerance=0.5 * problem.y.size * least, steps=steps or most)
 
 
 def _starts(

@@ -31,14 +31,14 @@ import numpy as np
 from hysim._basics.frozen import FloatArray
 from hysim._columns.channels import steady
 from hysim.errors import SimulationError
-from hysim.identification._assumptions import decided
+from hysim.identification._assumptions import decided, decides
 from hysim.identification._problem import Problem, Setting
 from hysim.identification._search import apart, brief_optimum, chosen, descended, spread
 from hysim.identification._uncertainty import uncertainty
 from hysim.metrics.criteria import information
 from hysim.models.dependent_structure import DependentStructure
 from hysim.models.parts import own
-from hysim.models.protocols import Identifiable, PartByPart, Undecided
+from hysim.models.protocols import Identifiable, PartByPart
 from hysim.models.search_space import Freedom
 from hysim.models.varying import weights
 from hysim.records import Record
@@ -134,7 +134,8 @@ def _with_law(plant: Any, setting: Setting) -> tuple[Any, _Law]:
         bounds=own(freedom.bounds, "hysteresis"),
     )
     alone = replace(setting.only([k]), records=[record], freedom=share, max_evaluations=None)
-    if alone.initial is None and isinstance(law, Undecided):
+    is_open = decides(law, [record])
+    if alone.initial is None and is_open:
         alone = replace(alone, initial="rest")
     every = decided(law, alone).problems
     best, optima = chosen([each.thinned(_THINNED) or each for each in every], seed=setting.seed)
@@ -142,7 +143,7 @@ def _with_law(plant: Any, setting: Setting) -> tuple[Any, _Law]:
         raise ValueError("every set of parameters of the law diverged on the slowest record: pass bounds=")
     estimates = best.estimates(best.completed(optima[0].x[np.newaxis])[0])
     model = best.family.assemble(estimates)
-    start = model if isinstance(model, Identifiable) and not isinstance(law, Undecided) else best.family
+    start = model if isinstance(model, Identifiable) and not is_open else best.family
     space = best.own
     searched = [name for name in space.names if name not in (*space.linear, *space.state)]
     shape = {f"hysteresis.{name}": estimates[name] for name in searched}

@@ -6,13 +6,13 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from hysim._basics.frozen import FloatArray
-from hysim.models.protocols import Forgetting, Identifiable, LongerPast, Staged, Undecided, Variant
+from hysim.models.protocols import Identifiable, Numbered, Variant
 from hysim.models.search_space import ALL_FREE, Freedom, Parameters, SearchSpace
 from hysim.models.stages import Simpler, Stage
 from hysim.records import Record
 
 
-class ByStructure(ABC):
+class ByStructure(Identifiable, ABC):
     """A model that passes `hysim.identify` on to a structure."""
 
     @abstractmethod
@@ -35,20 +35,16 @@ class ByStructure(ABC):
         return self.as_structure().notes(record, model)
 
     def assumed_states(self, record: Record) -> tuple[str, ...]:
-        structure = self.as_structure()
-        return structure.assumed_states(record) if isinstance(structure, Undecided) else ()
+        return self.as_structure().assumed_states(record)
 
     def variants(self) -> tuple[Variant, ...]:
-        structure = self.as_structure()
-        return structure.variants() if isinstance(structure, Undecided) else ()
+        return self.as_structure().variants()
 
     def longer_past(self) -> Any | None:
-        structure = self.as_structure()
-        return structure.longer_past() if isinstance(structure, LongerPast) else None
+        return self.as_structure().longer_past()
 
     def forgotten(self, record: Record, space: SearchSpace) -> int:
-        structure = self.as_structure()
-        return structure.forgotten(record, space) if isinstance(structure, Forgetting) else len(record)
+        return self.as_structure().forgotten(record, space)
 
 
 @dataclass(frozen=True)
@@ -63,23 +59,18 @@ class Holding(ByStructure):
 
     @property
     def scalars(self) -> Mapping[str, float]:
-        return {**self.structure.scalars, **self.values} if isinstance(self.structure, Staged) else self.values
+        return {**(self.structure.scalars if isinstance(self.structure, Numbered) else {}), **self.values}
 
-    @property
-    def stages(self) -> tuple[Stage, ...]:
-        return self.structure.stages if isinstance(self.structure, Staged) else ()
+    def freed_in_turn(self) -> tuple[Stage, ...]:
+        return self.structure.freed_in_turn()
 
     def simpler(self) -> Simpler | None:
-        simple = self.structure.simpler() if isinstance(self.structure, Staged) else None
+        simple = self.structure.simpler()
         return simple and simple._replace(family=Holding(simple.family, simple.carried(self.values)))
 
-    def rough(self) -> Identifiable:
-        rough = self.structure.rough() if isinstance(self.structure, Staged) else self.structure
-        return self if rough is self.structure else replace(self, structure=rough)
-
-    def close(self) -> Identifiable:
-        close = self.structure.close() if isinstance(self.structure, Staged) else self.structure
-        return self if close is self.structure else replace(self, structure=close)
+    def known_to(self, tolerance: float) -> Any:
+        known = self.structure.known_to(tolerance)
+        return self if known is self.structure else replace(self, structure=known)
 
     def search_space(self, record: Record, freedom: Freedom = ALL_FREE) -> SearchSpace:
         held = {name: value for name, value in self.values.items() if name not in freedom.free}

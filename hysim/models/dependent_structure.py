@@ -21,7 +21,7 @@ import numpy.typing as npt
 from hysim._basics.frozen import FloatArray, checked
 from hysim._columns.channels import value_in
 from hysim._names import among
-from hysim.models.protocols import Identifiable, PartByPart, Recorded, Staged, Undecided, Variant
+from hysim.models.protocols import Identifiable, Numbered, PartByPart, Recorded, Variant
 from hysim.models.search_space import ALL_FREE, Freedom, Parameters, SearchSpace
 from hysim.models.stages import Simpler, Stage
 from hysim.models.varying import ChannelPolynomial, check_memory_is_its_own, columns_along, names_of, places, weights
@@ -288,28 +288,23 @@ class DependentStructure(Identifiable):
 
     @property
     def scalars(self) -> Mapping[str, float]:
-        return dict(self.law.scalars) if isinstance(self.law, Staged) else {}
+        return dict(self.law.scalars) if isinstance(self.law, Numbered) else {}
 
-    @property
-    def stages(self) -> tuple[Stage, ...]:
+    def freed_in_turn(self) -> tuple[Stage, ...]:
         """The law's stages, where nothing depends on a channel; else none."""
-        return self.law.stages if isinstance(self.law, Staged) and not self.at else ()
+        return () if self.at else tuple(self.law.freed_in_turn())
 
     def simpler(self) -> Simpler | None:
-        return self.law.simpler() if isinstance(self.law, Staged) and not self.at else None
+        return None if self.at else self.law.simpler()
 
-    def rough(self) -> "DependentStructure":
-        return self._with(self.law.rough()) if isinstance(self.law, Staged) else self
-
-    def close(self) -> "DependentStructure":
-        return self._with(self.law.close()) if isinstance(self.law, Staged) else self
+    def known_to(self, tolerance: float) -> "DependentStructure":
+        return self._with(self.law.known_to(tolerance))
 
     def assumed_states(self, record: Record) -> tuple[str, ...]:
-        return self.law.assumed_states(record) if isinstance(self.law, Undecided) else ()
+        return tuple(self.law.assumed_states(record))
 
     def variants(self) -> tuple[Variant, ...]:
-        variants = self.law.variants() if isinstance(self.law, Undecided) else ()
-        return tuple(each._replace(family=self._with(each.family)) for each in variants)
+        return tuple(each._replace(family=self._with(each.family)) for each in self.law.variants())
 
     def _with(self, law: Any) -> "DependentStructure":
         return self if law is self.law else replace(self, law=law)

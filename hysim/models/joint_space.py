@@ -16,7 +16,7 @@ import numpy as np
 from hysim._basics.frozen import FloatArray
 from hysim._names import among
 from hysim.models.parts import own
-from hysim.models.protocols import Undecided, Variant
+from hysim.models.protocols import Variant
 from hysim.models.search_space import Freedom, SearchSpace
 from hysim.records import Record
 
@@ -157,19 +157,13 @@ def _starts(spaces: Sequence[SearchSpace]) -> FloatArray:
 
 def common_states(parts: Mapping[str, Any], record: Record) -> tuple[str, ...]:
     """Values of `initial` that every part with a state leaves to the record; empty if one leaves nothing open."""
-    offered = [
-        part.assumed_states(record) if isinstance(part, Undecided) else ()
-        for part in parts.values()
-        if part.search_space(record).state
-    ]
+    offered = [part.assumed_states(record) for part in parts.values() if part.search_space(record).state]
     return tuple(state for state in offered[0] if all(state in each for each in offered)) if offered else ()
 
 
 def combined_variants(parts: Mapping[str, Any], assembled: Callable[[Mapping[str, Any]], Any]) -> tuple[Variant, ...]:
     """Every combination of the parts' variants; `assembled` gives the whole with other parts by their labels."""
-    choices = {
-        label: found for label, part in parts.items() if isinstance(part, Undecided) and (found := part.variants())
-    }
+    choices = {label: found for label, part in parts.items() if (found := part.variants())}
     if not choices:
         return ()
     return tuple(

@@ -29,7 +29,7 @@ from hysim.models.compiled_step import compiled_start, compiled_step
 from hysim.models.composable import Placed
 from hysim.models.inverse_search import inverse_at_rest, inverse_response, not_reached, searched_inverse
 from hysim.models.parameters import Parameter, declared_space
-from hysim.models.protocols import UNLIMITED, CompiledLaw, Limits, Startable
+from hysim.models.protocols import UNLIMITED, CompiledLaw, Identifiable, Limits, Startable
 from hysim.models.search_space import ALL_FREE, Freedom, Parameters, SearchSpace
 from hysim.models.slope import HOOKS, states_of, step_of
 from hysim.models.stages import Simpler, Stage, Subset
@@ -45,9 +45,7 @@ State = tuple[float, ...]
 
 _AHEAD = 4  # runs through the turning points before the search for a steady memory
 _EXACT = 1e-12  # of the range: what a step along a branch leaves out,
-_FINEST = 1e-14  # in differences,
-_ROUGH = 1e-4  # in the first steps of a search, which rank points,
-_CLOSE = 1e-8  # and in its later ones, whose differences over 1e-6 of the box are still slopes
+_FINEST = 1e-14  # and in differences
 _FEW = 0.5  # of the samples: more turning points are those of noise
 
 
@@ -71,7 +69,7 @@ class Stepping(NamedTuple):
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Law(Placed, ABC):
+class Law(Placed, Identifiable, ABC):
     """A rate-independent law that is known by its step, or by its slope, of which the step follows.
 
     A family is a subclass under the decorator `hysim.family`: its fields, and the class attributes below. A field is
@@ -359,7 +357,7 @@ class Law(Placed, ABC):
         """
         from hysim.models.jacobian import response_jacobian  # loaded where it is needed
 
-        return response_jacobian(self, u, names, self._known_to(_FINEST))
+        return response_jacobian(self, u, names, self.known_to(_FINEST))
 
     def memory(self, u: npt.ArrayLike) -> FloatArray:
         """Memory at the samples of `u`; parameters and errors as in `response`.
@@ -583,19 +581,16 @@ class Law(Placed, ABC):
             defaults=self.defaults(),
         )  # fmt: skip
 
+    def freed_in_turn(self) -> tuple[Stage, ...]:
+        """The `stages` of the family."""
+        return self.stages
+
     def simpler(self) -> Simpler | None:
         """The law that this one `contains`, with the values that both have."""
         return None if self.contains is None else self.contains.of(self.scalars)
 
-    def rough(self) -> "Law":
-        """A law with nearly the same output, for the first steps of a search; itself where that is cheap enough."""
-        return self._known_to(_ROUGH)
-
-    def close(self) -> "Law":
-        """A law with the same output to what a search can tell, cheaper to compute; itself where there is none."""
-        return self._known_to(_CLOSE)
-
-    def _known_to(self, tolerance: float) -> "Law":
+    def known_to(self, tolerance: float) -> "Law":
+        """The law by its slope, integrated to this share of the range; itself where its step is exact."""
         known = not self.hidden_states or self.tolerance == tolerance
         return self if known else _with_tolerance(type(self), tolerance)(**items(self))
 
@@ -672,10 +667,6 @@ class Law(Placed, ABC):
             return passed
 
         return of
-
-    def notes(self, record: Record, model: Any) -> tuple[str, ...]:
-        """Remarks on the identified model, as phrases."""
-        return ()
 
     def assemble(self, parameters: Mapping[str, float]) -> Self:
         """The law with these parameters, one number for each name; the others are its own."""

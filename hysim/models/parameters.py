@@ -6,7 +6,7 @@ affine in it, and it is solved for; or it is neither, and held.
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 
@@ -169,6 +169,71 @@ def space_of(
         parameters=parameters,
         physical={each.name: each.physical for each in searched if each.name not in limits},
         **{"bounds": {name: pair for name, pair in limits.items() if name in columns}, **others},
+    )
+
+
+class Chart(Protocol):
+    """Coordinates of parameters: their names, the values at the start, and the ways there and back."""
+
+    @property
+    def coordinates(self) -> tuple[str, ...]:
+        """Names of the coordinates."""
+
+    @property
+    def values(self) -> Mapping[str, float]:
+        """Parameters by name, as the search begins."""
+
+    def encode(self, parameters: Mapping[str, float]) -> FloatArray:
+        """Coordinates (n_x,) of the parameters."""
+
+    def decode(self, x: FloatArray) -> dict[str, FloatArray]:
+        """Parameters (n_sets,) by name at the coordinates (n_sets, n_x)."""
+
+
+def space_of_chart(
+    chart: Chart,
+    box: tuple[FloatArray, FloatArray],
+    start: FloatArray,
+    defaults: Mapping[str, float],
+    columns: tuple[str, ...],
+    held: Mapping[str, float],
+    bounds: Mapping[str, tuple[float, float]],
+    freedom: Freedom,
+    *,
+    physical: Mapping[str, tuple[bool, bool]],
+    **others: Any,
+) -> SearchSpace:
+    """The search in the coordinates of a chart between the sides of its `box`, (n_x,) each, from `start` (n_x,).
+
+    A search that begins at a law of the user's has a box that holds it, but for the user's `bounds`.
+    """
+    lower, upper = box
+    if not freedom.starts_anew:
+        own = chart.encode(chart.values)
+        free = np.array([name not in bounds for name in chart.coordinates], dtype=bool)
+        lower, upper = np.where(free, np.minimum(lower, own), lower), np.where(free, np.maximum(upper, own), upper)
+
+    def decoded(x: FloatArray) -> dict[str, FloatArray]:
+        fixed = {name: np.full(len(np.atleast_2d(x)), value) for name, value in held.items() if name not in columns}
+        return fixed | chart.decode(x)
+
+    def encoded(parameters: Mapping[str, float]) -> FloatArray:
+        return np.asarray(np.clip(chart.encode({**chart.values, **parameters}), lower, upper))
+
+    return SearchSpace(
+        coordinates=chart.coordinates,
+        lower=lower,
+        upper=upper,
+        starts=np.clip(start, lower, upper)[np.newaxis],
+        names=tuple(name for name in defaults if name not in held),
+        columns=columns,
+        linear=tuple(name for name in columns if name not in held),
+        held=held,
+        parameters=decoded,
+        bounds={name: pair for name, pair in bounds.items() if name in columns},
+        physical={name: physical[name] for name in chart.coordinates if name in physical and name not in bounds},
+        encoded=encoded,
+        **others,
     )
 
 

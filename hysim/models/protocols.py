@@ -243,9 +243,23 @@ class Offering(Protocol):
         """Names to classes, models or structures; none where it is left out."""
 
 
+class Variant(NamedTuple):
+    """A choice that a family leaves to the record: the family with it, and the choice in words.
+
+    One that is not `offered` is searched only as the start of those behind it, which contain it.
+    """
+
+    family: Any
+    words: str
+    offered: bool = True
+
+
 @runtime_checkable
 class Identifiable(Protocol):
-    """A subject of `identify`: a model class, a model as the start, or a structure."""
+    """A subject of `identify`: a model class, a model as the start, or a structure.
+
+    What inherits this class has the methods that have a body.
+    """
 
     def search_space(self, record: Record, freedom: Freedom = ALL_FREE) -> SearchSpace:
         """Declare the box for `record`."""
@@ -271,16 +285,36 @@ class Identifiable(Protocol):
         """Remarks on the identified model, as phrases."""
         return ()
 
+    def freed_in_turn(self) -> tuple[Stage, ...]:
+        """Parameters that a search frees in turn; see `hysim.models.stages`."""
+        return ()
 
-class Variant(NamedTuple):
-    """A choice that a family leaves to the record: the family with it, and the choice in words.
+    def simpler(self) -> Simpler | None:
+        """The simpler family whose optimum starts the search."""
+        return None
 
-    One that is not `offered` is searched only as the start of those behind it, which contain it.
-    """
+    def known_to(self, tolerance: float) -> Any:
+        """A subject with the same search box and the same outputs to a share of the range, if that is cheaper."""
+        return self
 
-    family: Any
-    words: str
-    offered: bool = True
+    def assumed_states(self, record: Record) -> tuple[str, ...]:
+        """Values of `initial` among which the record decides, the simplest first; by default it decides nothing."""
+        return ()
+
+    def variants(self) -> tuple[Variant, ...]:
+        """Further choices that it decides, the simplest first; the last one contains all others."""
+        return ()
+
+    def longer_past(self) -> Any | None:
+        """The family whose free state at the first sample has one number more, if it has one."""
+        return None
+
+    def forgotten(self, record: Record, space: SearchSpace) -> int:
+        """The first sample from which on neither a coordinate of `space` nor a state or variant has an effect.
+
+        It is the number of samples where there is none.
+        """
+        return len(record)
 
 
 @runtime_checkable
@@ -300,58 +334,6 @@ class Rescalable(Protocol):
 
     def rescaled(self, residual: FloatArray) -> Any:
         """The record in units of that noise."""
-
-
-@runtime_checkable
-class Undecided(Protocol):
-    """A family that leaves to the record what a user does not say; `hysim.identify` decides by the BIC."""
-
-    def assumed_states(self, record: Record) -> tuple[str, ...]:
-        """Values of `initial`, the simplest first; none where the family's default holds for every record."""
-
-    def variants(self) -> tuple[Variant, ...]:
-        """Further choices, the simplest first; the last one contains all others. None where nothing is left open."""
-
-
-@runtime_checkable
-class Forgetting(Protocol):
-    """A family whose columns depend, from some sample on, on the input since the first sample alone."""
-
-    def forgotten(self, record: Record, space: SearchSpace) -> int:
-        """The first sample from which on neither a coordinate of `space` nor a state or variant has an effect.
-
-        It is the number of samples where there is none.
-        """
-
-
-@runtime_checkable
-class LongerPast(Protocol):
-    """A family whose free state at the first sample can be described by more numbers; the BIC decides how many."""
-
-    def longer_past(self) -> Any | None:
-        """The family with one number more, which contains this one; None where there is none."""
-
-
-@runtime_checkable
-class Staged(Protocol):
-    """A subject of `identify` that says how its search is staged; see `hysim.models.stages`."""
-
-    @property
-    def scalars(self) -> Mapping[str, float]:
-        """Every parameter by name, as the search begins."""
-
-    @property
-    def stages(self) -> tuple[Stage, ...]:
-        """Parameters that are freed in turn."""
-
-    def simpler(self) -> Simpler | None:
-        """The simpler family whose optimum starts the search."""
-
-    def rough(self) -> Identifiable:
-        """A subject with the same search box and nearly the same outputs, cheaper to compute."""
-
-    def close(self) -> Identifiable:
-        """A subject with the same search box and the same outputs to what a search can tell, cheaper to compute."""
 
 
 @runtime_checkable

@@ -24,7 +24,7 @@ from hysim.models.dependent import AlongRecord
 from hysim.models.joint_space import columns_beside, declared, together, without_repetition
 from hysim.models.model import family
 from hysim.models.parts import check_parts, own, response_of
-from hysim.models.protocols import Identifiable, Placeable, Undecided, law_at, needs_time, placed
+from hysim.models.protocols import Identifiable, Placeable, law_at, needs_time, placed
 from hysim.models.search_space import ALL_FREE, Freedom, Parameters, SearchSpace
 from hysim.records import Record
 
@@ -232,7 +232,7 @@ def checked_laws(laws: Mapping[str, Any]) -> InputSum:
 
 def _widest(law: Any) -> Any:
     """The law with the widest of its choices, such as weights of both signs: no loop of one input alone decides."""
-    variants = law.variants() if isinstance(law, Undecided) else ()
+    variants = law.variants()
     return variants[-1].family if variants else law
 
 

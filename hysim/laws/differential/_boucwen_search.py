@@ -21,11 +21,12 @@ or to zero and infinity cut the box at zero.
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import Protocol
+from typing import Any
 
 import numpy as np
 
 from hysim._basics.frozen import FloatArray
+from hysim.models.parameters import space_of_chart
 from hysim.models.search_space import Freedom, SearchSpace
 from hysim.records import Record
 
@@ -51,27 +52,6 @@ _BOX = {
     **dict.fromkeys(_FURTHER, (-KNEE, KNEE)),
     **_SCALED,
 }
-
-
-class Chart(Protocol):
-    """Coordinates of the parameters of a memory: their names, the values at the start, and the ways there and back."""
-
-    @property
-    def coordinates(self) -> tuple[str, ...]:
-        """Names of the coordinates."""
-
-    @property
-    def values(self) -> Mapping[str, float]:
-        """Parameters by name, as the search begins."""
-
-    def in_own_units(self) -> "Chart":
-        """The chart for an input of the span 1 and an output of the slope 1."""
-
-    def encode(self, parameters: Mapping[str, float]) -> FloatArray:
-        """Coordinates (n_x,) of the parameters."""
-
-    def decode(self, x: FloatArray) -> dict[str, FloatArray]:
-        """Parameters (n_sets,) by name at the coordinates (n_sets, n_x)."""
 
 
 def search_space(
@@ -100,60 +80,35 @@ def search_space(
     known = {*columns, *("A", "beta", "gamma", "n", "z0")}
     extended = not known.issuperset(defaults)  # what is admissible for such a law is not known
 
-    further = {name: value for name, value in held.items() if name not in (*_MEMORY, *columns)}
-
-    def decoded(x: FloatArray) -> dict[str, FloatArray]:
-        return {name: np.full(len(np.atleast_2d(x)), value) for name, value in further.items()} | chart.decode(x)
-
     quadrant = np.array([max(low, 0.0) if name in _PAIR else low for name, (low, _) in box.items()])
-    return replace(
-        space_of_chart(chart, (lower, upper), defaults, columns, held, bounds, anew=freedom.starts_anew),
-        parameters=decoded,
+    return space_of_memory(
+        chart,
+        (lower, upper),
+        defaults,
+        columns,
+        held,
+        bounds,
+        freedom,
         regions={"admissible": (quadrant, upper)} if set(_PAIR) <= set(box) and not extended else {},
         screened=screened,
     )
 
 
-def space_of_chart(
-    chart: Chart,
+def space_of_memory(
+    chart: Any,
     box: tuple[FloatArray, FloatArray],
     defaults: Mapping[str, float],
     columns: tuple[str, ...],
     held: Mapping[str, float],
     bounds: Mapping[str, tuple[float, float]],
-    *,
-    anew: bool,
+    freedom: Freedom,
+    **others: Any,
 ) -> SearchSpace:
-    """The search in the coordinates of a chart, between both sides of its `box`, from the chart's own values.
-
-    `anew` is `Freedom.starts_anew`.
-    """
-    lower, upper = box
-    begun = chart.in_own_units() if anew and _BY_DEFAULT.items() <= defaults.items() else chart
-    if not anew:
-        own = chart.encode(chart.values)
-        free = np.array([name not in bounds for name in chart.coordinates], dtype=bool)
-        lower, upper = np.where(free, np.minimum(lower, own), lower), np.where(free, np.maximum(upper, own), upper)
-
-    def encoded(parameters: Mapping[str, float]) -> FloatArray:
-        return np.asarray(np.clip(chart.encode({**chart.values, **parameters}), lower, upper))
-
-    return SearchSpace(
-        coordinates=chart.coordinates,
-        lower=lower,
-        upper=upper,
-        starts=np.clip(begun.encode(chart.values), lower, upper)[np.newaxis],
-        names=tuple(name for name in defaults if name not in held),
-        columns=columns,
-        linear=tuple(name for name in columns if name not in held),
-        held=held,
-        parameters=chart.decode,
-        redundant=REDUNDANT,
-        bounds={name: pair for name, pair in bounds.items() if name in columns},
-        state=("z0",),
-        physical={name: PHYSICAL[name] for name in chart.coordinates if name in PHYSICAL and name not in bounds},
-        encoded=encoded,
-    )
+    """The search of a memory in the coordinates of a chart, which begins in the units of the record by default."""
+    is_default = freedom.starts_anew and _BY_DEFAULT.items() <= defaults.items()
+    start = (chart.in_own_units() if is_default else chart).encode(chart.values)
+    others = {"redundant": REDUNDANT, "physical": PHYSICAL, **others}
+    return space_of_chart(chart, box, start, defaults, columns, held, bounds, freedom, state=("z0",), **others)
 
 
 def _cut(name: str, sign: tuple[float, float] | None) -> tuple[float, float]:

@@ -104,13 +104,10 @@ def search_space(
     drawn = [
         pair if name in limits else _DRAWN.get(name, pair) for name, pair in zip(chart.coordinates, box, strict=True)
     ]
-
-    physical = {name: _PHYSICAL[name] for name in chart.coordinates if name in _PHYSICAL and name not in limits}
-    physical |= {"loading": (True, False)} if pinches and "loading" in chart.coordinates else {}
-    return replace(
-        plain.space_of_chart(chart, (lower, upper), defaults, columns, held, bounds, anew=freedom.starts_anew),
-        physical=physical,
-        drawn=(np.array([low for low, _ in drawn]), np.array([high for _, high in drawn])),
+    physical = _PHYSICAL | ({"loading": (True, False)} if pinches else {})
+    sides = np.array([low for low, _ in drawn]), np.array([high for _, high in drawn])
+    return plain.space_of_memory(
+        chart, (lower, upper), defaults, columns, held, bounds, freedom, physical=physical, drawn=sides
     )
 
 

@@ -57,7 +57,7 @@ from hysim.kernels import jiles_atherton_inverse as inverse
 from hysim.models.inverse_search import first_input
 from hysim.models.law import Law, Packed, State
 from hysim.models.model import Example, family
-from hysim.models.parameters import Parameter, spans
+from hysim.models.parameters import Parameter, space_of_chart, spans
 from hysim.models.protocols import UNLIMITED, CompiledLaw, Limits
 from hysim.models.search_space import ALL_FREE, Freedom, Parameters, SearchSpace
 from hysim.models.tables import Tables
@@ -150,34 +150,13 @@ def search_space(
         magnetisation=0.5 * unit["y"] / (abs(values["gain"]) or 1.0),
     )
     lower, upper = np.array([chart.side(name) for name in chart.names]).reshape(-1, 2).T
-    begins_anew = freedom.starts_anew and is_by_default
-    if not freedom.starts_anew:
-        own = chart.encode(values)
-        free = np.array([name not in limits for name in chart.names], dtype=bool)
-        lower, upper = np.where(free, np.minimum(lower, own), lower), np.where(free, np.maximum(upper, own), upper)
     drawn = np.array([chart.side(name) if name in limits else _DRAWN.get(name, _BOX[name]) for name in chart.names])
-    low, high = np.clip(drawn.reshape(-1, 2).T, lower, upper)
-
-    def encoded(parameters: Mapping[str, float]) -> FloatArray:
-        return np.asarray(np.clip(chart.encode({**values, **parameters}), lower, upper))
-
-    return SearchSpace(
-        coordinates=tuple(name if name in limits else _CALLED.get(name, name) for name in chart.names),
-        lower=lower,
-        upper=upper,
-        starts=(0.5 * (low + high) if begins_anew else encoded({}))[np.newaxis],
-        names=tuple(name for name in scalars if name not in held),
-        columns=columns,
-        linear=tuple(name for name in columns if name not in held),
-        held=held,
-        parameters=chart.decode,
-        bounds={name: pair for name, pair in bounds.items() if name in columns},
-        state=("z0",),
-        physical={name: _PHYSICAL[name] for name in chart.names if name in _PHYSICAL and name not in limits},
-        screened=_SCREENED,
-        drawn=(low, high),
-        encoded=encoded,
-    )
+    low, high = drawn.reshape(-1, 2).T
+    start = 0.5 * (low + high) if freedom.starts_anew and is_by_default else chart.encode(values)
+    return space_of_chart(
+        chart, (lower, upper), start, scalars, columns, held, bounds, freedom,
+        state=("z0",), physical=_PHYSICAL, screened=_SCREENED, drawn=(low, high),
+    )  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -196,6 +175,11 @@ class _Chart:
             return _BOX[name]
         low, high = self.limits[name]
         return (float(np.log(low)), float(np.log(high))) if name in _LOGS else (low, high)
+
+    @property
+    def coordinates(self) -> tuple[str, ...]:
+        """Names of the coordinates."""
+        return tuple(name if name in self.limits else _CALLED.get(name, name) for name in self.names)
 
     def has_stability(self) -> bool:
         """Whether the coupling is searched by its stability."""

@@ -19,7 +19,6 @@ from hysim.kernels import tellinen as kernels
 from hysim.models.law import Law, Packed
 from hysim.models.model import Example, family
 from hysim.models.parameters import Parameter
-from hysim.models.protocols import Variant
 from hysim.models.search_space import ALL_FREE, Freedom, SearchSpace
 from hysim.models.tables import Tables
 from hysim.records import Record
@@ -95,10 +94,6 @@ class BranchLaw(Law):
     def assumed_states(self, record: Record) -> tuple[str, ...]:
         """Demagnetised, in the steady cycle, or anywhere between the branches: the record decides."""
         return self.states
-
-    def variants(self) -> tuple[Variant, ...]:
-        """None: nothing else is left open."""
-        return ()
 
 
 @family
