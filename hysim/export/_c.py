@@ -10,7 +10,9 @@ import ast
 import inspect
 import math
 import textwrap
+from collections import Counter
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from enum import IntEnum
 from functools import lru_cache
 from pathlib import Path
@@ -22,21 +24,8 @@ from numba.core.dispatcher import Dispatcher
 
 from hysim.kernels.stepping import Addressed, sources
 
-HELPERS = MappingProxyType(
-    {
-        "smaller": "static double smaller(double a, double b) { return b < a ? b : a; }",
-        "larger": "static double larger(double a, double b) { return b > a ? b : a; }",
-        "smaller_int": "static int smaller_int(int a, int b) { return b < a ? b : a; }",
-        "larger_int": "static int larger_int(int a, int b) { return b > a ? b : a; }",
-        "absolute_int": "static int absolute_int(int a) { return a < 0 ? -a : a; }",
-        "below": "static int below(int a, int b) { return a % b != 0 && (a < 0) != (b < 0); }",
-        "floor_quotient": "static int floor_quotient(int a, int b) { return a / b - below(a, b); }",
-        "floor_rest": "static int floor_rest(int a, int b) { return a % b + below(a, b) * b; }",
-        "power_2": "static double power_2(double x) { return x * x; }",
-        "power_3": "static double power_3(double x) { return x * (x * x); }",
-        "power_4": "static double power_4(double x) { return (x * x) * (x * x); }",
-    }
-)
+_HELPERS = Path(__file__).with_name("c").joinpath("helpers.c").read_text(encoding="utf-8").splitlines()
+HELPERS = MappingProxyType({line.partition("(")[0].split()[-1]: line for line in _HELPERS})
 """Functions of Python that C lacks; `min` and `max` keep the first of two that are not ordered."""
 
 RESERVED = frozenset(
@@ -197,28 +186,20 @@ def routine(function: Callable[..., Any]) -> Routine:
 
 
 class Value(NamedTuple):
-    """An expression in C: its text, its type, and how strongly its operator binds."""
+    """An expression in C: its text, its type, and how strongly its operator binds.
+
+    A vector has its lengths, which count as used once they are asked for, and the arrays in which it lies.
+    """
 
     text: str
     type: Type
     binds: int = PRIMARY
+    lengths: tuple[Callable[[], "Value"], ...] = ()
+    roots: frozenset[str] = frozenset()
 
     def within(self, binds: int) -> str:
         """Text as an operand of an operator that binds as strongly as this."""
         return self.text if self.binds >= binds else f"({self.text})"
-
-
-class Stretch(NamedTuple):
-    """An array, or a part of one: the pointer, its lengths as text once they are asked for, and where it lies."""
-
-    text: str
-    lengths: tuple[Callable[[], str], ...]
-    roots: frozenset[str]
-    binds: int = PRIMARY
-
-    @property
-    def type(self) -> Vector:
-        return Vector(len(self.lengths))
 
 
 class Parameter(NamedTuple):
@@ -251,16 +232,7 @@ class Library(Protocol):
         """Name of a constant vector."""
 
 
-class Uses(NamedTuple):
-    """Everything that one pass through a function has learnt; see `Scope`."""
-
-    types: dict[str, Type]
-    roots: dict[str, frozenset[str]]
-    lengths: set[tuple[str, int]]
-    written: set[str]
-    used: set[str]
-
-
+@dataclass
 class Scope:
     """Names of a function while it is translated, and what was learnt about them.
 
@@ -268,19 +240,18 @@ class Scope:
     read, `roots` the arrays in which a local one lies, and `before` what the last pass has learnt.
     """
 
-    def __init__(self, source: Routine, arguments: dict[str, Type]) -> None:
-        self.source = source
-        self.types: dict[str, Type] = dict(arguments)
-        self.roots: dict[str, frozenset[str]] = {}
-        self.lengths: set[tuple[str, int]] = set()
-        self.written: set[str] = set()
-        self.used: set[str] = set()
-        self.before: Uses | None = None
+    source: Routine
+    types: dict[str, Type]
+    roots: dict[str, frozenset[str]] = field(default_factory=dict)
+    lengths: set[tuple[str, int]] = field(default_factory=set)
+    written: set[str] = field(default_factory=set)
+    used: set[str] = field(default_factory=set)
+    before: "Scope | None" = None
 
     def again(self) -> bool:
         """Begin another pass; False if the last one has learnt nothing new."""
-        uses = Uses(dict(self.types), dict(self.roots), self.lengths, self.written, self.used)
-        settled, self.before = uses == self.before, uses
+        learnt = replace(self, types=dict(self.types), roots=dict(self.roots), before=None)
+        settled, self.before = learnt == self.before, learnt
         self.lengths, self.written, self.used = set(), set(), set()
         return not settled
 
@@ -310,21 +281,18 @@ class Scope:
 
 def homes(body: list[ast.stmt], arguments: Iterable[str]) -> Mapping[Place, list[str]]:
     """Names that are declared at each statement, in the order in which they appear."""
-    local = assignments(body).keys() - set(arguments)
+    local = stored(body).keys() - set(arguments)
     names = {name: None for statement in body for name in _mentioned(statement) if name in local}
     placed: dict[Place, list[str]] = {}
     for name in names:
-        if (home := _home(body, name)) is not None:
-            placed.setdefault(home, []).append(name)
+        placed.setdefault(_home(body, name), []).append(name)
     return placed
 
 
-def assignments(body: list[ast.stmt]) -> Mapping[str, int]:
-    counts: dict[str, int] = {}
-    for node in (node for statement in body for node in ast.walk(statement)):
-        if isinstance(node, ast.Name) and isinstance(node.ctx, ast.Store):
-            counts[node.id] = counts.get(node.id, 0) + 1
-    return counts
+def stored(nodes: Iterable[ast.AST]) -> Counter[str]:
+    """Names that are assigned, and how often."""
+    each = (node for root in nodes for node in ast.walk(root) if isinstance(node, ast.Name))
+    return Counter(node.id for node in each if isinstance(node.ctx, ast.Store))
 
 
 def counters_used_elsewhere(body: list[ast.stmt]) -> list[ast.For]:
@@ -335,17 +303,8 @@ def counters_used_elsewhere(body: list[ast.stmt]) -> list[ast.For]:
         loop
         for loop in loops
         if isinstance(loop.target, ast.Name)
-        and (loop.target.id in assignments(loop.body) or loop.target.id in outside - {"_"})
+        and (loop.target.id in stored(loop.body) or loop.target.id in outside - {"_"})
     ]
-
-
-def targets(statement: ast.stmt) -> list[str]:
-    if not isinstance(statement, ast.Assign):
-        return []
-    each = [
-        part for target in statement.targets for part in (target.elts if isinstance(target, ast.Tuple) else [target])
-    ]
-    return [target.id for target in each if isinstance(target, ast.Name)]
 
 
 def reads(node: ast.AST) -> set[str]:
@@ -353,38 +312,30 @@ def reads(node: ast.AST) -> set[str]:
     return {each.id for each in ast.walk(node) if isinstance(each, ast.Name) and isinstance(each.ctx, ast.Load)}
 
 
-def _home(block: list[ast.stmt], name: str) -> Place | None:
+def _home(block: list[ast.stmt], name: str) -> Place:
     numbers = [k for k, statement in enumerate(block) if name in _mentioned(statement)]
-    if not numbers:
-        return None
-    if len(numbers) == 1:
-        within = [inner for inner in _blocks(block[numbers[0]]) if any(name in _mentioned(each) for each in inner)]
-        if len(within) == 1 and name not in _headed(block[numbers[0]]) and _begins_with(within[0], name):
-            return _home(within[0], name)
+    if len(numbers) == 1 and (inner := _only_block(block[numbers[0]], name)) and _begins_with(inner, name):
+        return _home(inner, name)
     return id(block), numbers[0]
 
 
 def _begins_with(block: list[ast.stmt], name: str) -> bool:
-    """Whether the first statement with the name assigns it, or holds a block that does."""
-    first = next(statement for statement in block if name in _mentioned(statement))
-    if name in targets(first):
-        assert isinstance(first, ast.Assign)
+    """Whether the first statement with the name assigns it, or is the only one and holds a block that does."""
+    first, *others = (statement for statement in block if name in _mentioned(statement))
+    if isinstance(first, ast.Assign) and name in stored(first.targets):
         return name not in reads(first.value)
-    within = [inner for inner in _blocks(first) if any(name in _mentioned(each) for each in inner)]
-    others = sum(name in _mentioned(statement) for statement in block) > 1
-    return len(within) == 1 and not others and name not in _headed(first) and _begins_with(within[0], name)
+    inner = _only_block(first, name)
+    return inner is not None and not others and _begins_with(inner, name)
 
 
-def _blocks(statement: ast.stmt) -> list[list[ast.stmt]]:
-    if isinstance(statement, ast.If):
-        return [statement.body, statement.orelse]
-    return [statement.body] if isinstance(statement, ast.For | ast.While) else []
-
-
-def _headed(statement: ast.stmt) -> set[str]:
-    if isinstance(statement, ast.For):
-        return set(_mentioned(statement.iter))
-    return set(_mentioned(statement.test)) if isinstance(statement, ast.If | ast.While) else set()
+def _only_block(statement: ast.stmt, name: str) -> list[ast.stmt] | None:
+    """The block of a branch or a loop that alone has a name, which the head has not; else None."""
+    if not isinstance(statement, ast.If | ast.For | ast.While):
+        return None
+    head = statement.iter if isinstance(statement, ast.For) else statement.test
+    blocks = (statement.body, statement.orelse)
+    within = [block for block in blocks if any(name in _mentioned(each) for each in block)]
+    return within[0] if len(within) == 1 and name not in _mentioned(head) else None
 
 
 def _mentioned(node: ast.AST) -> dict[str, None]:

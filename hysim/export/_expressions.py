@@ -2,56 +2,44 @@
 
 import ast
 import builtins
-import math
-from collections.abc import Callable
-from functools import partial
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from functools import partial, reduce
 from types import BuiltinFunctionType, MappingProxyType, ModuleType
 from typing import Any
 
 import numpy as np
 
 from hysim.export import _c
-from hysim.export._c import (
-    Known,
-    Library,
-    Parameter,
-    Scalar,
-    Scope,
-    Several,
-    Stretch,
-    Type,
-    UntranslatableError,
-    Value,
-    Vector,
-    plain,
-)
+from hysim.export._c import Known, Library, Parameter, Scalar, Scope, Several, Type, Value, Vector, plain
 from hysim.kernels.stepping import borrowed
 
-_OPERATORS = MappingProxyType({ast.Add: ("+", _c.SUM), ast.Sub: ("-", _c.SUM), ast.Mult: ("*", _c.PRODUCT)})
-_COMPARED = MappingProxyType(
+SIGNS = MappingProxyType(
     {
-        **{
-            ast.Lt: ("<", _c.RELATION),
-            ast.LtE: ("<=", _c.RELATION),
-            ast.Gt: (">", _c.RELATION),
-            ast.GtE: (">=", _c.RELATION),
-        },
-        **{ast.Eq: ("==", _c.EQUALITY), ast.NotEq: ("!=", _c.EQUALITY)},
+        ast.Add: ("+", _c.SUM), ast.Sub: ("-", _c.SUM), ast.Mult: ("*", _c.PRODUCT), ast.Div: ("/", _c.PRODUCT),
+        ast.Lt: ("<", _c.RELATION), ast.LtE: ("<=", _c.RELATION), ast.Gt: (">", _c.RELATION),
+        ast.GtE: (">=", _c.RELATION), ast.Eq: ("==", _c.EQUALITY), ast.NotEq: ("!=", _c.EQUALITY),
+        ast.And: ("&&", _c.AND), ast.Or: ("||", _c.OR),
     }
+)  # fmt: skip
+"""Operators that C has, and how strongly they bind."""
+
+_OF_INTEGERS = MappingProxyType(
+    {ast.FloorDiv: "floor_quotient", ast.Mod: "floor_rest", ast.BitAnd: "&", ast.BitOr: "|"}
 )
 
 
 class Expressions:
     def __init__(self, library: Library, scope: Scope) -> None:
-        self.library, self.scope = library, scope
+        self.library, self.scope, self.refusal = library, scope, scope.source.refusal
 
     # ------------------------------------------------------------------------------ entry points
 
     def value(self, node: ast.expr) -> Value:
         """A number."""
         result = self.any(node)
-        if not isinstance(result, Value) or not isinstance(result.type, Scalar):
-            raise self._refusal(node, "a number is expected here")
+        if not isinstance(result.type, Scalar):
+            raise self.refusal(node, "a number is expected here")
         return result
 
     def condition(self, node: ast.expr) -> Value:
@@ -64,14 +52,20 @@ class Expressions:
         """An integer."""
         result = self.value(node)
         if result.type is Scalar.DOUBLE:
-            raise self._refusal(node, "an index is an integer")
+            raise self.refusal(node, "an index is an integer")
         return result
 
-    def stretch(self, node: ast.expr) -> Stretch:
-        """A vector."""
+    def vector(self, node: ast.expr) -> Value:
         result = self.any(node)
-        if not isinstance(result, Stretch):
-            raise self._refusal(node, "a vector is expected here")
+        if not isinstance(result.type, Vector):
+            raise self.refusal(node, "a vector is expected here")
+        return result
+
+    def quietly(self, node: ast.expr) -> Value:
+        """An array of which the lengths alone are used."""
+        used = set(self.scope.used)
+        result = self.vector(node)
+        self.scope.used = used
         return result
 
     def known(self, node: ast.expr) -> bool | None:
@@ -81,15 +75,15 @@ class Expressions:
             return (left == right == Known(None)) == isinstance(node.ops[0], ast.Is)
         return bool(node.value) if isinstance(node, ast.Constant) and isinstance(node.value, bool) else None
 
-    def any(self, node: ast.expr) -> Value | Stretch:
+    def any(self, node: ast.expr) -> Value:
         """A number, a vector, or a function."""
-        methods: dict[type[ast.expr], Callable[[Any], Value | Stretch]] = {
+        methods: dict[type[ast.expr], Callable[[Any], Value]] = {
             ast.Constant: self._constant, ast.Name: self._name, ast.Attribute: self._attribute, ast.BinOp: self._binary,
             ast.UnaryOp: self._unary, ast.BoolOp: self._junction, ast.Compare: self._comparison,
             ast.IfExp: self._choice, ast.Subscript: self._subscript, ast.Call: self._call,
         }  # fmt: skip
         if type(node) not in methods:
-            raise self._refusal(node, f"{type(node).__name__} is no expression of the subset")
+            raise self.refusal(node, f"{type(node).__name__} is no expression of the subset")
         return methods[type(node)](node)
 
     # ------------------------------------------------------------------------------ names and constants
@@ -97,64 +91,51 @@ class Expressions:
     def _constant(self, node: ast.Constant) -> Value:
         return self._literal(node, node.value, "")
 
-    def _literal(self, node: ast.AST, value: Any, name: str) -> Value | Any:
-        if isinstance(value, bool | np.bool_):
-            return Value(str(int(value)), Scalar.BOOL)
-        if isinstance(value, int | np.integer):
-            return Value(str(int(value)), Scalar.INT, _c.PRIMARY if value >= 0 else _c.UNARY)
-        if isinstance(value, float):
-            return Value(_c.number(value), Scalar.DOUBLE, _c.UNARY if math.copysign(1.0, value) < 0.0 else _c.PRIMARY)
+    def _literal(self, node: ast.AST, value: Any, name: str) -> Value:
+        if isinstance(value, bool | np.bool_ | int | np.integer | float):
+            text = _c.number(value) if isinstance(value, float) else str(int(value))
+            is_bool, is_double = isinstance(value, bool | np.bool_), isinstance(value, float)
+            kind = Scalar.BOOL if is_bool else Scalar.DOUBLE if is_double else Scalar.INT
+            return Value(text, kind, _c.UNARY if text.startswith("-") else _c.PRIMARY)
         if value is None or callable(plain(value)):
             return Value("", Known(None if value is None else plain(value)))
         if _c.is_table(value):
-            text = self.library.table(name, value)
-            return Stretch(text, (lambda: str(len(value)),), frozenset())
-        raise self._refusal(
-            node, f"{name} is a {type(value).__name__}: constants are numbers, vectors of doubles and kernels"
-        )
+            return Value(self.library.table(name, value), Vector(), lengths=(lambda: _length(str(len(value))),))
+        what = f"{name} is a {type(value).__name__}"
+        raise self.refusal(node, f"{what}: constants are numbers, vectors of doubles and kernels")
 
-    def _name(self, node: ast.Name) -> Value | Stretch:
+    def _name(self, node: ast.Name) -> Value:
         name, scope = node.id, self.scope
         type_ = scope.types.get(name)
-        if isinstance(type_, Vector):
-            scope.used.add(name)
-            lengths = tuple(partial(self._length, name, type_, axis) for axis in range(type_.rank))
-            return Stretch(scope.c_name(name), lengths, scope.roots.get(name, frozenset()) | {name})
+        if type_ is None:
+            if name not in scope.source.names:
+                raise self.refusal(node, f"{name} is read before it has a value")
+            return self._literal(node, scope.source.names[name], name)
         if isinstance(type_, Known):
             return Value("", type_)
-        if type_ is not None:
-            scope.used.add(name)
+        scope.used.add(name)
+        if not isinstance(type_, Vector):
             return Value(scope.c_name(name), type_)
-        if name not in scope.source.names:
-            raise self._refusal(node, f"{name} is read before it has a value")
-        result: Value | Stretch = self._literal(node, scope.source.names[name], name)
-        return result
+        lengths = tuple(partial(self._length_of, name, type_, axis) for axis in range(type_.rank))
+        roots = scope.roots.get(name, frozenset()) | {name}
+        return Value(scope.c_name(name), type_, lengths=lengths, roots=roots)
 
-    def _length(self, name: str, type_: Vector, axis: int) -> str:
+    def _length_of(self, name: str, type_: Vector, axis: int) -> Value:
         self.scope.lengths.add((name, axis))
-        return type_.length(self.scope.c_name(name), axis)
+        return _length(type_.length(self.scope.c_name(name), axis))
 
-    def _attribute(self, node: ast.Attribute) -> Value | Stretch:
+    def _attribute(self, node: ast.Attribute) -> Value:
         if node.attr == "size" and isinstance(self._type(node.value), Vector):
-            return Value(self._vector(node.value, quietly=True).lengths[0](), Scalar.INT, _c.SUM)
+            return self._of_one_axis(node, self.quietly(node.value)).lengths[0]()
         owner = self._module(node.value)
         if owner is None or node.attr not in vars(owner):
-            raise self._refusal(node, f"{ast.unparse(node)} is unknown")
-        result: Value | Stretch = self._literal(node, vars(owner)[node.attr], node.attr)
-        return result
+            raise self.refusal(node, f"{ast.unparse(node)} is unknown")
+        return self._literal(node, vars(owner)[node.attr], node.attr)
 
-    def quietly(self, node: ast.expr) -> Stretch:
-        """An array of which the lengths alone are used."""
-        used = set(self.scope.used)
-        result = self.stretch(node)
-        self.scope.used = used
-        return result
-
-    def _vector(self, node: ast.expr, *, quietly: bool = False) -> Stretch:
-        result = self.quietly(node) if quietly else self.stretch(node)
-        if len(result.lengths) != 1:
-            raise self._refusal(node, "an array of one axis is expected here")
-        return result
+    def _of_one_axis(self, node: ast.expr, whole: Value) -> Value:
+        if len(whole.lengths) != 1:
+            raise self.refusal(node, "an array of one axis is expected here")
+        return whole
 
     def _module(self, node: ast.expr) -> ModuleType | None:
         owner = self.scope.source.names.get(node.id) if isinstance(node, ast.Name) else None
@@ -164,31 +145,30 @@ class Expressions:
 
     def _binary(self, node: ast.BinOp) -> Value:
         left, right = self.value(node.left), self.value(node.right)
-        types = left.type, right.type
-        kind = max(*types, Scalar.INT)
-        if type(node.op) in _OPERATORS:
-            sign, binds = _OPERATORS[type(node.op)]
-            return Value(f"{left.within(binds)} {sign} {right.within(binds + 1)}", kind, binds)
-        if isinstance(node.op, ast.Div):
-            first = left.within(_c.PRODUCT) if kind is Scalar.DOUBLE else f"(double){left.within(_c.UNARY)}"
-            return Value(f"{first} / {right.within(_c.PRODUCT + 1)}", Scalar.DOUBLE, _c.PRODUCT)
+        kind = max(left.type, right.type, Scalar.INT)
         if isinstance(node.op, ast.Pow):
             return self._power(node, left, right)
-        if isinstance(node.op, ast.BitAnd | ast.BitOr) and kind is Scalar.INT:
-            sign = "&" if isinstance(node.op, ast.BitAnd) else "|"
-            return Value(f"({left.within(_c.UNARY)} {sign} {right.within(_c.UNARY)})", max(types))
-        if isinstance(node.op, ast.FloorDiv | ast.Mod) and kind is Scalar.INT:
-            helper = "floor_quotient" if isinstance(node.op, ast.FloorDiv) else "floor_rest"
-            return self._helped(helper, Scalar.INT, left, right)
-        raise self._refusal(node, f"{ast.unparse(node)} has no translation")
+        if type(node.op) in SIGNS:
+            sign, binds = SIGNS[type(node.op)]
+            first, is_division = left.within(binds), isinstance(node.op, ast.Div)
+            if is_division and kind is Scalar.INT:
+                first = f"(double){left.within(_c.UNARY)}"
+            return Value(f"{first} {sign} {right.within(binds + 1)}", Scalar.DOUBLE if is_division else kind, binds)
+        if type(node.op) not in _OF_INTEGERS or kind is not Scalar.INT:
+            raise self.refusal(node, f"{ast.unparse(node)} has no translation")
+        word = _OF_INTEGERS[type(node.op)]
+        if word in ("&", "|"):
+            return Value(f"({left.within(_c.UNARY)} {word} {right.within(_c.UNARY)})", max(left.type, right.type))
+        self.library.helpers.add("below")
+        return self._helped(word, Scalar.INT, left, right)
 
     def _power(self, node: ast.BinOp, base: Value, exponent: Value) -> Value:
         constant = node.right.value if isinstance(node.right, ast.Constant) else None
-        if constant in (2, 3, 4) and isinstance(constant, int):
-            if constant == 2 and isinstance(node.left, ast.Name):
-                return Value(f"{base.text} * {base.text}", base.type, _c.PRODUCT)
-            return self._helped(f"power_{constant}", Scalar.DOUBLE, base)
-        return Value(f"pow({base.text}, {exponent.text})", Scalar.DOUBLE)
+        if not isinstance(constant, int) or constant not in (2, 3, 4):
+            return Value(f"pow({base.text}, {exponent.text})", Scalar.DOUBLE)
+        if constant == 2 and isinstance(node.left, ast.Name):
+            return Value(f"{base.text} * {base.text}", base.type, _c.PRODUCT)
+        return self._helped(f"power_{constant}", Scalar.DOUBLE, base)
 
     def _unary(self, node: ast.UnaryOp) -> Value:
         if isinstance(node.op, ast.Not):
@@ -198,118 +178,104 @@ class Expressions:
             return Value(f"-{operand.within(_c.UNARY + 1)}", max(operand.type, Scalar.INT), _c.UNARY)
         if isinstance(node.op, ast.UAdd):
             return operand
-        raise self._refusal(node, f"{ast.unparse(node)} has no translation")
+        raise self.refusal(node, f"{ast.unparse(node)} has no translation")
 
     def _junction(self, node: ast.BoolOp) -> Value:
-        sign, binds = ("&&", _c.AND) if isinstance(node.op, ast.And) else ("||", _c.OR)
         parts = [self.value(each) for each in node.values]
         if any(part.type is not Scalar.BOOL for part in parts):
-            raise self._refusal(node, "`and` and `or` join truth values")
-        return Value(f" {sign} ".join(part.within(_c.EQUALITY) for part in parts), Scalar.BOOL, binds)
+            raise self.refusal(node, "`and` and `or` join truth values")
+        return _joined(type(node.op), parts)
 
     def _comparison(self, node: ast.Compare) -> Value:
         if (known := self.known(node)) is not None:
             return Value(str(int(known)), Scalar.BOOL)
         pairs = zip([node.left, *node.comparators], node.comparators, node.ops, strict=False)
-        parts = [self._compared(node, *each) for each in pairs]
-        if len(parts) == 1:
-            return parts[0]
-        return Value(" && ".join(part.within(_c.EQUALITY) for part in parts), Scalar.BOOL, _c.AND)
+        parts = [self._compared(node, left, right, type(operator)) for left, right, operator in pairs]
+        return parts[0] if len(parts) == 1 else _joined(ast.And, parts)
 
-    def _compared(self, node: ast.AST, left: ast.expr, right: ast.expr, operator: ast.cmpop) -> Value:
-        if isinstance(operator, ast.In | ast.NotIn) and isinstance(right, ast.Tuple):
-            sign, join, binds = ("==", " || ", _c.OR) if isinstance(operator, ast.In) else ("!=", " && ", _c.AND)
-            first = self.value(left).within(_c.SUM)
-            return Value(
-                join.join(f"{first} {sign} {self.value(e).within(_c.SUM)}" for e in right.elts), Scalar.BOOL, binds
-            )
-        if type(operator) not in _COMPARED:
-            raise self._refusal(node, "this comparison has no translation")
-        sign, binds = _COMPARED[type(operator)]
+    def _compared(self, node: ast.AST, left: ast.expr, right: ast.expr, operator: type[ast.cmpop]) -> Value:
+        if operator in (ast.In, ast.NotIn) and isinstance(right, ast.Tuple):
+            one, all_ = (ast.Eq, ast.Or) if operator is ast.In else (ast.NotEq, ast.And)
+            return _joined(all_, [self._compared(node, left, each, one) for each in right.elts])
+        if operator not in SIGNS:
+            raise self.refusal(node, "this comparison has no translation")
+        sign, binds = SIGNS[operator]
         return Value(f"{self.value(left).within(_c.SUM)} {sign} {self.value(right).within(_c.SUM)}", Scalar.BOOL, binds)
 
-    def _choice(self, node: ast.IfExp) -> Value | Stretch:
+    def _choice(self, node: ast.IfExp) -> Value:
         if (known := self.known(node.test)) is not None:
             return self.any(node.body if known else node.orelse)
         test, first, second = self.condition(node.test), self.value(node.body), self.value(node.orelse)
-        kind = max(first.type, second.type)
-        return Value(f"{test.within(_c.OR)} ? {first.within(_c.OR)} : {second.text}", kind, _c.CONDITIONAL)
+        text = f"{test.within(_c.OR)} ? {first.within(_c.OR)} : {second.text}"
+        return Value(text, max(first.type, second.type), _c.CONDITIONAL)
 
     # ------------------------------------------------------------------------------ vectors
 
-    def shape(self, node: ast.expr) -> Stretch | None:
+    def shape(self, node: ast.expr) -> Value | None:
         """The array of which an expression is the shape; None where it is something else."""
         if isinstance(node, ast.Attribute) and node.attr == "shape" and self._module(node.value) is None:
             return self.quietly(node.value)
         return None
 
-    def _subscript(self, node: ast.Subscript) -> Value | Stretch:
+    def _subscript(self, node: ast.Subscript) -> Value:
+        place = node.slice.value if isinstance(node.slice, ast.Constant) else None
         if (shaped := self.shape(node.value)) is not None:
-            if not isinstance(node.slice, ast.Constant) or not isinstance(node.slice.value, int):
-                raise self._refusal(node, "the axis of a shape is a number")
-            return Value(shaped.lengths[node.slice.value](), Scalar.INT, _c.SUM)
-        if not isinstance(node.slice, ast.Slice):
-            whole = self.any(node.value)
-            if isinstance(whole, Value):
-                return self._member(node, whole)
-            return Value(
-                f"{whole.text if whole.binds == _c.PRIMARY else f'({whole.text})'}{self.place(node, whole)}",
-                Scalar.DOUBLE,
-            )
-        whole = self.stretch(node.value)
-        if node.slice.step is not None:
-            raise self._refusal(node, "a slice has no stride")
-        first = None if node.slice.lower is None else self.index(node.slice.lower)
-        upper = node.slice.upper
+            if not isinstance(place, int):
+                raise self.refusal(node, "the axis of a shape is a number")
+            return shaped.lengths[place]()
+        if isinstance(node.slice, ast.Slice):
+            return self._part(self.vector(node.value), node.slice)
+        whole = self.any(node.value)
+        if isinstance(whole.type, Vector):
+            return Value(f"{whole.within(_c.PRIMARY)}{self.place(node, whole)}", Scalar.DOUBLE)
+        if not isinstance(whole.type, Several) or not isinstance(place, int):
+            raise self.refusal(node, "an array, or one of the results of a function, is expected here")
+        return Value(f"{whole.text}.at{place}", whole.type.members[place])
 
-        def length() -> str:
-            stop = Value(whole.lengths[0](), Scalar.INT, _c.SUM) if upper is None else self.index(upper)
-            return stop.text if first is None else f"{stop.within(_c.SUM)} - {first.within(_c.SUM + 1)}"
+    def _part(self, whole: Value, part: ast.Slice) -> Value:
+        if part.step is not None:
+            raise self.refusal(part.step, "a slice has no stride")
+        first, upper = None if part.lower is None else self.index(part.lower), part.upper
+
+        def length() -> Value:
+            stop = whole.lengths[0]() if upper is None else self.index(upper)
+            return _length(stop.text if first is None else f"{stop.within(_c.SUM)} - {first.within(_c.SUM + 1)}")
 
         lengths = (length, *whole.lengths[1:])
         if first is None:
             return whole._replace(lengths=lengths)
         offset = first
         for each in whole.lengths[1:]:
-            row = Value(each(), Scalar.INT, _c.SUM).within(_c.PRODUCT + 1)
+            row = each().within(_c.PRODUCT + 1)
             offset = Value(f"{offset.within(_c.PRODUCT)} * {row}", Scalar.INT, _c.PRODUCT)
-        return Stretch(f"{whole.text} + {offset.within(_c.SUM + 1)}", lengths, whole.roots, _c.SUM)
+        return whole._replace(text=f"{whole.text} + {offset.within(_c.SUM + 1)}", lengths=lengths, binds=_c.SUM)
 
-    def _member(self, node: ast.Subscript, several: Value) -> Value:
-        place = node.slice.value if isinstance(node.slice, ast.Constant) else None
-        if not isinstance(several.type, Several) or not isinstance(place, int):
-            raise self._refusal(node, "an array, or one of the results of a function, is expected here")
-        return Value(f"{several.text}.at{place}", several.type.members[place])
-
-    def place(self, node: ast.Subscript, whole: Stretch) -> str:
+    def place(self, node: ast.Subscript, whole: Value) -> str:
         index = node.slice
         parts = index.elts if isinstance(index, ast.Tuple) else [index]
         if len(parts) != len(whole.lengths):
-            raise self._refusal(node, "an element has one index for each axis")
+            raise self.refusal(node, "an element has one index for each axis")
         if isinstance(index, ast.UnaryOp) and isinstance(index.operand, ast.Constant) and index.operand.value == 1:
-            return f"[{whole.lengths[0]()} - 1]"
+            return f"[{whole.lengths[0]().text} - 1]"
         total = self.index(parts[0])
         for part, length in zip(parts[1:], whole.lengths[1:], strict=True):
+            next_ = self.index(part)
             if total.text == "0":
-                total = self.index(part)
+                total = next_
                 continue
-            times = Value(length(), Scalar.INT, _c.SUM).within(_c.PRODUCT + 1)
-            text = f"{total.within(_c.PRODUCT)} * {times} + {self.index(part).within(_c.SUM + 1)}"
-            total = Value(text, Scalar.INT, _c.SUM)
+            row = f"{total.within(_c.PRODUCT)} * {length().within(_c.PRODUCT + 1)}"
+            total = Value(f"{row} + {next_.within(_c.SUM + 1)}", Scalar.INT, _c.SUM)
         return f"[{total.text}]"
 
     # ------------------------------------------------------------------------------ calls
 
-    def _call(self, node: ast.Call) -> Value | Stretch:
+    def _call(self, node: ast.Call) -> Value:
         if node.keywords:
-            raise self._refusal(node, "a call has no keyword arguments")
-        if (
-            isinstance(node.func, ast.Attribute)
-            and node.func.attr == "reshape"
-            and self._module(node.func.value) is None
-        ):
-            return self._reshaped(node, node.func.value)
-        called = self._callee(node.func)
+            raise self.refusal(node, "a call has no keyword arguments")
+        method = node.func
+        if isinstance(method, ast.Attribute) and method.attr == "reshape" and self._module(method.value) is None:
+            return self._reshaped(node, method.value)
+        called = self._callee(method)
         if called is plain(borrowed):
             return self.any(node.args[0])
         builtin = self._builtin(node, called)
@@ -325,76 +291,63 @@ class Expressions:
             return vars(builtins).get(node.id) if type_ is None else None
         if isinstance(node, ast.Attribute) and (owner := self._module(node.value)) is not None:
             return plain(vars(owner).get(node.attr))
-        raise self._refusal(node, f"{ast.unparse(node)} is no function that is known beforehand")
+        raise self.refusal(node, f"{ast.unparse(node)} is no function that is known beforehand")
 
-    def _reshaped(self, node: ast.Call, of: ast.expr) -> Stretch:
+    def _reshaped(self, node: ast.Call, of: ast.expr) -> Value:
         if len(node.args) != 1 or not isinstance(node.args[0], ast.Tuple):
-            raise self._refusal(node, "reshape takes a tuple of lengths")
-        whole, lengths = self._vector(of), node.args[0].elts
-        return whole._replace(lengths=tuple(partial(self._extent, each) for each in lengths))
+            raise self.refusal(node, "reshape takes a tuple of lengths")
+        whole, lengths = self._of_one_axis(of, self.vector(of)), node.args[0].elts
+        extents = tuple(partial(self._extent, each) for each in lengths)
+        return whole._replace(type=Vector(len(lengths)), lengths=extents)
 
-    def _extent(self, node: ast.expr) -> str:
-        return self.index(node).text
+    def _extent(self, node: ast.expr) -> Value:
+        return _length(self.index(node).text)
 
     def _builtin(self, node: ast.Call, called: Any) -> Value | None:
         """A call of a function that C has, or that is a helper; None for another one."""
         if called is len:
-            return Value(self.quietly(node.args[0]).lengths[0](), Scalar.INT, _c.SUM)
-        name = called.__name__ if isinstance(called, BuiltinFunctionType) and called.__module__ == "math" else ""
-        if called in (float, int, bool, abs, min, max) or name:
-            values = [self.value(each) for each in node.args]
-        if called in (float, int):
-            kind = Scalar.DOUBLE if called is float else Scalar.INT
-            (value,) = values
-            return value if value.type is kind else Value(f"({kind.c_type}){value.within(_c.UNARY)}", kind, _c.UNARY)
+            return self.quietly(node.args[0]).lengths[0]()
         if called is bool:
             return self.condition(node.args[0])
-        if called is abs:
-            (value,) = values
-            if value.type is Scalar.DOUBLE:
-                return Value(f"fabs({value.text})", Scalar.DOUBLE)
-            return self._helped("absolute_int", Scalar.INT, value)
+        name = called.__name__ if isinstance(called, BuiltinFunctionType) and called.__module__ == "math" else ""
+        if called not in (float, int, abs, min, max) and name not in _c.TESTS | _c.MATHEMATICS:
+            return None
+        first, *_ = values = [self.value(each) for each in node.args]
+        if called in (float, int):
+            kind = Scalar.DOUBLE if called is float else Scalar.INT
+            return first if first.type is kind else Value(f"({kind.c_type}){first.within(_c.UNARY)}", kind, _c.UNARY)
         if called in (min, max):
-            return self._extreme("smaller" if called is min else "larger", values)
+            kind = Scalar.DOUBLE if any(value.type is Scalar.DOUBLE for value in values) else Scalar.INT
+            helper = f"{'smaller' if called is min else 'larger'}{'_int' * (kind is Scalar.INT)}"
+            return reduce(partial(self._helped, helper, kind), values)
+        if called is abs and first.type is not Scalar.DOUBLE:
+            return self._helped("absolute_int", Scalar.INT, first)
         if name in _c.TESTS:
-            return Value(f"{name}({values[0].text}) != 0", Scalar.BOOL, _c.EQUALITY)
-        if name in _c.MATHEMATICS:
-            return Value(f"{name}({', '.join(value.text for value in values)})", Scalar.DOUBLE)
-        return None
-
-    def _extreme(self, name: str, values: list[Value]) -> Value:
-        kind = Scalar.DOUBLE if any(value.type is Scalar.DOUBLE for value in values) else Scalar.INT
-        total = values[0]
-        for value in values[1:]:
-            total = self._helped(name if kind is Scalar.DOUBLE else f"{name}_int", kind, total, value)
-        return total
+            return Value(f"{name}({first.text}) != 0", Scalar.BOOL, _c.EQUALITY)
+        return Value(f"{name or 'fabs'}({', '.join(value.text for value in values)})", Scalar.DOUBLE)
 
     def _helped(self, helper: str, kind: Scalar, *values: Value) -> Value:
-        self.library.helpers |= {helper, "below"} if helper in ("floor_quotient", "floor_rest") else {helper}
+        self.library.helpers.add(helper)
         return Value(f"{helper}({', '.join(value.text for value in values)})", kind)
 
     def _translated(self, node: ast.Call, called: Any) -> Value:
         types = tuple(self._type(each) for each in node.args)
         if called is None or not callable(called):
-            raise self._refusal(
-                node, f"{ast.unparse(node.func)} is no function that is known when the program is translated"
-            )
+            name = ast.unparse(node.func)
+            raise self.refusal(node, f"{name} is no function that is known when the program is translated")
         function = self.library.function(called, types)
-        given: list[str] = []
-        for each, parameter in zip(node.args, function.parameters, strict=True):
-            given += self._given(each, parameter)
-        returns = Scalar.INT if function.returns is None else function.returns
-        return Value(f"{function.name}({', '.join(given)})", returns)
+        pairs = zip(node.args, function.parameters, strict=True)
+        given = ", ".join(text for each, parameter in pairs for text in self._given(each, parameter))
+        return Value(f"{function.name}({given})", Scalar.INT if function.returns is None else function.returns)
 
     def _given(self, node: ast.expr, parameter: Parameter) -> list[str]:
         """An argument as far as the function uses it, and its length where that is used."""
         if not isinstance(parameter.type, Vector):
             return [self.value(node).text] if parameter.is_used else []
-        stretch = self.stretch(node) if parameter.is_used else self.quietly(node)
-        if parameter.is_written:
-            for root in stretch.roots:
-                self.scope.write(root)
-        return [*[stretch.text] * parameter.is_used, *(stretch.lengths[axis]() for axis in parameter.axes)]
+        whole = self.vector(node) if parameter.is_used else self.quietly(node)
+        for root in whole.roots if parameter.is_written else ():
+            self.scope.write(root)
+        return [*[whole.text] * parameter.is_used, *(whole.lengths[axis]().text for axis in parameter.axes)]
 
     def writes(self, node: ast.expr) -> bool:
         return bool(self._tried(node)[1])
@@ -404,12 +357,14 @@ class Expressions:
 
     def _tried(self, node: ast.expr) -> tuple[Type, set[str]]:
         """Type of an expression, and the arrays that it writes to, without a trace."""
-        scope = self.scope
-        before = scope.lengths, scope.written, scope.used
-        scope.lengths, scope.written, scope.used = set(), set(), set()
-        type_, written = self.any(node).type, scope.written
-        scope.lengths, scope.written, scope.used = before
-        return type_, written
+        apart = replace(self.scope, lengths=set(), written=set(), used=set())
+        return Expressions(self.library, apart).any(node).type, apart.written
 
-    def _refusal(self, node: ast.AST, reason: str) -> UntranslatableError:
-        return self.scope.source.refusal(node, reason)
+
+def _length(text: str) -> Value:
+    return Value(text, Scalar.INT, _c.SUM)
+
+
+def _joined(operator: type[ast.boolop], parts: Sequence[Value]) -> Value:
+    sign, binds = SIGNS[operator]
+    return Value(f" {sign} ".join(part.within(_c.EQUALITY) for part in parts), Scalar.BOOL, binds)
