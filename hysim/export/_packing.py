@@ -1,66 +1,229 @@
 """The parameters of a step as expressions of a law's numbers.
 
 `Law.pack` turns the fields of laws into what their step takes, in numpy. It is run once on arrays of symbols, which
-record the arithmetic; the record is written as a function in C99 or JavaScript, for programs whose numbers may still be
-changed where they run. The functions of numpy that laws take are those of `Traced`; another one raises an
-`UntraceableError`, and so does a branch or a count that depends on a symbol.
+record the arithmetic on a `Tape`, each operation once; the record is written as a function in C99 or JavaScript, for
+programs whose numbers may still be changed where they run. The functions of numpy that laws take are those of `Traced`;
+another one raises an `UntraceableError`, and so does a branch or a count that depends on a symbol.
 """
 
+import functools
 import itertools
+import re
+from collections import Counter
 from collections.abc import Callable, Iterable, Sequence
-from typing import Any
+from pathlib import Path
+from typing import Any, NamedTuple
 
 import numpy as np
+from scipy.special import gammainc
 
 from hysim._basics.frozen import FloatArray
-from hysim.export._symbols import HELPERS, OPERATIONS, Number, Symbol, Tape, UntraceableError, helper, in_javascript
+from hysim.export import _c
 from hysim.models.law import Law
 
 _MANY = 8  # equal numbers in a row
 
+Number = Any
+"""A symbol, a float or a truth value."""
 
-class Packing:
+
+class Operation(NamedTuple):
+    """An operation in Python and in C99; its operands are ``{0}``, ``{1}`` and ``{2}``, helpers begin with ``@``."""
+
+    evaluate: Callable[..., Any]
+    text: str
+
+    @property
+    def c_type(self) -> str:
+        tests = isinstance(self.evaluate, np.ufunc) and f"{'d' * self.evaluate.nin}->?" in self.evaluate.types
+        return "int" if tests else "double"
+
+
+_FUNCTIONS = (np.sqrt, np.exp, np.expm1, np.log, np.log2, np.log1p, np.tanh, np.floor, np.trunc)
+_SIGNS: dict[np.ufunc, str] = {
+    **{np.add: "+", np.subtract: "-", np.multiply: "*", np.divide: "/"},
+    **{np.less: "<", np.less_equal: "<=", np.greater: ">", np.greater_equal: ">=", np.equal: "==", np.not_equal: "!="},
+    **{np.logical_and: "&&", np.logical_or: "||"},
+}
+OPERATIONS: dict[str, Operation] = {
+    **{function.__name__: Operation(function, f"{function.__name__}({{0}})") for function in _FUNCTIONS},
+    **{function.__name__: Operation(function, f"({{0}} {sign} {{1}})") for function, sign in _SIGNS.items()},
+    "negative": Operation(np.negative, "(-{0})"),
+    "square": Operation(np.square, "({0} * {0})"),
+    "reciprocal": Operation(np.reciprocal, "(1.0 / {0})"),
+    "power": Operation(np.power, "pow({0}, {1})"),
+    "absolute": Operation(np.absolute, "fabs({0})"),
+    "sign": Operation(np.sign, "({0} > 0.0 ? 1.0 : {0} < 0.0 ? -1.0 : {0} == 0.0 ? 0.0 : {0})"),
+    "maximum": Operation(np.maximum, "@larger({0}, {1})"),
+    "minimum": Operation(np.minimum, "@smaller({0}, {1})"),
+    "gammainc": Operation(gammainc, "@gamma_share({0}, {1})"),
+    "isfinite": Operation(np.isfinite, "(fabs({0}) < INFINITY)"),
+    "isinf": Operation(np.isinf, "({0} - {0} != 0.0 && {0} == {0})"),
+    "isnan": Operation(np.isnan, "({0} != {0})"),
+    "signbit": Operation(np.signbit, "@is_negative({0})"),
+    "logical_not": Operation(np.logical_not, "(!{0})"),
+    "where": Operation(lambda which, yes, no: yes if which else no, "({0} ? {1} : {2})"),
+}
+_UFUNCS: dict[np.ufunc, str] = {
+    **{each.evaluate: name for name, each in OPERATIONS.items() if isinstance(each.evaluate, np.ufunc)},
+    **{np.bitwise_and: "logical_and", np.bitwise_or: "logical_or", np.invert: "logical_not"},
+}
+_POWERS = {1.0: "", 2.0: "square", 0.5: "sqrt", -1.0: "reciprocal"}
+"""How numpy computes the power of an array to a plain number."""
+
+_HELPERS = Path(__file__).with_name("c").joinpath("pack.c").read_text(encoding="utf-8").split("\n\n")
+HELPERS = {text.partition("@")[2].partition("(")[0]: f"{text.strip()}\n" for text in _HELPERS}
+"""Functions that the texts of operations call."""
+
+_IN_JS = (
+    (r"\(void\)fields;", ""),
+    (r"\b(const )?double \*|(?<=\()double |(?<=, )double ", ""),  # of arguments
+    (r"\bstatic \w+ ", "function "),
+    (r"\bconst (double|int) ", "const "),
+    (r"\b(double|int) ", "let "),
+    (r"\b(exp|expm1|floor|log|log1p|log2|pow|sqrt|tanh|trunc)\(", r"Math.\1("),
+    (r"\bfabs\(", "Math.abs("),
+    (r"\bINFINITY\b", "Infinity"),
+    (r"\bNAN\b", "NaN"),
+)
+"""C99 as JavaScript has it, in which the operators are the same: patterns and their replacements."""
+
+
+class UntraceableError(ValueError):
+    """A number that arithmetic alone cannot compute from the fields: the code branches on it or counts by it."""
+
+    def __init__(self, numbers: Sequence["Symbol"]) -> None:
+        self.names = tuple(dict.fromkeys(name for symbol in numbers for name in symbol.tape.fields_of(symbol)))
+        super().__init__(f"{', '.join(self.names)} cannot be traced")
+
+
+class Symbol:
+    """A number that is known where the program runs: an operation on the tape."""
+
+    __slots__ = ("place", "tape")
+
+    def __init__(self, tape: "Tape", place: int) -> None:
+        self.tape, self.place = tape, place
+
+    def _refused(self, *_: Any) -> Any:
+        raise UntraceableError((self,))
+
+    __float__ = __bool__ = __int__ = __index__ = __complex__ = _refused
+
+    def __repr__(self) -> str:
+        return self.tape.texts((self,))[1][0]
+
+
+class Tape:
+    """Operations on the fields `names`, which stand first, in an order in which they can be computed."""
+
+    def __init__(self, names: tuple[str, ...]) -> None:
+        self.names = names
+        self._entries: list[tuple[str, tuple[Number, ...]]] = [("field", ()) for _ in names]
+        self._places: dict[Any, int] = {}
+
+    def record(self, operation: str, *operands: Number) -> Symbol:
+        key = operation, *(_key(operand) for operand in operands)
+        if key not in self._places:
+            self._places[key] = len(self._entries)
+            self._entries.append((operation, operands))
+        return Symbol(self, self._places[key])
+
+    def needed(self, numbers: Iterable[Number]) -> list[int]:
+        """Places of the operations on which numbers depend, in order."""
+        places = {number.place for number in numbers if isinstance(number, Symbol)}
+        for place in reversed(range(len(self._entries))):
+            if place in places:
+                places |= {operand.place for operand in self._entries[place][1] if isinstance(operand, Symbol)}
+        return sorted(places)
+
+    def fields_of(self, number: Number) -> tuple[str, ...]:
+        return tuple(self.names[place] for place in self.needed((number,)) if place < len(self.names))
+
+    def evaluate(self, numbers: Sequence[Number], values: Sequence[float]) -> list[float]:
+        results: dict[int, Any] = {k: np.float64(value) for k, value in enumerate(values)}
+
+        def value(number: Number) -> Any:
+            return results[number.place] if isinstance(number, Symbol) else number
+
+        with np.errstate(all="ignore"):
+            for place in self.needed(numbers):
+                operation, operands = self._entries[place]
+                if place not in results:
+                    results[place] = OPERATIONS[operation].evaluate(*map(value, operands))
+        return [float(value(number)) for number in numbers]
+
+    def texts(self, numbers: Sequence[Number]) -> tuple[list[str], list[str]]:
+        """Declarations of what occurs more than once, in order, and texts of the numbers; ``@`` marks helpers."""
+        written = {k: f"fields[{k}]" for k in range(len(self.names))}
+        operations = {place: self._entries[place] for place in self.needed(numbers) if place not in written}
+        uses = Counter(number.place for number in numbers if isinstance(number, Symbol))
+        for operation, operands in operations.values():
+            for k, operand in enumerate(operands):
+                if isinstance(operand, Symbol):
+                    uses[operand.place] += OPERATIONS[operation].text.count(f"{{{k}}}")
+
+        def text(number: Number) -> str:
+            return written[number.place] if isinstance(number, Symbol) else literal(number)
+
+        declarations: list[str] = []
+        for place, (operation, operands) in operations.items():
+            template = OPERATIONS[operation].text
+            written[place] = template.format(*map(text, operands))
+            if uses[place] > 1 or any(template.count(f"{{{k}}}") > 1 for k in range(len(operands))):
+                declarations.append(f"    const {OPERATIONS[operation].c_type} t{place} = {_bare(written[place])};")
+                written[place] = f"t{place}"
+        return declarations, [text(number) for number in numbers]
+
+
+def _key(number: Number) -> Any:
+    if isinstance(number, Symbol):
+        return number.place
+    return number if isinstance(number, (bool, np.bool_)) else float(number).hex()
+
+
+def literal(number: Number) -> str:
+    """A constant as C99 has it, as an operand of any operator."""
+    text = str(int(number)) if isinstance(number, (bool, np.bool_)) else _c.number(number)
+    return f"({text})" if text.startswith("-") else text
+
+
+class Packing(NamedTuple):
     """Parameters and first memory of a law's step, as expressions of its numbers.
 
     `fields` are the numbers that may be changed, in the order of the law's `scalars`. `parameters` and `memory` are
     floats, and symbols on the `tape` that depend on the fields; `memory` begins with the last input, zero.
     """
 
-    def __init__(
-        self, fields: tuple[str, ...], parameters: tuple[Number, ...], memory: tuple[Number, ...], tape: Tape
-    ) -> None:
-        self.fields, self.parameters, self.memory, self._tape = fields, parameters, memory, tape
+    fields: tuple[str, ...]
+    parameters: tuple[Number, ...]
+    memory: tuple[Number, ...]
+    tape: Tape
 
     def evaluate(self, values: Sequence[float]) -> tuple[FloatArray, FloatArray]:
         """Parameters and memory for `values` of the fields, in their order, as `Law.packed` has them."""
         if len(values) != len(self.fields):
             raise ValueError(f"expected {len(self.fields)} values, got {len(values)}")
-        numbers = self._tape.evaluate((*self.parameters, *self.memory), values)
-        size = len(self.parameters)
-        return np.array(numbers[:size]), np.array(numbers[size:])
+        numbers = self.tape.evaluate((*self.parameters, *self.memory), values)
+        return np.array(numbers[: len(self.parameters)]), np.array(numbers[len(self.parameters) :])
 
     def to_c(self, name: str) -> str:
         """C99 text of ``static void name(const double *fields, double *parameters, double *state)``."""
-        function, helpers = self._function(name)
-        return "\n".join((*(helper(each, "c") for each in helpers), function)).replace("@", f"{name}_")
-
-    def to_js(self, name: str) -> str:
-        """A function ``name(fields, parameters, state)`` in JavaScript that fills the last two."""
-        function, helpers = self._function(name)
-        texts = (*(helper(each, "js") for each in helpers), in_javascript(function))
-        return "\n".join(texts).replace("@", f"{name}_")
-
-    def _function(self, name: str) -> tuple[str, list[str]]:
-        locals_, texts = self._tape.texts((*self.parameters, *self.memory))
-        truths, size = self._tape.truth_values(), len(self.parameters)
-        lines = [
-            f"    const {'int' if local in truths else 'double'} {local} = {_bare(text)};" for local, text in locals_
-        ]
-        lines += _assignments("parameters", texts[:size]) + _assignments("state", texts[size:])
+        declarations, texts = self.tape.texts((*self.parameters, *self.memory))
+        size = len(self.parameters)
+        lines = [*declarations, *_assignments("parameters", texts[:size]), *_assignments("state", texts[size:])]
         unused = () if any("fields[" in line for line in lines) else ("    (void)fields;",)
         head = f"static void {name}(const double *fields, double *parameters, double *state)\n{{"
         text = "\n".join((head, *unused, *lines, "}\n"))
-        return text, [each for each in HELPERS if f"@{each}(" in text]
+        helpers = (helper for each, helper in HELPERS.items() if f"@{each}(" in text)
+        return "\n".join((*helpers, text)).replace("@", f"{name}_")
+
+    def to_js(self, name: str) -> str:
+        """A function ``name(fields, parameters, state)`` in JavaScript that fills the last two."""
+        text = self.to_c(name)
+        for pattern, replacement in _IN_JS:
+            text = re.sub(pattern, replacement, text)
+        return text
 
 
 def packing(law: Law, free: Iterable[str] | None = None) -> Packing:
@@ -77,7 +240,7 @@ def packing(law: Law, free: Iterable[str] | None = None) -> Packing:
         raise ValueError(f"{chosen[0]} of this {family} decides which step it has and cannot be free: leave it out")
     fields = tuple(name for name in scalars if name in names)
     tape = Tape(fields)
-    columns = {name: traced(tape.field(k)) for k, name in enumerate(fields)}
+    columns: dict[str, Any] = {name: np.array([[Symbol(tape, k)]]).view(Traced) for k, name in enumerate(fields)}
     try:
         parameters, memory = law.pack(law.completed(law.exchanged(columns)))
         return Packing(fields, _row(parameters), _row(memory), tape)
@@ -107,42 +270,36 @@ def _assignments(target: str, texts: list[str]) -> list[str]:
 
 def _bare(text: str) -> str:
     """A text without the parentheses around the whole of it."""
-    if not (text.startswith("(") and text.endswith(")")):
-        return text
-    depth = 0
-    for place, character in enumerate(text):
-        depth += (character == "(") - (character == ")")
-        if depth == 0 and place < len(text) - 1:
-            return text
-    return text[1:-1]
+    depths = list(itertools.accumulate((character == "(") - (character == ")") for character in text))
+    return text[1:-1] if text.endswith(")") and all(depth > 0 for depth in depths[:-1]) else text
 
 
 class Traced(np.ndarray[Any, np.dtype[np.object_]]):
     """An array of symbols and plain numbers, on which numpy's functions record what they do."""
 
     def __array_ufunc__(self, ufunc: np.ufunc, method: str, *inputs: Any, **others: Any) -> Any:
-        if not any(_has_symbols(each) for each in inputs):
-            methods: dict[str, Callable[..., Any]] = {
-                "__call__": ufunc,
-                "reduce": ufunc.reduce,
-                "accumulate": ufunc.accumulate,
-                "outer": ufunc.outer,
-            }
+        if not _symbols(*inputs):
+            methods = {
+                "__call__": ufunc, "reduce": ufunc.reduce, "accumulate": ufunc.accumulate, "outer": ufunc.outer,
+            }  # fmt: skip
             return methods[method](*map(_plain, inputs), **{k: v for k, v in others.items() if k != "out"})
-        if method == "__call__":
-            return _called(ufunc, inputs)
-        if method == "accumulate" and ufunc is np.add:
-            return _cumulated(np.asarray(inputs[0], dtype=object), int(others.get("axis", 0)))
-        raise UntraceableError(_names(inputs))
+        if method == "accumulate" and ufunc is np.add:  # one after the other, as numpy adds
+            rows = np.moveaxis(np.asarray(inputs[0]), axis := others.get("axis", 0), 0)
+            sums = list(itertools.accumulate(rows, functools.partial(_elementwise, "add")))
+            return np.moveaxis(np.array(sums, dtype=object), 0, axis).view(Traced)
+        if method == "__call__" and ufunc is np.power and isinstance(inputs[1], (int, float)) and inputs[1] in _POWERS:
+            operation = _POWERS[inputs[1]]
+            return _elementwise(operation, inputs[0]) if operation else inputs[0]
+        if method != "__call__" or ufunc not in _UFUNCS:
+            raise UntraceableError(_symbols(*inputs))
+        return _elementwise(_UFUNCS[ufunc], *inputs)
 
     def __array_function__(self, function: Any, types: Any, arguments: Any, others: Any) -> Any:
         if function is np.where:
-            return _elementwise(_chosen, arguments)
+            return _elementwise("where", *arguments)
         if function is np.clip:
             values, low, high = arguments
             return np.minimum(np.maximum(values, low), high)
-        if function is np.any:
-            return arguments[0].any()
         return _again(super().__array_function__(function, types, arguments, others))
 
     def any(self, *_: Any, **__: Any) -> Any:
@@ -151,72 +308,36 @@ class Traced(np.ndarray[Any, np.dtype[np.object_]]):
 
     def astype(self, dtype: Any, *_: Any, **__: Any) -> Any:
         kind = np.dtype(dtype)
-        if not _has_symbols(self):
+        if not _symbols(self):
             return _plain(self).astype(kind)
         if kind == np.float64:
             return self
         if kind.kind == "f":
-            raise UntraceableError(_names((self,)))
-        return _elementwise(_recorder("trunc"), (self,))
+            raise UntraceableError(_symbols(self))
+        return _elementwise("trunc", self)
 
 
-def traced(number: Symbol) -> FloatArray:
-    """A table of one law and one number, (1, 1)."""
-    table = np.empty((1, 1), dtype=object)
-    table[0, 0] = number
-    return table.view(Traced)
-
-
-_UFUNCS: dict[np.ufunc, str] = {
-    **{each.evaluate: name for name, each in OPERATIONS.items() if isinstance(each.evaluate, np.ufunc)},
-    **{np.bitwise_and: "logical_and", np.bitwise_or: "logical_or", np.invert: "logical_not"},
-}
-_POWERS = {1.0: "", 2.0: "square", 0.5: "sqrt", -1.0: "reciprocal"}
-"""How numpy computes the power of an array to a plain number."""
-
-
-def _called(ufunc: np.ufunc, inputs: tuple[Any, ...]) -> Any:
-    """The result of a function on arrays element by element, at least one of them with symbols."""
-    if ufunc is np.power and isinstance(inputs[1], (int, float)) and (name := _POWERS.get(inputs[1])) is not None:
-        return _elementwise(_recorder(name), inputs[:1]) if name else inputs[0]
-    if ufunc not in _UFUNCS:
-        raise UntraceableError(_names(inputs))
-    return _elementwise(_recorder(_UFUNCS[ufunc]), inputs)
-
-
-def _recorder(operation: str) -> Callable[..., Number]:
-    """A function of numbers that records the operation where one of them is a symbol, and does it where none is."""
+def _recorder(operation: str) -> Any:
+    """A ufunc that records the operation where one of its numbers is a symbol, and does it where none is."""
+    evaluate, text = OPERATIONS[operation]
 
     def apply(*operands: Number) -> Number:
         tapes = [operand.tape for operand in operands if isinstance(operand, Symbol)]
-        if not tapes:
-            return OPERATIONS[operation].evaluate(*operands)
+        is_choice = operation == "where"
+        if not tapes or (is_choice and not isinstance(operands[0], Symbol)):
+            return evaluate(*operands)
+        if is_choice and operands[1] is operands[2]:
+            return operands[1]
         kinds = (Symbol, bool, np.bool_)
         return tapes[0].record(operation, *(each if isinstance(each, kinds) else float(each) for each in operands))
 
-    return apply
+    return np.frompyfunc(apply, sum(f"{{{k}}}" in text for k in range(3)), 1)
 
 
-def _chosen(which: Number, yes: Number, no: Number) -> Number:
-    if not isinstance(which, Symbol):
-        return yes if which else no
-    return yes if yes is no else _recorder("where")(which, yes, no)
-
-
-def _elementwise(function: Callable[..., Number], arguments: Sequence[Any]) -> Any:
-    arrays = np.broadcast_arrays(*(np.asarray(each, dtype=object) for each in arguments))
-    result = np.empty(arrays[0].shape, dtype=object)
-    for place in np.ndindex(result.shape):
-        result[place] = function(*(array[place] for array in arrays))
-    return result.view(Traced)
-
-
-def _cumulated(values: Any, axis: int) -> Any:
-    """Sums up to each element along an axis, one after the other as numpy adds."""
-    result, add = np.moveaxis(values.copy(), axis, 0), _recorder("add")
-    for k in range(1, len(result)):
-        result[k] = _elementwise(add, (result[k - 1], result[k]))
-    return np.moveaxis(result, 0, axis).view(Traced)
+def _elementwise(operation: str, *arguments: Any) -> Any:
+    """The result of an operation on arrays element by element, as an array of symbols."""
+    arrays = [np.asarray(each, dtype=object) for each in arguments]
+    return np.asarray(_recorder(operation)(*arrays), dtype=object).view(Traced)
 
 
 def _again(result: Any) -> Any:
@@ -227,12 +348,9 @@ def _again(result: Any) -> Any:
     return result.view(Traced) if plain else result
 
 
-def _has_symbols(values: Any) -> bool:
-    return (
-        isinstance(values, np.ndarray)
-        and values.dtype == object
-        and any(isinstance(number, Symbol) for number in values.ravel().tolist())
-    )
+def _symbols(*inputs: Any) -> list[Symbol]:
+    arrays = (each for each in inputs if isinstance(each, np.ndarray) and each.dtype == object)
+    return [number for array in arrays for number in array.ravel().tolist() if isinstance(number, Symbol)]
 
 
 def _plain(values: Any) -> Any:
@@ -244,14 +362,3 @@ def _plain(values: Any) -> Any:
         return np.array(numbers, dtype=bool).reshape(values.shape)
     whole = all(isinstance(number, (int, np.integer)) for number in numbers)
     return np.array(numbers, dtype=np.int32 if whole else float).reshape(values.shape)
-
-
-def _names(inputs: Sequence[Any]) -> tuple[str, ...]:
-    symbols = [
-        number
-        for each in inputs
-        if isinstance(each, np.ndarray) and each.dtype == object
-        for number in each.ravel().tolist()
-        if isinstance(number, Symbol)
-    ]
-    return tuple(dict.fromkeys(name for symbol in symbols for name in symbol.tape.fields_of(symbol)))
