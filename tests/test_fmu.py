@@ -17,8 +17,7 @@ from square_dahl import SquareDahl
 
 import hysim as hs
 from hysim.export import _compilers, _fmu
-from hysim.export._fmu import field_unit
-from hysim.export._program import Field, Program
+from hysim.export._program import Field, Program, field_unit
 from hysim.models.protocols import needs_time
 
 VERSIONS = ("2.0", "3.0")
@@ -83,7 +82,7 @@ STEP = 0.1  # s
 def unit(folder, program=FRICTION, version="2.0", platforms=(), u0=0.0):
     """A unit in a file."""
     path = folder / f"{program.step}{version[0]}.fmu"
-    path.write_bytes(_fmu.archive(program, _fmu.Options("Friction", version, platforms, UNITS, u0)))
+    path.write_bytes(_fmu.archive(program, "Friction", version, platforms, UNITS, u0))
     return path
 
 

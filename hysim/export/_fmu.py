@@ -6,26 +6,25 @@ import math
 import re
 import uuid
 import zipfile
-from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
+from string import Template
+from types import MappingProxyType
 from typing import Any, Literal, NamedTuple
+from xml.sax.saxutils import quoteattr
 
 from hysim._basics.atomic import write_all
 from hysim._basics.frozen import check_choice
+from hysim._basics.prefixes import prefixed
 from hysim._basics.results import model_of
 from hysim._release import __version__
 from hysim.errors import warn_unsafe
 from hysim.export._c import number, table
-from hysim.export._compilers import TARGETS, Target, compiler, host, shared_library, universal
-from hysim.export._fmu_variables import Variable, build_description, description, is_tunable, variables_of
-from hysim.export._packing import packing
+from hysim.export._compilers import TARGETS, Target, compiler, shared_library, universal
 from hysim.export._program import Program, program_of
-from hysim.models.law import Law
 from hysim.models.protocols import standing
 
 _FOLDER = Path(__file__).with_name("fmu")
-_HEADERS = ("math.h", "stdbool.h", "stddef.h", "stdint.h", "stdlib.h", "string.h")
 Version = Literal["2.0", "3.0"]
 Platform = Literal["linux", "windows", "mac"]
 
@@ -33,68 +32,26 @@ VERSIONS = ("2.0", "3.0")
 _FOLDERS_2 = {"linux": "linux64", "windows": "win64", "darwin": "darwin64"}
 _WRITTEN = (1980, 1, 1, 0, 0, 0)  # the first time that a zip file knows
 _MODE = 0o100644 << 16
-
-
-def token_of(*contents: str) -> str:
-    """A GUID that depends on the contents alone."""
-    return f"{{{uuid.uuid5(uuid.NAMESPACE_URL, chr(0).join(contents))}}}"
-
-
-def source_of(program: Program, variables: Sequence[Variable], version: str, token: str) -> str:
-    parts = [
-        f"/* {', '.join(program.inputs)} to {program.output}; written by hysim {__version__}. */",
-        "\n".join(f"#include <{header}>" for header in _HEADERS),
-        program.source.strip(),
-        _numbers(program, variables, token),
-        (_FOLDER / "model.c").read_text(encoding="utf-8").strip(),
-        (_FOLDER / f"fmi{version[0]}.c").read_text(encoding="utf-8").strip(),
-    ]
-    return "\n\n".join(parts) + "\n"
-
-
-def _numbers(program: Program, variables: Sequence[Variable], token: str) -> str:
-    inputs = [each for each in variables if each.causality == "input"]
-    fields = list(variables[len(variables) - len(program.fields) :]) if program.fields else []
-    sizes = {
-        "INPUTS": len(inputs),
-        "FIELDS": len(fields),
-        "PARAMETERS": program.parameters.size,
-        "STATE": program.state.size,
-        "MEMORY": program.memory,
-        "IS_TUNABLE": int(is_tunable(program)),
+BASE_UNITS = ("kg", "m", "s", "A", "K", "rad")
+_EXPONENTS = MappingProxyType(
+    {
+        "m": (0, 1), "g": (1,), "s": (0, 0, 1), "A": (0, 0, 0, 1), "K": (0, 0, 0, 0, 1), "rad": (0, 0, 0, 0, 0, 1),
+        "N": (1, 1, -2), "Pa": (1, -1, -2), "Hz": (0, 0, -1), "W": (1, 2, -3), "J": (1, 2, -2), "L": (0, 3),
+        "V": (1, 2, -3, -1), "C": (0, 0, 1, 1), "F": (-1, -2, 4, 2), "T": (1, 0, -2, -1), "H": (1, 2, -2, -2),
+        "Wb": (1, 2, -2, -1), "ohm": (1, 2, -3, -2), "\u03a9": (1, 2, -3, -2),
     }
-    values = ", ".join(f"(x)[{k}]" for k in range(len(inputs)))
-    calls = {
-        "STEP(p, s, x)": f"{program.step}((p), (s), {values})",
-        "PACK(f, p, s)": f"{program.pack}((f), (p), (s))" if program.pack else "((void)0)",
-        "BEGIN(p, s, u0)": f"{program.start}((p), (s), (u0))" if program.start else "((void)0)",
-        "AT_LEAST_1(n)": "((n) > 0 ? (n) : 1)",
-    }
-    digest = hashlib.sha256(token.encode()).digest()
-    halves = ", ".join(number(float(int.from_bytes(digest[k : k + 6], "big"))) for k in (0, 6))
-    others = {"TOKEN": f'"{token}"', "TOKEN_NUMBERS": f"{{{halves}}}", "START_VALUE": number(inputs[0].start or 0.0)}
-    if program.start:
-        others["HAS_START"] = "1"
-    if math.isfinite(program.sample_time):
-        others["SAMPLE_TIME"] = number(program.sample_time)
-    tables = {
-        "INPUT_VALUES": [each.start or 0.0 for each in inputs],
-        "PARAMETER_VALUES": program.parameters.tolist(),
-        "STATE_VALUES": program.state.tolist(),
-        "FIELD_VALUES": [each.start or 0.0 for each in fields],
-    }
-    if fields:
-        tables |= {"FIELD_MINIMA": [each.lower for each in fields], "FIELD_MAXIMA": [each.upper for each in fields]}
-    defined = [f"#define FMU_{name} {value}" for name, value in (sizes | calls | others).items()]
-    return "\n".join([*defined, "", *(table(f"FMU_{name}", numbers) for name, numbers in tables.items())])
-
-
-class Options(NamedTuple):
-    name: str
-    version: str
-    platforms: tuple[str, ...] | None
-    units: Mapping[str, str]
-    u0: float
+)  # fmt: skip
+_POWERS = MappingProxyType({"g": -3, "L": -3})  # of ten, in base units
+_SIGNALS = MappingProxyType({"reference": "y", "measurement": "y", "command": "u", "h": "u"})
+_DELAY = (
+    "Each communication step passes the input at its beginning to the model and ends with the output for it: "
+    "the output is one communication step late."
+)
+_SAMPLED = (
+    "The model is computed at multiples of its sample time with the input of that moment, and its output holds "
+    "between them: it is late by one communication step."
+)
+_TUNED = "It may be changed during the simulation; the memory stays."
 
 
 def to_fmu(
@@ -170,44 +127,7 @@ def to_fmu(
     ['modelDescription.xml', 'sources/Dahl.c']
     """
     warn_unsafe(thing)
-    thing = model_of(thing)
-    target = _checked(Path(path), version, platforms)
-    labels = dict(units or {})
-    if not all(isinstance(text, str) for pair in labels.items() for text in pair):
-        raise TypeError(f"units must be labels by the names u, y and t, got {units!r}")
-    chosen = _checked_name(type(thing).__name__ if name is None else name)
-    program = program_of(thing, sample_time, u0=u0, y0=y0, tunable=_is_tunable(thing))
-    u0 = standing(thing, u0)
-    program = _with_units(program, thing)
-    systems = None if platforms is None else tuple(platforms)
-    write_all({target: archive(program, Options(chosen, version, systems, labels, u0))})
-    return target
-
-
-def _is_tunable(thing: Any) -> bool:
-    """Whether the parameters of the step follow from a law's numbers by arithmetic; else the numbers are constants."""
-    if not isinstance(thing, Law):
-        return False
-    try:
-        packing(thing)
-    except ValueError:
-        return False
-    return True
-
-
-def _with_units(program: Program, thing: Any) -> Program:
-    if not isinstance(thing, Law):
-        return program
-    return replace(program, fields=tuple(each._replace(unit=field_unit(thing, each.name)) for each in program.fields))
-
-
-def field_unit(law: Law, name: str) -> str:
-    """Unit of one number of a law, as in ``"y/u"``; empty where it is not known."""
-    searched = {each.name: each.unit for each in law.searched if each.unit != "1"}
-    return {**searched, **law.units}.get(name.partition("[")[0], "")
-
-
-def _checked(path: Path, version: str, platforms: Sequence[str] | None) -> Path:
+    thing, path = model_of(thing), Path(path)
     check_choice("version", version, VERSIONS)
     if path.suffix.lower() != ".fmu":
         raise ValueError(f"a functional mock-up unit is a file .fmu, got {str(path)!r}")
@@ -215,69 +135,262 @@ def _checked(path: Path, version: str, platforms: Sequence[str] | None) -> Path:
         raise TypeError(f"platforms must be a sequence such as ({platforms!r},), got {platforms!r}")
     for each in platforms or ():
         check_choice("platforms", each, TARGETS)
+    labels = dict(units or {})
+    if not all(isinstance(text, str) for pair in labels.items() for text in pair):
+        raise TypeError(f"units must be labels by the names u, y and t, got {units!r}")
+    name = type(thing).__name__ if name is None else name
+    if not re.fullmatch("[A-Za-z_][A-Za-z0-9_]*", name):
+        raise ValueError(f"name must be letters, digits and underscores after a letter, got {name!r}")
+    program = program_of(thing, sample_time, u0=u0, y0=y0, tunable=True)
+    write_all({path: archive(program, name, version, platforms, labels, standing(thing, u0))})
     return path
 
 
-def _checked_name(name: str) -> str:
-    if not re.fullmatch("[A-Za-z_][A-Za-z0-9_]*", name):
-        raise ValueError(f"name must be letters, digits and underscores after a letter, got {name!r}")
-    return name
-
-
-def archive(program: Program, options: Options) -> bytes:
-    version, name = options.version, options.name
-    variables = variables_of(program, options.units, options.u0)
-    blank = description(program, variables, name, version, ""), source_of(program, variables, version, "")
-    token = token_of(*blank)
-    source = source_of(program, variables, version, token)
-    files: dict[str, bytes] = {
-        "modelDescription.xml": description(program, variables, name, version, token).encode(),
-        f"sources/{name}.c": source.encode(),
+def archive(
+    program: Program,
+    name: str,
+    version: str,
+    platforms: Sequence[str] | None,
+    units: Mapping[str, str],
+    u0: float,
+) -> bytes:
+    """Bytes of a unit with a token that depends on its texts alone."""
+    variables = variables_of(program, units, u0)
+    blank = _description(program, variables, name, version, ""), _source(program, variables, version, "")
+    token = f"{{{uuid.uuid5(uuid.NAMESPACE_URL, chr(0).join(blank))}}}"
+    source = _source(program, variables, version, token)
+    texts = {
+        "modelDescription.xml": _description(program, variables, name, version, token),
+        f"sources/{name}.c": source,
     }
     if version == "3.0":
-        files["sources/buildDescription.xml"] = build_description(name).encode()
-    return _zipped(files | libraries(source, options))
+        texts["sources/buildDescription.xml"] = _template("build.xml").substitute(name=name)
+    files = {place: text.encode() for place, text in texts.items()} | _libraries(source, name, version, platforms)
+    stream = io.BytesIO()
+    with zipfile.ZipFile(stream, "w", zipfile.ZIP_DEFLATED) as unit:
+        for place, content in sorted(files.items()):
+            entry = zipfile.ZipInfo(place, _WRITTEN)
+            entry.create_system, entry.external_attr, entry.compress_type = 3, _MODE, zipfile.ZIP_DEFLATED
+            unit.writestr(entry, content)
+    return stream.getvalue()
 
 
-def libraries(source: str, options: Options) -> dict[str, bytes]:
-    """Shared libraries by their places in the unit; ImportError if no compiler serves a platform asked for by name."""
-    compiled = {
-        target: shared_library(source, options.name, target, command)
-        for target, command in _commands(options.platforms, options.version).items()
+def _template(name: str) -> Template:
+    return Template((_FOLDER / name).read_text(encoding="utf-8"))
+
+
+# ---------------------------------------------------------------------------------- sources and libraries
+
+
+def _source(program: Program, variables: Sequence["Variable"], version: str, token: str) -> str:
+    n_inputs, n_fields = len(program.inputs), len(program.fields)
+    inputs, fields = variables[:n_inputs], variables[len(variables) - n_fields :]
+    tables = {
+        "INPUT_VALUES": [each.start or 0.0 for each in inputs],
+        "PARAMETER_VALUES": program.parameters.tolist(),
+        "STATE_VALUES": program.state.tolist(),
+        "FIELD_VALUES": [each.start or 0.0 for each in fields],
     }
-    if options.version == "3.0":
-        return {f"binaries/{each.name}/{options.name}{each.ending}": data for each, data in compiled.items()}
+    if fields:
+        tables |= {"FIELD_MINIMA": [each.lower for each in fields], "FIELD_MAXIMA": [each.upper for each in fields]}
+    digest, sampled = hashlib.sha256(token.encode()).digest(), math.isfinite(program.sample_time)
+    return _template("source.c").substitute(
+        inputs=", ".join(program.inputs),
+        output=program.output,
+        hysim=__version__,
+        functions=program.source.strip(),
+        n_inputs=n_inputs,
+        n_fields=n_fields,
+        n_parameters=program.parameters.size,
+        n_state=program.state.size,
+        memory=program.memory,
+        is_tunable=int(bool(program.fields and program.memory)),
+        step=program.step,
+        values=", ".join(f"(x)[{k}]" for k in range(n_inputs)),
+        pack=f"{program.pack}((f), (p), (s))" if program.pack else "((void)0)",
+        begin=f"{program.start}((p), (s), (u0))" if program.start else "((void)0)",
+        token=token,
+        numbers=", ".join(number(float(int.from_bytes(digest[k : k + 6], "big"))) for k in (0, 6)),
+        start=number(inputs[0].start or 0.0),
+        more="#define FMU_HAS_START 1\n" * bool(program.start)
+        + f"#define FMU_SAMPLE_TIME {number(program.sample_time)}\n" * sampled,
+        tables="\n".join(table(f"FMU_{name}", numbers) for name, numbers in tables.items()),
+        model=(_FOLDER / "model.c").read_text(encoding="utf-8").strip(),
+        interface=(_FOLDER / f"fmi{version[0]}.c").read_text(encoding="utf-8").strip(),
+    )
+
+
+def _libraries(source: str, name: str, version: str, platforms: Sequence[str] | None) -> dict[str, bytes]:
+    """Shared libraries by their places in the unit; ImportError if no compiler serves a platform asked for by name."""
     places: dict[str, list[bytes]] = {}
-    for each, data in compiled.items():
-        folder = _FOLDERS_2[each.name.partition("-")[2]]
-        places.setdefault(f"binaries/{folder}/{options.name}{each.ending}", []).append(data)
+    for each, command in _commands(platforms, version).items():
+        folder = each.name if version == "3.0" else _FOLDERS_2[each.name.partition("-")[2]]
+        library = shared_library(source, name, each, command)
+        places.setdefault(f"binaries/{folder}/{name}{each.ending}", []).append(library)
     return {place: data[0] if len(data) == 1 else universal(data) for place, data in places.items()}
 
 
-def _commands(platforms: tuple[str, ...] | None, version: str) -> dict[Target, Sequence[str]]:
+def _commands(platforms: Sequence[str] | None, version: str) -> dict[Target, Sequence[str]]:
     """Targets, each with its compiler; FMI 2.0 has one place for Linux, which is that of x86-64."""
     if platforms is None:
-        own = [(each, compiler(each)) for targets in TARGETS.values() for each in targets if each.name == host()]
-        return {each: command for each, command in own if command is not None}
+        own = (each for targets in TARGETS.values() for each in targets if each.is_host)
+        return {each: command for each in own if (command := compiler(each)) is not None}
     commands: dict[Target, Sequence[str]] = {}
     for name in dict.fromkeys(platforms):
         targets = TARGETS[name][:1] if version == "2.0" and name == "linux" else TARGETS[name]
         found = {each: command for each in targets if (command := compiler(each)) is not None}
         if not found:
-            raise ImportError(
-                f"a shared library for {name} needs a compiler: pip install 'hysim[export]', or leave {name!r} out of "
-                "the platforms"
-            )
+            advice = f"pip install 'hysim[export]', or leave {name!r} out of the platforms"
+            raise ImportError(f"a shared library for {name} needs a compiler: {advice}")
         commands |= found
     return commands
 
 
-def _zipped(files: Mapping[str, bytes]) -> bytes:
-    """A zip file whose bytes depend on its contents alone."""
-    stream = io.BytesIO()
-    with zipfile.ZipFile(stream, "w", zipfile.ZIP_DEFLATED) as unit:
-        for name, content in sorted(files.items()):
-            entry = zipfile.ZipInfo(name, _WRITTEN)
-            entry.create_system, entry.external_attr, entry.compress_type = 3, _MODE, zipfile.ZIP_DEFLATED
-            unit.writestr(entry, content)
-    return stream.getvalue()
+# ---------------------------------------------------------------------------------- variables and their units
+
+
+class BaseUnit(NamedTuple):
+    """Exponents of `BASE_UNITS`, and the power of ten with which a value becomes one in them."""
+
+    exponents: tuple[int, ...]
+    power: int
+
+
+def label(unit: str, units: Mapping[str, str]) -> str:
+    """The label of a unit such as ``"y/u"`` for the labels of u, y and t; empty where one of them is unknown.
+
+    ``"1"`` and ``"s"`` stand for themselves, ``"h"`` for half the span of an input.
+
+    >>> label("y/u", {"u": "V", "y": "um"}), label("y", {}), label("1/u", {"u": "m/s"})
+    ('um/V', '', '1/(m/s)')
+    """
+    parts = unit.split("/")
+    names = [part if part in ("1", "s") else units.get(_SIGNALS.get(part, part), "") for part in parts]
+    if not all(names):
+        return ""
+    return "/".join([names[0], *(f"({name})" if "/" in name else name for name in names[1:])])
+
+
+def base_unit(unit: str) -> BaseUnit | None:
+    """A label such as ``um/V`` in base units, None where it is not understood.
+
+    >>> base_unit("um/V")
+    BaseUnit(exponents=(-1, -1, 3, 1, 0, 0), power=-6)
+    >>> base_unit("px") is None
+    True
+    """
+    exponents, power = [0] * len(BASE_UNITS), 0
+    for k, part in enumerate(unit.split("/")):
+        if part == "1":
+            continue
+        try:
+            prefix, base = prefixed(part)
+        except ValueError:
+            return None
+        sign = -1 if k else 1
+        power += sign * (prefix + _POWERS.get(base, 0))
+        for place, exponent in enumerate(_EXPONENTS[base]):
+            exponents[place] += sign * exponent
+    return BaseUnit(tuple(exponents), power)
+
+
+class Variable(NamedTuple):
+    """A real variable: its name and value reference, its role in FMI, and its unit, start value and limits."""
+
+    name: str
+    reference: int
+    causality: str
+    variability: str
+    initial: str = ""
+    unit: str = ""
+    start: float | None = None
+    lower: float = -math.inf
+    upper: float = math.inf
+    description: str = ""
+
+    def attributes(self) -> dict[str, str]:
+        """Those that stand in the XML of both versions beside each other."""
+        named = {
+            "name": self.name,
+            "valueReference": str(self.reference),
+            "causality": self.causality,
+            "variability": self.variability,
+            "initial": self.initial,
+            "description": self.description,
+        }
+        return {name: value for name, value in named.items() if value}
+
+    def numbers(self) -> dict[str, str]:
+        limits = {"min": self.lower, "max": self.upper}
+        finite = {name: repr(value) for name, value in limits.items() if math.isfinite(value)}
+        start = {} if self.start is None else {"start": repr(self.start)}
+        return ({"unit": self.unit} if self.unit else {}) | finite | start
+
+
+def variables_of(program: Program, units: Mapping[str, str], u0: float) -> list[Variable]:
+    """Variables in the order of their value references; ValueError if two have one name."""
+    first, output = program.inputs[0], 1 + len(program.inputs)
+    variables = [
+        Variable(name, k, "input", "continuous", unit=label(name, units), start=u0 if k == 1 else 0.0)
+        for k, name in enumerate(program.inputs, 1)
+    ]
+    unit = label(program.output, units)
+    variables.append(Variable(program.output, output, "output", "continuous", "calculated", unit))
+    if program.start:
+        text, role = "Input at which the model rests before the simulation.", ("parameter", "fixed", "exact")
+        variables.append(Variable(f"{first}0", output + 1, *role, label(first, units), u0, description=text))
+    if math.isfinite(program.sample_time):
+        time, text = program.sample_time, "Time between two samples of the model."
+        variables.append(Variable("sample_time", output + 2, "local", "constant", "exact", "s", time, description=text))
+    kind, text = ("tunable", _TUNED) if program.memory else ("fixed", "")
+    for k, each in enumerate(program.fields, output + 3):
+        limits = min(each.lower, each.value), max(each.upper, each.value)
+        unit = label(each.unit, units)
+        variables.append(Variable(each.name, k, "parameter", kind, "exact", unit, each.value, *limits, text))
+    names = [*(each.name for each in variables), "time"]
+    if double := next((name for name in names if names.count(name) > 1), None):
+        raise ValueError(f"two variables of the unit would be called {double!r}: rename the parameter of the law")
+    return variables
+
+
+def _description(program: Program, variables: Sequence[Variable], name: str, version: str, token: str) -> str:
+    is_2, step, experiment, words = version == "2.0", "", "", _DELAY
+    if math.isfinite(program.sample_time):
+        step = f' fixedInternalStepSize="{program.sample_time!r}"'
+        experiment = f'  <DefaultExperiment startTime="0.0" stepSize="{program.sample_time!r}" />\n'
+        ahead = f" The reference is that of {program.ahead} samples later." if program.ahead else ""
+        words = _SAMPLED + ahead
+    elements = (
+        f"    <ScalarVariable{_written(each.attributes())}>\n      <Real{_written(each.numbers())} />\n"
+        "    </ScalarVariable>\n"
+        if is_2
+        else f"    <Float64{_written(each.attributes() | each.numbers())} />\n"
+        for each in variables
+    )
+    return _template(f"fmi{version[0]}.xml").substitute(
+        name=name,
+        token=token,
+        description=words,
+        hysim=__version__,
+        step=step,
+        units=_units(variables),
+        experiment=experiment,
+        variables="".join(elements),
+        output=1 + len(program.inputs),
+    )
+
+
+def _units(variables: Iterable[Variable]) -> str:
+    text = ""
+    for each in dict.fromkeys(variable.unit for variable in variables if variable.unit):
+        if (base := base_unit(each)) is None:
+            text += f"    <Unit name={quoteattr(each)} />\n"
+            continue
+        exponents = {name: str(n) for name, n in zip(BASE_UNITS, base.exponents, strict=True) if n}
+        factor = {"factor": repr(10.0**base.power)} if base.power else {}
+        text += f"    <Unit name={quoteattr(each)}>\n      <BaseUnit{_written(exponents | factor)} />\n    </Unit>\n"
+    return f"  <UnitDefinitions>\n{text}  </UnitDefinitions>\n" if text else ""
+
+
+def _written(attributes: Mapping[str, str]) -> str:
+    return "".join(f" {name}={quoteattr(value)}" for name, value in attributes.items())

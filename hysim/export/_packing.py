@@ -279,7 +279,7 @@ class Traced(np.ndarray[Any, np.dtype[np.object_]]):
 
     def __array_ufunc__(self, ufunc: np.ufunc, method: str, *inputs: Any, **others: Any) -> Any:
         if not _symbols(*inputs):
-            methods = {
+            methods: dict[str, Any] = {
                 "__call__": ufunc, "reduce": ufunc.reduce, "accumulate": ufunc.accumulate, "outer": ufunc.outer,
             }  # fmt: skip
             return methods[method](*map(_plain, inputs), **{k: v for k, v in others.items() if k != "out"})

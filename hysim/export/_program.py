@@ -22,7 +22,7 @@ from hysim.control import Controller, InverseFeedforward, RestingPlant, Tracking
 from hysim.export import _c
 from hysim.export._body import Body
 from hysim.export._c import Function, Known, Parameter, Routine, Scalar, Several, Type, Vector, plain, routine
-from hysim.export._packing import packing
+from hysim.export._packing import Packing, packing
 from hysim.kernels.controllers import guarded
 from hysim.kernels.stepping import Start, Step, complete
 from hysim.models.law import Law
@@ -202,9 +202,10 @@ def program_of(
     """The step of a law, a plant or a controller in C99.
 
     A law that does not depend on time needs no `sample_time` [s]. A controller starts at rest at `u0` and `y0`, by
-    default those of `start_of`. If `tunable`, the numbers of a law may still be changed in the program. A TypeError is
-    raised if the thing cannot be stepped, a ValueError if a sample time is missing or a start is not finite, and an
-    UntranslatableError if a step is outside the subset of Python that is translated.
+    default those of `start_of`. If `tunable`, the numbers of a law may still be changed in the program, where its
+    parameters follow from them by arithmetic. A TypeError is raised if the thing cannot be stepped, a ValueError if a
+    sample time is missing or a start is not finite, and an UntranslatableError if a step is outside the subset of
+    Python that is translated.
     """
     if sample_time is not None and not 0.0 < sample_time < math.inf:
         raise ValueError(f"sample_time must be positive and finite, got {sample_time}")
@@ -216,18 +217,17 @@ def program_of(
     if isinstance(thing, Creep | Amplifier | Vibration):
         thing = as_stepwise(thing)
     if isinstance(thing, Stepwise):
-        if tunable and isinstance(thing, Law):
-            thing = thing.placed(None)  # whose state is completed where the program runs, from its numbers there
-        model = thing.startable(sample_time)
         timed = sample_time if needs_time(thing) else None
-        if not (tunable and isinstance(thing, Law)):
-            return _of_model(model, timed)
-        free = packing(thing)
-        program = _of_model(model, timed)
+        law = thing if tunable and isinstance(thing, Law) else None
+        free = None if law is None else _packing_of(law)
+        if law is None or free is None:
+            return _of_model(thing.startable(sample_time), timed)
+        # placed: its state is completed where the program runs, from its numbers there
+        program = _of_model(law.placed(None).startable(sample_time), timed)
         return replace(
             program,
             source=program.source + "\n" + free.to_c("pack"),
-            fields=tuple(Field(name, thing.scalars[name]) for name in free.fields),
+            fields=tuple(Field(name, law.scalars[name], unit=field_unit(law, name)) for name in free.fields),
             pack="pack",
             memory=len(free.memory),
         )
@@ -239,6 +239,20 @@ def program_of(
             raise ValueError(f"a {type(thing).__name__} is sampled: give sample_time")
         return _of_controller(thing, sample_time, *start_of(thing, sample_time, u0, y0))
     raise TypeError(f"a law, a plant or a controller that can be stepped is expected, got {type(thing).__name__}")
+
+
+def _packing_of(law: Law) -> Packing | None:
+    """Parameters of the step as expressions of a law's numbers; None where they do not follow by arithmetic."""
+    try:
+        return packing(law)
+    except ValueError:
+        return None
+
+
+def field_unit(law: Law, name: str) -> str:
+    """Unit of one number of a law, as in ``"y/u"``; empty where it is not known."""
+    searched = {each.name: each.unit for each in law.searched if each.unit != "1"}
+    return {**searched, **law.units}.get(name.partition("[")[0], "")
 
 
 def start_of(thing: Any, sample_time: float, u0: float | None, y0: float | None) -> tuple[float, float]:
