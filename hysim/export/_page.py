@@ -25,7 +25,7 @@ from hysim._columns.excursions import measured_cycles
 from hysim._columns.turning import TOLERANCE, Samples
 from hysim._release import __version__
 from hysim.export._compilers import compressed
-from hysim.export._page_model import Parts, about, heading, node_of, plane_of
+from hysim.export._page_model import Parts, about, heading, node_of, plane_of, rounded, slider
 from hysim.records import Record
 
 LARGEST = 300_000
@@ -179,16 +179,14 @@ def _model(name: str, shown: Shown, parts: Parts, record: Record | None) -> dict
 
 
 def _inputs(amplitude: float, middle: float, timed: bool) -> list[dict[str, Any]]:
-    sides = {"lower": _short(middle - 2.0 * amplitude), "upper": _short(middle + 2.0 * amplitude)}
-    sliders: list[dict[str, Any]] = [
-        {"name": "amplitude", "value": amplitude, "lower": _short(amplitude / 20.0), "upper": _short(2.0 * amplitude)},
-        {"name": "middle", "value": middle, **sides},
-        {"name": "cycles", "value": 2, "lower": 1, "upper": 6, "whole": True},
-        {"name": "smaller loops", "value": 4, "lower": 0, "upper": 12, "whole": True},
+    period = slider("period", _PERIOD, 0.01, 100.0, log=True, unit="s")
+    return [
+        slider("amplitude", amplitude, rounded(amplitude / 20.0, 4), rounded(2.0 * amplitude, 4)),
+        slider("middle", middle, rounded(middle - 2.0 * amplitude, 4), rounded(middle + 2.0 * amplitude, 4)),
+        slider("cycles", 2, 1, 6, whole=True),
+        slider("smaller loops", 4, 0, 12, whole=True),
+        *[period] * timed,
     ]
-    if timed:
-        sliders.append({"name": "period", "value": _PERIOD, "lower": 0.01, "upper": 100.0, "log": True, "unit": "s"})
-    return sliders
 
 
 def _stack(controls: list[dict[str, Any]], law: Any) -> list[dict[str, Any]]:
@@ -196,16 +194,15 @@ def _stack(controls: list[dict[str, Any]], law: Any) -> list[dict[str, Any]]:
     places = {name: k for k, name in enumerate(law.scalars)}
     most, weight = len(law.thresholds) - 1, sum(law.weights[1:])
     plays = sum(each != 0.0 for each in law.weights[1:])
-    reach = _short(law.thresholds[plays])
-    of = {name: [places[f"{name}[{k + 1}]"] for k in range(most)] for name in ("thresholds", "weights")}
-    ends: list[tuple[str, float, float, float, dict[str, Any]]] = [
-        ("plays", plays, 1, most, {"whole": True, "places": [], "stack": "plays"}),
-        ("largest threshold", reach, 0.1 * reach, 2.5 * reach, {"places": of["thresholds"], "stack": "reach"}),
-        ("weight of all plays", weight, -2.0 * weight, 2.0 * weight, {"places": of["weights"], "stack": "weight"}),
-        ("weight of the input", law.weights[0], -1.0, 2.0, {"places": [places["weights[0]"]]}),
+    reach = rounded(law.thresholds[plays], 4)
+    thresholds, weights = ([places[f"{name}[{k + 1}]"] for k in range(most)] for name in ("thresholds", "weights"))
+    return [
+        slider("plays", plays, 1, most, whole=True, places=[], stack="plays"),
+        slider("largest threshold", reach, 0.1 * reach, 2.5 * reach, places=thresholds, stack="reach"),
+        slider("weight of all plays", weight, -2.0 * weight, 2.0 * weight, places=weights, stack="weight"),
+        slider("weight of the input", law.weights[0], -1.0, 2.0, places=[places["weights[0]"]]),
+        *(control for control in controls if control["name"] == "offset"),
     ]
-    sliders = [{"name": name, "value": value, "lower": low, "upper": up, **rest} for name, value, low, up, rest in ends]
-    return sliders + [control for control in controls if control["name"] == "offset"]
 
 
 def _between(thing: Any, record: Record | None) -> tuple[float, float]:
@@ -258,7 +255,3 @@ def _expression(function: str, place: int) -> str:
 def _for_script(text: str) -> str:
     """JSON that no HTML parser takes for the end of its script."""
     return text.replace("&", "\\u0026").replace("<", "\\u003c").replace(">", "\\u003e")
-
-
-def _short(value: float) -> float:
-    return float(f"{value:.4g}")

@@ -4,13 +4,14 @@ A slider covers the values that change the output by about its own span on the p
 the law and where the constructor takes them. A number of which only positive values are allowed has a logarithmic one.
 """
 
+import itertools
 import math
 import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from html import escape
 from inspect import getdoc
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
@@ -24,9 +25,8 @@ from hysim.laws.dashpot import RatePart
 from hysim.laws.friction.rated_law import RatedLaw
 from hysim.laws.operators.rate_dependent_prandtl_ishlinskii import RateDependentPrandtlIshlinskii
 from hysim.laws.static import SingleValued
-from hysim.models.cascade import Cascade
 from hysim.models.law import Law
-from hysim.models.sum import Sum
+from hysim.models.sum import Composite
 from hysim.records import Record
 
 _MOST = 3  # elements of a tuple that have a slider each; longer ones have one for all
@@ -38,42 +38,25 @@ _FACTOR = 4.0  # of a slider that scales a tuple
 _CLOCK = "sample_time"
 
 
-class Control(NamedTuple):
-    """A slider for the numbers at some places among a law's; one with `scale` multiplies them."""
-
-    name: str
-    value: float
-    lower: float
-    upper: float
-    places: tuple[int, ...]
-    log: bool = False
-    scale: bool = False
-
-    def to_json(self, first: int, prefix: str = "") -> dict[str, Any]:
-        described = {"name": prefix + self.name, "value": self.value, "lower": self.lower, "upper": self.upper}
-        flags = {name: True for name, is_on in (("log", self.log), ("scale", self.scale)) if is_on}
-        return {**described, **flags, "places": [first + place for place in self.places]}
+def slider(name: str, value: float, lower: float, upper: float, **rest: Any) -> dict[str, Any]:
+    """A slider as the page takes it, for the numbers at its `places`; one with `scale` multiplies them."""
+    return {"name": name, "value": value, "lower": lower, "upper": upper, **rest}
 
 
-def controls_of(law: Law, free: tuple[str, ...], u: FloatArray, names: Sequence[str] | None = None) -> list[Control]:
+def sliders_of(law: Law, free: Sequence[str], u: FloatArray, names: Sequence[str]) -> list[dict[str, Any]]:
     """A slider for each number in `free`: long tuples share one, initial tuples have none; `names` says the places."""
-    names = list(law.scalars) if names is None else names
-    groups: dict[str, list[str]] = {}
-    for name in free:
-        groups.setdefault(name.partition("[")[0], []).append(name)
     reach = _Reach(law, u)
-    controls: list[Control] = []
-    for base, members in groups.items():
-        places = tuple(names.index(name) for name in members)
-        is_tuple = "[" in members[0]
-        if is_tuple and (base in law.initial or base in ("levels", "dead_zones")):
+    sliders: list[dict[str, Any]] = []
+    for base, group in itertools.groupby(free, lambda name: name.partition("[")[0]):
+        members = list(group)
+        places = [names.index(name) for name in members]
+        if "[" in members[0] and (base in law.initial or base in ("levels", "dead_zones")):
             continue
-        if is_tuple and len(members) > _MOST and base not in ("left", "right"):
-            if any(law.scalars[name] for name in members):
-                controls.append(Control(f"{base} ×", 1.0, 1.0 / _FACTOR, _FACTOR, places, log=True, scale=True))
-        else:
-            controls += [reach.control(name, place) for name, place in zip(members, places, strict=True)]
-    return controls
+        if len(members) <= _MOST or base in ("left", "right"):
+            sliders += [reach.slider_of(name, place) for name, place in zip(members, places, strict=True)]
+        elif any(law.scalars[name] for name in members):
+            sliders.append(slider(f"{base} ×", 1.0, 1.0 / _FACTOR, _FACTOR, log=True, scale=True, places=places))
+    return sliders
 
 
 def by_fields(law: Law) -> bool:
@@ -90,20 +73,19 @@ class _Reach:
         self.span = float(np.ptp(self.y)) or 1.0
         self.boxes = _boxes(law, Record(u=self.u, y=self.y))
 
-    def control(self, name: str, place: int) -> Control:
+    def slider_of(self, name: str, place: int) -> dict[str, Any]:
         value = self.law.scalars[name]
         low, high = self.boxes.get(name, (-math.inf, math.inf))
         if value > 0.0 and self._with(name, 0.0) is None:
             lower, upper = max(value / _DECADE, min(low, value)), min(value * _DECADE, max(high, value))
-            return Control(name, value, _nice(lower, down=True), _nice(upper, down=False), (place,), log=True)
+            return slider(name, value, _nice(lower, down=True), _nice(upper, down=False), log=True, places=[place])
         below, above = (self._end(name, value, sign) for sign in (-1.0, 1.0))
         step = 10.0 ** math.floor(math.log10(0.5 * (above - below)))
         lower, upper = math.floor(below / step + 1e-9) * step, math.ceil(above / step - 1e-9) * step
         lower = lower if self._with(name, lower) is not None else below
         upper = upper if self._with(name, upper) is not None else above
-        return Control(
-            name, value, _rounded(max(lower, min(low, value))), _rounded(min(upper, max(high, value))), (place,)
-        )
+        ends = rounded(max(lower, min(low, value))), rounded(min(upper, max(high, value)))
+        return slider(name, value, *ends, places=[place])
 
     def _with(self, name: str, value: float) -> Law | None:
         """The law with another value of a number, None where the constructor does not take it."""
@@ -114,18 +96,17 @@ class _Reach:
 
     def _end(self, name: str, value: float, sign: float) -> float:
         """The slider's end on one side: where the output has changed by about its span."""
-        size, reached = abs(value) or 1.0, 0.0
-        most, changes = math.inf, [(0.0, 0.0)]
+        size, most, changes = abs(value) or 1.0, math.inf, [(0.0, 0.0)]
         step = _FIRST * size
         while step <= min(most, _LAST * size):
-            other = self._with(name, value + sign * step)
-            change = math.inf if other is None else self._change(other)
+            change = self._change(name, value + sign * step)
             if change > _LARGE:
                 break
             if change > _SMALL:
                 most = min(most, 4.0 * step)
             changes.append((change, step))
-            reached, step = step, (4.0 if change < _TINY else 2.0) * step
+            step *= 4.0 if change < _TINY else 2.0
+        reached = changes[-1][1]
         if most == math.inf and step > _LAST * size:  # never much: half of what there is
             greatest = max(change for change, _ in changes)
             reached = next(step for change, step in changes if change >= 0.5 * greatest) or size
@@ -133,8 +114,11 @@ class _Reach:
             return 0.0
         return value + sign * (reached or _FIRST * size)
 
-    def _change(self, other: Law) -> float:
-        """Largest change of the output, in its spans."""
+    def _change(self, name: str, value: float) -> float:
+        """Largest change of the output by another value of a number, in its spans; infinite where there is none."""
+        other = self._with(name, value)
+        if other is None:
+            return math.inf
         try:
             return float(np.abs(other.response(self.u) - self.y).max()) / self.span
         except SimulationError:
@@ -157,11 +141,11 @@ def _nice(value: float, *, down: bool) -> float:
     """The next value of one digit."""
     power = 10.0 ** math.floor(math.log10(value))
     digits = value / power
-    return _rounded((math.floor(digits + 1e-9) if down else math.ceil(digits - 1e-9)) * power)
+    return rounded((math.floor(digits + 1e-9) if down else math.ceil(digits - 1e-9)) * power)
 
 
-def _rounded(value: float) -> float:
-    return float(f"{value:.6g}")
+def rounded(value: float, digits: int = 6) -> float:
+    return float(f"{value:.{digits}g}")
 
 
 @dataclass
@@ -175,62 +159,83 @@ class Parts:
     timed: bool = False
     sample_time: float = 1.0
 
+    def show(self, sliders: Sequence[Mapping[str, Any]], first: int, prefix: str) -> None:
+        """Add sliders for numbers from the place `first` on."""
+        for each in sliders:
+            places = [first + place for place in each["places"]]
+            self.controls.append({**each, "name": prefix + each["name"], "places": places})
+
 
 def node_of(thing: Any, u: FloatArray, parts: Parts, prefix: str = "") -> dict[str, Any]:
     """A model as the page takes it, its contents put into `parts`; TypeError if it consists of other than laws."""
-    if isinstance(thing, Sum):
-        return {"sum": _members(thing.parts, u, parts, prefix)}
-    if isinstance(thing, Cascade):
-        return {"cascade": _members(thing.stages, u, parts, prefix)}
-    first = len(parts.values)
+    if isinstance(thing, Composite):
+        names = [type(member).__name__ for member in thing.members]
+        named = [f"{name} {k}" if names.count(name) > 1 else name for k, name in enumerate(names, 1)]
+        members = zip(thing.members, named, strict=True)
+        return {type(thing).__name__.lower(): [node_of(each, u, parts, f"{prefix}{name}: ") for each, name in members]}
     if isinstance(thing, SingleValued):
         return {"knots": [thing.u.tolist(), thing.y.tolist()], "name": "hs.SingleValued", "fields": []}
+    first = len(parts.values)
     if isinstance(thing, RatePart):
-        return _of_rate(thing, parts, prefix)
-    if isinstance(thing, RatedLaw):
-        return _rated(thing, u, parts, prefix)
-    if isinstance(thing, RateDependentPrandtlIshlinskii):
-        return _at_sample_time(thing, u, parts, prefix)
-    if not isinstance(thing, Law):
+        size = 2.0 * abs(thing.c) or 1.0
+        parts.values.append(thing.c)
+        parts.timed, sliders = True, [slider("c", thing.c, -size, size, places=[0])]
+        words = {"name": _name(type(thing)), "fields": [["c", first, 1.0]], "output": output_of(type(thing))}
+        node = {"rate": first, "power": thing.power, **words}
+    else:
+        node, sliders = _law(thing, u, parts)
+    parts.show(sliders, first, prefix)
+    return node
+
+
+def _law(thing: Any, u: FloatArray, parts: Parts) -> tuple[dict[str, Any], list[dict[str, Any]]]:
+    """A law and its sliders; its step is for a sample time of the page where it depends on the rate of its input."""
+    coarse = u[:: max(1, len(u) // FEW)]
+    law = _at(thing, parts.sample_time * (len(u) - 1) / (len(coarse) - 1))
+    if not isinstance(law, Law):
         raise TypeError(
             f"a page takes a law, or a sum or cascade of laws, got {type(thing).__name__}: plants and controllers "
             "are exported by hysim.to_c and hysim.to_fmu"
         )
-    node = _law(thing, parts, first)
-    names = list(thing.scalars)
-    free = tuple(names[place] for place in node["free"])
-    parts.controls += [control.to_json(first, prefix) for control in controls_of(thing, free, u)]
-    return node
+    node, names = _node(law, type(thing), parts), list(law.scalars)
+    free = [names[place] for place in node["free"] if names[place] != _CLOCK]
+    parts.timed |= law is not thing
+    if isinstance(thing, RatedLaw):
+        node["fields"] = [each for each in node["fields"] if each[0] != _CLOCK]
+        return node | {"clock": names.index(_CLOCK)}, sliders_of(law, free, coarse, names)
+    if not isinstance(thing, RateDependentPrandtlIshlinskii):
+        return node, sliders_of(law, free, u, names)
+    place = names.index("width")  # of plays, which is divided by the page's sample time
+    node["fields"] = [["beta" if name == "width" else name, *rest] for name, *rest in node["fields"]]
+    beta = slider("beta", thing.beta, 0.0, 4.0 * thing.beta or 0.1, places=[place])
+    own = [name for name in names if name in thing.plays.scalars]
+    return node | {"per_time": [place]}, [*sliders_of(thing.plays, own, u, names), beta]
 
 
-def _members(members: tuple[Any, ...], u: FloatArray, parts: Parts, prefix: str) -> list[dict[str, Any]]:
-    """The parts of a sum or the stages of a cascade; their sliders are named by them."""
-    names = [type(member).__name__ for member in members]
-    return [
-        node_of(member, u, parts, f"{prefix}{name}{f' {k + 1}' if names.count(name) > 1 else ''}: ")
-        for k, (member, name) in enumerate(zip(members, names, strict=True))
-    ]
+def _at(thing: Any, sample_time: float) -> Any:
+    """A law that depends on the rate of its input, at a sample time; others as they are."""
+    if isinstance(thing, RatedLaw):
+        return thing.at_sample_time(sample_time)
+    return thing.at(1.0) if isinstance(thing, RateDependentPrandtlIshlinskii) else thing
 
 
-def _law(law: Law, parts: Parts, first: int) -> dict[str, Any]:
-    general = _general(law)
-    packed = packing(general)
-    kernels, state = kernels_of(general), general.startable().state
+def _node(law: Law, family: type, parts: Parts) -> dict[str, Any]:
+    general, first = _general(law), len(parts.values)
+    packed, kernels, names = packing(general), kernels_of(general), list(law.scalars)
     if kernels.name not in parts.modules:
         parts.modules[kernels.name] = module_of(kernels)
     parts.packs.append(packed.to_js(f"pack{len(parts.packs)}"))
-    names = list(law.scalars)
     parts.values += [float(value) for value in law.scalars.values()]
     return {
-        "kind": type(law).__name__,
-        "name": _name(type(law)),
+        "kind": family.__name__,
+        "name": _name(family),
         "module": kernels.name,
         "pack": len(parts.packs) - 1,
         "sizes": [len(packed.parameters), len(packed.memory)],
-        "work": state.size - len(packed.memory),
+        "work": general.startable().state.size - len(packed.memory),
         "first": first,
         "free": [names.index(name) for name in packed.fields],
-        "output": output_of(type(law)),
+        "output": output_of(family),
         **({} if law.u0 is None else {"u0": law.u0}),
         **_plays(law, kernels.step),
         **_printed(law, first),
@@ -250,12 +255,9 @@ def _plays(law: Law, step: Callable[..., float]) -> dict[str, Any]:
 
 
 def steps_of(thing: Any) -> list[Kernels]:
-    if isinstance(thing, (Sum, Cascade)):
-        members = thing.parts if isinstance(thing, Sum) else thing.stages
-        return [kernels for member in members for kernels in steps_of(member)]
-    if isinstance(thing, RateDependentPrandtlIshlinskii):
-        thing = thing.at(1.0)
-    law = thing.at_sample_time(1.0) if isinstance(thing, RatedLaw) else thing
+    if isinstance(thing, Composite):
+        return [kernels for member in thing.members for kernels in steps_of(member)]
+    law = _at(thing, 1.0)
     return [kernels_of(_general(law))] if isinstance(law, Law) else []
 
 
@@ -275,55 +277,16 @@ def _printed(law: Law, first: int) -> dict[str, Any]:
     names, defaults = list(law.scalars), law.defaults()
     if not by_fields(law):
         return {"fields": [], "base": _in_python(law), "named": [[name, first + k] for k, name in enumerate(names)]}
-    fields: list[list[Any]] = []
+    fields = []
     for name, value in law.arguments.items():
-        places = [first + names.index(f"{name}[{k}]") for k in range(len(value))] if isinstance(value, tuple) else None
-        fields.append([name, first + names.index(name) if places is None else places, defaults.get(name)])
+        places = [first + k for k, each in enumerate(names) if each.partition("[")[0] == name]
+        fields.append([name, places if isinstance(value, tuple) else places[0], defaults.get(name)])
     return {"fields": fields}
 
 
 def _in_python(law: Law) -> str:
     plain = {name: np.asarray(value).tolist() for name, value in law.arguments.items()}
     return f"{_name(type(law))}({', '.join(f'{name}={value!r}' for name, value in plain.items())})"
-
-
-def _at_sample_time(law: RateDependentPrandtlIshlinskii, u: FloatArray, parts: Parts, prefix: str) -> dict[str, Any]:
-    """Plays whose widening is divided by the page's sample time."""
-    first, parts.timed = len(parts.values), True
-    node = _law(law.at(1.0), parts, first)
-    names = list(law.at(1.0).scalars)
-    place = names.index("width")
-    others = tuple(name for name in names if name in law.plays.scalars)
-    parts.controls += [control.to_json(first, prefix) for control in controls_of(law.plays, others, u, names)]
-    size = 4.0 * law.beta or 0.1
-    parts.controls.append(Control("beta", law.beta, 0.0, size, (place,)).to_json(first, prefix))
-    fields = [["beta" if name == "width" else name, *rest] for name, *rest in node["fields"]]
-    names_of = {"kind": type(law).__name__, "name": _name(type(law)), "output": output_of(type(law))}
-    return {**node, **names_of, "fields": fields, "per_time": [place]}
-
-
-def _of_rate(part: RatePart, parts: Parts, prefix: str) -> dict[str, Any]:
-    """A part that is a power of the velocity of the input, times a coefficient."""
-    first, parts.timed = len(parts.values), True
-    parts.values.append(part.c)
-    size = 2.0 * abs(part.c) or 1.0
-    parts.controls.append(Control("c", part.c, -size, size, (0,)).to_json(first, prefix))
-    words = {"name": _name(type(part)), "fields": [["c", first, 1.0]], "output": output_of(type(part))}
-    return {"rate": first, "power": part.power, **words}
-
-
-def _rated(law: RatedLaw, u: FloatArray, parts: Parts, prefix: str) -> dict[str, Any]:
-    """A law that depends on the rate of its input, whose first number is the page's sample time."""
-    first, parts.timed = len(parts.values), True
-    coarse = u[:: max(1, len(u) // FEW)]
-    timed = law.at_sample_time(parts.sample_time * (len(u) - 1) / (len(coarse) - 1))
-    node = _law(timed, parts, first)
-    names = list(timed.scalars)
-    free = tuple(names[place] for place in node["free"] if names[place] != _CLOCK)
-    parts.controls += [control.to_json(first, prefix) for control in controls_of(timed, free, coarse)]
-    fields = [each for each in node["fields"] if each[0] != _CLOCK]
-    words = {"kind": type(law).__name__, "name": _name(type(law)), "output": output_of(type(law))}
-    return {**node, **words, "fields": fields, "clock": names.index(_CLOCK)}
 
 
 def _name(family: type) -> str:
@@ -334,10 +297,8 @@ def _name(family: type) -> str:
 
 
 def about(thing: Any) -> tuple[str, str]:
-    if isinstance(thing, (Sum, Cascade)):
-        members = thing.parts if isinstance(thing, Sum) else thing.stages
-        word = "Sum" if isinstance(thing, Sum) else "Cascade"
-        return f"{word} of {', '.join(escape(type(each).__name__) for each in members)}.", ""
+    if isinstance(thing, Composite):
+        return f"{type(thing).__name__} of {', '.join(escape(type(each).__name__) for each in thing.members)}.", ""
     text = getdoc(type(thing)) or ""
     summary = escape(text.split("\n\n")[0].replace("\n", " "), quote=False)
     block = re.search(r"::\n\n((?:    .*\n|\n)+)", text.split("\nParameters\n")[0] + "\n")
@@ -353,7 +314,7 @@ def output_of(family: type) -> str:
 
 
 def heading(thing: Any) -> str:
-    if isinstance(thing, (Sum, Cascade)):
+    if isinstance(thing, Composite):
         return about(thing)[0].rstrip(".")
     words = re.split(r"[,;:.`]", getdoc(type(thing)) or "")[0].strip()
     return words or type(thing).__name__
