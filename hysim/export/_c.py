@@ -10,6 +10,7 @@ import ast
 import inspect
 import math
 import textwrap
+import tomllib
 from collections import Counter
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -24,37 +25,15 @@ from numba.core.dispatcher import Dispatcher
 
 from hysim.kernels.stepping import Addressed, sources
 
-_HELPERS = Path(__file__).with_name("c").joinpath("helpers.c").read_text(encoding="utf-8").splitlines()
+_FOLDER = Path(__file__).with_name("c")
+_HELPERS = _FOLDER.joinpath("helpers.c").read_text(encoding="utf-8").splitlines()
 HELPERS = MappingProxyType({line.partition("(")[0].split()[-1]: line for line in _HELPERS})
 """Functions of Python that C lacks; `min` and `max` keep the first of two that are not ordered."""
 
-RESERVED = frozenset(
-    """
-    auto break case char const continue default do double else enum extern float for goto if inline int long main
-    register restrict return short signed sizeof static struct switch typedef union unsigned void volatile while
-    NAN INFINITY NULL errno
-    """.split()  # noqa: SIM905
+_WORDS = tomllib.loads(_FOLDER.joinpath("words.toml").read_text(encoding="utf-8"))
+RESERVED, HEADERS, MATHEMATICS, TESTS = (
+    frozenset(_WORDS[kind].split()) for kind in ("reserved", "headers", "mathematics", "tests")
 )
-"""Words that are no names in C."""
-
-HEADERS = frozenset(
-    """
-    assert complex ctype errno fenv float inttypes iso646 limits locale math setjmp signal stdarg stdbool stddef stdint
-    stdio stdlib string tgmath time wchar wctype
-    """.split()  # noqa: SIM905
-)
-"""Headers of C99: a file of this name could hide one."""
-
-MATHEMATICS = frozenset(
-    """
-    acos acosh asin asinh atan atan2 atanh copysign cos cosh erf erfc exp expm1 fabs fmod hypot lgamma log log10 log1p
-    log2 pow sin sinh sqrt tan tanh ceil floor trunc
-    """.split()  # noqa: SIM905
-)
-"""Functions of `math` that C has; the last three are whole numbers in Python, as doubles they do not overflow."""
-
-TESTS = frozenset(("isfinite", "isinf", "isnan"))
-"""Functions of `math` with a truth value."""
 
 CONDITIONAL, OR, AND, EQUALITY, RELATION, SUM, PRODUCT, UNARY, PRIMARY = range(9)
 """How strongly the operators of C bind."""

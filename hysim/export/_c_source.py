@@ -2,6 +2,7 @@
 
 import math
 import re
+import tomllib
 from pathlib import Path
 from string import Template
 from typing import Any
@@ -19,10 +20,6 @@ from hysim.export._program import Program, program_of, start_of
 
 _FOLDER = Path(__file__).with_name("c")  # templates
 _FEW = 16  # places of a state that are set one by one
-
-_HELD = """
-/* Number of samples at which an input was not finite (or beyond 1e100) or no command was, and the last one was held. */
-unsigned long ${name}_held(const ${name}_state *state)"""
 
 
 @printed
@@ -54,9 +51,12 @@ class CSource:
     main: str
     state_size: int
 
+    @property
+    def _files(self) -> dict[str, str]:
+        return {f"{self.name}.h": self.header, f"{self.name}.c": self.source, f"{self.name}_main.c": self.main}
+
     def __str__(self) -> str:
-        texts = {".h": self.header, ".c": self.source, "_main.c": self.main}
-        rows = {f"{self.name}{end}": f"{text.count(chr(10))} lines" for end, text in texts.items()}
+        rows = {name: f"{text.count(chr(10))} lines" for name, text in self._files.items()}
         title = f"CSource {self.name}: C99 with math.h alone, a state of {8 * self.state_size} bytes"
         return summary_text([title], rows)
 
@@ -64,8 +64,8 @@ class CSource:
         """Write name.h, name.c and name_main.c into a folder, which is made."""
         place = Path(folder).resolve()
         place.mkdir(parents=True, exist_ok=True)
-        for end, text in {".h": self.header, ".c": self.source, "_main.c": self.main}.items():
-            write_text(place / f"{self.name}{end}", text)
+        for name, text in self._files.items():
+            write_text(place / name, text)
 
 
 def to_c(
@@ -139,26 +139,21 @@ def _refusal(name: str) -> str:
     return f"{name}.h is a header of the C library" if name.lower() in _c.HEADERS else ""
 
 
-def _texts(program: Program, name: str, what: str, u0: float, y0: float) -> dict[str, str]:
-    timed = math.isfinite(program.sample_time)
-    is_model = program.inputs == ("u",)
-    defines = [f"#define {name.upper()}_SAMPLE_TIME {program.sample_time!r} /* s */\n"] * timed
-    defines += [f"#define {name.upper()}_AHEAD {program.ahead} /* samples of the reference */\n"] * (not is_model)
-    n_inputs = len(program.inputs)
-    last = f"state->x[{program.state.size - 1}]"
-    held = "" if is_model else Template(_HELD).substitute(name=name)
-    return {
-        "held_declared": held and f"{held};\n",
-        "held_defined": held and f"{held.partition('*/')[2]} {{\n    return (unsigned long){last};\n}}\n",
+def _texts(program: Program, name: str, kind: str, u0: float, y0: float) -> dict[str, str]:
+    upper, is_model, is_timed = name.upper(), program.inputs == ("u",), math.isfinite(program.sample_time)
+    defines = [f"#define {upper}_SAMPLE_TIME {program.sample_time!r} /* s */\n"] * is_timed
+    defines += [f"#define {upper}_AHEAD {program.ahead} /* samples of the reference */\n"] * (not is_model)
+    texts = {
         "name": name,
-        "NAME": name.upper(),
-        "what": f"a {what}" if is_model else f"a sampled controller, {what}",
+        "NAME": upper,
+        "kind": kind,
+        "u0": f"{u0:g}",
+        "y0": f"{y0:g}",
         "version": __version__,
-        "when": f"every {name.upper()}_SAMPLE_TIME seconds" if timed else "for each sample of the input",
+        "when": f"every {upper}_SAMPLE_TIME seconds" if is_timed else "for each sample of the input",
         "n_state": str(program.state.size),
+        "last": str(program.state.size - 1),
         "defines": "".join(defines),
-        "begun": "The first sample will be `u0`." if program.start else f"At rest{_rest(is_model, u0, y0)}.",
-        "result": _result(program, name, is_model),
         "first": ", double u0" if program.start else "",
         "begin": ", u" if program.start else "",
         "arguments": ", ".join(f"double {each}" for each in program.inputs),
@@ -167,21 +162,13 @@ def _texts(program: Program, name: str, what: str, u0: float, y0: float) -> dict
         "functions": program.source,
         "table": _c.table("parameters", program.parameters.tolist()),
         "init": _init(program.state, bool(program.start)),
-        "formats": " ".join(["%lf"] * n_inputs),
+        "formats": " ".join(["%lf"] * len(program.inputs)),
         "places": ", ".join(f"&{each}" for each in program.inputs),
-        "count": str(n_inputs),
+        "count": str(len(program.inputs)),
     }
-
-
-def _rest(is_model: bool, u0: float, y0: float) -> str:
-    return "" if is_model else f" at the command {u0:g} and the displacement {y0:g}"
-
-
-def _result(program: Program, name: str, is_model: bool) -> str:
-    if is_model:
-        return "The output at the next sample of the input."
-    within = "The command within the limits, to be held until the next sample"
-    return f"{within}, for the reference {name.upper()}_AHEAD samples ahead; state->x[0] is the one before them."
+    words = tomllib.loads((_FOLDER / "texts.toml").read_text(encoding="utf-8"))["model" if is_model else "controller"]
+    words |= {"begun": "The first sample will be `u0`."} if program.start else {}
+    return texts | {name: Template(text).substitute(texts) for name, text in words.items()}
 
 
 def _init(state: FloatArray, has_start: bool) -> str:

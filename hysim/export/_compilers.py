@@ -41,11 +41,6 @@ _WEB_OPTIONS = (
 _PROCESSORS = MappingProxyType({"amd64": "x86_64", "arm64": "aarch64"})
 _FAT_MAGIC, _FAT_ALIGNMENT = 0xCAFEBABE, 14  # of a Mach-O file for several processors, 2^14 bytes
 FOLDER = "page/wasm"
-_NO_START = """
-static void start(const double *parameters, int n_parameters, double *state, int n_state, double u0) {
-    (void)parameters, (void)n_parameters, (void)state, (void)n_state, (void)u0;
-}
-"""
 
 
 class Target(NamedTuple):
@@ -162,8 +157,9 @@ def compressed(module: bytes) -> bytes:
 
 def c_source(kernels: Kernels) -> str:
     text, has_start = entries(kernels.step, kernels.start)
-    wrapper = files("hysim.export").joinpath("page/module.c").read_text(encoding="utf-8")
-    return f"#include <math.h>\n{text}{'' if has_start else _NO_START}\n{wrapper}"
+    folder = files("hysim.export").joinpath("page")
+    no_start, wrapper = (folder.joinpath(name).read_text(encoding="utf-8") for name in ("no_start.c", "module.c"))
+    return f"#include <math.h>\n{text}{'' if has_start else no_start}\n{wrapper}"
 
 
 @lru_cache(maxsize=32)
