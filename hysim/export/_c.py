@@ -8,7 +8,6 @@ the name before anything else: otherwise the name may keep a value from one pass
 
 import ast
 import inspect
-import math
 import textwrap
 import tomllib
 from collections import Counter
@@ -44,12 +43,8 @@ Place = tuple[int, int]
 
 def number(value: float) -> str:
     """A double in C, with all its digits."""
-    if math.isnan(value):
-        return "NAN"
-    if math.isinf(value):
-        return "INFINITY" if value > 0.0 else "-INFINITY"
     text = repr(float(value))
-    return text if "." in text or "e" in text else text + ".0"
+    return {"nan": "NAN", "inf": "INFINITY", "-inf": "-INFINITY"}.get(text, text)
 
 
 def table(name: str, values: Sequence[float]) -> str:
@@ -136,13 +131,9 @@ class Routine(NamedTuple):
 
 def plain(function: Any) -> Any:
     """The Python function behind a kernel, or the value itself where it is none."""
-    while True:
-        if isinstance(function, Addressed):
-            function = function.function
-        elif isinstance(function, Dispatcher):
-            function = function.py_func
-        else:
-            return function
+    if isinstance(function, Addressed):
+        return plain(function.function)
+    return plain(function.py_func) if isinstance(function, Dispatcher) else function
 
 
 @lru_cache(maxsize=1024)

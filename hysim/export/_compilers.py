@@ -93,13 +93,6 @@ def shared_library(source: str, name: str, target: Target, command: Sequence[str
     return _built(source, f"{name}{target.ending}", (*command, *OPTIONS), libraries, target.name)
 
 
-def web_module(source: str) -> bytes:
-    """WebAssembly module of a C source; ImportError without ziglang, OSError with the compiler's first error."""
-    optional("ziglang", "a page for a step that is not hysim's own", "export")
-    command = (sys.executable, "-m", "ziglang", "cc", "-target", _WEB, *_WEB_OPTIONS)
-    return _built(source, "step.wasm", command, ("-lm",), _WEB)
-
-
 def _built(source: str, result: str, command: Sequence[str], libraries: Sequence[str], target: str) -> bytes:
     with tempfile.TemporaryDirectory() as folder:
         name = f"{Path(result).stem}.c"
@@ -164,8 +157,13 @@ def c_source(kernels: Kernels) -> str:
 
 @lru_cache(maxsize=32)
 def compiled(source: str) -> bytes:
-    """The module of a C99 text, which ends with its `mark`; errors as of `hysim.export._compilers.web_module`."""
-    return web_module(source) + mark(source)
+    """The module of a C99 text, which ends with its `mark`.
+
+    Raises ImportError without ziglang, OSError with the compiler's first error.
+    """
+    optional("ziglang", "a page for a step that is not hysim's own", "export")
+    command = (sys.executable, "-m", "ziglang", "cc", "-target", _WEB, *_WEB_OPTIONS)
+    return _built(source, "step.wasm", command, ("-lm",), _WEB) + mark(source)
 
 
 def mark(source: str) -> bytes:

@@ -89,9 +89,9 @@ class Expressions:
     # ------------------------------------------------------------------------------ names and constants
 
     def _constant(self, node: ast.Constant) -> Value:
-        return self._literal(node, node.value, "")
+        return self._literal(node, node.value)
 
-    def _literal(self, node: ast.AST, value: Any, name: str) -> Value:
+    def _literal(self, node: ast.AST, value: Any, name: str = "") -> Value:
         if isinstance(value, bool | np.bool_ | int | np.integer | float):
             text = _c.number(value) if isinstance(value, float) else str(int(value))
             is_bool, is_double = isinstance(value, bool | np.bool_), isinstance(value, float)

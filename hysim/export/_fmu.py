@@ -147,12 +147,7 @@ def to_fmu(
 
 
 def archive(
-    program: Program,
-    name: str,
-    version: str,
-    platforms: Sequence[str] | None,
-    units: Mapping[str, str],
-    u0: float,
+    program: Program, name: str, version: str, platforms: Sequence[str] | None, units: Mapping[str, str], u0: float
 ) -> bytes:
     """Bytes of a unit with a token that depends on its texts alone."""
     variables = variables_of(program, units, u0)

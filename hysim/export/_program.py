@@ -17,7 +17,7 @@ from dataclasses import dataclass, field, replace
 from types import MappingProxyType
 from typing import Any, NamedTuple
 
-from hysim._basics.frozen import FloatArray, frozen, read_only
+from hysim._basics.frozen import FloatArray, frozen
 from hysim.control import Controller, InverseFeedforward, RestingPlant, TrackingController, begun, preview
 from hysim.export import _c
 from hysim.export._body import Body
@@ -178,7 +178,7 @@ class Program:
     """
 
     source: str
-    step: str
+    step: str = "step"
     inputs: tuple[str, ...]
     output: str
     parameters: FloatArray
@@ -270,11 +270,10 @@ def _of_model(model: Startable, sample_time: float | None) -> Program:
     source, has_start = entries(model.step, model.start, sizes)
     return Program(
         source=source,
-        step="step",
         inputs=_LAW,
         output="y",
-        parameters=read_only(model.parameters, finite=False),
-        state=read_only(model.state, finite=False),
+        parameters=model.parameters,
+        state=model.state,
         start="start" if has_start else "",
         memory=model.state.size,
         sample_time=math.nan if sample_time is None else sample_time,
@@ -289,11 +288,10 @@ def _of_controller(controller: Controller, sample_time: float, u0: float, y0: fl
     inputs = _FEEDFORWARD if isinstance(controller, InverseFeedforward) else _CONTROLLER
     return Program(
         source=translation.text() + "\n" + _entry("step", function, inputs, (parameters.size, state.size), _CONTROLLER),
-        step="step",
         inputs=inputs,
         output="command",
-        parameters=read_only(parameters, finite=False),
-        state=read_only(state, finite=False),
+        parameters=parameters,
+        state=state,
         memory=state.size,
         sample_time=sample_time,
         ahead=preview(controller, sample_time),
@@ -307,13 +305,10 @@ def entries(step: Step, start: Start, sizes: tuple[int, int] | None = None) -> t
     serves every law of a family. An UntranslatableError is raised for Python outside the subset.
     """
     translation, types = Translation(), (*_VECTORS, Scalar.DOUBLE)
-    function = translation.function(step, types)
-    has_start = start is not complete
-    begun = translation.function(start, types) if has_start else None
-    texts = [translation.text(), _entry("step", function, _LAW, sizes, _LAW)]
-    if begun is not None:
-        texts.append(_entry("start", begun, ("u0",), sizes, ("u0",)))
-    return "\n".join(texts), has_start
+    kernels = {"step": (step, _LAW)} | ({} if start is complete else {"start": (start, ("u0",))})
+    made = {name: (translation.function(kernel, types), inputs) for name, (kernel, inputs) in kernels.items()}
+    texts = [_entry(name, function, inputs, sizes, inputs) for name, (function, inputs) in made.items()]
+    return "\n".join([translation.text(), *texts]), "start" in kernels
 
 
 def _entry(
