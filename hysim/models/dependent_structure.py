@@ -45,6 +45,7 @@ def expanded(
     own = [(k, name) for k, each in enumerate(space.coordinates) for name in names.get(each, (each,))]
     places = [k for k, _ in own]
     several = {each: [j for j, (k, _) in enumerate(own) if space.coordinates[k] == each] for each in names}
+    several = {each: columns for each, columns in several.items() if columns}
 
     def laid(side: FloatArray) -> FloatArray:
         return side[..., places]
@@ -59,8 +60,6 @@ def expanded(
         middle = base(sets)
         found = dict(space.parameters(middle))
         for each, columns in several.items():
-            if not columns:
-                continue
             del found[each]
             for name, j in zip(names[each], columns, strict=True):
                 at_place = middle.copy()
@@ -224,7 +223,7 @@ class DependentStructure(Identifiable):
         """The law's columns at the record's channels, one for each place where a parameter is affine."""
         constant, varying, diverged = self._of_record(parameters, record)
         columns = columns_along(self.law, constant, varying, record)
-        if diverged is not None and diverged.any():
+        if diverged.any():
             columns = np.where(diverged[:, np.newaxis, np.newaxis], np.inf, columns)
         blocks = []
         for k, name in enumerate(self.columns):
@@ -234,18 +233,18 @@ class DependentStructure(Identifiable):
 
     def _of_record(
         self, parameters: Parameters, record: Record
-    ) -> tuple[dict[str, Any], dict[str, FloatArray], npt.NDArray[np.bool_] | None]:
+    ) -> tuple[dict[str, Any], dict[str, FloatArray], npt.NDArray[np.bool_]]:
         """The law's parameters on a record: constant ones, those along it, and which sets come too near to zero."""
         of_places = {name for names in self.names.values() for name in names}
         constant = {name: value for name, value in parameters.items() if name not in of_places}
         varying: dict[str, FloatArray] = {}
-        diverged: npt.NDArray[np.bool_] | None = None
+        diverged = np.zeros(1, dtype=bool)
         for name, at in self.at.items():
             if name in self.columns:
                 continue
             values = np.stack([np.atleast_1d(parameters[each]) for each in self.names[name]], axis=-1)
             is_near = _comes_near_zero(at, values)
-            diverged = is_near if diverged is None else diverged | is_near
+            diverged = diverged | is_near
             values = np.where(is_near[:, np.newaxis], values.mean(axis=1, keepdims=True), values)
             along = values @ self._weights(name, record).T
             if self._channel(name, record).ndim:

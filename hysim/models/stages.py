@@ -4,7 +4,7 @@ A family contains a simpler one if it is that one for some values of its further
 optimum of the simpler family is then a start, so that the larger family never fits worse.
 """
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any, NamedTuple
 
@@ -130,11 +130,6 @@ class Subset:
         """The simpler law with the values of a larger law, whose numbers by name are `scalars`."""
         law = self.family()
         names = {name: self.names.get(name, name) for name in law.scalars}
-        rest = _without(scalars, names.values())
-        neutral = {name: self.neutral[base] for name in rest if (base := name.partition("[")[0]) in self.neutral}
+        rest = {name: name.partition("[")[0] for name in scalars if name not in names.values()}
+        neutral = {name: self.neutral[base] for name, base in rest.items() if base in self.neutral}
         return Simpler(law.assemble({name: scalars[larger] for name, larger in names.items()}), names, neutral)
-
-
-def _without(names: Iterable[str], others: Iterable[str]) -> list[str]:
-    excluded = set(others)
-    return [name for name in names if name not in excluded]

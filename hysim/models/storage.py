@@ -56,7 +56,8 @@ def save(model: Any, path: str | Path, *, units: Mapping[str, str] | None = None
 def to_json(model: Any, *, units: Mapping[str, str] | None = None) -> str:
     model = model_of(model)
     if not is_model(model):
-        raise TypeError(f"save takes a model of hysim, got {type(model).__name__}{_advice(model)}")
+        advice = ": hs.save_record(record, path) writes a record" if isinstance(model, _InputOutput) else ""
+        raise TypeError(f"save takes a model of hysim, got {type(model).__name__}{advice}")
     document = {"hysim": __version__, **to_document(model), "units": dict(units or {})}
     _check_depth(document)
     return json.dumps(document, indent=2, allow_nan=False) + "\n"
@@ -72,11 +73,6 @@ class _InputOutput(Protocol):
     def y(self) -> Any: ...
 
 
-def _advice(value: Any) -> str:
-    """Name of the function to call for something that is not a model."""
-    return ": hs.save_record(record, path) writes a record" if isinstance(value, _InputOutput) else ""
-
-
 def load_model(path: str | Path) -> Any:
     """Read a model that `save` wrote; ValueError names what is wrong in the file, OSError if it cannot be read."""
     return from_json(Path(path).read_bytes(), path)[0]
@@ -88,13 +84,11 @@ def from_json(text: str | bytes, source: str | Path) -> tuple[Any, dict[str, str
         document = json.loads(text, object_pairs_hook=_each_name_once, parse_int=_integer)
         _check_depth(document)
         units = _units(document)
-    except RecursionError:
-        raise ValueError(f"{source} does not hold a model of hysim: {_TOO_DEEP}") from None
-    except (json.JSONDecodeError, UnicodeDecodeError) as error:
-        advice = "" if text.lstrip()[:1] in ("{", b"{") else "; if it is a record: read it with hs.load"
-        raise ValueError(f"{source} does not hold a model of hysim: {_one_line(error)}{advice}") from None
-    except ValueError as error:
-        raise ValueError(f"{source} does not hold a model of hysim: {_one_line(error)}") from None
+    except (RecursionError, ValueError) as error:
+        is_json = not isinstance(error, json.JSONDecodeError | UnicodeDecodeError) or text.lstrip()[:1] in ("{", b"{")
+        advice = "" if is_json else "; if it is a record: read it with hs.load"
+        reason = _TOO_DEEP if isinstance(error, RecursionError) else _one_line(error)
+        raise ValueError(f"{source} does not hold a model of hysim: {reason}{advice}") from None
     return from_document(document, source), units
 
 
@@ -154,9 +148,8 @@ def from_document(document: Mapping[str, Any], path: str | Path) -> Any:
         loaded = FAMILIES[family](**parameters)
     except (ArithmeticError, AttributeError, LookupError, TypeError, ValueError) as error:
         raise ValueError(f"{path} does not hold a {family}: {_one_line(error)}") from None
-    if missing := [
-        field.name for field in fields(loaded) if field.name not in {*parameters, *last_names(type(loaded))}
-    ]:
+    optional = {*parameters, *last_names(type(loaded))}
+    if missing := [field.name for field in fields(loaded) if field.name not in optional]:
         raise ValueError(f"{path} does not hold a whole {family}: {', '.join(missing)} missing")
     return loaded
 

@@ -130,22 +130,15 @@ def places(low: float, high: float, degree: int) -> tuple[float, ...]:
 def weights(at: tuple[float, ...], channel: npt.ArrayLike) -> FloatArray:
     """Weights of the values at the places, shape (..., n_places): exactly 0 and 1 at a place."""
     x, nodes = np.asarray(channel, dtype=float)[..., np.newaxis], np.array(at)
-    products = []
-    for k in range(nodes.size):
-        others = np.delete(nodes, k)
-        products.append(np.prod((x - others) / (nodes[k] - others), axis=-1))
-    return np.stack(products, axis=-1)
+    rest = [np.delete(nodes, k) for k in range(nodes.size)]
+    return np.stack([np.prod((x - r) / (node - r), axis=-1) for node, r in zip(nodes, rest, strict=True)], axis=-1)
 
 
 def power_coefficients(at: tuple[float, ...]) -> FloatArray:
     """Coefficients of the powers 0, 1, ... of each weight, shape (n_places, n_places)."""
-    nodes = np.array(at)
-    rows = []
-    for k in range(nodes.size):
-        others = np.delete(nodes, k)
-        powers = np.polynomial.polynomial.polyfromroots(others) / np.prod(nodes[k] - others)
-        rows.append(powers)
-    return np.array(rows)
+    nodes, roots = np.array(at), np.polynomial.polynomial.polyfromroots
+    rest = [np.delete(nodes, k) for k in range(nodes.size)]
+    return np.array([roots(r) / np.prod(node - r) for node, r in zip(nodes, rest, strict=True)])
 
 
 def columns_along(
