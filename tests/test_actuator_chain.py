@@ -197,7 +197,7 @@ def test_an_output_at_the_end_of_the_hold_is_the_next_ones_begin():
 def test_a_loop_in_chunks_gives_the_same_bits(monkeypatch, plant, chunk):
     t, r = H * np.arange(60), np.linspace(0.0, 0.5, 60)
     whole = hs.close_loop(plant, INTEGRAL, t, r)
-    monkeypatch.setattr("hysim.plants.chain._CHUNK", chunk)
+    monkeypatch.setattr("hysim._basics.parallel._STRETCH", chunk)
     assert hs.close_loop(plant, INTEGRAL, t, r) == whole
 
 

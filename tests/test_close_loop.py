@@ -186,7 +186,7 @@ def test_the_sampled_loop_converges_to_the_continuous_one_at_first_order():
 def test_a_run_in_chunks_gives_the_same_bits_and_calls_back(monkeypatch, chunk):
     plant, r = replace(PROPER, delay=0.12), reference(100)
     whole = closed(LAWS[2], plant, FULL, r, 0.3)
-    monkeypatch.setattr("hysim.plants.chain._CHUNK", chunk)
+    monkeypatch.setattr("hysim._basics.parallel._STRETCH", chunk)
     calls = []
     actuator = hs.Actuator(hysteresis=LAWS[2], vibration=plant)
     parts = hs.close_loop(actuator, FULL, whole.t, r, u0=0.3, progress=lambda *done: calls.append(done))
@@ -195,7 +195,7 @@ def test_a_run_in_chunks_gives_the_same_bits_and_calls_back(monkeypatch, chunk):
 
 
 def test_an_interrupting_callback_stops_the_loop(monkeypatch):
-    monkeypatch.setattr("hysim.plants.chain._CHUNK", 10)
+    monkeypatch.setattr("hysim._basics.parallel._STRETCH", 10)
 
     def stop(done, total):
         raise KeyboardInterrupt

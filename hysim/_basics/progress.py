@@ -58,8 +58,11 @@ def silence() -> None:
 
 @contextlib.contextmanager
 def along(progress: Reports) -> Iterator[None]:
-    """Report how far the input of a plant has been followed, which `hysim._basics.parallel.in_pieces` knows."""
-    token = _along.set(progress or None)
+    """Report how far the input of a plant has been followed, which `hysim._basics.parallel.in_pieces` knows.
+
+    None changes nothing: what is reported to stays.
+    """
+    token = _along.set(_along.get() if progress is None else progress or None)
     try:
         yield
     finally:

@@ -15,7 +15,7 @@ from hysim import signals
 from hysim._basics.frozen import FloatArray, frozen, read_only
 from hysim._basics.printing import extent, printed, quantity, summary_text
 from hysim.control._controller import Controller, preview
-from hysim.control._loop import ClosedLoop, RestingPlant, around_actuator, as_actuator, sampled
+from hysim.control._loop import ClosedLoop, RestingPlant, around, as_actuator, sampled
 from hysim.control._open_loop import secant_gain, without_memory
 from hysim.control._stability import judge
 from hysim.control._tracking import is_fed_back
@@ -130,7 +130,7 @@ def assess_loop(
         raise ValueError(f"period must be at least a sample and no longer than the reference, got {period} s")
     cycle = r[-samples:]
     cycle = np.append(resting.y0, cycle) if np.ptp(cycle) == 0.0 else cycle
-    gain = secant_gain(resting.actuator, cycle)
+    gain = secant_gain(resting.plant, cycle)
     return _judged(resting, controller, times, r, cycle, gain, slice(-samples, None), period)
 
 
@@ -145,7 +145,7 @@ def _judged(
     period: float = math.nan,
 ) -> LoopAssessment:
     """Judgement of a loop; `gain` is the secant gain along `cycle`, and `counted` are the samples of the error."""
-    closed = around_actuator(resting, controller, times, reference)
+    closed = around(resting, controller, times, reference)
     linear, moves = judge(resting, controller, closed.reference, cycle, gain)
     unstable = linear.max_sensitivity == math.inf
     why = ": a pole of the linear loop lies outside the unit circle" if unstable else " where the reference stops"

@@ -10,13 +10,12 @@ import numpy.typing as npt
 
 from hysim._basics.frozen import FloatArray, frozen, read_only, vectors
 from hysim._basics.printing import extent, printed, quantity, summary_text
-from hysim._basics.progress import Progress, Reports, reports
+from hysim._basics.progress import Reports, along, reports
 from hysim._basics.results import model_of
 from hysim.control._controller import Controller, begun, held_samples, limits_of, preview
 from hysim.errors import SimulationError, warn_beyond, warn_limited
 from hysim.models.model import in_brief
 from hysim.models.protocols import Remembering, Responding, standing
-from hysim.plants.actuator import Actuator
 from hysim.plants.actuator import as_actuator as as_actuator
 from hysim.plants.chain import Signals
 from hysim.plants.structures.moving import ControlledStructure
@@ -182,106 +181,112 @@ def close_loop(
     >>> round(float(run.y[-1]), 3), run.conditions["sample_time"]
     (1.0, 0.01)
     """
-    _check_controller(controller)
     times, r, h = sampled(t, reference)
     plant = model_of(plant)
     if isinstance(plant, Structure):
         if u0 or substeps is not None:
             raise ValueError("a structure has its own initial_state and substeps: leave out u0 and substeps")
         quake = None if ground_acceleration is None else vectors(ground_acceleration=ground_acceleration, t=times)[0]
-        ground = ControlledStructure(plant, h, quake)
-        return _around_structure(ground, controller, times, r, h, units or {}, progress or None)
+        resting = RestingPlant(plant, h, chain=ControlledStructure(plant, h, quake))
+        return around(resting, controller, times, r, units, progress)
     actuator = as_actuator(plant)
     if ground_acceleration is not None:
         raise ValueError(f"only a Structure stands on the ground, got {type(plant).__name__} and ground_acceleration")
-    resting = RestingPlant(actuator, h, u0, substeps)
-    run = around_actuator(resting, controller, times, r, units, progress or None)
+    run = around(RestingPlant(actuator, h, u0, substeps), controller, times, r, units, progress)
     warn_beyond(actuator.u_range, run.u, type(actuator.hysteresis).__name__)
     warn_limited(run.conditions["limited_samples"], run.u.size)
     return run
 
 
-def around_actuator(
+def around(
     resting: "RestingPlant",
     controller: Controller,
     times: FloatArray,
     r: FloatArray,
     units: Mapping[str, str] | None = None,
-    progress: Progress | None = None,
+    progress: Reports = None,
 ) -> ClosedLoop:
-    """The loop around an actuator, without the warnings of `close_loop`: measures of loops print what these say."""
-    _check_controller(controller)
+    """The loop around a plant, without the warnings of `close_loop`: measures of loops print what these say."""
+    if not is_controller(controller):
+        raise TypeError(f"controller must be a PID or the like, got {type(controller).__name__}")
+    chain, h = resting.chain, resting.sample_time
     signals = resting.run(controller, r, progress, float(times[0]))
-    u = resting.voltages(signals)
-    sensor, amplifier = resting.chain.sensor, resting.chain.amplifier
+    sensor, amplifier = chain.sensor, chain.amplifier
     within = amplifier.voltage(signals.command) == amplifier.gain * signals.command + amplifier.offset
-    limited, h = (signals.drive != signals.command) | ~within, resting.sample_time
-    conditions = _conditions(resting.actuator, controller, h, resting.chain.substeps, u, limited, signals.held) | {
-        "delay": resting.chain.delay + sensor.delay,
+    noise = np.zeros(1)
+    if sensor.noise:
+        silent = resting.quiet().attempt(controller, r)
+        noise = signals.u - silent.u if silent.lost < 0 else np.array([math.nan])
+    conditions = {
+        "plant": resting.plant,
+        "controller": controller,
+        "sample_time": h,
+        "substeps": chain.substeps,
+        "delay": chain.delay + sensor.delay,
+        "preview": preview(controller, h) * h,
+        "limits": limits_of(controller),
         "amplifier_limits": amplifier.limits,
         "sensor_quantum": sensor.quantum,
         "noise": sensor.noise,
         "seed": sensor.seed if sensor.noise else None,
         "u0": resting.u0,
+        "lowest_u": float(signals.u.min()),
+        "highest_u": float(signals.u.max()),
+        "limited_samples": int(np.count_nonzero((signals.drive != signals.command) | ~within)),
+        "held_samples": signals.held,
+        "voltage_noise_rms": float(np.sqrt(np.mean(noise**2))),
+        "voltage_noise_peak": float(np.abs(noise).max()),
     }
-    if sensor.noise:
-        quiet = resting.quiet()
-        silent = quiet.attempt(controller, r)
-        noise = u - quiet.voltages(silent) if silent.lost < 0 else np.array([math.nan])
-        conditions["voltage_noise_rms"] = float(np.sqrt(np.mean(noise**2)))
-        conditions["voltage_noise_peak"] = float(np.abs(noise).max())
     return ClosedLoop(
         t=times,
         reference=r,
         error=r - signals.measurement,
         command=signals.command,
         drive=signals.drive,
-        u=u,
+        u=signals.u,
         z=resting.memory(signals),
         y=signals.y,
         measurement=signals.measurement,
         conditions=conditions,
         units=units or {},
+        signals=signals.others,
     )
 
 
-def _check_controller(controller: Any) -> None:
-    if not is_controller(controller):
-        raise TypeError(f"controller must be a PID or the like, got {type(controller).__name__}")
-
-
 class RestingPlant:
-    """A sampled actuator at rest at the command `u0`, from which every loop starts."""
+    """A sampled actuator, or a structure in its place, at rest at the command `u0`, from which every loop starts."""
 
     def __init__(
-        self, actuator: Actuator, sample_time: float, u0: float | None = None, substeps: int | None = None
+        self, plant: Any, sample_time: float, u0: float | None = None, substeps: int | None = None, chain: Any = None
     ) -> None:
-        self.actuator, self.sample_time, self.u0 = actuator, sample_time, standing(actuator, u0)
-        self.chain = actuator.chain(sample_time, substeps)
+        self.plant, self.sample_time, self.u0 = plant, sample_time, standing(plant, u0)
+        self.chain = plant.chain(sample_time, substeps) if chain is None else chain
         self.state = self.chain.rest(self.u0)
         self.y0 = self.chain.displacement(self.state)
 
     def quiet(self) -> "RestingPlant":
-        if self.actuator.sensor is None:
+        if self.plant.sensor is None:
             return self
-        actuator = replace(self.actuator, sensor=replace(self.actuator.sensor, noise=0.0))
-        return RestingPlant(actuator, self.sample_time, self.u0, self.chain.substeps)
+        plant = replace(self.plant, sensor=replace(self.plant.sensor, noise=0.0))
+        return RestingPlant(plant, self.sample_time, self.u0, self.chain.substeps)
 
     def run(
-        self, controller: Controller, reference: FloatArray, progress: Progress | None = None, begin: float = 0.0
+        self, controller: Controller, reference: FloatArray, progress: Reports = None, begin: float = 0.0
     ) -> Signals:
         """Signals of the loop that a controller closes from the time `begin` [s]; a SimulationError if it diverges."""
-        signals = self.attempt(controller, reference, progress)
+        with along(progress):
+            signals = self.attempt(controller, reference)
         if signals.lost >= 0:
             time = begin + signals.lost * self.sample_time
             raise SimulationError(f"the loop diverges at t = {time:g}: it is unstable")
         return signals
 
-    def attempt(self, controller: Controller, reference: FloatArray, progress: Progress | None = None) -> Signals:
+    def attempt(self, controller: Controller, reference: FloatArray) -> Signals:
         """As `run`; where the loop diverges, the signals name the sample."""
         compiled = begun(controller, self.sample_time, self.u0, self.y0)
-        ahead = _ahead(controller, self.sample_time, reference)
-        signals, _ = self.chain.run(compiled, self.state, ahead, progress)
+        samples = min(preview(controller, self.sample_time), reference.size)
+        ahead = read_only(np.append(reference[samples:], np.full(samples, reference[-1])))
+        signals: Signals = self.chain.run(compiled, self.state, ahead)[0]
         return signals._replace(held=held_samples(compiled))
 
     def attempt_each(
@@ -289,10 +294,8 @@ class RestingPlant:
     ) -> tuple[FloatArray, npt.NDArray[np.int64]]:
         """Displacements (m, n) of the loops of controllers of one class, and the first sample that diverges, or -1."""
         compiled = [begun(each, self.sample_time, self.u0, self.y0) for each in controllers]
-        return self.chain.run_each(compiled, self.state, reference)
-
-    def voltages(self, signals: Signals) -> FloatArray:
-        return self.chain.just_after(float(self.state.voltages[1]), signals.v)
+        displacements: tuple[FloatArray, npt.NDArray[np.int64]] = self.chain.run_each(compiled, self.state, reference)
+        return displacements
 
     def memory(self, signals: Signals) -> FloatArray | None:
         """Memory of the law just before each new command; None for a law without one."""
@@ -302,68 +305,7 @@ class RestingPlant:
         return law.memory(np.append(self.state.voltages[1], signals.v))[: -1 : self.chain.substeps]
 
     def driven(self, u: FloatArray) -> FloatArray:
-        return self.chain.driven(u, self.state)[0].y
-
-
-def _ahead(controller: Controller, sample_time: float, reference: FloatArray) -> FloatArray:
-    samples = min(preview(controller, sample_time), reference.size)
-    return read_only(np.append(reference[samples:], np.full(samples, reference[-1])))
-
-
-def _around_structure(
-    plant: ControlledStructure,
-    controller: Controller,
-    t: FloatArray,
-    reference: FloatArray,
-    sample_time: float,
-    units: Mapping[str, str],
-    progress: Progress | None,
-) -> ClosedLoop:
-    compiled = begun(controller, sample_time, 0.0, plant.y0)
-    run = plant.run(compiled, _ahead(controller, sample_time, reference), progress)
-    if run.lost >= 0:
-        raise SimulationError(f"the loop diverges at t = {t[run.lost]:g}: it is unstable")
-    structure, limited, held = plant.structure, run.drive != run.command, held_samples(compiled)
-    return ClosedLoop(
-        t=t,
-        reference=reference,
-        error=reference - run.y,
-        command=run.command,
-        drive=run.drive,
-        u=run.drive,
-        z=None,
-        y=run.y,
-        measurement=run.y,
-        conditions=_conditions(structure, controller, sample_time, structure.substeps, run.drive, limited, held),
-        units=units,
-        signals={name: values for name, values in run.signals.items() if name != "y"},
-    )
-
-
-def _conditions(
-    plant: Any, controller: Controller, sample_time: float, substeps: int | None, u: FloatArray, limited: Any, held: int
-) -> dict[str, Any]:
-    """The conditions of a loop, those of stages that the plant may lack at their value of rest."""
-    return {
-        "plant": plant,
-        "controller": controller,
-        "sample_time": sample_time,
-        "substeps": substeps,
-        "delay": 0.0,
-        "preview": preview(controller, sample_time) * sample_time,
-        "limits": limits_of(controller),
-        "amplifier_limits": None,
-        "sensor_quantum": 0.0,
-        "noise": 0.0,
-        "seed": None,
-        "u0": 0.0,
-        "lowest_u": float(u.min()),
-        "highest_u": float(u.max()),
-        "limited_samples": int(np.count_nonzero(limited)),
-        "held_samples": held,
-        "voltage_noise_rms": 0.0,
-        "voltage_noise_peak": 0.0,
-    }
+        return np.asarray(self.chain.driven(u, self.state)[0].y)
 
 
 def sampled(t: npt.ArrayLike, reference: npt.ArrayLike) -> tuple[FloatArray, FloatArray, float]:

@@ -250,7 +250,7 @@ def judge(
     resting: RestingPlant, controller: Controller, reference: FloatArray, cycle: FloatArray, gain: float
 ) -> tuple[LinearFigures, str]:
     """Figures of the linear loop along a `cycle` with this secant gain, and why the loop does not rest, or ""."""
-    linear = _linear_figures(resting.actuator, controller, resting.sample_time, cycle, gain)
+    linear = _linear_figures(resting.plant, controller, resting.sample_time, cycle, gain)
     if linear.max_sensitivity == math.inf:
         return linear, "is unstable"
     asked = float(np.ptp(cycle)) / abs(gain)
@@ -397,7 +397,7 @@ def bandwidth(
     check_positive(amplitude=amplitude, lowest=lowest)
     resting = RestingPlant(as_actuator(plant), sample_time, u0).quiet()
     cycle = resting.y0 + amplitude * np.sin(np.linspace(0.0, 2.0 * math.pi, _FEWEST))
-    if moves := judge(resting, controller, cycle, cycle, secant_gain(resting.actuator, cycle))[1]:
+    if moves := judge(resting, controller, cycle, cycle, secant_gain(resting.plant, cycle))[1]:
         raise SimulationError(f"the loop {moves}: it has no bandwidth")
 
     def follows(frequency: float) -> bool:

@@ -374,7 +374,7 @@ class _Search:
         lowest = max(_SLOWEST * highest, 2.0 * math.pi / (self.reference.size * h))
         points = []
         for crossover in np.geomspace(lowest, highest, _CROSSOVERS + 2)[1:-1]:
-            at_crossover = LinearLoop(self.resting.actuator, h, [crossover])
+            at_crossover = LinearLoop(self.resting.plant, h, [crossover])
             for gains in self.template.shapes(float(crossover), plant.loop.resonances.imag / h):
                 feedback = self.template.controller(self.template.point(gains))
                 if isinstance(feedback, TrackingController):

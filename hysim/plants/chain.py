@@ -2,14 +2,15 @@
 
 import functools
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from types import MappingProxyType
 from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
 from hysim._basics.frozen import FloatArray, check_count, read_only
-from hysim._basics.progress import Progress
+from hysim._basics.parallel import in_pieces
 from hysim.kernels import controllers
 from hysim.kernels import loop as kernels
 from hysim.laws.static import Line
@@ -33,7 +34,6 @@ from hysim.plants.sensor import Sensor
 _chain_step = functools.lru_cache(maxsize=256)(kernels.chain_step)
 _chain_start = functools.lru_cache(maxsize=256)(kernels.chain_start)
 
-_CHUNK = 1_000_000
 _PER_TIME_CONSTANT = 4  # sub-steps
 _FEWEST, _MOST = 4, 64  # sub-steps of a sample
 
@@ -64,16 +64,21 @@ class ChainState(NamedTuple):
 
 
 class Signals(NamedTuple):
-    """Signals at samples, `v` and `w` of the law at sub-steps, first `lost` sample or -1, number of `held` ones."""
+    """Signals at samples, `v` and `w` of the law at sub-steps, first `lost` sample or -1, number of `held` ones.
+
+    `u` is the voltage at the law just after each new command; a structure has `others` by name.
+    """
 
     command: FloatArray
     drive: FloatArray
+    u: FloatArray
     v: FloatArray
     w: FloatArray
     y: FloatArray
     measurement: FloatArray
     lost: int
     held: int = 0
+    others: Mapping[str, FloatArray] = MappingProxyType({})
 
 
 class Chain:
@@ -139,11 +144,7 @@ class Chain:
         return signals.y + self.linear.D * np.diff(w)[1 : 1 + signals.y.size]
 
     def run(
-        self,
-        controller: CompiledController,
-        state: ChainState,
-        reference: FloatArray,
-        progress: Progress | None = None,
+        self, controller: CompiledController, state: ChainState, reference: FloatArray
     ) -> tuple[Signals, ChainState]:
         """Run a controller, whose state moves along, from a state of the chain; the state at the end with it."""
         n = reference.size
@@ -151,22 +152,21 @@ class Chain:
         parts = (state.voltages, state.x, state.past, state.readings)
         plant_state, inputs = np.concatenate(parts), self._inputs(state, reference)
         samples, path = np.empty((4, n)), np.empty((2, n * self.substeps))
-        lost = -1
-        for start in range(0, n, _CHUNK):
-            stop = min(start + _CHUNK, n)
-            with np.errstate(all="ignore"):  # an unstable loop may overflow before it is lost
-                lost = kernels.close(
-                    *controller, *law, self._parameters, plant_state, inputs, start, stop, samples, path
-                )
-            if lost >= 0:
-                break
-            if progress is not None:
-                progress(stop, n)
+
+        def piece(k: slice) -> int:
+            lost = kernels.close(
+                *controller, *law, self._parameters, plant_state, inputs, k.start, k.stop, samples, path
+            )
+            return lost - k.start if lost >= 0 else -1
+
+        with np.errstate(all="ignore"):  # an unstable loop may overflow before it is lost
+            lost = in_pieces(piece, n)
         voltages, x, past, readings = np.split(plant_state, np.cumsum([part.size for part in parts])[:-1])
         remaining = np.append(np.roll(readings[:-1], -n), readings[-1])
         end = ChainState(state.samples + n, voltages, law, x, np.roll(past, -n * self.substeps), remaining)
         (command, drive, y, measurement), (v, w) = samples, path
-        return Signals(command, drive, v, w, y, measurement, lost), end
+        u = np.append(state.voltages[1], v)[: -1 : self.substeps] if self.amplifier.dynamic else v
+        return Signals(command, drive, u, v, w, y, measurement, lost), end
 
     def run_each(
         self, controllers: Sequence[CompiledController], state: ChainState, reference: FloatArray
@@ -227,10 +227,6 @@ class Chain:
         ]  # fmt: skip
         amplifier = self.amplifier.compiled(self.step).parameters
         return read_only(np.concatenate([amplifier, head, self.linear_block]), finite=False)
-
-    def just_after(self, before: float, fine: FloatArray) -> FloatArray:
-        """The voltages `fine` just after each new command; `before` is the voltage before the run."""
-        return np.append(before, fine)[: -1 : self.substeps] if self.amplifier.dynamic else fine
 
 
 def linear_stage(creep: Creep | None, vibration: Vibration | None, step: float) -> Stage:

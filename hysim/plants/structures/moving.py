@@ -9,7 +9,7 @@ import numpy.typing as npt
 
 from hysim._basics.frozen import FloatArray, read_only
 from hysim._basics.parallel import in_pieces
-from hysim._basics.progress import Progress
+from hysim._basics.progress import along
 from hysim.errors import SimulationError
 from hysim.kernels.controllers import CONTROLLER
 from hysim.kernels.structure_layout import Elements, Flows, Motion, Plant, Steps, Tracks
@@ -17,6 +17,9 @@ from hysim.kernels.structure_loop import close
 from hysim.kernels.structure_path import follow
 from hysim.kernels.structure_pointers import addresses
 from hysim.models.protocols import CompiledController, needed_time, positive_time
+from hysim.plants.amplifier import Amplifier
+from hysim.plants.chain import Signals
+from hysim.plants.sensor import Sensor
 from hysim.plants.structures import assembly
 from hysim.plants.structures.assembly import AssembledStructure
 from hysim.plants.structures.parts import parted
@@ -64,7 +67,7 @@ class MovingStructure(AssembledStructure):
 
     def memories(self, u: npt.ArrayLike, sample_time: float) -> tuple[FloatArray, ...]:
         """State of each element's law at the samples of `u`, (n_samples, n_numbers) each: last input and memory."""
-        states = self._followed(read_only(u, "u", ndim=1), sample_time, None, None, with_laws=True)[1].laws
+        states = self._followed(read_only(u, "u", ndim=1), sample_time, with_laws=True)[1].laws
         ends = np.cumsum([each.state.size for each in self.laws.steppers])[:-1]
         parts = np.split(states, ends, axis=1) if self.elements else []
         return tuple(part[:, place] for part, place in zip(parts, self.laws.places, strict=True))
@@ -85,13 +88,13 @@ class MovingStructure(AssembledStructure):
     ) -> tuple[dict[str, FloatArray], StructureState]:
         """As `signals`, continued from `state` with the bits of one input, and the state after the last sample."""
         inputs = read_only(u, "u", ndim=1)
-        begun, tracks = self._followed(inputs, needed_time(self, sample_time), state, progress, with_laws=False)
+        with along(progress):
+            begun, tracks = self._followed(inputs, needed_time(self, sample_time), state)
         return self.signals_of(inputs, begun, tracks), begun
 
     def _followed(
-        self, u: FloatArray, sample_time: float, state: StructureState | None,
-        progress: Callable[[int, int], None] | None, *, with_laws: bool,
-    ) -> tuple[StructureState, Tracks]:  # fmt: skip
+        self, u: FloatArray, sample_time: float, state: StructureState | None = None, *, with_laws: bool = False
+    ) -> tuple[StructureState, Tracks]:
         positive_time(sample_time)
         before = state or self.start()
         motion = Motion(*(part.copy() for part in before.motion))
@@ -102,7 +105,7 @@ class MovingStructure(AssembledStructure):
             is_first = k.start == 0 and not before.started
             return int(follow(*arguments, is_first, inputs[k], motion, room, rows))
 
-        lost, tracks = moved(run, u.size, motion, progress, with_laws=with_laws)
+        lost, tracks = moved(run, u.size, motion, with_laws=with_laws)
         if lost >= 0:
             hint = "; if it should not, use more substeps, or substeps=None" if self.substeps else ""
             raise SimulationError(f"the motion diverges at t = {lost * sample_time:g}{hint}")
@@ -183,33 +186,21 @@ class MovingStructure(AssembledStructure):
 
 
 def moved(
-    run: Callable[[slice, Tracks], int], n: int, motion: Motion, progress: Progress | None, *, with_laws: bool = False
+    run: Callable[[slice, Tracks], int], n: int, motion: Motion, *, with_laws: bool = False
 ) -> tuple[int, Tracks]:
     """The first sample that is lost, or -1, and all `n` samples, which `run` computes piece by piece."""
     tracks = assembly.empty_tracks(n, motion, with_laws=with_laws)
-
-    def piece(k: slice) -> int:
-        lost = run(k, Tracks(*(part[k] for part in tracks)))
-        if progress is not None:
-            progress(k.stop, n)
-        return lost
-
     with np.errstate(all="ignore"):
-        return in_pieces(piece, n), tracks
-
-
-class Controlled(NamedTuple):
-    """Command before and after limits, output (n,), signals just before each new command; first `lost` sample or -1."""
-
-    command: FloatArray
-    drive: FloatArray
-    y: FloatArray
-    signals: dict[str, FloatArray]
-    lost: int
+        return in_pieces(lambda k: run(k, Tracks(*(part[k] for part in tracks))), n), tracks
 
 
 class ControlledStructure:
-    """A structure at a sample time [s], as a loop takes it; the force before the first sample is zero."""
+    """A structure at a sample time [s], as a loop takes it in place of a `Chain`, whose other stages do nothing.
+
+    The force before the first sample is zero.
+    """
+
+    amplifier, hysteresis, sensor, delay = Amplifier(), None, Sensor(), 0.0
 
     def __init__(self, structure: MovingStructure, sample_time: float, ground_acceleration: FloatArray | None) -> None:
         if structure.excitation != "force":
@@ -226,14 +217,19 @@ class ControlledStructure:
         self.weights = measured(structure)
         before = structure.start()
         self.begin = StructureState(before.motion._replace(loads=np.zeros(len(directions))), False, before.stored)
+        self.substeps = structure.substeps
 
-    @property
-    def y0(self) -> float:
-        motion = self.begin.motion
-        return float(self.weights @ np.concatenate([motion.x, motion.carry[0], [0.0]]))
+    def rest(self, u0: float) -> StructureState:
+        return self.begin
 
-    def run(self, controller: CompiledController, reference: FloatArray, progress: Progress | None) -> Controlled:
-        n, motion = reference.size, Motion(*(part.copy() for part in self.begin.motion))
+    def displacement(self, state: StructureState) -> float:
+        return float(self.weights @ np.concatenate([state.motion.x, state.motion.carry[0], [0.0]]))
+
+    def run(
+        self, controller: CompiledController, state: StructureState, reference: FloatArray
+    ) -> tuple[Signals, StructureState]:
+        """As `Chain.run`; the signals are those just before each new command."""
+        n, motion = reference.size, Motion(*(part.copy() for part in state.motion))
         (address,), follow = addresses([controller.step], CONTROLLER), assembly.follow_address()
         inputs = np.column_stack([reference] if self.ground is None else [reference, self.ground])
         samples, room = np.empty((n, 3)), assembly.room_for(motion)
@@ -245,14 +241,16 @@ class ControlledStructure:
             )  # fmt: skip
             return int(lost)
 
-        lost, tracks = moved(run, n, motion, progress)
+        lost, tracks = moved(run, n, motion)
         command, drive, y = samples.T.copy()
+        end = StructureState(motion, True, state.stored)
+        signals = Signals(command, drive, drive, drive, tracks.carry, y, y, lost)
         if lost >= 0:
-            return Controlled(command, drive, y, {}, lost)
+            return signals, end
         self.structure.check_resolved(motion)
-        state = StructureState(motion, True, self.begin.stored)
-        signals = self.structure.signals_of(np.append(0.0, drive[:-1]), state, tracks)
-        return Controlled(command, drive, y, signals, lost)
+        others = self.structure.signals_of(np.append(0.0, drive[:-1]), end, tracks)
+        del others["y"]
+        return signals._replace(others=others), end
 
 
 def measured(structure: MovingStructure) -> FloatArray:
