@@ -178,7 +178,7 @@ def test_cut_and_continued_it_has_the_same_bits(method, hold, monkeypatch):
     assert again == end
     for name, values in whole.items():
         assert np.array_equal(np.concatenate([first[name], second[name]]), values), name
-    monkeypatch.setattr(module, "_CHUNK", 7)
+    monkeypatch.setattr("hysim._basics.parallel._STRETCH", 7)
     calls = []
     chunked = whole_plant.advance(u, sample_time=1.0 / RATE, progress=lambda done, total: calls.append((done, total)))
     assert np.array_equal(chunked[0]["y"], whole["y"])

@@ -38,6 +38,8 @@ import numpy.typing as npt
 from scipy.linalg import expm
 
 from hysim._basics.frozen import FloatArray, check_choice, check_positive, check_whole, items, read_only, whole_substeps
+from hysim._basics.parallel import in_pieces
+from hysim._basics.progress import along
 from hysim.errors import SimulationError
 from hysim.kernels import oscillator as kernels
 from hysim.kernels.boucwen import prepare
@@ -60,7 +62,6 @@ Period = Callable[[FloatArray], FloatArray]
 """State (3,) after a period, from that before; SimulationError if it diverges."""
 
 _ANGLE = 0.1  # largest phase of the mode in a default step: errors of 1e-7 of the output on the Noel-Schoukens system
-_CHUNK = 1 << 16
 _SETTLING_CHUNK = 1 << 13
 
 
@@ -226,7 +227,7 @@ class BoucWenOscillator:
         The samples are `sample_time` apart [s]. Raises SimulationError if the motion diverges, with the time;
         ValueError if `u` is not finite or has not one axis, or the sample time is not positive.
         """
-        return self._states(u, sample_time, None, None)[1][:, 0].copy()
+        return self._states(u, sample_time)[1][:, 0].copy()
 
     def periodic_response(self, u: npt.ArrayLike, sample_time: float, *, tolerance: float = 1e-10) -> FloatArray:
         """Displacement (n,) [m] in the steady state under an input that repeats itself.
@@ -257,7 +258,7 @@ class BoucWenOscillator:
 
         def after(x: FloatArray) -> FloatArray:
             start = OscillatorState(float(inputs[-1]), *x.tolist())
-            return np.asarray(self._states(inputs, sample_time, start, None)[1][-1, :3])
+            return np.asarray(self._states(inputs, sample_time, start)[1][-1, :3])
 
         for n_periods in range(ATTEMPTS[-1] + 2):
             if n_periods in ATTEMPTS:
@@ -268,7 +269,7 @@ class BoucWenOscillator:
             for begin in range(0, inputs.size, _SETTLING_CHUNK):
                 piece = slice(begin, begin + _SETTLING_CHUNK)
                 try:
-                    states = self._states(inputs[piece], sample_time, state, None)[1]
+                    states = self._states(inputs[piece], sample_time, state)[1]
                 except SimulationError:
                     raise SimulationError("the motion leaves the finite numbers before it is steady") from None
                 state = OscillatorState(float(inputs[piece][-1]), *states[-1].tolist())
@@ -297,7 +298,8 @@ class BoucWenOscillator:
         progress: Callable[[int, int], None] | None = None,
     ) -> tuple[dict[str, FloatArray], OscillatorState]:
         """As `signals`, continued from `state` with the bits of one input, and the state after the last sample."""
-        inputs, states = self._states(u, needed_time(self, sample_time), state, progress)
+        with along(progress):
+            inputs, states = self._states(u, needed_time(self, sample_time), state)
         y, velocity, z, input_work, damping_loss, memory_work = states.T.copy()
         law, start = self.law, self._start(0.0)
         recoverable = law.gain / law.A if law.A else 0.0
@@ -403,36 +405,28 @@ class BoucWenOscillator:
         return whole_substeps(max(self.natural_frequency, abs(self.damping) / self.mass) * sample_time / _ANGLE)
 
     def _states(
-        self,
-        u: npt.ArrayLike,
-        sample_time: float,
-        state: OscillatorState | None,
-        progress: Callable[[int, int], None] | None,
+        self, u: npt.ArrayLike, sample_time: float, state: OscillatorState | None = None
     ) -> tuple[FloatArray, FloatArray]:
         """Inputs, and what the kernel carries at their samples, shape (n, 6)."""
-        inputs = read_only(u, "u", ndim=1)
-        positive_time(sample_time)
-        states, done = np.empty((inputs.size, 6)), 0
-        if state is None and inputs.size:
-            state, done = self._start(float(inputs[0])), 1
-            states[0] = state[1:]
-        scale = 1.0 if self.excitation == "force" else -self.mass
-        steps = self._compiled(float(sample_time))
-        first = done
-        while state is not None and done < inputs.size:
-            stop = min(done + _CHUNK, inputs.size)
-            piece = states[done:stop]
-            lost = steps(scale * state.u, scale * inputs[done:stop], np.array(state[1:]), piece)
-            if lost >= 0:
-                elapsed = (done + lost + 1 - first) * sample_time
-                raise SimulationError(
-                    f"the motion leaves the finite numbers within {elapsed:.6g} s from the start, at sample "
-                    f"{done + lost}: the plant is unstable, or the method needs more substeps"
-                )
-            state, done = OscillatorState(float(inputs[stop - 1]), *piece[-1].tolist()), stop
-            if progress is not None:
-                progress(done, inputs.size)
-        return inputs, states
+        inputs, steps = read_only(u, "u", ndim=1), self._compiled(positive_time(sample_time))
+        if not inputs.size:
+            return inputs, np.empty((0, 6))
+        begin, done = state or self._start(float(inputs[0])), int(state is None)
+        forces = (1.0 if self.excitation == "force" else -self.mass) * np.append(begin.u, inputs)
+        path = np.empty((forces.size, 6))
+        path[: 1 + done] = begin[1:]
+
+        def work(k: slice) -> int:
+            first, last = max(k.start, done), k.stop + 1
+            lost = steps(forces[first], forces[first + 1 : last], path[first].copy(), path[first + 1 : last])
+            return first - k.start + lost if lost >= 0 else -1
+
+        if (lost := in_pieces(work, inputs.size)) >= 0:
+            raise SimulationError(
+                f"the motion leaves the finite numbers within {(lost + 1 - done) * sample_time:.6g} s from the start, "
+                f"at sample {lost}: the plant is unstable, or the method needs more substeps"
+            )
+        return inputs, path[1:]
 
     def _compiled(self, sample_time: float) -> Callable[[float, FloatArray, FloatArray, FloatArray], int]:
         """The kernel with everything but the input, the state before it, and the states to come."""
