@@ -5,6 +5,7 @@ import functools
 import inspect
 import math
 import sys
+import types
 import typing
 from collections.abc import Callable, Iterable, Mapping
 from types import MappingProxyType
@@ -17,6 +18,12 @@ from hysim._basics.results import model_of
 from hysim._names import among, meant
 
 FloatArray = npt.NDArray[np.float64]
+Positive = typing.Annotated[float, "positive"]
+NotNegative = typing.Annotated[float, "not negative"]
+Interval = typing.Annotated[tuple[float, ...], "lowest and highest"]
+Count = typing.Annotated[int, "at least 1"]
+"""Hints of fields that are checked where a specification is made; so are families and choices (`Literal`)."""
+
 LAST = {"last": True}  # metadata of a field of a base class that stands behind those of its families
 T = TypeVar("T")
 
@@ -131,6 +138,8 @@ def _freeze(cls: type[T], *, finite: bool) -> type[T]:
             prepare(self)
         for name, coerce in _coercions(type(self), finite).items():  # type: ignore[arg-type]
             object.__setattr__(self, name, coerce(vars(self)[name], name))
+        for name, kinds in _checks(type(self)).items() if finite else ():  # type: ignore[arg-type]
+            _check_kind(vars(self)[name], name, kinds)
         if check is not None:
             check(self)
 
@@ -212,6 +221,38 @@ def _coercions(cls: Any, finite: bool) -> dict[str, Callable[[Any, str], Any]]:
     if finite:  # the parts of a specification are models, and no results of fits
         coercions = {name: _as_parts if coerce is None else coerce for name, coerce in coercions.items()}
     return {name: coerce for name, coerce in coercions.items() if coerce is not None}
+
+
+@functools.cache
+def _checks(cls: Any) -> dict[str, tuple[Any, ...]]:
+    """Kinds of the fields for which `_check_kind` has a rule; of an optional one None is a kind, too."""
+    checks = {}
+    for name, hint in typing.get_type_hints(cls, include_extras=True).items():
+        kinds = typing.get_args(hint) if typing.get_origin(hint) in (types.UnionType, typing.Union) else (hint,)
+        if typing.get_origin(kinds[0]) in (typing.Literal, typing.Annotated) or dataclasses.is_dataclass(kinds[0]):
+            checks[name] = kinds
+    return checks
+
+
+def _check_kind(value: Any, name: str, kinds: tuple[Any, ...]) -> None:
+    kind = kinds[0]
+    if value is None and types.NoneType in kinds:
+        return
+    if kind == Positive:
+        check_positive(**{name: value})
+    elif kind == NotNegative:
+        check_not_negative(**{name: value})
+    elif kind == Count:
+        check_whole(value, name)
+    elif kind == Interval:
+        if not (len(value) == 2 and value[0] <= value[1]):
+            raise ValueError(f"{name} must be (lowest, highest), got {value}")
+    elif typing.get_origin(kind) is typing.Literal:
+        check_choice(name, value, typing.get_args(kind))
+    elif not isinstance(value, kinds):
+        names = [each.__name__ for each in kinds if each is not types.NoneType]
+        words = f"a {', a '.join(names[:-1])} or a {names[-1]}" if names[1:] else f"of {names[0]}"
+        raise TypeError(f"{name} must be {words}, got {type(value).__name__}")
 
 
 def _as_float(value: Any, name: str, *, finite: bool) -> float:

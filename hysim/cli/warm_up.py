@@ -36,7 +36,7 @@ def calls() -> dict[str, Callable[[], object]]:
             with suppress(ValueError, hs.SimulationError):  # of a law that has no inverse for this output
                 model.inverse_response(y, *time)
 
-    def oscillator(method: str) -> None:
+    def oscillator(method: Any) -> None:
         hs.BoucWenOscillator(mass=1.0, damping=0.1, stiffness=1.0, law=law, method=method).response(u, 0.1)
 
     return {

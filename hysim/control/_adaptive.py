@@ -6,8 +6,8 @@ from typing import Any
 
 import numpy as np
 
-from hysim._basics.frozen import FloatArray, read_only
-from hysim.control._controller import WithoutFeedback, check_limits
+from hysim._basics.frozen import FloatArray, Interval, read_only
+from hysim.control._controller import WithoutFeedback
 from hysim.kernels import stepping
 from hysim.kernels.adaptive_inverse import adaptive
 from hysim.models.compiled_step import compiled_step
@@ -72,7 +72,7 @@ class AdaptiveInverse(WithoutFeedback):
     free: tuple[str, ...]
     drift: tuple[float, ...]
     noise: float
-    limits: tuple[float, ...] | None = None
+    limits: Interval | None = None
 
     def __post_init__(self) -> None:
         if not isinstance(self.law, Law):
@@ -83,7 +83,6 @@ class AdaptiveInverse(WithoutFeedback):
             raise ValueError(f"free has {unknown[0]!r}: a {type(self.law).__name__} has {', '.join(self.law.scalars)}")
         if not (min(self.drift) > 0.0 and self.noise > 0.0):
             raise ValueError("drift and noise must be positive")
-        check_limits(self.limits)
         if self.law.workspace and self.law.resume is None:
             raise ValueError(f"the workspace of a {type(self.law).__name__} cannot follow numbers that change")
         self._rates()

@@ -16,7 +16,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy.linalg import block_diag
 
-from hysim._basics.frozen import FloatArray, check_not_negative, read_only, vectors
+from hysim._basics.frozen import FloatArray, Interval, NotNegative, read_only, vectors
 from hysim.kernels import controllers as kernels
 from hysim.models.model import family
 from hysim.models.protocols import CompiledController, positive_time
@@ -164,11 +164,6 @@ class WithoutFeedback(SampledController):
         return Feedback(np.zeros((0, 0)), np.zeros(0), np.zeros(0), 0.0)
 
 
-def check_limits(limits: tuple[float, ...] | None) -> None:
-    if limits is not None and not (len(limits) == 2 and limits[0] <= limits[1]):
-        raise ValueError(f"limits must be (lowest, highest), got {limits}")
-
-
 State = tuple[float, float, float, float]
 """Last command before the limits, integral part, derivative part, and last c r - y."""
 
@@ -209,15 +204,11 @@ class PID(SampledController):
     kp: float = 0.0
     ki: float = 0.0
     kd: float = 0.0
-    derivative_filter: float = 0.0
-    limits: tuple[float, ...] | None = None
-    tracking_time: float | None = None
+    derivative_filter: NotNegative = 0.0
+    limits: Interval | None = None
+    tracking_time: NotNegative | None = None
     setpoint_weight: float = 1.0
     derivative_weight: float = 0.0
-
-    def __post_init__(self) -> None:
-        check_not_negative(derivative_filter=self.derivative_filter, tracking_time=self.tracking_time)
-        check_limits(self.limits)
 
     @classmethod
     def standard(

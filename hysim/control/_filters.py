@@ -38,7 +38,7 @@ from typing import Self
 import numpy as np
 import numpy.typing as npt
 
-from hysim._basics.frozen import FloatArray, check_count, check_not_negative, check_positive
+from hysim._basics.frozen import Count, FloatArray, NotNegative, Positive, check_count, check_positive
 from hysim.control._controller import Feedback
 from hysim.models.model import family
 from hysim.plants.sampled import sampled, vibration_stage
@@ -88,13 +88,9 @@ class Notch(_Filter):
     [1.0, 0.01]
     """
 
-    natural_frequency: float
-    damping_ratio: float
-    new_damping_ratio: float = 1.0
-
-    def __post_init__(self) -> None:
-        check_positive(natural_frequency=self.natural_frequency, new_damping_ratio=self.new_damping_ratio)
-        check_not_negative(damping_ratio=self.damping_ratio)
+    natural_frequency: Positive
+    damping_ratio: NotNegative
+    new_damping_ratio: Positive = 1.0
 
     def coefficients(self, sample_time: float) -> FloatArray:
         w = self.natural_frequency
@@ -132,11 +128,8 @@ class DampingLoop(_Filter):
     """
 
     gain: float
-    frequency: float
-    damping_ratio: float | None = None
-
-    def __post_init__(self) -> None:
-        check_positive(frequency=self.frequency, damping_ratio=self.damping_ratio)
+    frequency: Positive
+    damping_ratio: Positive | None = None
 
     def coefficients(self, sample_time: float) -> FloatArray:
         w = self.frequency
@@ -193,8 +186,8 @@ class Shaper:
 
     natural_frequencies: tuple[float, ...] = ()
     damping_ratios: tuple[float, ...] = ()
-    repeats: int = 1
-    smoothing: float = 0.0
+    repeats: Count = 1
+    smoothing: NotNegative = 0.0
 
     def __post_init__(self) -> None:
         if len(self.natural_frequencies) != len(self.damping_ratios):
@@ -205,8 +198,6 @@ class Shaper:
         check_positive(natural_frequencies=min(self.natural_frequencies, default=None))
         if not all(0.0 <= ratio < 1.0 for ratio in self.damping_ratios):
             raise ValueError(f"damping_ratios must be from 0 to below 1, got {self.damping_ratios}")
-        check_count("repeats", self.repeats)
-        check_not_negative(smoothing=self.smoothing)
 
     @classmethod
     def zv(cls, natural_frequencies: npt.ArrayLike, damping_ratios: npt.ArrayLike) -> Self:
@@ -279,11 +270,8 @@ class ModeInverse:
     (0.5, 1.0)
     """
 
-    natural_frequency: float
-    damping_ratio: float
-
-    def __post_init__(self) -> None:
-        mode(self.natural_frequency, self.damping_ratio)
+    natural_frequency: Positive
+    damping_ratio: NotNegative
 
     def weights(self, sample_time: float) -> FloatArray:
         """Weights of the reference two samples ahead, one ahead, now, and one ago."""

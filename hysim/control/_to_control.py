@@ -151,7 +151,7 @@ def _scratch(controller: Any, sample_time: float) -> int:
     if not isinstance(forward, InverseFeedforward):
         return 0
     block = forward.block(sample_time, 0.0)
-    if block.inverse is not boucwen_inverse.step:
+    if block.step is not boucwen_inverse.step:
         return 0
     creeping = 0 if forward.creep is None else len(forward.creep.weights)
     return block.state.size - creeping - boucwen_inverse.N_OWN - 2  # behind the law's input and memory

@@ -12,35 +12,25 @@ take, so that the displacement follows it without delay.
 
 import functools
 import math
-from dataclasses import fields
-from typing import Any, NamedTuple, Self
+from typing import Any, Self
 
 import numpy as np
 import numpy.typing as npt
 
-from hysim._basics.frozen import FloatArray, read_only
-from hysim.control._controller import PID, Feedback, SampledController, WithoutFeedback, check_limits
+from hysim._basics.frozen import FloatArray, Interval, read_only
+from hysim.control._controller import PID, Feedback, SampledController, WithoutFeedback
 from hysim.control._filters import DampingLoop, ModeInverse, Notch, Shaper
 from hysim.kernels import tracking as kernels
 from hysim.kernels.inverses import line
-from hysim.kernels.stepping import Step
 from hysim.laws.static import Line
 from hysim.models.inverse_search import inverse_step
 from hysim.models.model import family
-from hysim.models.protocols import CompiledController, needs_time, positive_time
+from hysim.models.protocols import CompiledController, CompiledLaw, needs_time, positive_time
 from hysim.plants.actuator import Actuator, as_actuator, is_law
 from hysim.plants.amplifier import Amplifier
 from hysim.plants.creep import Creep
 
 _with_inverse = functools.lru_cache(maxsize=256)(kernels.bound)
-
-
-class FeedforwardBlock(NamedTuple):
-    """A feed-forward as `hysim.kernels.tracking.feed_forward` takes it."""
-
-    inverse: Step
-    parameters: FloatArray
-    state: FloatArray
 
 
 @family
@@ -80,8 +70,6 @@ class InverseFeedforward(WithoutFeedback):
     amplifier: Amplifier | None = None
 
     def __post_init__(self) -> None:
-        _check_kind("creep", self.creep, Creep)
-        _check_kind("amplifier", self.amplifier, Amplifier)
         if self.amplifier is not None and (self.amplifier.dynamic or not self.amplifier.gain):
             raise ValueError(
                 "the amplifier must answer at once and have a gain: its slewing and its lag have no inverse"
@@ -121,7 +109,7 @@ class InverseFeedforward(WithoutFeedback):
 
     def block(
         self, sample_time: float, u0: float, commands: tuple[float, float] = (-math.inf, math.inf)
-    ) -> FeedforwardBlock:
+    ) -> CompiledLaw:
         """Compiled inverse at rest at the command `u0`, for commands within these limits."""
         amplifier, law = self.amplifier or Amplifier(), Line(slope=1.0) if self.law is None else self.law
         lowest, highest = sorted(amplifier.voltage(commands).tolist())
@@ -130,7 +118,7 @@ class InverseFeedforward(WithoutFeedback):
         declines, weights = np.expm1(-sample_time / np.array(creep.time_constants)), np.array(creep.weights)
         scale = 1.0 / (creep.instant_gain - float(weights @ declines))
         head = [amplifier.gain, amplifier.offset, weights.size, scale]
-        return FeedforwardBlock(
+        return CompiledLaw(
             inverse.step,
             np.concatenate([head, weights, declines, inverse.parameters]),
             np.concatenate([np.full(weights.size, inverse.state[1]), inverse.state]),
@@ -138,7 +126,7 @@ class InverseFeedforward(WithoutFeedback):
 
 
 _THROUGH = np.array([1.0, 0.0, 0.0, 0.0, 0.0])
-_NOTHING = FeedforwardBlock(line, np.empty(0), np.empty(0))
+_NOTHING = CompiledLaw(line, np.empty(0), np.empty(0))
 
 
 @family
@@ -192,13 +180,9 @@ class TrackingController(SampledController):
     damping: DampingLoop | None = None
     model: Actuator | None = None
     preview: bool = False
-    limits: tuple[float, ...] | None = None
+    limits: Interval | None = None
 
     def __post_init__(self) -> None:
-        kinds = (Shaper, ModeInverse, InverseFeedforward, PID, Notch, DampingLoop, Actuator)
-        for field, kind in zip(fields(self), kinds, strict=False):
-            _check_kind(field.name, vars(self)[field.name], kind)
-        check_limits(self.limits)
         if self.feedback is not None and self.feedback.limits is not None:
             raise ValueError(
                 "the feedback is limited together with the feed-forward: give the limits to the controller"
@@ -258,7 +242,7 @@ class TrackingController(SampledController):
         parameters = [np.array(head), taps.ravel(), plant, feedback.parameters, *filters, forward.parameters]
         state = [np.array([u0]), np.full(taps.shape[1], y0), plant_state, feedback.state, np.zeros(4), forward.state]
         return CompiledController(
-            _with_inverse(kernels.track, forward.inverse),
+            _with_inverse(kernels.track, forward.step),
             read_only(np.concatenate(parameters), finite=False),
             np.concatenate(state),
         )
@@ -296,8 +280,3 @@ def is_fed_back(controller: object) -> bool:
     if isinstance(controller, TrackingController):
         return controller.feedback is not None or controller.damping is not None
     return not isinstance(controller, InverseFeedforward)
-
-
-def _check_kind(name: str, part: Any, kind: type) -> None:
-    if part is not None and not isinstance(part, kind):
-        raise TypeError(f"{name} must be of {kind.__name__}, got {type(part).__name__}")

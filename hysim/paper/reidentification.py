@@ -13,7 +13,7 @@ Table 2 cannot tell them, and whatever they say away from that line is extrapola
 import math
 from collections.abc import Mapping
 from dataclasses import replace
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -299,7 +299,7 @@ def without_means(record: Record) -> Record:
     )
 
 
-def _fits(model: TransferFunction, record: Record, units: FloatArray, sample: str = "start") -> FloatArray:
+def _fits(model: TransferFunction, record: Record, units: FloatArray, sample: Any = "start") -> FloatArray:
     """Fit [%] of a printed model under a held input, columns as in `printed_fits`; the record's time in samples."""
     order, zeros = model.order, len(model.num) - 1
     powers = units[:, np.newaxis] ** np.arange(1, order + 1)
@@ -348,7 +348,7 @@ def _time_unit(name: str, sample_time: float) -> TimeUnit:
 
 
 def _refit(
-    poles: int, record: Record, hold: str, sample: str, initial: str, fit: Identification | None = None
+    poles: int, record: Record, hold: Any, sample: Any, initial: Any, fit: Identification | None = None
 ) -> Refit:
     """Some poles and a zero on a record, identified unless that has been done."""
     structure = TransferFunction.structure(poles=poles, zeros=1, hold=hold, sample=sample, initial=initial)

@@ -94,15 +94,18 @@ class Actuator:
     vibration: Vibration | None = None
     sensor: Sensor | None = None
 
+    def _prepare(self) -> None:
+        object.__setattr__(self, "vibration", linear_plant(self.vibration))
+
     def __post_init__(self) -> None:
-        for name, kind in (("amplifier", Amplifier), ("creep", Creep), ("sensor", Sensor)):
-            if not isinstance(part := items(self)[name], kind | None):
-                raise TypeError(f"{name} must be of {kind.__name__}, got {type(part).__name__}")
         if self.hysteresis is not None and not is_law(self.hysteresis):
             raise TypeError(
                 f"hysteresis must be a law that a loop can step, such as BoucWen, got {type(self.hysteresis).__name__}"
             )
-        object.__setattr__(self, "vibration", as_vibration(self.vibration))
+        if isinstance(self.vibration, TransferFunction) and self.vibration.hold != "zoh":
+            raise ValueError('the vibration\'s input is held: its hold must be "zoh"')
+        if isinstance(self.vibration, TransferFunction) and self.vibration.initial_state:
+            raise ValueError("an actuator begins at rest: its vibration must not hold an initial state")
 
     @property
     def u0(self) -> float | None:
@@ -397,18 +400,6 @@ class Actuator:
             return self
         vibration = self.vibration or TransferFunction(num=(1.0,), den=(1.0,))
         return replace(self, vibration=replace(vibration, delay=vibration.delay + delay))
-
-
-def as_vibration(value: Any) -> Vibration | None:
-    """A linear stage, one of another package converted."""
-    plant = linear_plant(value)
-    if plant is not None and not isinstance(plant, Vibration):
-        raise TypeError(f"vibration must be a TransferFunction, a StateSpace or Modes, got {type(value).__name__}")
-    if isinstance(plant, TransferFunction) and plant.hold != "zoh":
-        raise ValueError('the vibration\'s input is held: its hold must be "zoh"')
-    if isinstance(plant, TransferFunction) and plant.initial_state:
-        raise ValueError("an actuator begins at rest: its vibration must not hold an initial state")
-    return plant
 
 
 def as_actuator(plant: Any) -> Actuator:

@@ -6,7 +6,15 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from hysim._basics.frozen import FloatArray, check_not_negative, check_positive, read_only
+from hysim._basics.frozen import (
+    FloatArray,
+    Interval,
+    NotNegative,
+    Positive,
+    check_not_negative,
+    check_positive,
+    read_only,
+)
 from hysim.models.model import family
 
 
@@ -55,16 +63,9 @@ class Amplifier:
 
     gain: float = 1.0
     offset: float = 0.0
-    limits: tuple[float, ...] | None = None
-    slew_rate: float | None = None
-    time_constant: float = 0.0
-
-    def __post_init__(self) -> None:
-        if self.limits is not None and not (len(self.limits) == 2 and self.limits[0] <= self.limits[1]):
-            raise ValueError(f"limits must be (lowest, highest), got {self.limits}")
-        if self.slew_rate is not None and not self.slew_rate > 0.0:
-            raise ValueError(f"slew_rate must be positive, got {self.slew_rate}; None takes the bound away")
-        check_not_negative(time_constant=self.time_constant)
+    limits: Interval | None = None
+    slew_rate: Positive | None = None
+    time_constant: NotNegative = 0.0
 
     @classmethod
     def non_inverting(

@@ -225,8 +225,9 @@ class Chain:
             stage.decline.size, stage.rest.size, stage.lag, self.samples_late,
             self.substeps, self.seen_in, self.sensor.quantum,
         ]  # fmt: skip
-        amplifier = self.amplifier.compiled(self.step).parameters
-        return read_only(np.concatenate([amplifier, head, self.linear_block]), finite=False)
+        return read_only(
+            np.concatenate([self.amplifier.compiled(self.step).parameters, head, self.linear_block]), finite=False
+        )
 
 
 def linear_stage(creep: Creep | None, vibration: Vibration | None, step: float) -> Stage:

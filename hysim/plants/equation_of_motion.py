@@ -15,14 +15,16 @@ sample kept. There a periodic signal goes on with itself beyond its ends, any ot
 
 import math
 from collections.abc import Callable, Sequence
-from typing import NamedTuple
+from typing import Literal, NamedTuple, get_args
 
 import numpy as np
 from scipy.signal import cont2discrete, firwin, lfilter, upfirdn
 
 from hysim._basics.frozen import FloatArray
 
-METHODS = ("split", "runge-kutta", "newmark", "strang")
+Excitation = Literal["force", "base"]
+Method = Literal["split", "runge-kutta", "newmark", "strang"]
+METHODS: tuple[Method, ...] = get_args(Method)
 """Ways to step an oscillator."""
 
 _ROUNDS = 20  # of the linear fit: it settles in five to ten

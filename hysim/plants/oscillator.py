@@ -31,13 +31,13 @@ Source: R. Seydel, Practical Bifurcation and Stability Analysis, 3rd ed., Spring
 import math
 from collections.abc import Callable, Sequence
 from functools import partial
-from typing import ClassVar, NamedTuple
+from typing import ClassVar, Literal, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 from scipy.linalg import expm
 
-from hysim._basics.frozen import FloatArray, check_choice, check_positive, check_whole, items, read_only, whole_substeps
+from hysim._basics.frozen import Count, FloatArray, Positive, check_positive, read_only, whole_substeps
 from hysim._basics.parallel import in_pieces
 from hysim._basics.progress import along
 from hysim.errors import SimulationError
@@ -48,7 +48,8 @@ from hysim.laws.differential.boucwen import BoucWen
 from hysim.laws.differential.polynomial_boucwen import PolynomialBoucWen
 from hysim.models.model import family
 from hysim.models.protocols import needed_time, positive_time
-from hysim.plants.equation_of_motion import METHODS
+from hysim.plants.equation_of_motion import METHODS as METHODS
+from hysim.plants.equation_of_motion import Excitation, Method
 from hysim.plants.oscillator_structure import OscillatorStructure
 
 ATTEMPTS = (16, 32, 64, 128, 256)  # periods gone through before each search for a fixed point, and before giving up
@@ -185,28 +186,20 @@ class BoucWenOscillator:
     '1.0838e-03 m, 0.8678 J'
     """
 
-    mass: float
+    mass: Positive
     damping: float
     stiffness: float
     law: BoucWen | PolynomialBoucWen
-    excitation: str = "force"
-    hold: str = "foh"
-    method: str = "split"
-    substeps: int | None = None
+    excitation: Excitation = "force"
+    hold: Literal["foh", "zoh"] = "foh"
+    method: Method = "split"
+    substeps: Count | None = None
     initial_state: tuple[float, ...] = ()
 
     dynamic: ClassVar[bool] = True
     short = "oscillator"
 
     def __post_init__(self) -> None:
-        check_positive(mass=self.mass)
-        if not isinstance(self.law, BoucWen | PolynomialBoucWen):
-            raise TypeError(f"law must be a BoucWen or a PolynomialBoucWen, got {type(self.law).__name__}")
-        options = {"excitation": ("force", "base"), "hold": ("foh", "zoh"), "method": METHODS}
-        for name, allowed in options.items():
-            check_choice(name, items(self)[name], allowed)
-        if self.substeps is not None:
-            check_whole(self.substeps, "substeps")
         if len(self.initial_state) not in (0, 2):
             raise ValueError(f"initial_state must be empty or hold 2 numbers, got {len(self.initial_state)}")
 
@@ -323,13 +316,13 @@ class BoucWenOscillator:
     def structure(
         cls,
         *,
-        method: str = "split",
+        method: Method = "split",
         oversampling: int = 4,
         decimation: Sequence[int] = (),
-        initial: str = "rest",
+        initial: Literal["rest", "periodic"] = "rest",
         period: int | None = None,
-        hold: str = "foh",
-        excitation: str = "force",
+        hold: Literal["foh", "zoh", "band-limited"] = "foh",
+        excitation: Excitation = "force",
     ) -> OscillatorStructure:
         """Description for `hysim.identify` of how the record of an oscillator with a Bouc-Wen law was made.
 

@@ -18,11 +18,11 @@ where w is the memory of a law with A = 1, exact along the measured y. Both side
 import math
 from collections.abc import Mapping
 from dataclasses import replace
-from typing import Any, NamedTuple
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 
-from hysim._basics.frozen import FloatArray, check_choice, check_whole, checked, items, read_only
+from hysim._basics.frozen import Count, FloatArray, check_whole, checked, read_only
 from hysim._basics.parallel import in_chunks
 from hysim.errors import SimulationError
 from hysim.kernels import boucwen as kernels
@@ -32,8 +32,9 @@ from hysim.models.protocols import Identifiable
 from hysim.models.search_space import ALL_FREE, Freedom, Parameters, SearchSpace
 from hysim.plants.equation_of_motion import (
     HALF_FILTER,
-    METHODS,
+    Excitation,
     Linear,
+    Method,
     Motion,
     checked_plant,
     decimated,
@@ -183,25 +184,15 @@ class OscillatorStructure(Identifiable):
     """
 
     family: type
-    method: str = "split"
-    oversampling: int = 4
+    method: Method = "split"
+    oversampling: Count = 4
     decimation: tuple[int, ...] = ()
-    initial: str = "rest"
-    period: int | None = None
-    hold: str = "foh"
-    excitation: str = "force"
+    initial: Literal["rest", "periodic"] = "rest"
+    period: Count | None = None
+    hold: Literal["foh", "zoh", "band-limited"] = "foh"
+    excitation: Excitation = "force"
 
     def __post_init__(self) -> None:
-        options = {
-            "method": METHODS,
-            "initial": ("rest", "periodic"),
-            "hold": ("foh", "zoh", "band-limited"),
-            "excitation": ("force", "base"),
-        }
-        for name, allowed in options.items():
-            check_choice(name, items(self)[name], allowed)
-        check_whole(self.oversampling, "oversampling")
-        check_whole(self.period or 1, "period")
         for factor in self.decimation:
             check_whole(factor, "decimation")
         if self.decimation and np.prod(self.decimation) != self.oversampling:

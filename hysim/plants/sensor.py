@@ -3,7 +3,7 @@
 import numpy as np
 import numpy.typing as npt
 
-from hysim._basics.frozen import FloatArray, check_not_negative, check_whole, read_only
+from hysim._basics.frozen import FloatArray, NotNegative, check_whole, read_only
 from hysim.models.model import family
 
 
@@ -37,13 +37,12 @@ class Sensor:
     [0.0, 0.5, 1.0]
     """
 
-    quantum: float = 0.0
-    noise: float = 0.0
-    delay: float = 0.0
+    quantum: NotNegative = 0.0
+    noise: NotNegative = 0.0
+    delay: NotNegative = 0.0
     seed: int = 0
 
     def __post_init__(self) -> None:
-        check_not_negative(quantum=self.quantum, noise=self.noise, delay=self.delay)
         check_whole(self.seed, "seed", least=0)
 
     def noise_samples(self, n: int) -> FloatArray:

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from hysim._basics.frozen import FloatArray, check_not_negative, check_positive
+from hysim._basics.frozen import FloatArray, NotNegative, check_not_negative, check_positive
 from hysim.models.model import family
 from hysim.plants.transfer_function import TransferFunction
 
@@ -46,7 +46,7 @@ class StateSpace:
     B: FloatArray
     C: FloatArray
     D: float = 0.0
-    delay: float = 0.0
+    delay: NotNegative = 0.0
 
     def __post_init__(self) -> None:
         n = self.B.size
@@ -55,7 +55,6 @@ class StateSpace:
                 f"A, B and C must have the shapes (n, n), (n,) and (n,), got {self.A.shape}, {self.B.shape} and "
                 f"{self.C.shape}"
             )
-        check_not_negative(delay=self.delay)
 
     @property
     def poles(self) -> npt.NDArray[np.complex128]:
@@ -158,7 +157,7 @@ class Modes:
     natural_frequencies: tuple[float, ...]
     damping_ratios: tuple[float, ...]
     gains: tuple[float, ...]
-    delay: float = 0.0
+    delay: NotNegative = 0.0
 
     def __post_init__(self) -> None:
         lengths = len(self.natural_frequencies), len(self.damping_ratios), len(self.gains)
@@ -168,7 +167,7 @@ class Modes:
                 f"{lengths[0]}, {lengths[1]} and {lengths[2]}"
             )
         check_positive(natural_frequencies=min(self.natural_frequencies))
-        check_not_negative(damping_ratios=min(self.damping_ratios), delay=self.delay)
+        check_not_negative(damping_ratios=min(self.damping_ratios))
 
     @property
     def dc_gain(self) -> float:

@@ -11,12 +11,12 @@ delay, where it is not known, is searched beside the denominator.
 
 import math
 from collections.abc import Iterable, Mapping
-from typing import ClassVar
+from typing import ClassVar, Literal
 
 import numpy as np
 import numpy.typing as npt
 
-from hysim._basics.frozen import FloatArray, check_not_negative, checked, read_only
+from hysim._basics.frozen import FloatArray, NotNegative, checked, read_only
 from hysim.errors import SimulationError
 from hysim.models.composable import Composable
 from hysim.models.model import family
@@ -33,6 +33,9 @@ from hysim.plants._transfer_function_search import (
     sections,
 )
 from hysim.records import Record
+
+Hold = Literal["zoh", "foh"]
+Sample = Literal["start", "end"]
 
 FREQUENCY = (0.1, np.pi)  # box of a section's frequency: rad over the whole record, rad per sample
 DAMPING = (1e-3, 30.0)  # box of its damping ratio; two real poles above 1
@@ -85,15 +88,15 @@ class TransferFunction(Composable):
 
     num: tuple[float, ...]
     den: tuple[float, ...]
-    delay: float = 0.0
-    hold: str = "zoh"
-    sample: str = "start"
+    delay: NotNegative = 0.0
+    hold: Hold = "zoh"
+    sample: Sample = "start"
     initial_state: tuple[float, ...] = ()
 
     dynamic: ClassVar[bool] = True
 
     def __post_init__(self) -> None:
-        _check_options(self.hold, self.sample)
+        _check_sample(self.hold, self.sample)
         if not self.den or self.den[0] == 0.0:
             raise ValueError(f"den must begin with a coefficient that is not zero, got {self.den}")
         if not self.num:
@@ -102,7 +105,6 @@ class TransferFunction(Composable):
             raise ValueError(f"num and den over the first of den must be finite, got {self.num} and {self.den}")
         if len(self.num) > len(self.den):
             raise ValueError(f"the numerator's degree {len(self.num) - 1} is above the denominator's {self.order}")
-        check_not_negative(delay=self.delay)
         if len(self.initial_state) not in (0, self.order):
             raise ValueError(f"initial_state must be empty or hold {self.order} numbers, got {len(self.initial_state)}")
 
@@ -184,9 +186,9 @@ class TransferFunction(Composable):
         poles: int,
         zeros: int,
         delay: float | str = 0.0,
-        hold: str = "zoh",
-        sample: str = "start",
-        initial: str | None = None,
+        hold: Hold = "zoh",
+        sample: Sample = "start",
+        initial: Literal["rest", "free"] | None = None,
     ) -> "TransferFunctionStructure":
         """Numbers of poles and zeros for `hysim.identify`, and how the record was sampled.
 
@@ -241,9 +243,9 @@ class TransferFunction(Composable):
         poles: Iterable[int] = range(1, 6),
         zeros: Iterable[int] | None = None,
         delays: Iterable[float | str] = (0.0,),
-        hold: str = "zoh",
-        sample: str = "start",
-        initial: str | None = None,
+        hold: Hold = "zoh",
+        sample: Sample = "start",
+        initial: Literal["rest", "free"] | None = None,
     ) -> dict[str, "TransferFunctionStructure"]:
         """Candidates for `hysim.select`: a structure for every combination of the numbers and delays, by its name.
 
@@ -286,20 +288,17 @@ class TransferFunctionStructure(Identifiable, Composable):
 
     poles: int
     zeros: int
-    delay: float | None = 0.0
-    hold: str = "zoh"
-    sample: str = "start"
-    initial: str | None = None
+    delay: NotNegative | None = 0.0
+    hold: Hold = "zoh"
+    sample: Sample = "start"
+    initial: Literal["rest", "free"] | None = None
 
     def __post_init__(self) -> None:
-        _check_options(self.hold, self.sample)
-        if self.initial not in ("rest", "free", None):
-            raise ValueError(f'initial must be "rest" or "free", got {self.initial!r}')
+        _check_sample(self.hold, self.sample)
         if not all(isinstance(number, int) for number in (self.poles, self.zeros)):
             raise TypeError(f"numbers of poles and zeros must be int, got {self!r}")
         if not 0 <= self.zeros <= self.poles or self.poles < 1:
             raise ValueError(f"there must be at least one pole, and no more zeros than poles, got {self!r}")
-        check_not_negative(delay=self.delay)
 
     def __str__(self) -> str:
         poles, zeros = (
@@ -431,10 +430,6 @@ class TransferFunctionStructure(Identifiable, Composable):
         return results | dict.fromkeys(self.free_delay, late)
 
 
-def _check_options(hold: str, sample: str) -> None:
-    if hold not in ("zoh", "foh"):
-        raise ValueError(f'hold must be "zoh" or "foh", got {hold!r}')
-    if sample not in ("start", "end"):
-        raise ValueError(f'sample must be "start" or "end", got {sample!r}')
+def _check_sample(hold: str, sample: str) -> None:
     if (hold, sample) == ("foh", "end"):
         raise ValueError('sample="end" needs an input that is held, hold="zoh"')

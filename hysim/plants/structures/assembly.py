@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 from functools import cached_property
-from typing import Any, NamedTuple
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -223,7 +223,7 @@ class AssembledStructure:
     damping: Any
     stiffness: FloatArray
     elements: Any
-    excitation: str
+    excitation: Literal["base", "force"]
     influence: tuple[float, ...]
     output: str
     substeps: int | None

@@ -18,13 +18,13 @@ the forces out of balance fall, and a stroke on which that does not help is halv
 
 import itertools
 from collections.abc import Callable, Mapping, Sequence
-from typing import Any, ClassVar, NamedTuple
+from typing import Any, ClassVar, Literal, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 from scipy.linalg import LinAlgError, cholesky
 
-from hysim._basics.frozen import FloatArray, check_choice, check_whole, frozen, read_only
+from hysim._basics.frozen import Count, FloatArray, check_whole, frozen, read_only
 from hysim._basics.printing import extent, printed, summary_text
 from hysim.errors import SimulationError
 from hysim.models.model import family
@@ -282,10 +282,10 @@ class Structure(SearchedStructure):
     damping: Any = 0.0
     stiffness: FloatArray = 0.0  # type: ignore[assignment]
     elements: Any = ()
-    excitation: str = "base"
+    excitation: Literal["base", "force"] = "base"
     influence: tuple[float, ...] = ()
     output: str = "displacement"
-    substeps: int | None = None
+    substeps: Count | None = None
     tolerance: float = 1e-8
     initial_state: tuple[float, ...] = ()
 
@@ -295,9 +295,6 @@ class Structure(SearchedStructure):
         object.__setattr__(self, "elements", _elements(self.elements))
         if not isinstance(self.damping, Rayleigh | ModalDamping):
             object.__setattr__(self, "damping", read_only(self.damping, "damping"))
-        check_choice("excitation", self.excitation, ("base", "force"))
-        if self.substeps is not None:
-            check_whole(self.substeps, "substeps")
         if not 1e-12 <= self.tolerance <= _LOOSEST:
             raise ValueError(f"tolerance must be between 1e-12 and {_LOOSEST:g}, got {self.tolerance:g}")
         if len(self.influence) not in (0, self.n_nodes):
