@@ -6,14 +6,13 @@ from typing import Any, Literal, NamedTuple, get_args
 import numpy as np
 import numpy.typing as npt
 
-from hysim._basics.frozen import FloatArray, check_choice, read_only
-from hysim._basics.parallel import in_chunks
+from hysim._basics.frozen import FloatArray, read_only
 from hysim.kernels.structure_ensembles import Results, Sets, follow_each
 from hysim.kernels.structure_layout import Plant, Steps
 from hysim.models.compiled_step import compiled_start, compiled_step
 from hysim.models.law import Law
 from hysim.models.parts import own
-from hysim.models.protocols import Startable, positive_time
+from hysim.models.protocols import Startable
 from hysim.plants.structures import assembly
 from hysim.plants.structures.parts import MATRICES, ModalDamping, Rayleigh, expanded, modal_damping
 
@@ -22,7 +21,7 @@ Reduction = Literal[
 ]  # fmt: skip
 
 REDUCTIONS = get_args(Reduction)
-_AT_ONCE = 2_000_000  # samples that a call of the kernel computes, or one structure
+AT_ONCE = 2_000_000  # samples that a call of the kernel computes, or one structure
 
 
 class _Stack(NamedTuple):
@@ -35,40 +34,7 @@ class _Stack(NamedTuple):
     matrices: assembly.Matrices
 
 
-def responses(
-    structure: Any,
-    parameters_or_scales: Mapping[str, npt.ArrayLike] | npt.ArrayLike,
-    inputs: npt.ArrayLike,
-    sample_time: float,
-    reduce: Reduction,
-    workers: int | None,
-) -> FloatArray:
-    """See `hysim.Structure.responses`."""
-    check_choice("reduce", reduce, REDUCTIONS)
-    positive_time(sample_time)
-    u = read_only(inputs, "ground_accelerations")
-    if u.ndim not in (1, 2) or not u.shape[-1]:
-        raise ValueError(f"ground_accelerations must have the shape (n,) or (n_sets, n), got {u.shape}")
-    u = u[np.newaxis] if u.ndim == 1 else u
-    values = _values(structure, parameters_or_scales)
-    sizes = {name: column.size for name, column in values.items() if column.size != 1}
-    sizes |= {"ground_accelerations": len(u)} if len(u) > 1 else {}
-    n_sets = next(iter(sizes.values()), 1)
-    if unequal := {name: size for name, size in sizes.items() if size != n_sets}:
-        raise ValueError(f"every parameter needs one value, or one for each of {n_sets} sets, got {unequal}")
-    of_nodes = reduce in ("peak_displacement", "peak_acceleration")
-    out = np.empty((n_sets, structure.n_nodes if of_nodes else len(structure.elements)))
-
-    def work(start: int, stop: int) -> None:
-        rows = slice(start, stop)
-        chosen = {name: column if column.size == 1 else column[rows] for name, column in values.items()}
-        out[rows] = _reduced(structure, chosen, u[rows] if len(u) > 1 else u, stop - start, sample_time, reduce)
-
-    in_chunks(work, n_sets, workers=workers, minimum=max(1, _AT_ONCE // u.shape[1]), n_samples=u.shape[1])
-    return out
-
-
-def _values(structure: Any, given: Mapping[str, npt.ArrayLike] | npt.ArrayLike) -> dict[str, FloatArray]:
+def values_by_name(structure: Any, given: Mapping[str, npt.ArrayLike] | npt.ArrayLike) -> dict[str, FloatArray]:
     """Columns (n_sets,) by names without wildcards."""
     named: Mapping[str, Any] = given if isinstance(given, Mapping) else {"scale": given}
     scales = {name: column for name, column in named.items() if name == "scale"}
@@ -79,7 +45,7 @@ def _values(structure: Any, given: Mapping[str, npt.ArrayLike] | npt.ArrayLike) 
     }
 
 
-def _reduced(
+def reduced(
     structure: Any, values: Mapping[str, FloatArray], u: FloatArray, n_sets: int, sample_time: float, reduce: Reduction
 ) -> FloatArray:
     laws, parameters, states, slopes, matrices = _stacked(structure, values, n_sets)

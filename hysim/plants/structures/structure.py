@@ -24,12 +24,14 @@ import numpy as np
 import numpy.typing as npt
 from scipy.linalg import LinAlgError, cholesky
 
-from hysim._basics.frozen import Count, FloatArray, check_whole, frozen, read_only
+from hysim._basics.frozen import Count, FloatArray, check_choice, check_whole, frozen, read_only
+from hysim._basics.parallel import in_chunks
 from hysim._basics.printing import extent, printed, summary_text
 from hysim.errors import SimulationError
 from hysim.models.model import family
+from hysim.models.protocols import positive_time
 from hysim.plants.structures.assembly import AssembledStructure, Laws
-from hysim.plants.structures.ensemble import Reduction, responses
+from hysim.plants.structures.ensemble import AT_ONCE, REDUCTIONS, Reduction, reduced, values_by_name
 from hysim.plants.structures.parts import Element, ModalDamping, Rayleigh, assembled
 from hysim.plants.structures.search import SearchedStructure
 
@@ -383,7 +385,28 @@ class Structure(SearchedStructure):
         >>> frame.responses({"elements.*.beta": [25.0, 50.0]}, a, sample_time=0.01, reduce="energy").shape
         (2, 2)
         """
-        return responses(self, parameters_or_scales, ground_accelerations, sample_time, reduce, workers)
+        check_choice("reduce", reduce, REDUCTIONS)
+        positive_time(sample_time)
+        u = read_only(ground_accelerations, "ground_accelerations")
+        if u.ndim not in (1, 2) or not u.shape[-1]:
+            raise ValueError(f"ground_accelerations must have the shape (n,) or (n_sets, n), got {u.shape}")
+        u = u[np.newaxis] if u.ndim == 1 else u
+        values = values_by_name(self, parameters_or_scales)
+        sizes = {name: column.size for name, column in values.items() if column.size != 1}
+        sizes |= {"ground_accelerations": len(u)} if len(u) > 1 else {}
+        n_sets = next(iter(sizes.values()), 1)
+        if unequal := {name: size for name, size in sizes.items() if size != n_sets}:
+            raise ValueError(f"every parameter needs one value, or one for each of {n_sets} sets, got {unequal}")
+        of_nodes = reduce in ("peak_displacement", "peak_acceleration")
+        out = np.empty((n_sets, self.n_nodes if of_nodes else len(self.elements)))
+
+        def work(start: int, stop: int) -> None:
+            rows = slice(start, stop)
+            chosen = {name: column if column.size == 1 else column[rows] for name, column in values.items()}
+            out[rows] = reduced(self, chosen, u[rows] if len(u) > 1 else u, stop - start, sample_time, reduce)
+
+        in_chunks(work, n_sets, workers=workers, minimum=max(1, AT_ONCE // u.shape[1]), n_samples=u.shape[1])
+        return out
 
     def pushover(self, pattern: npt.ArrayLike, control: npt.ArrayLike, *, at: str = "displacement") -> StaticResponse:
         """Equilibria under loads that grow slowly, told by a displacement.
