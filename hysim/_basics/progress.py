@@ -58,10 +58,7 @@ def silence() -> None:
 
 @contextlib.contextmanager
 def along(progress: Reports) -> Iterator[None]:
-    """Report how far the input of a plant has been followed, which `hysim._basics.parallel.in_pieces` knows.
-
-    None changes nothing: what is reported to stays.
-    """
+    """Report how far `hysim._basics.parallel.in_pieces` has followed the input of a plant; None changes nothing."""
     token = _along.set(_along.get() if progress is None else progress or None)
     try:
         yield

@@ -64,21 +64,18 @@ class ChainState(NamedTuple):
 
 
 class Signals(NamedTuple):
-    """Signals at samples, `v` and `w` of the law at sub-steps, first `lost` sample or -1, number of `held` ones.
-
-    `u` is the voltage at the law just after each new command; a structure has `others` by name.
-    """
+    """Signals at samples, `v` and `w` of the law at sub-steps, first `lost` sample or -1, number of `held` ones."""
 
     command: FloatArray
     drive: FloatArray
-    u: FloatArray
+    u: FloatArray  # voltage at the law just after each new command
     v: FloatArray
     w: FloatArray
     y: FloatArray
     measurement: FloatArray
     lost: int
     held: int = 0
-    others: Mapping[str, FloatArray] = MappingProxyType({})
+    others: Mapping[str, FloatArray] = MappingProxyType({})  # of a structure, by name
 
 
 class Chain:

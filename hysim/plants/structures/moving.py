@@ -195,10 +195,7 @@ def moved(
 
 
 class ControlledStructure:
-    """A structure at a sample time [s], as a loop takes it in place of a `Chain`, whose other stages do nothing.
-
-    The force before the first sample is zero.
-    """
+    """A structure at a sample time [s], in place of a `Chain`; the force before the first sample is zero."""
 
     amplifier, hysteresis, sensor, delay = Amplifier(), None, Sensor(), 0.0
 
