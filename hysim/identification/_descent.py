@@ -13,7 +13,7 @@ constraint "this parameter has that value" is kept by eliminating one coordinate
 bringing the pivot back onto the constraint after it.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -24,6 +24,7 @@ from hysim.identification._problem import Problem
 from hysim.identification.marquardt import Evaluated, Flags, Sets, Trial, bounded_steps, descend
 
 N_STEPS = 60
+_MOST_AT_ONCE = 1_000_000  # samples of all sets that descend together, to bound the memory
 _TRIALS = 3  # sets that a step tries, for the budget
 _RESTORING = 12
 _ON_CONSTRAINT = 1e-11  # relative error of the constrained value
@@ -68,6 +69,15 @@ class Descent:
         steps: int = N_STEPS,
     ) -> Reached:
         """Descend from `theta` (n_sets, n_theta) until a step lowers the loss by less than `tolerance`."""
+        few = max(1, _MOST_AT_ONCE // self.problem.y.size)
+        if len(theta) > few and constraint is None:
+            parts = [
+                replace(self, targets=_some(self.targets, k), weights=_some(self.weights, k)).run(
+                    theta[k], tolerance=tolerance, steps=steps
+                )
+                for k in (slice(first, first + few) for first in range(0, len(theta), few))
+            ]
+            return Reached(*map(np.concatenate, zip(*parts, strict=True)))
         targets, weights = (np.broadcast_to(each, (len(theta), each.shape[1])) for each in (self.targets, self.weights))
         sets = _Sets(self, targets, weights * self.problem.weights, constraint)
         theta = np.clip(theta, *self.box())
@@ -87,7 +97,7 @@ class Descent:
         """dm/dtheta, (n_sets, n_samples, n_theta), at points with these `outputs` and `columns`."""
         n_sets, n_x = len(theta), self.problem.n_x
         if not n_x:
-            return columns
+            return columns.copy()
         x = theta[:, :n_x]
         ends, steps = self.problem.beside(x)
         every: Sets = np.indices(steps.shape).reshape(2, -1)
@@ -97,8 +107,9 @@ class Descent:
         ends[tuple(places)] = x[places[0]] + shares[:, np.newaxis] * (ends[tuple(places)] - x[places[0]])
         steps[tuple(places)] = ends[(*places, places[1])] - x[tuple(places)]
         changes[stiff] = _changes(self.problem, theta, outputs, ends, places)
+        by_x = changes.reshape(n_sets, n_x, -1)
         with np.errstate(over="ignore", invalid="ignore"):
-            by_x = changes.reshape(n_sets, n_x, -1) / steps[..., np.newaxis]
+            by_x /= steps[..., np.newaxis]
         by_x[~np.isfinite(by_x)] = 0.0
         return np.concatenate([by_x.transpose(0, 2, 1), columns], axis=2)
 
@@ -177,7 +188,9 @@ class _Sets:
         _, slope, curvature = self.descent.noise.terms(self.targets[sets] - outputs, sigma)
         root = self._root(sets, curvature, sigma)
         goal = -self.weights[sets] * slope / np.where(root > 0.0, root, 1.0)
-        return root[..., np.newaxis] * self.descent.slopes(x, outputs, columns), goal
+        jacobian = self.descent.slopes(x, outputs, columns)
+        jacobian *= root[..., np.newaxis]
+        return jacobian, goal
 
     def _root(self, sets: Sets, curvature: FloatArray, sigma: FloatArray) -> FloatArray:
         return np.asarray(np.sqrt(self.weights[sets] * np.maximum(curvature, 1e-12 / sigma**2)))
@@ -225,12 +238,19 @@ class _Sets:
         return Constraint(self.constraint.place[sets], self.constraint.value[sets])
 
 
+def _some(rows: FloatArray, sets: slice) -> FloatArray:
+    return rows[sets] if len(rows) > 1 else rows
+
+
 def _changes(law: Problem, theta: FloatArray, outputs: FloatArray, ends: FloatArray, places: Sets) -> FloatArray:
     """Changes (n, n_samples) of the `outputs` of sets where a coordinate moves to its end; `places` (2, n) are both."""
     there = theta[places[0]]
     there[:, : law.n_x] = ends[tuple(places)]
+    changed = law.model(there)
     with np.errstate(over="ignore", invalid="ignore"):
-        return np.asarray(law.model(there) - outputs[places[0]])
+        for row, k in zip(changed, places[0].tolist(), strict=True):
+            row -= outputs[k]
+    return changed
 
 
 def named_slopes(problem: Problem, theta: FloatArray) -> FloatArray:

@@ -227,16 +227,17 @@ class Problem:
 
     def completed(self, x: FloatArray) -> FloatArray:
         """Theta (n_sets, n_theta): the coordinates `x` and the best linear parameters."""
-        linear = [self._solve(x[part])[0] for part in self._chunks(len(x))]
+        linear = [self._solve(x[part])[0] for part in self.chunks(len(x))]
         return np.concatenate([x, np.concatenate(linear)], axis=1)
 
     def costs(self, x: FloatArray) -> FloatArray:
         """Sums of squares (n_sets,); those beyond the budget are infinite."""
         n_sets = len(x) if self.budget is None else self.budget.sets(len(x), self.y.size)
-        known = [np.sum(self._solve(x[:n_sets][part])[1] ** 2, axis=1) for part in self._chunks(n_sets)]
+        known = [np.sum(self._solve(x[:n_sets][part])[1] ** 2, axis=1) for part in self.chunks(n_sets)]
         return np.concatenate([*known, np.full(len(x) - n_sets, np.inf)])
 
-    def _chunks(self, n_sets: int) -> list[slice]:
+    def chunks(self, n_sets: int) -> list[slice]:
+        """Sets that are evaluated at once."""
         size = max(1, _CHUNK // self.y.size)
         return [slice(k, k + size) for k in range(0, n_sets, size)]
 
@@ -261,7 +262,7 @@ class Problem:
 
     def model(self, theta: FloatArray) -> FloatArray:
         outputs = np.empty((len(theta), self.y.size))
-        for sets in self._chunks(len(theta)):
+        for sets in self.chunks(len(theta)):
             columns, fixed_part = self.split(theta[sets, : self.n_x])
             with np.errstate(over="ignore", invalid="ignore"):
                 outputs[sets] = fixed_part + (columns @ theta[sets, self.n_x :, np.newaxis])[..., 0]

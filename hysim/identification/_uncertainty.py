@@ -82,7 +82,7 @@ def uncertainty(problem: Problem, theta: FloatArray, curvature: FloatArray) -> U
     scaled, way_back = np.where(known, 0.0, slopes) * np.sqrt(curvature)[:, np.newaxis], np.where(known, 0.0, way_back)
     norms = np.linalg.norm(scaled, axis=0)
     norms[norms == 0.0] = 1.0
-    _, singular, right = np.linalg.svd(scaled / norms, full_matrices=False)
+    _, singular, right = np.linalg.svd(np.linalg.qr(scaled / norms, mode="r"))  # on few rows
     is_determined = singular > _SINGULAR * singular[0]
     factor = np.sqrt(n_samples / (n_samples - n_names))
     spread = factor * (right[is_determined].T / singular[is_determined]) / norms[:, np.newaxis]
@@ -133,10 +133,13 @@ def _differences(problem: Problem, theta: FloatArray, share: float) -> FloatArra
     n_x = problem.n_x
     x, linear = theta[np.newaxis, :n_x], theta[n_x:]
     ahead, behind, steps = (values[0] for values in problem.neighbours(x, share))
-    columns, fixed_part = problem.split(np.concatenate([ahead, behind, x]))
-    outputs = columns @ linear + fixed_part
+    points, outputs = np.concatenate([ahead, behind]), np.empty((2 * n_x, problem.y.size))
+    for sets in problem.chunks(len(points)):
+        columns, fixed_part = problem.split(points[sets])
+        outputs[sets] = columns @ linear + fixed_part
     with np.errstate(invalid="ignore"):
-        return np.column_stack([(outputs[:n_x] - outputs[n_x : 2 * n_x]).T / steps, columns[-1]])
+        outputs[:n_x] -= outputs[n_x:]
+    return np.column_stack([outputs[:n_x].T / steps, problem.split(x)[0][0]])
 
 
 def _extrapolated(problem: Problem, theta: FloatArray) -> FloatArray | None:

@@ -21,6 +21,7 @@ from hysim._basics.frozen import FloatArray
 
 _RANK = 1e-11  # singular values of the normalised columns below this are taken as zero
 _MANY = 8  # columns from which on a triangle costs clearly less
+_LONG = 100_000  # rows from which on they are taken in pieces, to bound the memory
 _WELL = 1e9  # norm of an inverse below which no singular value is near `_RANK`
 
 
@@ -45,6 +46,10 @@ class Settled:
 
 def triangle(columns: FloatArray, target: FloatArray) -> tuple[FloatArray, FloatArray]:
     """The same regression with one row more than it has columns: the last one holds what no parameters explain."""
+    if columns.shape[1] > _LONG:
+        pieces = [slice(first, first + _LONG) for first in range(0, columns.shape[1], _LONG)]
+        rows, goals = zip(*(triangle(columns[:, piece], target[:, piece]) for piece in pieces), strict=True)
+        return triangle(np.concatenate(rows, axis=1), np.concatenate(goals, axis=1))
     both = np.asarray(np.linalg.qr(np.concatenate([columns, target[..., np.newaxis]], axis=2), mode="r"))
     return both[..., :-1], both[..., -1]
 
