@@ -241,8 +241,8 @@ def test_a_wrong_space_is_refused(space, error, words):
         ({"executor": "dusk"}, ValueError, "executor must be"),
         ({"executor": 3}, TypeError, "method submit"),
         ({"workers": 0}, ValueError, "workers must be"),
-        ({"seed": -1}, ValueError, "at least 0"),
-        ({"seed": 1.5}, TypeError, "an integer"),
+        ({"seed": -1}, ValueError, "not be negative"),
+        ({"seed": 1.5}, TypeError, "a whole number"),
         ({"on_change": "ask"}, ValueError, "on_change must be"),
     ],
 )

@@ -1,7 +1,7 @@
 """Chunks of tasks: how they are computed, the table of the rows that are done, and the seeds of tasks.
 
-A chunk is computed task by task, or through their batch form; failures are kept as rows. The values of a chunk are
-returned by their layout, the names and shapes of the tasks' outputs. A worker does not know that of the study.
+A chunk is computed task by task, or through their batch form; failures are kept as rows. The outputs of a task are kept
+by their names. A worker does not know the names and shapes that the study has.
 
 **Rows that are done.** The first task that succeeds, in the order of the study and not of time, sets the names and
 shapes of a row. A task that returns others has failed.
@@ -22,14 +22,14 @@ from typing import Any, NamedTuple, Protocol, runtime_checkable
 import numpy as np
 import numpy.typing as npt
 
-from hysim._basics.frozen import FloatArray
+from hysim._basics.frozen import FloatArray, check_whole
 from hysim._basics.parallel import at_most
 from hysim._basics.progress import silent
 from hysim.sweeps._space import OWN_NAMES, Column
 
 Task = Callable[..., Any]
-Layout = tuple[tuple[str, tuple[int, ...]], ...]
-"""Names and shapes of a task's outputs; a number has the shape ()."""
+Layout = Mapping[str, tuple[int, ...]]
+"""Shapes of a task's outputs by name; a number has the shape ()."""
 
 
 @runtime_checkable
@@ -40,120 +40,71 @@ class Batched(Protocol):
 
 
 class Chunk(NamedTuple):
-    """Tasks that are sent together: places in the study, shape (n,), parameters, and seeds if the task takes one."""
+    """Tasks that are sent together: places in the study, shape (n,), and parameters, with seeds if the task has one."""
 
     places: npt.NDArray[np.int64]
     columns: Mapping[str, Column]
-    seeds: npt.NDArray[np.int64] | None
+
+    def part(self, part: Any) -> "Chunk":
+        return Chunk(self.places[part], {name: values[part] for name, values in self.columns.items()})
 
 
-class Group(NamedTuple):
-    """Outputs of the tasks at some places: `columns` in the order of the layout, each of shape (n, *shape)."""
+class Row(NamedTuple):
+    """A finished task: its place, its time [s], why it failed, and its outputs, none if it failed."""
 
-    layout: Layout
-    places: npt.NDArray[np.int64]
-    columns: tuple[FloatArray, ...]
-
-
-class Outcome(NamedTuple):
-    """A finished chunk: values by layout, messages of failed tasks by place, and seconds of each, shape (n,)."""
-
-    places: npt.NDArray[np.int64]
-    groups: tuple[Group, ...]
-    errors: Mapping[int, str]
-    seconds: FloatArray
+    place: int
+    seconds: float
+    error: str | None
+    outputs: Mapping[str, float | FloatArray]
 
 
-def computed(task: Task, chunk: Chunk) -> Outcome:
-    """The outcome of a chunk; kernels inside use one thread."""
+def computed(task: Task, chunk: Chunk) -> list[Row]:
+    """The rows of a chunk; kernels inside use one thread."""
     with at_most(1), silent():
         return _together(task.batch, chunk) if isinstance(task, Batched) else _singly(task, chunk)
 
 
-def _singly(task: Task, chunk: Chunk) -> Outcome:
-    names = [*chunk.columns, *(() if chunk.seeds is None else ("seed",))]
-    values = [column.tolist() for column in (*chunk.columns.values(), chunk.seeds) if column is not None]
-    rows: dict[Layout, tuple[list[int], list[list[Any]]]] = {}
-    errors, seconds, clock = {}, [], time.perf_counter
-    for place, *arguments in zip(chunk.places.tolist(), *values, strict=True):
-        begin = clock()
+def _singly(task: Task, chunk: Chunk) -> list[Row]:
+    rows, columns = [], [column.tolist() for column in chunk.columns.values()]
+    for place, *arguments in zip(chunk.places.tolist(), *columns, strict=True):
+        begin = time.perf_counter()
         try:
-            layout, row = _row(task(**dict(zip(names, arguments, strict=True))))
-        except Exception as error:
-            errors[place] = _message(error)
-        else:
-            places, outputs = rows.setdefault(layout, ([], []))
-            places.append(place)
-            outputs.append(row)
-        seconds.append(clock() - begin)
-    groups = tuple(
-        Group(layout, np.array(places), tuple(_plain(np.array(column)) for column in zip(*outputs, strict=True)))
-        for layout, (places, outputs) in rows.items()
-    )
-    return Outcome(chunk.places, groups, errors, np.array(seconds))
+            arrays = _outputs(task(**dict(zip(chunk.columns, arguments, strict=True))))
+            error, outputs = None, {name: array if array.ndim else array.item() for name, array in arrays.items()}
+        except Exception as failure:
+            error, outputs = _message(failure), {}
+        rows.append(Row(place, time.perf_counter() - begin, error, outputs))
+    return rows
 
 
-def _together(batch: Task, chunk: Chunk) -> Outcome:
-    """The outcome through the batch form; a chunk that fails is halved until each task that fails is alone."""
+def _together(batch: Task, chunk: Chunk) -> list[Row]:
+    """The rows through the batch form; a chunk that fails is halved until each task that fails is alone."""
     begin, n = time.perf_counter(), chunk.places.size
     try:
-        arguments = dict(chunk.columns) if chunk.seeds is None else {**chunk.columns, "seed": chunk.seeds}
-        group = _group(chunk.places, batch(**arguments))
+        arrays = _outputs(batch(**chunk.columns))
+        for name, array in arrays.items():
+            if array.shape[:1] != (n,):
+                raise ValueError(f"the batch form returned {name} of shape {array.shape} for {n} tasks")
     except Exception as error:
         if n > 1:
-            halves = (slice(None, n // 2), slice(n // 2, None))
-            return _joined([_together(batch, part_of(chunk, half)) for half in halves])
-        errors = {int(chunk.places[0]): _message(error)}
-        return Outcome(chunk.places, (), errors, np.array([time.perf_counter() - begin]))
-    return Outcome(chunk.places, (group,), {}, np.full(n, (time.perf_counter() - begin) / n))
+            return [row for half in (slice(n // 2), slice(n // 2, n)) for row in _together(batch, chunk.part(half))]
+        return [Row(chunk.places.item(), time.perf_counter() - begin, _message(error), {})]
+    seconds = (time.perf_counter() - begin) / n
+    rows = zip(*(array if array.ndim > 1 else array.tolist() for array in arrays.values()), strict=True)
+    places = zip(chunk.places.tolist(), rows, strict=True)
+    return [Row(place, seconds, None, dict(zip(arrays, row, strict=True))) for place, row in places]
 
 
-def part_of(chunk: Chunk, part: Any) -> Chunk:
-    columns = {name: values[part] for name, values in chunk.columns.items()}
-    return Chunk(chunk.places[part], columns, None if chunk.seeds is None else chunk.seeds[part])
-
-
-def _joined(parts: list[Outcome]) -> Outcome:
-    return Outcome(
-        np.concatenate([part.places for part in parts]),
-        tuple(group for part in parts for group in part.groups),
-        {place: message for part in parts for place, message in part.errors.items()},
-        np.concatenate([part.seconds for part in parts]),
-    )
-
-
-def _row(returned: Any) -> tuple[Layout, list[Any]]:
-    values = {name: value if type(value) is float else _numbers(name, value) for name, value in _named(returned)}
-    layout = tuple((name, () if isinstance(value, float) else value.shape) for name, value in values.items())
-    return layout, [*values.values()]
-
-
-def _group(places: npt.NDArray[np.int64], returned: Any) -> Group:
-    columns = {name: _plain(_numbers(name, values)) for name, values in _named(returned)}
-    for name, column in columns.items():
-        if column.shape[:1] != places.shape:
-            raise ValueError(f"the batch form returned {name} of shape {column.shape} for {places.size} tasks")
-    return Group(tuple((name, column.shape[1:]) for name, column in columns.items()), places, tuple(columns.values()))
-
-
-def _named(returned: Any) -> list[tuple[str, Any]]:
-    if not isinstance(returned, Mapping):
-        return [("value", returned)]
-    if not returned or not all(isinstance(name, str) for name in returned):
+def _outputs(returned: Any) -> dict[str, FloatArray]:
+    named = returned if isinstance(returned, Mapping) else {"value": returned}
+    if not named or not all(isinstance(name, str) for name in named):
         raise TypeError(f"a task returns a number, an array, or a mapping of names to these, got {returned!r}")
-    return list(returned.items())
-
-
-def _numbers(name: str, value: Any) -> FloatArray:
-    array = np.asarray(value)
-    if array.dtype.kind not in "fiub":
-        raise TypeError(f"a task returns numbers and arrays of numbers, got {type(value).__name__} for {name}")
-    return np.array(array, dtype=np.float64)  # a copy: the task may use its array again
-
-
-def _plain(column: FloatArray) -> FloatArray:
-    """These values, every nan with the same bits."""
-    return np.where(np.isnan(column), np.nan, column)
+    arrays = {name: np.asarray(value) for name, value in named.items()}
+    for name, array in arrays.items():
+        if array.dtype.kind not in "fiub":
+            kind = type(named[name]).__name__
+            raise TypeError(f"a task returns numbers and arrays of numbers, got {kind} for {name}")
+    return {name: np.array(array, dtype=np.float64) for name, array in arrays.items()}  # it may use its arrays again
 
 
 def _message(error: Exception) -> str:
@@ -161,117 +112,68 @@ def _message(error: Exception) -> str:
 
 
 class Table:
-    """Values of the tasks that are done, nan elsewhere, one column for each output, shape (n_tasks, *shape)."""
+    """Outputs of the tasks that are done, nan elsewhere, one column for each, shape (n_tasks, *shape)."""
 
     def __init__(self, n_tasks: int, parameters: Iterable[str]) -> None:
-        self.layout: Layout | None = None
+        self.layout: Layout = {}  # empty until a task has succeeded
         self.values: dict[str, FloatArray] = {}
         self.errors: dict[int, str] = {}
         self.seconds = np.full(n_tasks, np.nan)
         self.done = np.zeros(n_tasks, dtype=bool)
         self._other_names = (*OWN_NAMES, *parameters)
 
-    def judge(self, outcome: Outcome) -> Outcome:
-        """The outcome in the study's layout, with an error for each task whose values have another layout."""
-        if self.layout is None and outcome.groups:
-            self.begin(min(outcome.groups, key=lambda group: int(group.places.min())).layout)
-        errors, groups = dict(outcome.errors), []
-        for group in outcome.groups:
-            if dict(group.layout) == dict(self.layout or ()):
-                groups.append(self._in_order(group))
-            else:
-                errors |= dict.fromkeys(group.places.tolist(), self._mismatch(group.layout))
-        return outcome._replace(groups=tuple(groups), errors=errors)
-
     def begin(self, layout: Layout) -> None:
         """Set the layout of the study; ValueError if an output has the name of another column."""
-        for name, shape in layout:
+        for name, shape in layout.items():
             if name in self._other_names:
                 raise ValueError(f"the task returned {name}, which is the name of another column: rename the output")
             self.values[name] = np.full((self.done.size, *shape), np.nan)
         self.layout = layout
 
-    def restore(self, layout: Layout | None, outcome: Outcome) -> None:
-        if layout:
-            self.begin(layout)
-        self.enter(outcome)
-
-    def enter(self, outcome: Outcome) -> None:
-        for group in outcome.groups:
-            for (name, _), column in zip(group.layout, group.columns, strict=True):
-                self.values[name][group.places] = column
-        self.errors |= outcome.errors
-        self.seconds[outcome.places] = outcome.seconds
-        self.done[outcome.places] = True
-
-    def _in_order(self, group: Group) -> Group:
-        layout = self.layout or ()
-        columns = dict(zip(dict(group.layout), group.columns, strict=True))
-        return Group(layout, group.places, tuple(columns[name] for name, _ in layout))
-
-    def _mismatch(self, layout: Layout) -> str:
-        first = _shown(self.layout or ())
-        return f"ValueError: the task returned {_shown(layout)}, where the first that succeeded returned {first}"
+    def enter(self, rows: Iterable[Row]) -> list[Row]:
+        """Enter rows in the order of the study, and return them; one with another layout is a task that failed."""
+        entered = []
+        for row in rows:
+            layout = {name: np.shape(value) for name, value in row.outputs.items()}
+            if layout and not self.layout:
+                self.begin(layout)
+            if layout and layout != self.layout:
+                first, other = _shown(self.layout), _shown(layout)
+                error = f"ValueError: the task returned {other}, where the first that succeeded returned {first}"
+                row = row._replace(error=error, outputs={})
+            if row.error is not None:
+                self.errors[row.place] = row.error
+            for name, value in row.outputs.items():
+                self.values[name][row.place] = value
+            self.seconds[row.place], self.done[row.place] = row.seconds, True
+            entered.append(row)
+        return entered
 
 
 def _shown(layout: Layout) -> str:
-    return ", ".join(f"{name} of shape {shape}" if shape else f"the number {name}" for name, shape in layout)
+    return ", ".join(f"{name} of shape {shape}" if shape else f"the number {name}" for name, shape in layout.items())
 
 
-_POOL = 4  # words
 _WORD = 0xFFFFFFFF
-Words = Any
-"""One word, an int or an array of uint64, below 2^32."""
 
 
-def seeds(seed: int, places: npt.NDArray[np.int64]) -> npt.NDArray[np.int64]:
+def seeds(seed: int | np.integer[Any], places: npt.NDArray[np.int64]) -> npt.NDArray[np.int64]:
     """Seeds of the tasks at these places, shape (n,); TypeError or ValueError unless `seed` is an integer from 0 on."""
-    if isinstance(seed, bool) or not isinstance(seed, (int, np.integer)):
-        raise TypeError(f"seed must be an integer, got {seed!r}")
-    if seed < 0:
-        raise ValueError(f"seed must be at least 0, got {seed}")
-    low, high = _state(_pool([*_words(int(seed)), places.astype(np.uint64)]))
+    check_whole(int(seed) if isinstance(seed, np.integer) else seed, "seed", least=0)
+    calls = 4 * max(4, -(-int(seed).bit_length() // 32))  # of the hash for the words of the seed, four of its pool
+    pool = np.random.SeedSequence(int(seed)).pool.tolist()
+    own = [_hashed(places.astype(np.uint64), 0x43B0D7E5, 0x931E8875, calls + k) for k in (0, 1)]
+    low, high = (_hashed(_mixed(pool[k], own[k]), 0x8B51F9DD, 0x58F38DED, k) for k in (0, 1))
     return np.asarray((high << 32 | low) >> 1, dtype=np.int64)
 
 
-def _words(seed: int) -> list[Words]:
-    """Words of 32 bits, the lowest first, filled up to the pool."""
-    words = [seed & _WORD]
-    while seed := seed >> 32:
-        words.append(seed & _WORD)
-    return words + [0] * (_POOL - len(words))
+def _hashed(word: Any, start: int, factor: int, calls: int) -> Any:
+    """Hash of words below 2^32; its constant is multiplied by `factor` in every call, and `calls` came before."""
+    constant = start * pow(factor, calls, _WORD + 1) & _WORD
+    word = (word ^ constant) * (constant * factor & _WORD) & _WORD
+    return word ^ word >> 16
 
 
-def _pool(entropy: list[Words]) -> list[Words]:
-    hashed = _Hash(0x43B0D7E5, 0x931E8875)
-    pool = [hashed(word) for word in entropy[:_POOL]]
-    for source in range(_POOL):
-        for target in range(_POOL):
-            if source != target:
-                pool[target] = _mixed(pool[target], hashed(pool[source]))
-    for word in entropy[_POOL:]:
-        pool = [_mixed(old, hashed(word)) for old in pool]
-    return pool
-
-
-def _state(pool: list[Words]) -> tuple[Words, Words]:
-    hashed = _Hash(0x8B51F9DD, 0x58F38DED)
-    return hashed(pool[0]), hashed(pool[1])
-
-
-class _Hash:
-    """Hash of one word after the other, by a constant that changes from word to word."""
-
-    def __init__(self, start: int, factor: int) -> None:
-        self.constant, self.factor = start, factor
-
-    def __call__(self, word: Words) -> Words:
-        word = word ^ self.constant
-        self.constant = self.constant * self.factor & _WORD
-        word = word * self.constant & _WORD
-        return word ^ word >> 16
-
-
-def _mixed(one: Words, other: Words) -> Words:
-    word = (one * 0xCA01F9DD + (_WORD + 1) - (other * 0x4973F715 & _WORD)) & _WORD
+def _mixed(one: Any, other: Any) -> Any:
+    word = ((one * 0xCA01F9DD & _WORD) + (_WORD + 1) - (other * 0x4973F715 & _WORD)) & _WORD
     return word ^ word >> 16

@@ -23,7 +23,7 @@ from hysim._basics.libraries import optional
 from hysim._basics.printing import csv_text, printed, summary_text
 from hysim._names import among
 from hysim.sweeps._chunks import Table, seeds
-from hysim.sweeps._space import Column
+from hysim.sweeps._space import Column, Space, saltelli
 from hysim.sweeps._store import opened
 
 
@@ -166,31 +166,30 @@ def load_sweep(path: str | Path) -> Sweep:
     [3.0, 4.0, 6.0, 8.0]
     """
     with opened(path, to_read=True) as store:
-        finished, space, seed = store.finished(), store.space(), store.seed
-        table = Table(store.n_tasks, space.columns)
-        table.restore(store.layout(), finished)
-    return result_of(table, space.columns, space.axes, seeds(seed, finished.places))
+        study, space = store.study, store.space()
+        table = Table(study.n_tasks, space.columns)
+        store.restore(table)
+    return result_of(table, space, seeds(int(study.identity["seed"]), np.flatnonzero(table.done)))
 
 
-def result_of(
-    table: Table, parameters: Mapping[str, Column], axes: Mapping[str, Column] | None, task_seeds: Column
-) -> Sweep:
+def result_of(table: Table, space: Space, task_seeds: Column) -> Sweep:
     """The rows of the tasks that are done, with their parameters and seeds, shape (n,)."""
     places = np.flatnonzero(table.done)
     values = {name: column[places] for name, column in table.values.items()}
-    for column in (places, task_seeds, *parameters.values(), *values.values()):
+    for column in values.values():
+        column[np.isnan(column)] = np.nan  # all of the same bits
+    for column in (places, task_seeds, *space.columns.values(), *values.values()):
         column.setflags(write=False)
-    shapes = dict(table.layout or ())
     return Sweep(
-        parameters=parameters,
-        outputs={name: column for name, column in values.items() if not shapes[name]},
-        arrays={name: column for name, column in values.items() if shapes[name]},
+        parameters=space.columns,
+        outputs={name: column for name, column in values.items() if column.ndim == 1},
+        arrays={name: column for name, column in values.items() if column.ndim > 1},
         task=places,
         seed=task_seeds,
         seconds=table.seconds[places],
         errors=dict(sorted(table.errors.items())),
         n_tasks=table.done.size,
-        axes=axes,
+        axes=space.axes,
     )
 
 
@@ -288,12 +287,9 @@ def _check(result: Sweep, n: int) -> None:
         raise ValueError(
             f"Sobol indices need every task: {len(result)} of {result.n_tasks} are done, {len(result.errors)} failed"
         )
-    d = len(result.parameters)
-    for k, values in enumerate(result.parameters.values()):
-        a, b = values[:n], values[n : 2 * n]
-        expected = np.concatenate([a, b, *(b if i == k else a for i in range(d))])
-        if n == 0 or not np.array_equal(values, expected):
-            raise ValueError('Sobol indices need the sample hs.Sample(..., method="saltelli")')
+    sets = np.column_stack([*result.parameters.values()])
+    if n == 0 or not np.array_equal(sets, saltelli(sets[:n], sets[n : 2 * n])):
+        raise ValueError('Sobol indices need the sample hs.Sample(..., method="saltelli")')
 
 
 def _estimates(parts: FloatArray) -> FloatArray:

@@ -109,23 +109,31 @@ class Sample:
             return np.asarray(qmc.LatinHypercube(d, rng=rng).random(self.n))
         if self.method == "sobol":
             return np.asarray(qmc.Sobol(d, rng=rng).random(self.n))
-        a, b = np.hsplit(qmc.Sobol(2 * d, rng=rng).random(self.n), 2)
-        mixed = [np.where(np.arange(d) == k, b, a) for k in range(d)]
-        return np.concatenate([a, b, *mixed])
+        return saltelli(*np.hsplit(qmc.Sobol(2 * d, rng=rng).random(self.n), 2))
+
+
+def saltelli(a: FloatArray, b: FloatArray) -> FloatArray:
+    """Samples A, B and AB_i for each parameter i, shape (n (d + 2), d), from the first two, shape (n, d)."""
+    d = a.shape[1]
+    return np.concatenate([a, b, *(np.where(np.arange(d) == k, b, a) for k in range(d))])
 
 
 def space_of(space: Any) -> Space:
     """The tasks of a mapping (a grid), a list of mappings or a `Sample`; TypeError or ValueError for anything else."""
+    axes = None
     if isinstance(space, Sample):
-        return Space(_checked(space.draw()), None)
-    if isinstance(space, Mapping):
+        columns: Mapping[str, Column] = space.draw()
+    elif isinstance(space, Mapping):
         axes = _checked({name: _column(name, values) for name, values in space.items()})
-        return Space(_product(axes), axes)
-    if isinstance(space, Iterable) and not isinstance(space, str):
-        return Space(_checked(_listed(list(space))), None)
-    raise TypeError(
-        f"a space is a mapping of names to values, a list of mappings or a hs.Sample, got {type(space).__name__}"
-    )
+        lengths = [len(values) for values in axes.values()]
+        places = np.unravel_index(np.arange(math.prod(lengths)), lengths)
+        columns = {name: values[place] for (name, values), place in zip(axes.items(), places, strict=True)}
+    elif isinstance(space, Iterable) and not isinstance(space, str):
+        columns = _listed(list(space))
+    else:
+        kind = type(space).__name__
+        raise TypeError(f"a space is a mapping of names to values, a list of mappings or a hs.Sample, got {kind}")
+    return Space(_checked(columns), axes)
 
 
 def _quantiles(name: str, distribution: Any) -> Any:
@@ -156,12 +164,6 @@ def _column(name: str, values: Any) -> Column:
     raise TypeError(f"the values of {name} must be all numbers, all strings or all booleans, got {names}")
 
 
-def _product(axes: Mapping[str, Column]) -> dict[str, Column]:
-    lengths = [len(values) for values in axes.values()]
-    places = np.unravel_index(np.arange(math.prod(lengths)), lengths)
-    return _read_only({name: values[place] for (name, values), place in zip(axes.items(), places, strict=True)})
-
-
 def _listed(tasks: list[Any]) -> dict[str, Column]:
     if not tasks:
         raise ValueError("there is no task in the list")
@@ -183,10 +185,5 @@ def _checked(columns: Mapping[str, Column]) -> dict[str, Column]:
             raise ValueError(f"there is no value of {name}")
         if values.dtype.kind == "f" and np.isnan(values).any():
             raise ValueError(f"the values of {name} must be numbers, got nan")
-    return _read_only(dict(columns))
-
-
-def _read_only(columns: dict[str, Column]) -> dict[str, Column]:
-    for values in columns.values():
         values.setflags(write=False)
-    return columns
+    return dict(columns)

@@ -27,7 +27,7 @@ import re
 import reprlib
 import secrets
 import sqlite3
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import closing, contextmanager
 from itertools import chain, count
 from pathlib import Path
@@ -36,20 +36,17 @@ from zipfile import BadZipFile
 from zlib import error as CompressionError  # noqa: N812
 
 import numpy as np
-import numpy.typing as npt
 
 from hysim._basics.atomic import replacing
-from hysim._basics.frozen import FloatArray
-from hysim.sweeps._chunks import Group, Layout, Outcome
+from hysim.sweeps._chunks import Layout, Row, Table
 from hysim.sweeps._space import Column, Space
 
 T = TypeVar("T")
 
-_KINDS = "fibU"
-_TOKEN = re.compile(r"[0-9a-f]{16}")
+_KINDS: dict[str, Any] = {"f": np.float64, "i": np.int64, "b": np.bool_, "U": np.str_}
 _DAMAGE = (
-    ArithmeticError, AttributeError, BadZipFile, CompressionError, EOFError, LookupError, RecursionError, TypeError,
-    ValueError,
+    ArithmeticError, AttributeError, BadZipFile, CompressionError, EOFError, LookupError, MemoryError, RecursionError,
+    TypeError, ValueError,
 )  # fmt: skip
 
 
@@ -57,7 +54,7 @@ class Output(NamedTuple):
     """Name and shape of an output, and its column if it is a number."""
 
     name: str
-    shape: tuple[int, ...]
+    shape: Sequence[int]
     column: str
 
 
@@ -68,42 +65,43 @@ class Study(NamedTuple):
     n_tasks: int
     parameters: Mapping[str, str]
     kinds: Mapping[str, str]
-    axes: tuple[tuple[str, list[Any]], ...] | None
-    layout: tuple[Output, ...] | None
+    axes: Sequence[tuple[str, list[Any]]] | None
     shards: str
+    layout: Sequence[Output] = ()
 
     @property
-    def columns(self) -> list[str]:
-        outputs = [output.column for output in self.layout or () if not output.shape]
-        return [*self.parameters.values(), *outputs]
+    def numbers(self) -> dict[str, str]:
+        """Columns of the outputs that are numbers, by their names."""
+        return {output.name: output.column for output in self.layout if not output.shape}
 
     @property
-    def rows(self) -> dict[str, str]:
-        """The facts as texts in JSON, by their names; without a layout before it is known."""
-        return {name: json.dumps(value) for name, value in self._asdict().items() if (name, value) != ("layout", None)}
+    def shapes(self) -> Layout:
+        return {output.name: tuple(output.shape) for output in self.layout}
+
+    def has(self, shard: Any) -> bool:
+        """Whether this is the name of a file with arrays of the study."""
+        return isinstance(shard, str) and re.fullmatch(rf"{self.shards}-[0-9]{{9,18}}\.npz", shard) is not None
 
 
 def study_of(rows: Mapping[str, Any]) -> Study:
     """The study in the rows of a store; any of `_DAMAGE` if they are damaged."""
     facts = {name: json.loads(text) for name, text in rows.items()}
-    identity, parameters, kinds = (_texts(facts[name]) for name in ("identity", "parameters", "kinds"))
-    axes = None if facts["axes"] is None else tuple((_of(str, name), _of(list, v)) for name, v in facts["axes"])
-    layout = tuple(_output(*each) for each in _of(list, facts["layout"])) if "layout" in facts else None
-    study = Study(identity, _number(facts["n_tasks"]), parameters, kinds, axes, layout, _of(str, facts["shards"]))
-    int(study.identity["seed"])
-    if study.layout == ():
-        raise ValueError("the layout has no output")
-    if not study.parameters or study.parameters.keys() != study.kinds.keys():
-        raise ValueError("parameters and kinds do not have the same names")
-    if not {*study.kinds.values()} <= {*_KINDS}:
-        raise ValueError(f"kinds must be among {', '.join(_KINDS)}, got {', '.join(study.kinds.values())}")
-    if study.axes is not None:
-        if [name for name, _ in study.axes] != [*study.parameters]:
-            raise ValueError("axes and parameters do not have the same names")
-        if math.prod(len(values) for _, values in study.axes) != study.n_tasks:
-            raise ValueError(f"its axes do not have {study.n_tasks} combinations")
-    if not _TOKEN.fullmatch(study.shards):
-        raise ValueError("the names of shards do not begin with 16 hexadecimal digits")
+    axes = None if facts["axes"] is None else [(_of(str, name), _of(list, values)) for name, values in facts["axes"]]
+    layout = [Output(_of(str, n), [*map(_size, shape)], _of(str, c)) for n, shape, c in facts.get("layout", ())]
+    study = Study(
+        *(_texts(facts["identity"]), _size(facts["n_tasks"]), _texts(facts["parameters"]), _texts(facts["kinds"])),
+        *(axes, _of(str, facts["shards"]), layout),
+    )
+    is_sound = (
+        (layout or "layout" not in facts)
+        and (study.parameters and study.parameters.keys() == study.kinds.keys())
+        and (_KINDS.keys() >= {*study.kinds.values()} and int(study.identity["seed"]) >= 0)
+        and (axes is None or [name for name, _ in axes] == [*study.parameters])
+        and (axes is None or math.prod(len(values) for _, values in axes) == study.n_tasks)
+        and re.fullmatch("[0-9a-f]{16}", study.shards)
+    )
+    if not is_sound:
+        raise ValueError("the facts of its study contradict each other")
     return study
 
 
@@ -117,19 +115,14 @@ def damage_named(path: str | Path) -> Iterator[None]:
         raise ValueError(f"{path} is a damaged store, move it away: {reason}") from error
 
 
-def _output(name: Any, shape: Any, column: Any) -> Output:
-    return Output(_of(str, name), tuple(_number(length) for length in shape), _of(str, column))
-
-
 def _texts(value: Any) -> dict[str, str]:
     return {name: _of(str, text) for name, text in _of(dict, value).items()}
 
 
-def _number(value: Any) -> int:
-    number = _of(int, value)
-    if not 0 <= number < 2**63:
-        raise ValueError(f"expected a number of tasks or samples, got {reprlib.repr(number)}")
-    return number
+def _size(value: Any) -> int:
+    if not 0 <= _of(int, value) < 2**63:
+        raise ValueError(f"expected a number of tasks or samples, got {reprlib.repr(value)}")
+    return int(value)
 
 
 def _of(kind: type[T], value: Any) -> T:
@@ -146,9 +139,10 @@ ON_CHANGE = ("error", "keep", "restart")
 # writer waits for readers, since rows that are finished would be lost.
 _FOR_A_WRITER, _FOR_A_COMMIT, _FOR_READERS = 0.25, 10.0, 60.0
 _OWN_COLUMNS = ("task", "seed", "seconds", "error", "shard")
+_LOCKED = errno.EAGAIN, "the store is locked: another process is writing to it"
 _TROUBLE = {
-    sqlite3.SQLITE_BUSY: (errno.EAGAIN, "the store is locked: another process is writing to it"),
-    sqlite3.SQLITE_LOCKED: (errno.EAGAIN, "the store is locked: another process is writing to it"),
+    sqlite3.SQLITE_BUSY: _LOCKED,
+    sqlite3.SQLITE_LOCKED: _LOCKED,
     sqlite3.SQLITE_FULL: (errno.ENOSPC, "the disk is full; every row that was reported is kept"),
     sqlite3.SQLITE_READONLY: (errno.EACCES, "the store is read-only"),
     sqlite3.SQLITE_CANTOPEN: (errno.EACCES, "the store cannot be opened or made there"),
@@ -164,6 +158,13 @@ class Store:
         self._facts: Study | None = None  # as they were read or written last
         self._tasks: list[Column] = []  # seeds and parameters of all tasks
 
+    @property
+    def study(self) -> Study:
+        facts = self._facts or self._read()
+        if facts is None:
+            raise ValueError(f"{self.path} is not a store of hysim: it is empty")
+        return facts
+
     def begin(self, identity: Mapping[str, str], space: Space, seeds: Column, on_change: OnChange) -> None:
         self._tasks = [seeds, *space.columns.values()]
         self._database.execute("BEGIN IMMEDIATE")
@@ -171,59 +172,64 @@ class Store:
         if before is not None and self._is_continued(before.identity, identity, on_change):
             self._remember(before._replace(identity=identity))
         else:
-            self._refuse_arrays_of_others(before)
+            for path in self._files():
+                if path.suffix == ".npz" and not (before and before.has(path.name)):
+                    message = f"{path} does not belong to this study: move it or the folder, or use another store"
+                    raise ValueError(message)
             self._create(identity, space, before)
         self._commit()
-        for study in (self._study, before or self._study):
-            self._remove_shards_without_rows(study)
+        named = {*self._column("shard")}
+        for path in self._files():  # those of a transaction that failed, or of the study that was replaced
+            name = re.sub(r"^\.(.*\.npz)\.[0-9a-f]{16}$", r"\1", path.name)  # without what it has during writing
+            if path.name not in named and any(study.has(name) for study in (self.study, before or self.study)):
+                path.unlink()
 
     def space(self) -> Space:
-        study = self._study
+        """The parameters of the tasks that have a row, and the axes of all."""
         with damage_named(self.path):
-            axes = {name: _as_column(values, study.kinds[name]) for name, values in study.axes or ()} or None
-            columns = {
-                name: _as_column(self._filled(column), study.kinds[name]) for name, column in study.parameters.items()
-            }
-        return Space(columns, axes)
+            kinds = {name: _KINDS[kind] for name, kind in self.study.kinds.items()}
+            axes: dict[str, Column] = {name: np.array(values, kinds[name]) for name, values in self.study.axes or ()}
+            parameters = self.study.parameters.items()
+            columns: dict[str, Column] = {name: np.array(self._filled(c), kinds[name]) for name, c in parameters}
+        return Space(columns, axes or None)
 
-    @property
-    def n_tasks(self) -> int:
-        return self._study.n_tasks
-
-    @property
-    def seed(self) -> int:
-        return int(self._study.identity["seed"])
-
-    def layout(self) -> Layout | None:
-        """Names and shapes of a row, None before the first task that succeeds."""
-        return tuple((output.name, output.shape) for output in self._study.layout or ()) or None
-
-    def finished(self) -> Outcome:
+    def restore(self, table: Table) -> None:
+        """Enter the rows of the store into the table of its study."""
         with damage_named(self.path):
+            table.begin(self.study.shapes)
             places = np.array(self._column("task"), dtype=np.int64)
-            if places.size and not 0 <= places[0] <= places[-1] < self.n_tasks:
-                raise ValueError(f"it has a row of the task {places[0] if places[0] < 0 else places[-1]}")
-            messages = dict(zip(places.tolist(), self._column("error"), strict=True))
-            good = np.array([text is None for text in messages.values()], dtype=bool)
-            layout = self._study.layout or ()
-            arrays = self._arrays(places[good]) if any(output.shape for output in layout) else {}
-            columns = [
-                arrays[output.name] if output.shape else np.array(self._column(output.column), dtype=float)[good]
-                for output in layout
-            ]
-            return Outcome(
-                places,
-                (Group(self.layout() or (), places[good], tuple(columns)),) if columns else (),
-                {place: str(text) for place, text in messages.items() if text is not None},
-                np.array(self._filled("seconds"), dtype=float),
-            )
+            if (outside := places[(places < 0) | (places >= table.done.size)]).size:
+                raise ValueError(f"it has a row of the task {outside[0]}")
+            errors = dict(zip(places.tolist(), self._column("error"), strict=True))
+            table.errors = {place: str(error) for place, error in errors.items() if error is not None}
+            table.seconds[places] = np.array(self._filled("seconds"), dtype=float)
+            table.done[places] = True
+            for name, column in self.study.numbers.items():
+                table.values[name][places] = np.array(self._column(column), dtype=float)
+            arrays = {name: table.values[name] for name, shape in self.study.shapes.items() if shape}
+            if arrays:
+                self._restore_arrays(arrays, errors.keys() - table.errors.keys())
 
-    def commit(self, outcomes: list[Outcome], layout: Layout | None) -> None:
-        """Write the rows of finished chunks, all or none of them; rows may be written again."""
+    def _restore_arrays(self, arrays: Mapping[str, Column], missing: set[int]) -> None:
+        """Fill in the arrays of the tasks at the missing places, from the shards that hold them."""
+        known = {*missing}
+        for shard in sorted({name for name in self._column("shard") if name}):
+            with open(self._shard(shard), "rb") as raw, np.load(raw, allow_pickle=False) as file:
+                tasks = file["task"]
+                if not known.issuperset(tasks.tolist()):
+                    raise ValueError(f"{shard} holds tasks that have no row")
+                for name, array in arrays.items():
+                    array[tasks] = file[f"output_{name}"]
+            missing.difference_update(tasks.tolist())
+        if missing:
+            raise ValueError(f"the arrays of the task {min(missing)} are missing")
+
+    def commit(self, rows: Sequence[Row], layout: Layout) -> None:
+        """Write the rows of finished tasks, all or none of them; rows may be written again."""
         if not self._database.in_transaction:  # after an interrupt
             self._database.execute("BEGIN IMMEDIATE")
         try:
-            self._write(outcomes, layout)
+            self._write(rows, layout)
             self._commit()
         except BaseException:
             self._facts = None
@@ -231,34 +237,19 @@ class Store:
                 self._database.execute("ROLLBACK")
             raise
 
-    def _write(self, outcomes: list[Outcome], layout: Layout | None) -> None:
-        if layout and not self._study.layout:
+    def _write(self, rows: Sequence[Row], layout: Layout) -> None:
+        if layout and not self.study.layout:
             self._add_outputs(layout)
-        names = [*_OWN_COLUMNS, *self._study.parameters.values()]
-        outputs = [output.column for output in self._study.layout or () if not output.shape]
-        shard = self._write_shard(outcomes)
-        for outcome in outcomes:
-            seconds = dict(zip(outcome.places.tolist(), outcome.seconds.tolist(), strict=True))
-            failed = Group((), np.array([*outcome.errors], dtype=np.int64), ())
-            for group in (*outcome.groups, failed):
-                keys, numbers = group.places.tolist(), zip(group.layout, group.columns, strict=True)
-                seeds, *parameters = (column[group.places].tolist() for column in self._tasks)
-                own = (
-                    keys, seeds, [seconds[key] for key in keys], [outcome.errors.get(key) for key in keys],
-                    [shard if group.layout else None] * len(keys),
-                )  # fmt: skip
-                columns = [*own, *parameters, *(column.tolist() for (_, shape), column in numbers if not shape)]
-                filled = _quoted([*names, *(outputs if group.layout else [])])
-                places = ", ".join("?" * len(columns))
-                rows = zip(*columns, strict=True)
-                self._database.executemany(f"INSERT OR REPLACE INTO results ({filled}) VALUES ({places})", rows)
-
-    @property
-    def _study(self) -> Study:
-        facts = self._facts or self._read()
-        if facts is None:
-            raise ValueError(f"{self.path} is not a store of hysim: it is empty")
-        return facts
+        study, shard = self.study, self._write_shard([row for row in rows if row.error is None])
+        tasks = zip(*(column[[row.place for row in rows]].tolist() for column in self._tasks), strict=True)
+        lines = [
+            [row.place, row.seconds, row.error, shard if row.error is None else None, *task]
+            + [row.outputs.get(name) for name in study.numbers]
+            for row, task in zip(rows, tasks, strict=True)
+        ]
+        columns = ["task", "seconds", "error", "shard", "seed", *study.parameters.values(), *study.numbers.values()]
+        marks = ", ".join("?" * len(columns))
+        self._database.executemany(f"INSERT OR REPLACE INTO results ({_quoted(columns)}) VALUES ({marks})", lines)
 
     def _read(self) -> Study | None:
         tables = [name for (name,) in self._database.execute("SELECT name FROM sqlite_master WHERE type = 'table'")]
@@ -269,8 +260,10 @@ class Store:
         with damage_named(self.path):
             facts = study_of(dict(self._database.execute("SELECT name, value FROM study")))
             columns = {name for _, name, *_ in self._database.execute("PRAGMA table_info(results)")}
-            if missing := {*_OWN_COLUMNS, *facts.columns} - columns:  # which SQLite would take for a text
-                raise ValueError(f"it has no column {', '.join(map(repr, sorted(missing)))}")
+            if missing := {*_OWN_COLUMNS, *facts.parameters.values(), *facts.numbers.values()} - columns:
+                raise ValueError(
+                    f"it has no column {', '.join(map(repr, sorted(missing)))}"
+                )  # SQLite takes it for text
         self._facts = facts
         return facts
 
@@ -297,21 +290,18 @@ class Store:
             f"{_quoted(parameters.values())})"
         )
         kinds = {name: column.dtype.kind for name, column in space.columns.items()}
-        axes = tuple((name, values.tolist()) for name, values in (space.axes or {}).items()) or None
-        self._remember(
-            Study(identity, space.n_tasks, parameters, kinds, axes, layout=None, shards=secrets.token_hex(8))
-        )
+        axes = [(name, values.tolist()) for name, values in (space.axes or {}).items()] or None
+        self._remember(Study(identity, space.n_tasks, parameters, kinds, axes, secrets.token_hex(8)))
 
     def _add_outputs(self, layout: Layout) -> None:
-        columns = _distinct([name for name, _ in layout], (*_OWN_COLUMNS, *self._study.parameters.values()))
-        for name, shape in layout:
-            if not shape:
-                self._database.execute(f"ALTER TABLE results ADD COLUMN {_quoted([columns[name]])}")
-        outputs = tuple(Output(name, shape, columns[name]) for name, shape in layout)
-        self._remember(self._study._replace(layout=outputs))
+        columns = _distinct(layout, (*_OWN_COLUMNS, *self.study.parameters.values()))
+        self._remember(self.study._replace(layout=[Output(name, layout[name], columns[name]) for name in layout]))
+        for column in self.study.numbers.values():
+            self._database.execute(f"ALTER TABLE results ADD COLUMN {_quoted([column])}")
 
     def _remember(self, study: Study) -> None:
-        self._database.executemany("INSERT OR REPLACE INTO study VALUES (?, ?)", study.rows.items())
+        facts = [(name, json.dumps(value)) for name, value in study._asdict().items() if name != "layout" or value]
+        self._database.executemany("INSERT OR REPLACE INTO study VALUES (?, ?)", facts)
         self._facts = study
 
     def _filled(self, name: str) -> list[Any]:
@@ -329,68 +319,31 @@ class Store:
         self._database.execute(f"PRAGMA busy_timeout = {1000 * _FOR_READERS:.0f}")
         self._database.execute("BEGIN IMMEDIATE")
 
-    def _write_shard(self, outcomes: list[Outcome]) -> str | None:
-        groups = [group for outcome in outcomes for group in outcome.groups if any(shape for _, shape in group.layout)]
-        if not groups:
+    def _write_shard(self, rows: list[Row]) -> str | None:
+        names = [name for name, shape in self.study.shapes.items() if shape]
+        if not rows or not names:
             return None
-        arrays = {
-            f"output_{name}": np.concatenate([group.columns[k] for group in groups])
-            for k, (name, shape) in enumerate(groups[0].layout)
-            if shape
-        }
-        places = np.concatenate([group.places for group in groups])
-        name = f"{self._study.shards}-{places.min():09d}.npz"
+        arrays: Any = {f"output_{name}": np.array([row.outputs[name] for row in rows]) for name in names}
+        places = [row.place for row in rows]
+        shard = f"{self.study.shards}-{min(places):09d}.npz"
         self._folder.mkdir(exist_ok=True)
-        with replacing(self._shard(name), "xb") as file:
-            np.savez(file, task=places, **arrays)  # type: ignore[arg-type]
+        with replacing(self._shard(shard), "xb") as file:
+            np.savez(file, task=places, **arrays)
             file.flush()
             os.fsync(file.fileno())
-        return name
-
-    def _arrays(self, places: npt.NDArray[np.int64]) -> dict[str, FloatArray]:
-        """Arrays of the tasks at these places, read from the shards that hold them."""
-        shapes = {output.name: output.shape for output in self._study.layout or () if output.shape}
-        arrays = {name: np.empty((places.size, *shape)) for name, shape in shapes.items()}
-        filled = np.zeros(places.size, dtype=bool)
-        for shard in sorted({name for name in self._column("shard") if name}):
-            with open(self._shard(shard), "rb") as raw, np.load(raw, allow_pickle=False) as file:
-                tasks = file["task"]
-                rows = np.searchsorted(places, tasks)
-                if not np.array_equal(places[rows], tasks):
-                    raise ValueError(f"{shard} holds tasks that have no row")
-                for name, array in arrays.items():
-                    array[rows] = file[f"output_{name}"]
-                filled[rows] = True
-        if not filled.all():
-            raise ValueError(f"the arrays of the task {places[~filled][0]} are missing")
-        return arrays
+        return shard
 
     def _shard(self, name: Any) -> Path:
         """Path of the shard of this name; ValueError unless it is a shard of this study and no link."""
-        if not isinstance(name, str) or not self._is_shard(name, self._study):
+        if not self.study.has(name):
             raise ValueError(f"{name!r} is not the name of one of its files with arrays")
-        path = self._folder / name
+        path: Path = self._folder / name
         if path.is_symlink():
             raise ValueError(f"{path} is a link, and not a file with arrays")
         return path
 
-    @staticmethod
-    def _is_shard(name: str, study: Study) -> bool:
-        return re.fullmatch(rf"{study.shards}-[0-9]{{9,18}}\.npz", name) is not None
-
-    def _refuse_arrays_of_others(self, before: Study | None) -> None:
-        """Refuse a folder with arrays that do not belong to the study that was in the store before."""
-        for path in sorted(self._folder.iterdir()) if self._folder.is_dir() else ():
-            if path.suffix == ".npz" and not (before is not None and self._is_shard(path.name, before)):
-                raise ValueError(f"{path} does not belong to this study: move it or the folder, or use another store")
-
-    def _remove_shards_without_rows(self, study: Study) -> None:
-        """Remove the shards of a study that no row names: their transaction failed, or the study was replaced."""
-        shards = {*self._column("shard")}
-        for path in self._folder.iterdir() if self._folder.is_dir() else ():
-            name = re.sub(r"^\.(.*\.npz)\.[0-9a-f]{16}$", r"\1", path.name)  # without what the name has during writing
-            if self._is_shard(name, study) and path.name not in shards:
-                path.unlink()
+    def _files(self) -> list[Path]:
+        return sorted(self._folder.iterdir()) if self._folder.is_dir() else []
 
 
 @contextmanager
@@ -399,28 +352,23 @@ def opened(path: str | Path, *, to_read: bool = False) -> Iterator[Store]:
     path = Path(path)
     if to_read and not path.is_file():
         raise FileNotFoundError(errno.ENOENT, os.strerror(errno.ENOENT), str(path))
-    with _built_in_errors(path), closing(_connected(path, "rw" if to_read else "rwc")) as database:
-        if to_read:
-            database.execute("BEGIN")  # so that all rows are of one moment
-        yield Store(path, database)  # whose open transaction is rolled back in the end
-
-
-def _connected(path: Path, mode: str) -> sqlite3.Connection:
-    """A connection; a reader may write too: the unfinished transaction of a killed writer is first rolled back."""
-    timeout = _FOR_A_WRITER if mode == "rwc" else _FOR_A_COMMIT
-    return sqlite3.connect(f"{path.resolve().as_uri()}?mode={mode}", uri=True, timeout=timeout, isolation_level=None)
-
-
-@contextmanager
-def _built_in_errors(path: Path) -> Iterator[None]:
     try:
-        yield
+        with closing(_connected(path, "rw" if to_read else "rwc")) as database:
+            if to_read:
+                database.execute("BEGIN")  # so that all rows are of one moment
+            yield Store(path, database)  # whose open transaction is rolled back in the end
     except sqlite3.DatabaseError as error:
         code = vars(error).get("sqlite_errorcode", 0) & 0xFF  # errors of the module itself have none
         if code in (sqlite3.SQLITE_NOTADB, sqlite3.SQLITE_CORRUPT):
             raise ValueError(f"{path} is not a store of hysim: {error}") from error
         number, message = _TROUBLE.get(code, (errno.EIO, f"the store failed: {error}"))
         raise OSError(number, message, str(path)) from error
+
+
+def _connected(path: Path, mode: str) -> sqlite3.Connection:
+    """A connection; a reader may write too: the unfinished transaction of a killed writer is first rolled back."""
+    timeout = _FOR_A_WRITER if mode == "rwc" else _FOR_A_COMMIT
+    return sqlite3.connect(f"{path.resolve().as_uri()}?mode={mode}", uri=True, timeout=timeout, isolation_level=None)
 
 
 def _changes(before: Mapping[str, str], now: Mapping[str, str]) -> dict[str, str]:
@@ -432,7 +380,7 @@ def _changes(before: Mapping[str, str], now: Mapping[str, str]) -> dict[str, str
     return {name: text for name, text in words.items() if before.get(name) != now[name]}
 
 
-def _distinct(names: Iterable[str], taken: tuple[str, ...]) -> dict[str, str]:
+def _distinct(names: Iterable[str], taken: Iterable[str]) -> dict[str, str]:
     """Names of columns that differ in SQL, where A equals a."""
     used, columns = {name.lower() for name in taken}, {}
     for name in names:
@@ -444,7 +392,3 @@ def _distinct(names: Iterable[str], taken: tuple[str, ...]) -> dict[str, str]:
 
 def _quoted(columns: Iterable[str]) -> str:
     return ", ".join('"' + column.replace('"', '""') + '"' for column in columns)
-
-
-def _as_column(values: list[Any], kind: str) -> Column:
-    return np.array(values, dtype={"f": np.float64, "i": np.int64, "b": bool, "U": str}[kind])

@@ -15,7 +15,7 @@ import hashlib
 import inspect
 import pickle
 from collections.abc import Callable, Iterator, Mapping
-from concurrent.futures import FIRST_COMPLETED, CancelledError, Future, ProcessPoolExecutor, ThreadPoolExecutor, wait
+from concurrent.futures import FIRST_COMPLETED, CancelledError, Future, wait
 from contextlib import contextmanager, nullcontext
 from functools import partial
 from pathlib import Path
@@ -29,7 +29,7 @@ from hysim._basics.libraries import is_installed
 from hysim._basics.parallel import GLANCE, cores, processes, threads
 from hysim._basics.progress import Line, Progress, Reports, reports
 from hysim._release import __version__
-from hysim.sweeps._chunks import Chunk, Outcome, Table, Task, computed, part_of, seeds
+from hysim.sweeps._chunks import Chunk, Row, Table, Task, computed, seeds
 from hysim.sweeps._result import Sweep, result_of
 from hysim.sweeps._space import Space, space_of
 from hysim.sweeps._store import ON_CHANGE, OnChange, Store, opened
@@ -52,7 +52,7 @@ class _DaskClient(Protocol):
 class Workers(NamedTuple):
     """A function that sends a chunk out, and the number of chunks that are computed at a time."""
 
-    submit: Callable[[Chunk], Future[Outcome]]
+    submit: Callable[[Chunk], Future[list[Row]]]
     number: Callable[[], int]
 
 
@@ -61,33 +61,28 @@ def workers_of(executor: Any, number: int | None, task: Task) -> Iterator[Worker
     """The workers that the argument `executor` of `sweep` stands for; own threads and processes end with the block."""
     if number is not None:
         check_count("workers", number)
+    size: Callable[[], int] = cores
+    work: tuple[Any, ...] = computed, task
     if executor in (None, "threads"):
-        with threads(number or cores()) as pool:
-            yield Workers(lambda chunk: pool.submit(computed, task, chunk), lambda: number or cores())
+        pool: Any = threads(number or cores())
     elif executor == "processes":
-        with processes(number or cores(), _begin, task) as pool:
-            yield Workers(lambda chunk: pool.submit(_computed_here, chunk), lambda: number or cores())
-    elif isinstance(executor, str):
-        raise ValueError(f'executor must be "threads", "processes", an Executor or a dask client, got {executor!r}')
+        pool, work = processes(number or cores(), _begin, task), (_computed_here,)
     elif isinstance(executor, _DaskClient):
-        of_client = executor.get_executor()
-        yield Workers(
-            lambda chunk: of_client.submit(computed, task, chunk),
-            lambda: number or max(1, sum(executor.nthreads().values())),
-        )
+        pool, size = nullcontext(executor.get_executor()), lambda: max(1, sum(executor.nthreads().values()))
     elif isinstance(executor, _Submits):
-        is_pool = isinstance(executor, (ThreadPoolExecutor, ProcessPoolExecutor))
-        size: int = vars(executor)["_max_workers"] if is_pool else cores()
-        yield Workers(lambda chunk: executor.submit(computed, task, chunk), lambda: number or size)
+        pool, size = nullcontext(executor), lambda: vars(executor).get("_max_workers", cores())
     else:
-        raise TypeError(f"executor must have the method submit of concurrent.futures.Executor, got {executor!r}")
+        words = 'executor must be "threads", "processes", a dask client, or have the method submit of an Executor'
+        raise (ValueError if isinstance(executor, str) else TypeError)(f"{words}, got {executor!r}")
+    with pool as opened_pool:
+        yield Workers(partial(opened_pool.submit, *work), lambda: number or size())
 
 
 def _begin(task: Task) -> None:
     _task_of_process[:] = [task]
 
 
-def _computed_here(chunk: Chunk) -> Outcome:
+def _computed_here(chunk: Chunk) -> list[Row]:
     return computed(_task_of_process[0], chunk)
 
 
@@ -112,8 +107,21 @@ def _digest(value: Any) -> str:
     return digest.hexdigest()[:16]
 
 
+_MEMBERS: dict[Any, Callable[[Any], list[Any]]] = {
+    list | tuple: list,
+    Mapping: lambda value: [each for name in sorted(value, key=repr) for each in (name, value[name])],
+    set | frozenset: lambda value: sorted(value, key=repr),
+    np.ndarray: lambda value: [value.shape, *value.ravel().tolist()],
+    partial: lambda value: [value.func, value.args, value.keywords],
+    MethodType: lambda value: [value.__func__, value.__self__],
+    CodeType: lambda value: [value.co_code, value.co_names, value.co_varnames, value.co_consts],
+}
+"""The parts of a value in a fixed order, by its type."""
+
+
 def _parts(value: Any, above: tuple[Any, ...]) -> Iterator[bytes]:
     """The content of a value in bytes that are the same in every process; `above` are the functions that hold it."""
+    members = next((members for kind, members in _MEMBERS.items() if isinstance(value, kind)), None)
     if isinstance(value, (FunctionType, CodeType)) and any(value is one for one in above):
         yield b"itself"
     elif isinstance(value, FunctionType):
@@ -124,36 +132,20 @@ def _parts(value: Any, above: tuple[Any, ...]) -> Iterator[bytes]:
         yield repr(value).encode()
     elif isinstance(value, (type, ModuleType)):
         yield f"{value.__module__ if isinstance(value, type) else ''}.{value.__name__}".encode()
-    elif (members := _members(value)) is not None:
-        yield str(len(members)).encode()
-        for member in members:
-            yield from _parts(member, above)
+    elif members is not None or dataclasses.is_dataclass(value):
+        parts = members(value) if members is not None else _fields(value)
+        yield str(len(parts)).encode()
+        for part in parts:
+            yield from _parts(part, above)
     else:
         yield from (repr(type(value)).encode(), _pickled(value))
 
 
-def _members(value: Any) -> list[Any] | None:
-    """The parts of a value in a fixed order; None if it is of a type without known parts."""
-    if isinstance(value, (list, tuple)):
-        return [*value]
-    if isinstance(value, Mapping):
-        return [each for name in sorted(value, key=repr) for each in (name, value[name])]
-    if isinstance(value, (set, frozenset)):
-        return sorted(value, key=repr)
-    if isinstance(value, np.ndarray):
-        return [value.shape, *value.ravel().tolist()]
-    if isinstance(value, partial):
-        return [value.func, value.args, value.keywords]
-    if isinstance(value, MethodType):
-        return [value.__func__, value.__self__]
-    if isinstance(value, CodeType):
-        return [value.co_code, value.co_names, value.co_varnames, value.co_consts]
-    if dataclasses.is_dataclass(value):
-        # a user's dataclass may have slots, so that `vars` would fail
-        values = {field.name: getattr(value, field.name) for field in dataclasses.fields(value)}
-        last = last_names(type(value))
-        return [type(value), *(each for name, each in values.items() if each is not None or name not in last)]
-    return None
+def _fields(value: Any) -> list[Any]:
+    # a user's dataclass may have slots, so that `vars` would fail
+    values = {field.name: getattr(value, field.name) for field in dataclasses.fields(value)}
+    last = last_names(type(value))
+    return [type(value), *(each for name, each in values.items() if each is not None or name not in last)]
 
 
 def _function_parts(function: FunctionType, above: tuple[Any, ...]) -> Iterator[bytes]:
@@ -246,17 +238,17 @@ def sweep(
     if isinstance(progress, Line) and not is_installed("pandas"):
         progress.warn("pandas is not installed: the result has no to_frame (pip install 'hysim[tables]')")
     tasks = space_of(space)
-    takes_seed = _takes_seed(task, tasks)
     task_seeds = seeds(seed, np.arange(tasks.n_tasks))
-    everything = Chunk(np.arange(tasks.n_tasks), tasks.columns, task_seeds if takes_seed else None)
+    columns = {**tasks.columns, "seed": task_seeds} if _takes_seed(task, tasks) else tasks.columns
     table = Table(tasks.n_tasks, tasks.columns)
     with nullcontext() if store is None else opened(store) as opened_store:
         if opened_store is not None:
             opened_store.begin(identity(task, tasks, seed), tasks, task_seeds, on_change)
-            table.restore(opened_store.layout(), opened_store.finished())
+            opened_store.restore(table)
+        remaining = Chunk(np.arange(tasks.n_tasks), columns).part(~table.done)
         with workers_of(executor, workers, task) as pool:
-            _Run(everything, table, opened_store, pool, progress or None).run()
-    return result_of(table, tasks.columns, tasks.axes, task_seeds)
+            _Run(remaining, table, opened_store, pool, progress or None).run()
+    return result_of(table, tasks, task_seeds)
 
 
 def _takes_seed(task: Callable[..., Any], space: Space) -> bool:
@@ -277,49 +269,48 @@ class _Run:
     """One run of a study: the tasks that remain, the chunks that are being computed, and the rows that are done."""
 
     def __init__(
-        self, everything: Chunk, table: Table, store: Store | None, workers: Workers, progress: Progress | None
+        self, remaining: Chunk, table: Table, store: Store | None, workers: Workers, progress: Progress | None
     ) -> None:
-        self.remaining = part_of(everything, np.flatnonzero(~table.done))
-        self.table, self.store, self.workers, self.progress = table, store, workers, progress
-        self.running: dict[Future[Outcome], int] = {}
+        self.remaining, self.table, self.store, self.workers = remaining, table, store, workers
+        self.progress = progress or (lambda done, total: None)
+        self.running: dict[Future[list[Row]], int] = {}  # numbers of tasks
         self.sent, self.largest, self.seconds_a_task = 0, 0, 0.0
 
     def run(self) -> None:
-        self._report()
+        self.progress(*self._done())
         try:
-            while self._send() or self.running:
+            while self.sent < self.remaining.places.size or self.running:
+                self._send()
                 self._wait()
                 self._settle()
-        except KeyboardInterrupt:
-            self._end(_PATIENCE)
-            self._settle()
-            raise
-        except BaseException:
-            self._end(0.0)
+        except BaseException as error:
+            for future in [*self.running]:
+                if future.cancel():
+                    del self.running[future]
+            if isinstance(error, KeyboardInterrupt):
+                wait(self.running, timeout=_PATIENCE)
+                self._settle()
             raise
 
-    def _send(self) -> bool:
-        """Fill the workers' queues; False if all was sent before."""
+    def _done(self) -> tuple[int, int]:
+        return int(self.table.done.sum()), self.table.done.size
+
+    def _send(self) -> None:
+        """Fill the workers' queues."""
         total, number = self.remaining.places.size, self.workers.number()
-        anything = self.sent < total
         while self.sent < total and len(self.running) < 2 * number + 1:
             stop = self.sent + self._size(total - self.sent, number)
-            self.running[self._future(part_of(self.remaining, slice(self.sent, stop)))] = stop - self.sent
-            self.sent = stop
-        return anything
-
-    def _future(self, chunk: Chunk) -> Future[Outcome]:
-        try:
-            return self.workers.submit(chunk)
-        except Exception as error:  # a broken pool raises here or in the future
-            lost: Future[Outcome] = Future()
-            lost.set_exception(error)
-            return lost
+            try:
+                future = self.workers.submit(self.remaining.part(slice(self.sent, stop)))
+            except Exception as error:  # a broken pool raises here or in the future
+                future = Future()
+                future.set_exception(error)
+            self.running[future], self.sent = stop - self.sent, stop
 
     def _size(self, remaining: int, number: int) -> int:
         if not self.largest:
             return 1
-        has_arrays = any(shape for _, shape in self.table.layout or ())
+        has_arrays = any(self.table.layout.values())
         target = max(_WITH_ARRAYS if has_arrays and self.store else _CHUNK, number / _MOST_A_SECOND)
         cost = max(self.seconds_a_task, 1e-9)
         share = max(remaining / (2 * number), _SHORTEST / cost)
@@ -327,51 +318,34 @@ class _Run:
 
     def _wait(self) -> None:
         """Wait until a chunk can be settled: before the layout is known, the first one."""
-        futures = [next(iter(self.running))] if self.table.layout is None else [*self.running]
+        futures = [*self.running] if self.table.layout else [next(iter(self.running))]
         while not any(future.done() for future in futures):
             wait(futures, timeout=GLANCE, return_when=FIRST_COMPLETED)  # and check for an interrupt
 
     def _settle(self) -> None:
-        """Judge, write, enter and report finished chunks, in the order of the tasks until the layout is known."""
-        outcomes, lost = {}, None
-        for future in list(self.running):
-            if future.done() and not future.cancelled() and future.exception() is None:
-                outcomes[future] = self.table.judge(future.result())
+        """Enter, write and report finished chunks, in the order of the tasks until the layout is known."""
+        rows: list[Row] = []
+        settled, lost = list[Future[list[Row]]](), None
+        for future in self.running:
+            is_done = future.done()
+            if is_done and not future.cancelled() and future.exception() is None:
+                rows += self.table.enter(future.result())
+                settled.append(future)
                 continue
-            if future.done():
-                lost = future
-            if self.table.layout is None:
+            lost = future if is_done else lost
+            if not self.table.layout:
                 break
-        if outcomes and self.store is not None:
-            self.store.commit(list(outcomes.values()), self.table.layout)
-        for future, outcome in outcomes.items():
-            self.table.enter(outcome)
-            self._learn(outcome)
-            del self.running[future]
-        if outcomes:
-            self._report()
+        if rows:
+            if self.store is not None:
+                self.store.commit(rows, self.table.layout)
+            cost = sum(row.seconds for row in rows) / len(rows)
+            self.seconds_a_task = 0.5 * (self.seconds_a_task + cost) if self.largest else cost
+            self.largest = max(self.largest, *(self.running.pop(future) for future in settled))
+            self.progress(*self._done())
         if lost is not None:
-            self._raise(lost)
-
-    def _learn(self, outcome: Outcome) -> None:
-        n = outcome.places.size
-        cost = float(outcome.seconds.sum()) / n
-        self.seconds_a_task = 0.5 * (self.seconds_a_task + cost) if self.largest else cost
-        self.largest = max(self.largest, n)
-
-    def _report(self) -> None:
-        if self.progress is not None:
-            self.progress(int(self.table.done.sum()), self.table.done.size)
-
-    def _raise(self, lost: Future[Outcome]) -> None:
-        error = CancelledError("it was cancelled") if lost.cancelled() else lost.exception()
-        raise OSError(
-            f"the executor lost a chunk of {self.running[lost]} tasks: {type(error).__name__}: {error}. "
-            f"{int(self.table.done.sum())} of {self.table.done.size} tasks are done"
-        ) from error
-
-    def _end(self, patience: float) -> None:
-        for future in list(self.running):
-            if future.cancel():
-                del self.running[future]
-        wait(self.running, timeout=patience)
+            error = CancelledError("it was cancelled") if lost.cancelled() else lost.exception()
+            done, total = self._done()
+            raise OSError(
+                f"the executor lost a chunk of {self.running[lost]} tasks: {type(error).__name__}: {error}. "
+                f"{done} of {total} tasks are done"
+            ) from error
