@@ -115,8 +115,8 @@ class Text(NamedTuple):
             kept = [k for k, line in enumerate(texts) if line.strip() and not line.lstrip().startswith(COMMENTS)]
             yield Lines([numbers[k] for k in kept], [texts[k] for k in kept])
 
-    def whole(self) -> str:
-        return "\n".join(line for lines in self.lines() for line in lines.texts)
+    def whole(self) -> list[str]:
+        return [line for lines in self.lines() for line in lines.texts]
 
     def _no_text(self, encoding: str, reason: str) -> str:
         return (

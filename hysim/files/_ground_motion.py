@@ -7,7 +7,7 @@ order; else it is a table with a column of times.
 
 import re
 from io import BytesIO
-from itertools import islice
+from itertools import islice, takewhile
 from typing import Any, Literal, NamedTuple
 
 import numpy as np
@@ -26,7 +26,17 @@ from hysim.files._number_lists import (
     number_list,
     peer_header,
 )
-from hysim.files._table import COMMENTS, Column, Table, UnreadableError, listed, require, shown
+from hysim.files._table import (
+    COMMENTS,
+    Column,
+    Table,
+    UnreadableError,
+    check_complete,
+    check_increasing,
+    listed,
+    require,
+    shown,
+)
 from hysim.records import step_if_even
 from hysim.signals import sample_times
 
@@ -133,19 +143,21 @@ def load_ground_motion(
     >>> t.tolist(), acceleration.round(6).tolist()
     ([0.0, 0.005, 0.01], [0.0, 0.980665, -1.96133])
     """
-    _check_arguments(sample_time, units, t, skip, delimiter, decimal)
+    check_unit(units)
+    is_step = sample_time is None or 0.0 < sample_time < np.inf
+    require(is_step, f"sample_time must be positive and finite, got {sample_time}")
+    require(sample_time is None or t is None, "give either sample_time or the column t, not both")
+    options_of_a_text(delimiter, decimal, None, skip, None)
     choice = _Choice(t, acceleration, sample_time, units)
     for_text = {"delimiter": delimiter, "decimal": decimal, "encoding": encoding}
     with opened(path) as source:
         if source.format == "text":
-            text = Text(source.content, source.name, source.encoding or encoding).whole()
-            step, values = _of_text(text, choice, skip, delimiter, decimal)
+            lines = Text(source.content, source.name, source.encoding or encoding).whole()
+            step, values = _of_text(lines, choice, skip, delimiter, decimal)
         else:
             require(not skip, f"skip is for text, this is a file of the format {source.format}: leave it out")
             with table_of(source, for_text) as table:
                 step, values = _of_table(table, choice)
-        require(values.size >= 2, f"a ground motion needs at least 2 samples, there are {values.size}")
-        require(np.isfinite(values).all(), "the accelerations are too large for their unit: correct it by units=")
         begin, sample_time = step
         return begin + sample_times(values.size, sample_time), values
 
@@ -165,35 +177,37 @@ def column_names(path: Source, **for_text: Any) -> tuple[str, ...]:
         return tuple(table.labels)
 
 
-def _check_arguments(
-    sample_time: float | None, units: str | None, t: object, skip: int, delimiter: str | None, decimal: str | None
-) -> None:
-    check_unit(units)
-    is_step = sample_time is None or 0.0 < sample_time < np.inf
-    require(is_step, f"sample_time must be positive and finite, got {sample_time}")
-    require(sample_time is None or t is None, "give either sample_time or the column t, not both")
-    options_of_a_text(delimiter, decimal, None, skip, None)
-
-
 _Motion = tuple[tuple[float, float], FloatArray]
 """First time and step, and the accelerations in m/s^2."""
 
 
-def _of_text(text: str, choice: _Choice, skip: int, delimiter: str | None, decimal: str | None) -> _Motion:
-    lines = text.split("\n")
+def _of_text(lines: list[str], choice: _Choice, skip: int, delimiter: str | None, decimal: str | None) -> _Motion:
     by_column = choice.t is not None or choice.acceleration is not None
     if not by_column and (header := peer_header(lines[: max(TOP, skip)])):
-        return _of_stated(text, header, choice, skip, decimal)
-    if not by_column and (blocks := cosmos_blocks(text, skip)):
-        return _of_cosmos(text, blocks, choice, decimal)
+        return _of_stated(lines, header, choice, max(skip, header.line), decimal, "g")
+    if not by_column and (blocks := cosmos_blocks(lines, skip)):
+        block, line = blocks[0], blocks[0].line
+        numbers = ", ".join(str(each.line) for each in blocks)
+        require(
+            len(blocks) == 1,
+            f"the file holds {len(blocks)} accelerations, in lines {numbers}: save each to a file, or pass the number "
+            "of lines above the last one as skip=",
+        )
+        unit = choice.units or stated_unit(lines[line - 1])
+        require(unit is not None, f"line {line} states no unit of its accelerations: pass units=")
+        return _of_stated(block_below(lines, line), block, choice._replace(units=unit), line, decimal, "")
     if not by_column and choice.sample_time is not None:
-        return _of_list(text, choice, choice.sample_time, skip, delimiter, decimal)
-    below = "\n" * min(skip, len(lines)) + "\n".join(lines[skip:])
+        require(delimiter is None, "delimiter is for columns: a list of numbers needs none")
+        list_of_numbers = number_list(lines, decimal, skip)
+        list_of_numbers.check_widths()
+        values = _in_stated_unit(list_of_numbers, choice, "m/s^2")
+        _check_no_times(list_of_numbers)
+        return (0.0, choice.sample_time), values
     try:
-        table = _table_below_titles(below, delimiter, decimal)
+        table = _table_below_titles([""] * min(skip, len(lines)) + lines[skip:], delimiter, decimal)
         require(by_column or len(table.labels) > 1, "there is no column of times beside the accelerations")
     except ValueError as error:
-        if not by_column and (count := _count_in_list(text, decimal, skip)):
+        if not by_column and (count := _count_in_list(lines, decimal, skip)):
             raise UnreadableError(
                 f"{error}; if these are {count} accelerations in reading order, pass their sample_time="
             ) from None
@@ -201,10 +215,12 @@ def _of_text(text: str, choice: _Choice, skip: int, delimiter: str | None, decim
     return _of_table(table, choice)
 
 
-def _table_below_titles(text: str, delimiter: str | None, decimal: str | None) -> Table:
-    lines, errors = text.split("\n"), list[ValueError]()
-    titles = _titles(lines)
-    for kept in (len(titles), 2, 1, 0):  # all, names and units, names, or none
+def _table_below_titles(lines: list[str], delimiter: str | None, decimal: str | None) -> Table:
+    """The table below some titles: all lines of text above it are names and units, or the last two, one, or none."""
+    samples = (k for k, line in enumerate(lines) if line.strip() and not line.lstrip().startswith(COMMENTS))
+    titles = [*takewhile(lambda place: not re.match(r"\s*\"?[+-]?[.,]?\d", lines[place]), samples)]
+    errors = list[ValueError]()
+    for kept in (len(titles), 2, 1, 0):
         dropped = titles[: max(0, len(titles) - kept)]
         below = "\n".join("" if k in dropped else line for k, line in enumerate(lines))
         try:
@@ -214,68 +230,31 @@ def _table_below_titles(text: str, delimiter: str | None, decimal: str | None) -
     raise errors[0]
 
 
-def _titles(lines: list[str]) -> list[int]:
-    """Places of the lines of text above the first one that begins with a number."""
-    titles = []
-    for place, line in enumerate(lines):
-        if re.match(r"\s*\"?[+-]?[.,]?\d", line):
-            break
-        if line.strip() and not line.lstrip().startswith(COMMENTS):
-            titles.append(place)
-    return titles
-
-
-def _count_in_list(text: str, decimal: str | None, skip: int) -> int:
+def _count_in_list(lines: list[str], decimal: str | None, skip: int) -> int:
     try:
-        return number_list(text, decimal, skip).values.size
+        return number_list(lines, decimal, skip).values.size
     except ValueError:
         return 0
 
 
-def _of_stated(text: str, header: StatedValues, choice: _Choice, skip: int, decimal: str | None) -> _Motion:
-    """The values below a line that states their number and step, in g if their unit is not stated."""
-    require(
-        0.0 < header.step < np.inf,
-        f"line {header.line}: the step must be positive, got {header.step:g}; correct the line",
-    )
-    require(
-        choice.sample_time in (None, header.step),
-        f"line {header.line} states a step of {header.step:g} s: leave out sample_time, or correct the line",
-    )
-    numbers = number_list(text, decimal, max(skip, header.line))
-    check_quantity(numbers.header)
-    require(
-        numbers.values.size == header.n_values,
-        f"line {header.line} states {header.n_values} values, but {numbers.values.size} follow: the file is "
-        "incomplete, or the line is to be corrected",
-    )
-    unit = choice.units or stated_unit(numbers.header) or "g"
-    return (0.0, header.step), in_si(numbers.values, unit)
-
-
-def _of_cosmos(text: str, blocks: list[StatedValues], choice: _Choice, decimal: str | None) -> _Motion:
-    """The only block of accelerations of a file that may hold velocities and displacements too."""
-    first, *others = blocks
-    lines = ", ".join(str(block.line) for block in blocks)
-    require(
-        not others,
-        f"the file holds {len(blocks)} accelerations, in lines {lines}: save each to a file, or pass the number of "
-        "lines above the last one as skip=",
-    )
-    unit = choice.units or stated_unit(text.split("\n")[first.line - 1])
-    require(unit is not None, f"line {first.line} states no unit of its accelerations: pass units=")
-    return _of_stated(block_below(text, first.line), first, choice._replace(units=unit), 0, decimal)
-
-
-def _of_list(
-    text: str, choice: _Choice, sample_time: float, skip: int, delimiter: str | None, decimal: str | None
+def _of_stated(
+    lines: list[str], header: StatedValues, choice: _Choice, skip: int, decimal: str | None, unit: str
 ) -> _Motion:
-    require(delimiter is None, "delimiter is for columns: a list of numbers needs none")
-    numbers = number_list(text, decimal, skip)
-    numbers.check_widths()
+    """The values below a line that states their number and step, in this unit if none is stated."""
+    where, n, step = f"line {header.line}", header.n_values, header.step
+    require(0.0 < step < np.inf, f"{where}: the step must be positive, got {step:g}; correct the line")
+    is_same = choice.sample_time in (None, step)
+    require(is_same, f"{where} states a step of {step:g} s: leave out sample_time, or correct the line")
+    numbers = number_list(lines, decimal, skip)
+    values = _in_stated_unit(numbers, choice, unit)
+    advice = "the file is incomplete, or the line is to be corrected"
+    require(values.size == n, f"{where} states {n} values, but {values.size} follow: {advice}")
+    return (0.0, step), values
+
+
+def _in_stated_unit(numbers: NumberList, choice: _Choice, unit: str) -> FloatArray:
     check_quantity(numbers.header)
-    _check_no_times(numbers)
-    return (0.0, sample_time), in_si(numbers.values, choice.units or stated_unit(numbers.header) or "m/s^2")
+    return in_si(numbers.values, choice.units or stated_unit(numbers.header) or unit)
 
 
 def _check_no_times(numbers: NumberList) -> None:
@@ -296,19 +275,13 @@ def _of_table(table: Table, choice: _Choice) -> _Motion:
     time = _time_column(table, choice)
     motion = _motion_column(table, choice, time)
     columns = [motion] if time is None else [motion, time]
-    values = table.values(columns)
-    if np.isnan(values).any():
-        k, j = np.argwhere(np.isnan(values).T)[0]
-        raise ValueError(
-            f"{table.place(k)}, column {shown(columns[j].label)}: the value is missing; fill it in, or delete the "
-            "lines from there on"
-        )
-    notes = table.notes.units
-    unit = choice.units or unit_of_column(motion.label, notes.get(motion.label, motion.unit))
+    values, units = table.values(columns), table.notes.units
+    check_complete(table, columns, values, "fill it in, or delete the lines from there on")
+    unit = choice.units or unit_of_column(motion.label, units.get(motion.label, motion.unit))
+    accelerations = in_si(values[0], unit)
     if time is None:
-        return (0.0, choice.sample_time or 0.0), in_si(values[0], unit)
-    clock = _in_seconds(values[1], notes.get(time.label, time.unit))
-    return _even(table, clock), in_si(values[0], unit)
+        return (0.0, choice.sample_time or 0.0), accelerations
+    return _even(table, _in_seconds(values[1], units.get(time.label, time.unit))), accelerations
 
 
 def _signals(table: Table) -> list[str]:
@@ -320,37 +293,26 @@ def _time_column(table: Table, choice: _Choice) -> Column | None:
     """The column of times, None where the caller gives the step instead."""
     if choice.t is not None:
         return table.column(choice.t)
-    names = [name for name in _signals(table) if _TIME_NAME.fullmatch(name)]
+    names, is_named = [name for name in _signals(table) if _TIME_NAME.fullmatch(name)], choice.acceleration is not None
     if choice.sample_time is not None:
-        require(
-            not names or choice.acceleration is not None,
-            f"there is a column of times, {shown(names[0]) if names else ''}: leave out sample_time, or name the "
-            "column of the acceleration",
-        )
+        advice = "leave out sample_time, or name the column of the acceleration"
+        require(is_named or not names, f"there is a column of times, {shown(''.join(names[:1]))}: {advice}")
         return None
-    if len(names) == 1:
-        return table.column(names[0])
-    require(not names, f"several columns may be the time: pass one of {listed(names)} as t=")
-    require(
-        len(_signals(table)) == 2 and choice.acceleration is None,
-        f"no column is called t or time, the columns are: {listed(table.labels)}; pass one as t=, or sample_time= if "
-        "there is none",
-    )
-    return table.column(0)
+    require(len(names) < 2, f"several columns may be the time: pass one of {listed(names)} as t=")
+    columns, advice = f"the columns are: {listed(table.labels)}", "pass one as t=, or sample_time= if there is none"
+    is_clear = names or (len(_signals(table)) == 2 and not is_named)
+    require(is_clear, f"no column is called t or time, {columns}; {advice}")
+    return table.column(names[0] if names else 0)
 
 
 def _motion_column(table: Table, choice: _Choice, time: Column | None) -> Column:
     if choice.acceleration is not None:
         return table.column(choice.acceleration)
     others = [name for name in _signals(table) if time is None or name != time.label]
-    names = [name for name in others if _MOTION_NAME.fullmatch(name)]
-    if len(names) == 1 or len(others) == 1:
-        return table.column((names or others)[0])
-    if names or not others:
-        raise ValueError(f"the columns are: {listed(table.labels)}; pass that of the acceleration as acceleration=")
-    raise ValueError(
-        f"no column is called acceleration, the columns are: {listed(table.labels)}; pass one as acceleration="
-    )
+    names = [name for name in others if _MOTION_NAME.fullmatch(name)] or others
+    columns = f"the columns are: {listed(table.labels)}; pass that of the acceleration as acceleration="
+    require(len(names) == 1, columns)
+    return table.column(names[0])
 
 
 def _in_seconds(times: FloatArray, unit: str) -> FloatArray:
@@ -364,16 +326,11 @@ def _in_seconds(times: FloatArray, unit: str) -> FloatArray:
 
 def _even(table: Table, times: FloatArray) -> tuple[float, float]:
     """First time and step of evenly spaced times; a ValueError names the place where they are not."""
-    require(times.size >= 2, f"a ground motion needs at least 2 samples, there are {times.size}")
-    steps = np.diff(times)
-    if not (steps > 0.0).all():
-        k = int(np.argmax(steps <= 0.0)) + 1
-        raise ValueError(
-            f"{table.place(k)}: time must increase, got {times[k]} after {times[k - 1]}; sort the samples and remove "
-            "repeated ones, or name the column of the acceleration and pass sample_time="
-        )
+    advice = "sort the samples and remove repeated ones, or name the column of the acceleration and pass sample_time="
+    check_increasing(table, times, np.arange(times.size), advice)
     step = step_if_even(times)
     if step is None:
+        steps = np.diff(times)
         usual = float(np.median(steps))
         k = int(np.argmax(np.abs(steps - usual))) + 1
         raise ValueError(
@@ -386,13 +343,16 @@ def _even(table: Table, times: FloatArray) -> tuple[float, float]:
 
 
 def in_si(values: FloatArray, unit: str) -> FloatArray:
-    """Accelerations in m/s^2, infinite where too large, from those in a unit; ValueError if it is unknown."""
+    """Accelerations in m/s^2, from those in a unit; ValueError if it is unknown, or they are too few or too large."""
     name = _name(unit)
     if name is None:
         raise ValueError(f"{shown(unit)} is no known unit of acceleration: {_KNOWN}; pass the file's unit as units=")
     factor, divisor = _SCALES[name]
     with np.errstate(over="ignore"):
-        return np.asarray(values * factor / divisor)
+        accelerations = np.asarray(values * factor / divisor)
+    require(accelerations.size >= 2, f"a ground motion needs at least 2 samples, there are {accelerations.size}")
+    require(np.isfinite(accelerations).all(), "the accelerations are too large for their unit: correct it by units=")
+    return accelerations
 
 
 def check_unit(unit: str | None) -> None:

@@ -22,7 +22,7 @@ from hysim._columns.resolution import output_quantum
 from hysim.files._arrays import NUMBERS, Arrays, mat, npy, npz
 from hysim.files._delimited import DECIMALS, THOUSANDS, Delimited, Text, delimited
 from hysim.files._hdf5 import hdf5
-from hysim.files._table import Column, Frame, Table, damaged, require, shown
+from hysim.files._table import Column, Frame, Table, check_complete, check_increasing, damaged, require
 from hysim.interop import table_in
 from hysim.records import Record
 
@@ -239,22 +239,49 @@ class _Named(Protocol):
 def opened(source: Source) -> Iterator[Opened]:
     """Open a source to read from, and begin every message about it with its name; OSError, TypeError or ValueError."""
     with ExitStack() as stack:
+        path, encoding, table = None, None, None
+        file: BinaryIO
         if isinstance(source, (str, os.PathLike)):
             path = Path(source)
-            file = stack.enter_context(path.open("rb"))
-            is_regular = path.is_file()  # not a pipe or a device
-            content = _regular(path, file) if is_regular else _stream(path.name, file)
+            name, file = path.name, stack.enter_context(path.open("rb"))
+            if not path.is_file():  # a pipe or a device
+                path, (file, encoding) = None, _content(file)
         elif isinstance(source, _Readable):
-            content = _stream(Path(str(source.name)).name if isinstance(source, _Named) else "stream", source)
+            name = Path(str(source.name)).name if isinstance(source, _Named) else "stream"
+            file, encoding = _content(source)
         elif (table := table_in(source)) is not None:
-            content = Opened(f"the {table.kind}", "frame", Frame(table))
+            name, file = f"the {table.kind}", BytesIO()
         else:
             raise TypeError(f"load takes a path, an open file or a DataFrame, got {type(source).__name__}")
         try:
-            yield content
+            yield Opened(name, "frame", Frame(table)) if table is not None else _opened(name, file, path, encoding)
         except ValueError as error:
             line = " ".join(str(error).split())
-            raise ValueError(line if line.startswith(content.name) else f"{content.name}: {line}") from None
+            raise ValueError(line if line.startswith(name) else f"{name}: {line}") from None
+
+
+def _content(stream: _Readable) -> tuple[BytesIO, str | None]:
+    """The content of a stream, not much more than the most that is taken, and its encoding if it is text."""
+    pieces, size = list[Any](), 0
+    while size <= MOST_TEXT and (piece := stream.read(_PIECE)):
+        pieces.append(piece)
+        size += len(piece)
+    is_text = bool(pieces) and isinstance(pieces[0], str)
+    content = "".join(pieces).encode(errors="replace") if is_text else b"".join(pieces)
+    return BytesIO(content), "utf-8" if is_text else None
+
+
+def _opened(name: str, file: BinaryIO, path: Path | None, encoding: str | None) -> Opened:
+    form = format_of(file.read(_HEAD))
+    form = "text" if encoding and form != "model" else form
+    size = file.seek(0, 2)
+    require(
+        size <= MOST_TEXT or (path is not None and form != "text"),
+        f"{name} is too large: a text or a stream may have {MOST_TEXT:,} bytes, got {size}; cut it, or save its "
+        "columns as NPZ, MAT or HDF5 and pass the path",
+    )
+    file.seek(0)
+    return Opened(name, form, file, path, encoding)
 
 
 def format_of(head: bytes) -> str:
@@ -268,38 +295,6 @@ def format_of(head: bytes) -> str:
     if head.startswith(b"MATLAB 5.0") or head[124:128] in (b"\x00\x01IM", b"\x01\x00MI"):
         return "mat"
     return "model" if _MODEL.match(head) else "text"
-
-
-def _regular(path: Path, file: BinaryIO) -> Opened:
-    form = format_of(file.read(_HEAD))
-    size = file.seek(0, 2)
-    if form == "text":
-        _check_size(path.name, size)
-    file.seek(0)
-    return Opened(path.name, form, file, path)
-
-
-def _stream(name: str, source: Any) -> Opened:
-    pieces: list[Any] = []
-    size = 0
-    while piece := source.read(_PIECE):
-        size += len(piece)
-        _check_size(name, size)
-        pieces.append(piece)
-    is_text = bool(pieces) and isinstance(pieces[0], str)
-    content = "".join(pieces).encode(errors="replace") if is_text else b"".join(pieces)
-    form = format_of(content[:_HEAD])
-    if is_text and form != "model":
-        form = "text"
-    return Opened(name, form, BytesIO(content), None, "utf-8" if is_text else None)
-
-
-def _check_size(name: str, size: int) -> None:
-    require(
-        size <= MOST_TEXT,
-        f"{name} is too large: a text or a stream may have {MOST_TEXT:,} bytes, got {size}; cut it, or save its "
-        "columns as NPZ, MAT or HDF5 and pass the path",
-    )
 
 
 @contextmanager
@@ -358,14 +353,10 @@ def _columns(table: Table, keys: Mapping[str, str | int | None]) -> dict[str, Co
 def _parts(
     table: Table, columns: Mapping[str, Column], values: FloatArray, on_missing: str
 ) -> list[npt.NDArray[np.intp]]:
-    is_missing = np.isnan(values)
-    if on_missing == "error" and is_missing.any():
-        k, j = np.argwhere(is_missing.T)[0]
-        raise ValueError(
-            f"{table.place(k)}, column {shown([*columns.values()][j].label)}: the value is missing; "
-            'on_missing="drop" leaves such samples out, on_missing="split" cuts the record there'
-        )
-    samples = np.flatnonzero(~is_missing.any(axis=0))
+    if on_missing == "error":
+        advice = 'on_missing="drop" leaves such samples out, on_missing="split" cuts the record there'
+        check_complete(table, [*columns.values()], values, advice)
+    samples = np.flatnonzero(~np.isnan(values).any(axis=0))
     is_cut = on_missing == "split"
     parts = np.split(samples, np.flatnonzero(np.diff(samples) > 1) + 1 if is_cut else [])
     long_enough = [part for part in parts if part.size >= 2]
@@ -374,12 +365,8 @@ def _parts(
     require(long_enough, f"a record needs at least 2 samples, there are {longest}{in_a_row}")
     times = values[[*columns].index("t")] if "t" in columns else np.arange(float(values.shape[1]))
     for part in long_enough:
-        for wrong in np.flatnonzero(np.diff(times[part]) <= 0):
-            before, k = part[wrong : wrong + 2]
-            raise ValueError(
-                f"{table.place(k)}: time must increase, got {times[k]} after {times[before]}; sort the samples, "
-                "remove repeated ones, or load without time: t=False"
-            )
+        advice = "sort the samples, remove repeated ones, or load without time: t=False"
+        check_increasing(table, times, part, advice)
     return long_enough
 
 

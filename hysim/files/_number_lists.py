@@ -16,6 +16,7 @@ alone. Only the last line may be shorter than the others.
 import math
 import re
 from contextlib import suppress
+from itertools import takewhile
 from typing import NamedTuple
 
 import numpy as np
@@ -33,8 +34,7 @@ _IN_ORDER = re.compile(
     rf"^\s*(\d+)[\s,]+{_REAL}[\s,]*NPTS\W+DT\b|\bNPTS\s*,?\s*DT\s*[=:]?\s*(\d+)[\s,]+{_REAL}", re.IGNORECASE
 )
 _BLOCK = re.compile(
-    rf"^[ \t]*(\d+)\s+points\s+of\s+acc\w*\s+data\s+equally\s+spaced\s+at\s+{_REAL}\s*sec.*$",
-    re.IGNORECASE | re.MULTILINE,
+    rf"[ \t]*(\d+)\s+points\s+of\s+acc\w*\s+data\s+equally\s+spaced\s+at\s+{_REAL}\s*sec", re.IGNORECASE
 )
 _NUMBERS_ONLY = re.compile(r"[\d\s.,;+\-eEdD]*")
 
@@ -69,19 +69,14 @@ def peer_header(lines: list[str]) -> StatedValues | None:
     return None
 
 
-def cosmos_blocks(text: str, skip: int) -> list[StatedValues]:
+def cosmos_blocks(lines: list[str], skip: int) -> list[StatedValues]:
     """Every line below the first `skip` ones above a block of accelerations, as files of COSMOS have it."""
-    blocks = [
-        StatedValues(text.count("\n", 0, found.start()) + 1, int(found[1]), _real(found[2]))
-        for found in _BLOCK.finditer(text)
-    ]
-    return [block for block in blocks if block.line > skip]
+    numbered = [(number, _BLOCK.match(line)) for number, line in enumerate(lines, 1) if number > skip]
+    return [StatedValues(number, int(block[1]), _real(block[2])) for number, block in numbered if block]
 
 
-def block_below(text: str, line: int) -> str:
-    lines = text.split("\n")
-    end = next((k for k in range(line, len(lines)) if not _NUMBERS_ONLY.fullmatch(lines[k])), len(lines))
-    return "\n".join(lines[:end])
+def block_below(lines: list[str], line: int) -> list[str]:
+    return lines[:line] + list(takewhile(_NUMBERS_ONLY.fullmatch, lines[line:]))
 
 
 def check_quantity(header: str) -> None:
@@ -112,9 +107,8 @@ class NumberList(NamedTuple):
             )
 
 
-def number_list(text: str, decimal: str | None, skip: int = 0) -> NumberList:
+def number_list(lines: list[str], decimal: str | None, skip: int = 0) -> NumberList:
     """All numbers of a text after `skip` lines, or from the first line of numbers on; ValueError for anything else."""
-    lines = text.split("\n")
     if (decimal or _decimal_sign(lines[skip:])) == ",":
         lines = [line.replace(",", ".") for line in lines]
     samples = [k for k, line in enumerate(lines) if line.strip() and not line.lstrip().startswith(COMMENTS)]

@@ -9,6 +9,7 @@ from dataclasses import dataclass, field
 from typing import Any, NamedTuple, Protocol
 
 import numpy as np
+import numpy.typing as npt
 
 from hysim._basics.frozen import FloatArray
 from hysim._names import meant
@@ -111,6 +112,21 @@ def damaged(form: str) -> Iterator[None]:
     except Exception as error:
         reason = f"{type(error).__name__} {error}"[:_LONGEST_REASON].strip()
         raise UnreadableError(f"the {form} file is damaged: {reason}; copy or save it again") from None
+
+
+def check_complete(table: Table, columns: Sequence[Column], values: FloatArray, advice: str) -> None:
+    """Refuse a missing value, by its place."""
+    for sample, k in np.argwhere(np.isnan(values).T)[:1]:
+        raise ValueError(f"{table.place(sample)}, column {shown(columns[k].label)}: the value is missing; {advice}")
+
+
+def check_increasing(table: Table, times: FloatArray, samples: npt.NDArray[np.intp], advice: str) -> None:
+    """Refuse times of some samples that do not increase, by the place of the first."""
+    for k in np.flatnonzero(np.diff(times[samples]) <= 0.0)[:1]:
+        before, after = samples[k : k + 2]
+        raise ValueError(
+            f"{table.place(after)}: time must increase, got {times[after]} after {times[before]}; {advice}"
+        )
 
 
 def number_of(key: str, kind: str, *names: Sequence[str]) -> int | None:
