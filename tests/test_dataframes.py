@@ -344,13 +344,13 @@ def test_without_pandas_the_extra_is_named(monkeypatch):
     ("verb", "value", "message"),
     [
         (hs.save, RECORD, r"save takes a model of hysim, got Record: hs.save_record\(record, path\) writes a record"),
-        (hs.save_record, hs.Line(), r"save_record takes a Record, got Line: hs.save\(model, path\) writes a model"),
+        (hs.save_record, hs.Line(), r"save_record takes a Record, got Line: .* hs.save\(model, path\) writes a model"),
         (
             hs.save_record,
             hs.simulate(hs.Line(), None, U),
             r"make one by hs.Record\(u=result.u, y=result.y, t=result.t\)",
         ),
-        (hs.save_record, 3, r"save_record takes a Record, got int: hs.Record\(u=u, y=y\)"),
+        (hs.save_record, 3, r"save_record takes a Record, got int: make one by hs.Record\(u="),
     ],
 )
 def test_save_and_save_record_say_which_is_which(verb, value, message, tmp_path):

@@ -265,7 +265,7 @@ def test_a_decimal_comma_is_seen_where_it_can_be_nothing_else():
             {"sample_time": 1.0},
             "the first of 3 columns increases from line to line, as times do",
         ),
-        ("t,acc,accel\n0,1,2\n1,2,3\n", {}, "t, acc, accel; pass that of the acceleration as acceleration="),
+        ("t,acc,accel\n0,1,2\n1,2,3\n", {}, "t, acc, accel; pass one as acceleration="),
         ("t,time,a\n0,1,2\n1,2,3\n", {}, "several columns may be the time: pass one of t, time as t="),
         (".1\n.2\n", {}, "if these are 2 accelerations in reading order, pass their sample_time="),
         ("TITLE\n.1 .2 .3\n.4 .5\n", {}, "if these are 5 accelerations in reading order, pass their sample_time="),

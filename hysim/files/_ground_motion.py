@@ -310,8 +310,9 @@ def _motion_column(table: Table, choice: _Choice, time: Column | None) -> Column
         return table.column(choice.acceleration)
     others = [name for name in _signals(table) if time is None or name != time.label]
     names = [name for name in others if _MOTION_NAME.fullmatch(name)] or others
-    columns = f"the columns are: {listed(table.labels)}; pass that of the acceleration as acceleration="
-    require(len(names) == 1, columns)
+    which = "no column is" if names == others else "several columns are"
+    columns = f"the columns are: {listed(table.labels)}"
+    require(len(names) == 1, f"{which} called acceleration, {columns}; pass one as acceleration=")
     return table.column(names[0])
 
 

@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterable, Mapping
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
-from typing import Any, Protocol, runtime_checkable
+from typing import Any
 
 import numpy as np
 
@@ -67,7 +67,8 @@ def save_record(record: Record, path: str | Path) -> None:
     True
     """
     if (own := as_record(record, "save_record")) is None:
-        raise TypeError(f"save_record takes a Record, got {type(record).__name__}: {_advice(record)}")
+        advice = "make one by hs.Record(u=result.u, y=result.y, t=result.t); hs.save(model, path) writes a model"
+        raise TypeError(f"save_record takes a Record, got {type(record).__name__}: {advice}")
     record = own
     varying = along(record.channels)
     columns = {} if record.t is None else {"t": record.t}
@@ -75,28 +76,6 @@ def save_record(record: Record, path: str | Path) -> None:
     _check_columns(varying, path)
     channels = {name: name if name in varying else value for name, value in record.channels.items()}
     write_all({path: packed(columns, path, Notes(record.units, record.resolution, record.name, channels))})
-
-
-@runtime_checkable
-class _InputOutput(Protocol):
-    """A simulation, a closed loop."""
-
-    @property
-    def u(self) -> Any: ...
-    @property
-    def y(self) -> Any: ...
-
-
-@runtime_checkable
-class _Responding(Protocol):
-    def response(self, u: Any, /) -> Any: ...
-
-
-def _advice(value: Any) -> str:
-    """Name of the function to call for something that is not a record."""
-    if isinstance(value, _InputOutput):
-        return "make one by hs.Record(u=result.u, y=result.y, t=result.t)"
-    return "hs.save(model, path) writes a model" if isinstance(value, _Responding) else "hs.Record(u=u, y=y)"
 
 
 def _check_columns(names: Iterable[str], path: str | Path) -> None:
