@@ -111,7 +111,7 @@ def test_no_message_of_the_library_keeps_an_argument_that_is_an_option():
 
 
 READ_BY = {"files": "--encoding", "_load.py": "--on-missing"}
-READ_BY |= dict.fromkeys(("_ground_motion.py", "_number_lists.py", "records.py"), "--sample-time")
+READ_BY |= dict.fromkeys(("_ground_motion.py", "records.py"), "--sample-time")
 """Where messages come from that reach the commands with an option alone: those that read texts, records or times."""
 OPTIONS = {name: {*flags_of_one.values(), "--help"} for name, flags_of_one in FLAGS_OF.items()}
 ADVISED = re.compile(r"(?:hysim (\w+) )?(?<![\w-])(--[a-z][\w-]*)")

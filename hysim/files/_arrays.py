@@ -145,12 +145,11 @@ class Arrays:
         sizes = ", ".join(f"{shown(c.label)} {v.size}" for c, v in zip(columns, values, strict=True))
         is_even = len({column.size for column in values}) == 1
         require(is_even, f"the columns have unequal numbers of samples: {sizes}")
-        for column, each in zip(columns, values, strict=True):
-            if np.isinf(each).any():
-                k = int(np.argmax(np.isinf(each)))
-                place = f"{self.place(k)}, column {shown(column.label)}"
-                raise ValueError(f"{place}: expected a finite number, got {each[k]}")
-        return np.stack(values)
+        numbers_of = np.stack(values)
+        for sample, k in np.argwhere(np.isinf(numbers_of).T)[:1]:
+            place = f"{self.place(sample)}, column {shown(columns[k].label)}"
+            raise ValueError(f"{place}: expected a finite number, got {numbers_of[k, sample]}")
+        return numbers_of
 
     def place(self, sample: int) -> str:
         """The sample's number from 0."""
