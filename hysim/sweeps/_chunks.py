@@ -134,7 +134,7 @@ class Table:
         """Enter rows in the order of the study, and return them; one with another layout is a task that failed."""
         entered = []
         for row in rows:
-            layout = {name: np.shape(value) for name, value in row.outputs.items()}
+            layout = {name: () if type(value) is float else np.shape(value) for name, value in row.outputs.items()}
             if layout and not self.layout:
                 self.begin(layout)
             if layout and layout != self.layout:
