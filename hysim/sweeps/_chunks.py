@@ -1,7 +1,7 @@
 """Chunks of tasks: how they are computed, the table of the rows that are done, and the seeds of tasks.
 
-A chunk is computed task by task, or through their batch form; failures are kept as rows. The outputs of a task are kept
-by their names. A worker does not know the names and shapes that the study has.
+A chunk is computed task by task, or through their batch form; failures are kept as rows. Tasks whose outputs have the
+same names and shapes are kept together, as columns. A worker does not know the names and shapes that the study has.
 
 **Rows that are done.** The first task that succeeds, in the order of the study and not of time, sets the names and
 shapes of a row. A task that returns others has failed.
@@ -16,7 +16,7 @@ NumPy needs 10 us for each; here they are computed for all tasks at once by its 
 """
 
 import time
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any, NamedTuple, Protocol, runtime_checkable
 
 import numpy as np
@@ -49,62 +49,74 @@ class Chunk(NamedTuple):
         return Chunk(self.places[part], {name: values[part] for name, values in self.columns.items()})
 
 
-class Row(NamedTuple):
-    """A finished task: its place, its time [s], why it failed, and its outputs, none if it failed."""
+class Rows(NamedTuple):
+    """Finished tasks: places and times [s], shape (n,), and outputs, shape (n, ...), or errors if they failed."""
 
-    place: int
-    seconds: float
-    error: str | None
-    outputs: Mapping[str, float | FloatArray]
+    places: npt.NDArray[np.int64]
+    seconds: FloatArray
+    errors: Sequence[str]
+    outputs: Mapping[str, FloatArray]
 
 
-def computed(task: Task, chunk: Chunk) -> list[Row]:
+def computed(task: Task, chunk: Chunk) -> list[Rows]:
     """The rows of a chunk; kernels inside use one thread."""
     with at_most(1), silent():
         return _together(task.batch, chunk) if isinstance(task, Batched) else _singly(task, chunk)
 
 
-def _singly(task: Task, chunk: Chunk) -> list[Row]:
-    rows, columns = [], [column.tolist() for column in chunk.columns.values()]
-    for place, *arguments in zip(chunk.places.tolist(), *columns, strict=True):
+def _singly(task: Task, chunk: Chunk) -> list[Rows]:
+    groups: dict[Any, tuple[list[int], list[float], list[list[Any]]]] = {}  # by names and shapes, none if they failed
+    errors: list[str] = []
+    parameters = [column.tolist() for column in chunk.columns.values()]
+    for place, *arguments in zip(chunk.places.tolist(), *parameters, strict=True):
         begin = time.perf_counter()
         try:
-            arrays = _outputs(task(**dict(zip(chunk.columns, arguments, strict=True))))
-            error, outputs = None, {name: array if array.ndim else array.item() for name, array in arrays.items()}
-        except Exception as failure:
-            error, outputs = _message(failure), {}
-        rows.append(Row(place, time.perf_counter() - begin, error, outputs))
-    return rows
+            outputs = _outputs(task(**dict(zip(chunk.columns, arguments, strict=True))))
+        except Exception as error:
+            outputs = {}
+            errors.append(_message(error))
+        row = [*outputs.values()]
+        shapes = tuple([() if type(value) is float else value.shape for value in row])
+        places, seconds, rows = groups.setdefault(((*outputs,), shapes), ([], [], []))
+        places.append(place)
+        rows.append(row)
+        seconds.append(time.perf_counter() - begin)
+    finished = []
+    for (names, _), (places, seconds, rows) in groups.items():
+        columns = dict(zip(names, map(np.array, zip(*rows, strict=True)), strict=True))
+        finished.append(Rows(np.array(places), np.array(seconds), [] if names else errors, columns))
+    return finished
 
 
-def _together(batch: Task, chunk: Chunk) -> list[Row]:
+def _together(batch: Task, chunk: Chunk) -> list[Rows]:
     """The rows through the batch form; a chunk that fails is halved until each task that fails is alone."""
     begin, n = time.perf_counter(), chunk.places.size
+    errors: list[str] = []
     try:
-        arrays = _outputs(batch(**chunk.columns))
-        for name, array in arrays.items():
-            if array.shape[:1] != (n,):
-                raise ValueError(f"the batch form returned {name} of shape {array.shape} for {n} tasks")
+        outputs = _outputs(batch(**chunk.columns))
+        for name, column in outputs.items():
+            if np.shape(column)[:1] != (n,):
+                raise ValueError(f"the batch form returned {name} of shape {np.shape(column)} for {n} tasks")
     except Exception as error:
         if n > 1:
-            return [row for half in (slice(n // 2), slice(n // 2, n)) for row in _together(batch, chunk.part(half))]
-        return [Row(chunk.places.item(), time.perf_counter() - begin, _message(error), {})]
-    seconds = (time.perf_counter() - begin) / n
-    rows = zip(*(array if array.ndim > 1 else array.tolist() for array in arrays.values()), strict=True)
-    places = zip(chunk.places.tolist(), rows, strict=True)
-    return [Row(place, seconds, None, dict(zip(arrays, row, strict=True))) for place, row in places]
+            return [rows for half in (slice(n // 2), slice(n // 2, n)) for rows in _together(batch, chunk.part(half))]
+        errors, outputs = [_message(error)], {}
+    return [Rows(chunk.places, np.full(n, (time.perf_counter() - begin) / n), errors, outputs)]
 
 
-def _outputs(returned: Any) -> dict[str, FloatArray]:
+def _outputs(returned: Any) -> dict[str, Any]:
+    """The outputs by name, floats and arrays."""
     named = returned if isinstance(returned, Mapping) else {"value": returned}
     if not named or not all(isinstance(name, str) for name in named):
         raise TypeError(f"a task returns a number, an array, or a mapping of names to these, got {returned!r}")
-    arrays = {name: np.asarray(value) for name, value in named.items()}
-    for name, array in arrays.items():
-        if array.dtype.kind not in "fiub":
-            kind = type(named[name]).__name__
-            raise TypeError(f"a task returns numbers and arrays of numbers, got {kind} for {name}")
-    return {name: np.array(array, dtype=np.float64) for name, array in arrays.items()}  # it may use its arrays again
+    return {name: value if type(value) is float else _numbers(name, value) for name, value in named.items()}
+
+
+def _numbers(name: str, value: Any) -> FloatArray:
+    array = np.asarray(value)
+    if array.dtype.kind not in "fiub":
+        raise TypeError(f"a task returns numbers and arrays of numbers, got {type(value).__name__} for {name}")
+    return np.array(array, dtype=np.float64)  # a copy: the task may use its array again
 
 
 def _message(error: Exception) -> str:
@@ -130,23 +142,25 @@ class Table:
             self.values[name] = np.full((self.done.size, *shape), np.nan)
         self.layout = layout
 
-    def enter(self, rows: Iterable[Row]) -> list[Row]:
-        """Enter rows in the order of the study, and return them; one with another layout is a task that failed."""
+    def enter(self, rows: Iterable[Rows]) -> list[Rows]:
+        """Enter rows in the order of the study, and return them; those with another layout are tasks that failed."""
         entered = []
-        for row in rows:
-            layout = {name: () if type(value) is float else np.shape(value) for name, value in row.outputs.items()}
+        for part in rows:
+            layout = {name: column.shape[1:] for name, column in part.outputs.items()}
             if layout and not self.layout:
                 self.begin(layout)
             if layout and layout != self.layout:
                 first, other = _shown(self.layout), _shown(layout)
                 error = f"ValueError: the task returned {other}, where the first that succeeded returned {first}"
-                row = row._replace(error=error, outputs={})
-            if row.error is not None:
-                self.errors[row.place] = row.error
-            for name, value in row.outputs.items():
-                self.values[name][row.place] = value
-            self.seconds[row.place], self.done[row.place] = row.seconds, True
-            entered.append(row)
+                part = part._replace(errors=[error] * part.places.size, outputs={})
+            if part.errors:
+                self.errors |= zip(part.places.tolist(), part.errors, strict=True)
+            # every nan has the same bits, as it has when it is read from a store
+            outputs = {name: np.where(np.isnan(c), np.nan, c) for name, c in part.outputs.items()}
+            for name, column in outputs.items():
+                self.values[name][part.places] = column
+            self.seconds[part.places], self.done[part.places] = part.seconds, True
+            entered.append(part._replace(outputs=outputs))
         return entered
 
 

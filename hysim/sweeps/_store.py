@@ -38,7 +38,7 @@ from zlib import error as CompressionError  # noqa: N812
 import numpy as np
 
 from hysim._basics.atomic import replacing
-from hysim.sweeps._chunks import Layout, Row, Table
+from hysim.sweeps._chunks import Layout, Rows, Table
 from hysim.sweeps._space import Column, Space
 
 T = TypeVar("T")
@@ -224,7 +224,7 @@ class Store:
         if missing:
             raise ValueError(f"the arrays of the task {min(missing)} are missing")
 
-    def commit(self, rows: Sequence[Row], layout: Layout) -> None:
+    def commit(self, rows: Sequence[Rows], layout: Layout) -> None:
         """Write the rows of finished tasks, all or none of them; rows may be written again."""
         if not self._database.in_transaction:  # after an interrupt
             self._database.execute("BEGIN IMMEDIATE")
@@ -237,19 +237,22 @@ class Store:
                 self._database.execute("ROLLBACK")
             raise
 
-    def _write(self, rows: Sequence[Row], layout: Layout) -> None:
+    def _write(self, rows: Sequence[Rows], layout: Layout) -> None:
         if layout and not self.study.layout:
             self._add_outputs(layout)
-        study, shard = self.study, self._write_shard([row for row in rows if row.error is None])
-        tasks = zip(*(column[[row.place for row in rows]].tolist() for column in self._tasks), strict=True)
-        lines = [
-            [row.place, row.seconds, row.error, shard if row.error is None else None, *task]
-            + [row.outputs.get(name) for name in study.numbers]
-            for row, task in zip(rows, tasks, strict=True)
-        ]
+        study, shard = self.study, self._write_shard([part for part in rows if part.outputs])
         columns = ["task", "seconds", "error", "shard", "seed", *study.parameters.values(), *study.numbers.values()]
-        marks = ", ".join("?" * len(columns))
+        marks, lines = ", ".join("?" * len(columns)), self._lines(rows, shard)
         self._database.executemany(f"INSERT OR REPLACE INTO results ({_quoted(columns)}) VALUES ({marks})", lines)
+
+    def _lines(self, rows: Sequence[Rows], shard: str | None) -> Iterator[tuple[Any, ...]]:
+        for part in rows:
+            nothing = [None] * part.places.size
+            shards = [shard] * part.places.size if part.outputs else nothing
+            tasks = [column[part.places].tolist() for column in self._tasks]
+            numbers = [part.outputs[name].tolist() if part.outputs else nothing for name in self.study.numbers]
+            own = part.places.tolist(), part.seconds.tolist(), part.errors or nothing, shards
+            yield from zip(*own, *tasks, *numbers, strict=True)
 
     def _read(self) -> Study | None:
         tables = [name for (name,) in self._database.execute("SELECT name FROM sqlite_master WHERE type = 'table'")]
@@ -319,13 +322,13 @@ class Store:
         self._database.execute(f"PRAGMA busy_timeout = {1000 * _FOR_READERS:.0f}")
         self._database.execute("BEGIN IMMEDIATE")
 
-    def _write_shard(self, rows: list[Row]) -> str | None:
+    def _write_shard(self, rows: list[Rows]) -> str | None:
         names = [name for name, shape in self.study.shapes.items() if shape]
         if not rows or not names:
             return None
-        arrays: Any = {f"output_{name}": np.array([row.outputs[name] for row in rows]) for name in names}
-        places = [row.place for row in rows]
-        shard = f"{self.study.shards}-{min(places):09d}.npz"
+        arrays: Any = {f"output_{name}": np.concatenate([part.outputs[name] for part in rows]) for name in names}
+        places = np.concatenate([part.places for part in rows])
+        shard = f"{self.study.shards}-{places.min():09d}.npz"
         self._folder.mkdir(exist_ok=True)
         with replacing(self._shard(shard), "xb") as file:
             np.savez(file, task=places, **arrays)

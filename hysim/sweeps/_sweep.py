@@ -29,7 +29,7 @@ from hysim._basics.libraries import is_installed
 from hysim._basics.parallel import GLANCE, cores, processes, threads
 from hysim._basics.progress import Line, Progress, Reports, reports
 from hysim._release import __version__
-from hysim.sweeps._chunks import Chunk, Row, Table, Task, computed, seeds
+from hysim.sweeps._chunks import Chunk, Rows, Table, Task, computed, seeds
 from hysim.sweeps._result import Sweep, result_of
 from hysim.sweeps._space import Space, space_of
 from hysim.sweeps._store import ON_CHANGE, OnChange, Store, opened
@@ -52,7 +52,7 @@ class _DaskClient(Protocol):
 class Workers(NamedTuple):
     """A function that sends a chunk out, and the number of chunks that are computed at a time."""
 
-    submit: Callable[[Chunk], Future[list[Row]]]
+    submit: Callable[[Chunk], Future[list[Rows]]]
     number: Callable[[], int]
 
 
@@ -82,7 +82,7 @@ def _begin(task: Task) -> None:
     _task_of_process[:] = [task]
 
 
-def _computed_here(chunk: Chunk) -> list[Row]:
+def _computed_here(chunk: Chunk) -> list[Rows]:
     return computed(_task_of_process[0], chunk)
 
 
@@ -273,7 +273,7 @@ class _Run:
     ) -> None:
         self.remaining, self.table, self.store, self.workers = remaining, table, store, workers
         self.progress = progress or (lambda done, total: None)
-        self.running: dict[Future[list[Row]], int] = {}  # numbers of tasks
+        self.running: dict[Future[list[Rows]], int] = {}  # numbers of tasks
         self.sent, self.largest, self.seconds_a_task = 0, 0, 0.0
 
     def run(self) -> None:
@@ -324,8 +324,8 @@ class _Run:
 
     def _settle(self) -> None:
         """Enter, write and report finished chunks, in the order of the tasks until the layout is known."""
-        rows: list[Row] = []
-        settled, lost = list[Future[list[Row]]](), None
+        rows: list[Rows] = []
+        settled, lost = list[Future[list[Rows]]](), None
         for future in self.running:
             is_done = future.done()
             if is_done and not future.cancelled() and future.exception() is None:
@@ -338,7 +338,7 @@ class _Run:
         if rows:
             if self.store is not None:
                 self.store.commit(rows, self.table.layout)
-            cost = sum(row.seconds for row in rows) / len(rows)
+            cost = float(np.concatenate([part.seconds for part in rows]).mean())
             self.seconds_a_task = 0.5 * (self.seconds_a_task + cost) if self.largest else cost
             self.largest = max(self.largest, *(self.running.pop(future) for future in settled))
             self.progress(*self._done())
