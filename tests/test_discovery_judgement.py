@@ -11,8 +11,7 @@ from scipy.optimize import least_squares
 
 import hysim as hs
 from hysim.discovery._competitors import steady_width
-from hysim.discovery._held_out import at_one_rate, rate_spread
-from hysim.discovery._judgement import BETTER, RATES, _loops, competitors, doubts, judge
+from hysim.discovery._judgement import BETTER, RATES, _loops, at_one_rate, competitors, doubts, judge, rate_spread
 
 TAU = 0.05  # s
 LAW = hs.BoucWen(beta=1.5, gamma=0.4, feedthrough=1.0, gain=-0.5)
@@ -296,9 +295,9 @@ def test_linear_creep_is_a_lag():
 @pytest.mark.skipif(not COMPILED, reason="identifies on hundreds of samples, which takes minutes uncompiled")
 def test_only_a_law_that_could_change_the_verdict_is_worth_a_search():
     curve = competitors(sines(lambda u, _: MAPS["tanh"](u)))
-    assert curve.enough == pytest.approx(BETTER * curve.trial.errors["curve"], rel=1e-3)  # and the floor of the errors
+    assert curve.enough == pytest.approx(BETTER * curve.errors["curve"], rel=1e-3)  # and the floor of the errors
     slow = competitors(sines(lag().response))
-    assert slow.enough == pytest.approx(slow.trial.errors["rival"] / BETTER, rel=1e-3)
+    assert slow.enough == pytest.approx(slow.errors["rival"] / BETTER, rel=1e-3)
     assert competitors(sines(lambda u, _: LAW.response(u))).enough == np.inf
     assert competitors([hs.Record(u=TRIANGLE, y=LAW.response(TRIANGLE))]).enough == np.inf
 

@@ -19,7 +19,7 @@ from hysim import metrics
 from hysim._basics.blas import one_blas_thread
 from hysim._basics.frozen import FloatArray, check_choice
 from hysim._basics.progress import Progress, Reports, reports
-from hysim.discovery._judgement import HYSTERESIS, LAG, NO_STRUCTURE, Competitors, Judgement, competitors, doubts, judge
+from hysim.discovery._judgement import HYSTERESIS, LAG, NO_STRUCTURE, Judgement, Trial, competitors, doubts, judge
 from hysim.discovery._refinement import DIVERGED, AnyExponent, Candidate, FreeRun, Samples, Work
 from hysim.discovery._result import Discovery, coefficients, law_from
 from hysim.discovery._search import Library, Options, Outcome, or_any_exponent, searched
@@ -271,7 +271,7 @@ def _discovery(
     records: tuple[Record, ...],
     outcome: Outcome,
     candidate: Candidate[Any],
-    others: Competitors,
+    others: Trial,
     seed: int,
 ) -> Discovery:
     letter, structure = outcome.library.letter, candidate.structure
@@ -323,7 +323,7 @@ def _regressed(outcome: Outcome) -> dict[str, float]:
 
 
 def _judged(
-    records: tuple[Record, ...], candidate: Candidate[Any], letter: str, models: Sequence[Any], others: Competitors
+    records: tuple[Record, ...], candidate: Candidate[Any], letter: str, models: Sequence[Any], others: Trial
 ) -> Judgement:
     structure = candidate.structure
 

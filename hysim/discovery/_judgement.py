@@ -1,13 +1,15 @@
 """The verdict on records: hysteresis, a lag that looks like it, or neither.
 
-Models of three kinds are fitted to the same records and judged on samples that were left out (`_held_out`):
+Models of three kinds are fitted to the same records and judged on samples that were left out:
 
     still     a curve, or a line: no memory
     lagging   a linear plant of one or two poles, or relaxations: memory that depends on time
     turning   the law, or a superposition of plays: memory that depends on the order of the extremes only
 
 The plays need no library: the verdict does not depend on whether the library has a good law. Better means an rmse on
-held-out samples below BETTER times the other's.
+held-out samples below BETTER times the other's. A model explains the samples if its error is at most FACTOR times that
+on the fitted samples, where records or rates are left out, or else times the noise; or at most UNEXPLAINED times the
+error of a curve.
 
 1. Neither a lagging nor a turning model is better than the still ones: "no structure found".
 2. One rate, or no time: "cannot be told from one rate".
@@ -16,21 +18,30 @@ held-out samples below BETTER times the other's.
    or noise.
 4. If the law diverges in free run, on the records or on steady cycles over their range: "no structure found", unless
    the plays show at several rates that the records are hysteretic.
+
+**The samples that are left out** of a fit at a time are a record, if there are several and none goes beyond the range
+of the others; of one record a rate, if its cycles have several; else a cycle, if there are three; else a few blocks.
+The start of each record is never left out, since it determines the initial state, and samples beyond the range of the
+others do not count, unless all are. A slow trend of each record is taken out of every residual.
 """
 
+import itertools
 import math
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property, partial
+from typing import NamedTuple, Protocol
 
 import numpy as np
+import numpy.typing as npt
+from scipy import special
 
 from hysim import metrics, signals
 from hysim._basics.frozen import FloatArray, frozen
 from hysim._columns.turning import TOLERANCE, complete_cycles
-from hysim.discovery import _held_out as held_out
-from hysim.discovery._competitors import FLOOR, Rival, rival, steady_width
-from hysim.discovery._held_out import CURVE, LAW, PLAYS, RELAXATIONS, RIVAL, SEVERAL, Law, Refit, Trial
+from hysim.discovery._competitors import FLOOR, Rival, curve, means, plays, relaxations, rival, steady_width, trend
 from hysim.errors import SimulationError
+from hysim.identification import folds as blocks
 from hysim.plants.transfer_function import TransferFunction
 from hysim.records import Record
 
@@ -39,15 +50,171 @@ LAG = "linear lag"
 ONE_RATE = "cannot be told from one rate"
 NO_STRUCTURE = "no structure found"
 
+LAW, RIVAL, RELAXATIONS, PLAYS, CURVE = "law", "rival", "relaxations", "plays", "curve"
+
 RATES = (0.1, 1.0, 10.0)
 BETTER = 0.9
+FACTOR, UNEXPLAINED = 2.0, 0.2
 LEAST = 1e-4
 """Strokes by which a memory must show: no measured input is known more exactly."""
 
+_DOUBT = 0.05  # probability of the t test below which a difference counts
 _THINNED = 1000  # samples of all records together, beyond which fewer are judged
 _PER_BRANCH = 32  # samples of a typical branch that thinning leaves: a sine's extreme is then right to 1.2e-3
+_FOLDS = 5
+_START = 0.1  # share of each record that is never left out
+_PARTS = 8  # of each record, for the t test
+_INSIDE = 0.05  # spans of the input by which left-out samples may reach beyond the others
+SEVERAL = 1.5
+"""Rates whose ratio is smaller count as one."""
+
+_EDGES = np.linspace(0.05, 0.95, 10)  # of the bands, in spans of the input
+_TAILS = (0.05, 0.95)
 _AMPLITUDES = (0.25, 0.5, 0.75, 1.0)
 _CYCLES = 10
+
+Samples = npt.NDArray[np.intp]
+
+Model = Callable[[FloatArray], FloatArray]
+"""Outputs (n_samples,) at all samples, fitted again where the weights (n_samples,) are not zero."""
+
+
+class Scores(NamedTuple):
+    """Rmse of a model on held-out samples, on the fitted ones, and in parts of the held-out ones [unit of y]."""
+
+    error: float = math.nan
+    fitted: float = math.nan
+    parts: FloatArray = np.empty(0)
+
+
+def scores_of(model: Model, records: Sequence[Record], y: FloatArray, left_out: Sequence[Samples]) -> Scores:
+    """Fit a model again without each group of samples of the outputs `y`, and predict these."""
+    residual, fitted = np.full(y.size, math.nan), []
+    for samples in left_out:
+        weights = np.ones(y.size)
+        weights[samples] = 0.0
+        remaining = y - model(weights)
+        residual[samples] = remaining[samples]
+        fitted.extend(about_trends(np.where(weights > 0.0, remaining, math.nan), records))
+    detrended = about_trends(residual, records)
+    pieces = [piece for each in detrended for piece in np.array_split(each, _PARTS)]
+    parts = [rms([piece]) for piece in pieces if np.count_nonzero(~np.isnan(piece)) > 1]
+    return Scores(rms(detrended), rms(fitted), np.array(parts))
+
+
+def about_trends(residual: FloatArray, records: Sequence[Record]) -> list[FloatArray]:
+    """Residual of each record about its own trend; nan where it is nan or has too few samples."""
+    residuals = []
+    for own, record in zip(of_each(residual, records), records, strict=True):
+        counts = ~np.isnan(own)
+        slow = trend(record)[counts]
+        if np.count_nonzero(counts) <= slow.shape[1]:
+            own, counts = np.full(own.size, math.nan), np.zeros(own.size, dtype=bool)
+        elif np.isfinite(own[counts]).all():
+            own[counts] -= slow @ np.linalg.lstsq(slow, own[counts])[0]
+        residuals.append(own)
+    return residuals
+
+
+def of_each(values: FloatArray, records: Sequence[Record]) -> list[FloatArray]:
+    return np.split(values, np.cumsum([len(record) for record in records])[:-1])
+
+
+def folds(records: Sequence[Record]) -> tuple[str, list[Samples]]:
+    lengths = [len(record) for record in records]
+    begins = np.cumsum([0, *lengths])[:-1]
+    counted = np.ones(sum(lengths), dtype=bool)
+    for begin, length in zip(begins, lengths, strict=True):
+        counted[begin : begin + math.ceil(_START * length)] = False
+    by, parts = "record", [begin + np.arange(length) for begin, length in zip(begins, lengths, strict=True)]
+    u = np.concatenate([record.u for record in records])
+    if len(records) == 1:
+        by, parts = _folds_of(records[0])
+    elif not all(_covers(np.delete(u, samples), u[samples]) for samples in parts):
+        by, parts = "block", blocks(min(2 * _FOLDS * len(records), u.size), u.size)
+    groups = [np.unique(np.concatenate(parts[k::_FOLDS])) for k in range(min(_FOLDS, len(parts)))]
+    left_out = [group[counted[group]] for group in groups if counted[group].any()]
+    left_out = [samples for samples in left_out if _covers(np.delete(u, samples), u[samples])] or left_out
+    inside = [samples[_is_inside(np.delete(u, samples), u[samples])] for samples in left_out]
+    return by, [samples for samples in inside if samples.size] or left_out
+
+
+def _folds_of(record: Record) -> tuple[str, list[Samples]]:
+    parts = at_one_rate(record)
+    if len(parts) > 1:
+        return "rate", parts
+    cycles = [np.arange(*cycle.path.indices(len(record))) for cycle in complete_cycles(record.u, TOLERANCE)[::-1]]
+    return ("cycle", cycles) if len(cycles) > 2 else ("block", blocks(min(2 * _FOLDS, len(record)), len(record)))
+
+
+def _covers(training: FloatArray, other: FloatArray) -> bool:
+    beyond = _INSIDE * float(np.ptp(np.append(training, other)))
+    return bool(other.min() >= training.min() - beyond and other.max() <= training.max() + beyond)
+
+
+def _is_inside(training: FloatArray, other: FloatArray) -> npt.NDArray[np.bool_]:
+    return np.asarray((other >= training.min()) & (other <= training.max()))
+
+
+def rms(parts: Sequence[FloatArray]) -> float:
+    values = np.concatenate(parts) if parts else np.empty(0)
+    counts = values[~np.isnan(values)]
+    return float(np.sqrt(np.mean(counts**2))) if counts.size else math.nan
+
+
+def rate_spread(records: Sequence[Record]) -> float:
+    """How much the input's rate differs between passes at the same input; 1 for one rate, nan without time.
+
+    The input's range has nine equal bands between 5 and 95 % of it. A branch that crosses one has there the rate band
+    over time of crossing. In each band the 95th percentile of the rates is divided by the 5th, all records having the
+    same weight; the median over the bands that two records cross, or else all, is taken.
+    """
+    if any(record.t is None for record in records):
+        return math.nan
+    low, high = min(record.u.min() for record in records), max(record.u.max() for record in records)
+    crossed = [_crossings(record, low + (high - low) * _EDGES) for record in records]
+    bands = list(zip(*crossed, strict=True))
+    shared = [band for band in bands if sum(map(bool, band)) > 1]
+    ratios = [ratio for band in shared or bands if (ratio := _ratio(band)) is not None]
+    return float(np.median(ratios)) if ratios else math.nan
+
+
+def at_one_rate(record: Record) -> list[Samples]:
+    """Samples of the consecutive parts of a record whose cycles have one rate."""
+    everything = np.arange(len(record))
+    if record.t is None:
+        return [everything]
+    begins, rate = [], 0.0
+    for cycle in reversed(complete_cycles(record.u, TOLERANCE)):
+        here = 1.0 / float(np.ptp(record.t[cycle.path]))
+        if rate == 0.0 or not 1.0 / SEVERAL < here / rate < SEVERAL:
+            begins.append(cycle.path.start)
+            rate = here
+    return np.split(everything, begins[1:])
+
+
+def _crossings(record: Record, edges: FloatArray) -> list[list[float]]:
+    bands: list[list[float]] = [[] for _ in itertools.pairwise(edges)]
+    for branch in record.branches(TOLERANCE):
+        sign = 1.0 if branch.u[-1] > branch.u[0] else -1.0
+        reached, first, count = np.unique(np.maximum.accumulate(sign * branch.u), return_index=True, return_counts=True)
+        t = np.asarray(branch.t, dtype=float)
+        times = 0.5 * (t[first] + t[first + count - 1])
+        at_edges = np.interp(sign * edges, reached, times, left=math.nan, right=math.nan)
+        for rates, height, duration in zip(bands, np.diff(edges), np.abs(np.diff(at_edges)), strict=True):
+            if duration > 0.0:
+                rates.append(float(height / duration))
+    return bands
+
+
+def _ratio(band: Sequence[list[float]]) -> float | None:
+    """High over low rate of a band's passes, a list for each record; None for fewer than two passes."""
+    rates = np.concatenate(band)
+    if rates.size < 2:
+        return None
+    shares = np.concatenate([np.full(len(passes), 1.0 / max(len(passes), 1)) for passes in band])
+    slow, fast = np.quantile(rates, _TAILS, weights=shares, method="inverted_cdf")
+    return float(fast / slow)
 
 
 @frozen
@@ -102,46 +269,141 @@ class Judgement:
     explained_by: tuple[str, ...] = ()
 
 
+class Law(Protocol):
+    """A model that is judged: an output at the samples of an input, without time."""
+
+    def response(self, u: npt.ArrayLike, /) -> FloatArray: ...
+
+
+Refit = Callable[[Sequence[Record], Sequence[FloatArray]], Sequence[Law]]
+"""Laws, one for each record, fitted again where the weights (n_samples,) are not zero."""
+
+
 @dataclass(frozen=True)
-class Competitors:
-    """Models that need no law, fitted to records with even times; `spread` is their `rate_spread`."""
+class Trial:
+    """Records, the linear plant nearest to them, and the scores of models on samples that were left out.
+
+    `spread` is the `rate_spread`, `left_out` are the samples of each fold `by` which they are left out, and `together`
+    is the rmse of plays fitted to all samples.
+    """
 
     records: Sequence[Record]
     linear: Rival | None
-    trial: Trial
     spread: float
+    by: str
+    left_out: Sequence[Samples]
+    scores: Mapping[str, Scores]
+    together: float
+
+    @property
+    def errors(self) -> dict[str, float]:
+        return {name: scores.error for name, scores in self.scores.items()}
+
+    @cached_property
+    def floor(self) -> float:
+        return FLOOR * float(np.ptp(np.concatenate([record.y for record in self.records])))
+
+    def explains(self, name: str) -> bool:
+        """Whether a model predicts held-out samples nearly as well as fitted ones; plays may also be fitted to all."""
+        own, curve = self.scores[name], self.scores[CURVE]
+        # third differences show white noise: those of smooth outputs are small
+        noise = rms([np.diff(record.y, 3) for record in self.records]) / math.sqrt(20.0)
+        usual = own.fitted if self.by in ("record", "rate") else noise
+        error = min(own.error, self.together) if name == PLAYS else own.error
+        return error <= max(FACTOR * usual, UNEXPLAINED * curve.error) + self.floor
+
+    def consistent(self, name: str, other: str) -> bool:
+        """Whether a model is better than another in most parts: a t test of the logarithms of their rmse."""
+        gains = np.log((self.scores[other].parts + self.floor) / (self.scores[name].parts + self.floor))
+        if gains.size < 2:
+            return True
+        student = float(special.stdtrit(gains.size - 1, 1.0 - _DOUBT))
+        return float(np.mean(gains)) * math.sqrt(gains.size) > student * float(np.std(gains, ddof=1))
+
+    def least(self, names: Sequence[str]) -> float:
+        errors = (self.errors[name] + self.floor for name in names)
+        return min((error for error in errors if not math.isnan(error)), default=math.inf)
+
+    @property
+    def lagging(self) -> list[str]:
+        return [RELAXATIONS, *[RIVAL] * (self.linear is None or not self.linear.is_line)]
+
+    def still(self, single_valued: bool = False) -> float:
+        """Error of the best model without memory; the law is one if it is `single_valued`."""
+        straight = self.linear is not None and self.linear.is_line
+        return self.least([CURVE, *[RIVAL] * straight, *[LAW] * single_valued])
+
+    def verdict(self, single_valued: bool = False) -> str:
+        still, turning = self.still(single_valued), [PLAYS, *[LAW] * (not single_valued)]
+        moving = min([*self.lagging, *turning], key=lambda name: self.least([name]))
+        if still <= LEAST / FLOOR * self.floor or self.least([moving]) >= BETTER * still:
+            return NO_STRUCTURE
+        if not self.consistent(moving, CURVE):
+            return NO_STRUCTURE
+        if not self.spread >= SEVERAL:
+            return ONE_RATE
+        lag, turn = self.least(self.lagging), self.least(turning)
+        if self.least([name for name in self.lagging if self.explains(name)]) < BETTER * min(turn, still):
+            return LAG
+        explained = self.least([name for name in turning if self.explains(name)])
+        return HYSTERESIS if explained < BETTER * min(lag, still) else NO_STRUCTURE
 
     @property
     def enough(self) -> float:
         """Rmse below which a law could change the verdict [unit of y]; inf if any law could."""
-        verdict = _verdict(self.trial, self.linear, single_valued=False, spread=self.spread)
-        if verdict == NO_STRUCTURE:
-            return BETTER * _still(self.trial, self.linear)
-        if verdict == LAG:
-            return _least(self.trial, _lagging(self.linear)) / BETTER
-        return math.inf
+        least = {NO_STRUCTURE: BETTER * self.still(), LAG: self.least(self.lagging) / BETTER}
+        return least.get(self.verdict(), math.inf)
 
 
-def competitors(records: Sequence[Record]) -> Competitors:
-    timed = all(record.t is not None for record in records)
-    spread = held_out.rate_spread(records)
+def competitors(records: Sequence[Record]) -> Trial:
+    """The trial of the models that need no law; errors of a law, and without time of linear plants, are nan."""
+    timed, spread = all(record.t is not None for record in records), rate_spread(records)
     records = _thinned([_even(record) for record in records] if timed else records)
+    u, y = np.concatenate([record.u for record in records]), np.concatenate([record.y for record in records])
     linear = rival(records) if timed else None
-    return Competitors(records, linear, held_out.competitors_held_out(records, linear), spread)
+    by_plays = partial(plays(records).outputs, y)
+    models: dict[str, Model] = {CURVE: partial(curve(records).outputs, y), PLAYS: by_plays}
+    if linear is not None:
+        models[RELAXATIONS] = partial(relaxations(records).outputs, y)
+        models[RIVAL] = lambda weights: np.concatenate(
+            linear.refitted(records, of_each(weights, records)).outputs(records)
+        )
+    by, left_out = folds(records)
+    scores = dict.fromkeys((LAW, RIVAL, RELAXATIONS, PLAYS, CURVE), Scores())
+    scores |= {name: scores_of(model, records, y, left_out) for name, model in models.items()}
+    steps = scores_of(partial(means, u, y), records, y, left_out)  # another curve; the better one counts
+    scores[CURVE] = min(scores[CURVE], steps, key=lambda each: each.error)
+    together = rms(about_trends(y - by_plays(np.ones(y.size)), records))
+    return Trial(records, linear, spread, by, left_out, scores, together)
 
 
-def judge(records: Sequence[Record], laws: Sequence[Law], refit: Refit, others: Competitors | None = None) -> Judgement:
+def judge(records: Sequence[Record], laws: Sequence[Law], refit: Refit, others: Trial | None = None) -> Judgement:
     """Judge laws fitted to records, one for each; `refit(records, weights)` fits where the weights are not zero."""
     others = others or competitors(records)
-    records, linear, spread = others.records, others.linear, others.spread
-    trial = held_out.law_held_out(others.trial, records, refit)
+    records, linear = others.records, others.linear
+    y = np.concatenate([record.y for record in records])
+
+    def fitted(weights: FloatArray) -> FloatArray:
+        try:
+            again = refit(records, of_each(weights, records))
+            return np.concatenate([law.response(record.u) for law, record in zip(again, records, strict=True)])
+        except (SimulationError, ValueError):
+            return np.full(y.size, math.inf)
+
+    trial = replace(others, scores={**others.scores, LAW: scores_of(fitted, records, y, others.left_out)})
     longest = max(range(len(records)), key=lambda k: len(records[k]))
-    loops = _loops(laws[longest], records[longest].u)
+    law, record = laws[longest], records[longest]
+    loops = _loops(law, record.u)
     areas = np.array([math.nan if loop is None else signed_area(loop) for loop in loops])
     stable = all(_response(law, record.u) is not None for law, record in zip(laws, records, strict=True))
     stable = stable and loops[-1] is not None
-    single_valued = all(loop is not None and loop.relative_width < LEAST for loop in loops)
-    verdict = _verdict(trial, linear, single_valued, spread)
+    verdict = trial.verdict(all(loop is not None and loop.relative_width < LEAST for loop in loops))
+    own, width, of_rival = _response(law, record.u), math.nan, (math.nan,) * len(RATES)
+    cycles = complete_cycles(record.u, TOLERANCE)  # between the extremes: one about a level is no steady cycle
+    if cycles and own is not None:
+        width = metrics.loop_metrics(record.u, own).relative_width
+    if cycles and linear is not None:
+        of_rival = tuple(steady_width(linear.plants[longest], record[cycles[0].path], rate) for rate in RATES)
     return Judgement(
         verdict=verdict if stable or verdict == HYSTERESIS else NO_STRUCTURE,
         rival=None if linear is None else linear.plants[longest],
@@ -149,49 +411,13 @@ def judge(records: Sequence[Record], laws: Sequence[Law], refit: Refit, others: 
         held_out=trial.errors,
         held_out_by=trial.by,
         rates=np.array(RATES),
-        widths={
-            "law": (_width(laws[longest], records[longest]),) * len(RATES),
-            "rival": _rival_widths(linear, longest, records[longest]),
-        },
+        widths={"law": (width,) * len(RATES), "rival": of_rival},
         dissipation=float(areas[-1]),
         one_sign=bool((areas * areas[-1] >= 0.0).all()),
-        rate_spread=spread,
+        rate_spread=trial.spread,
         stable=stable,
         explained_by=tuple(name for name in trial.errors if trial.explains(name)),
     )
-
-
-def _verdict(trial: Trial, linear: Rival | None, single_valued: bool, spread: float) -> str:
-    still, lagging = _still(trial, linear, single_valued), _lagging(linear)
-    turning = [PLAYS, *[LAW] * (not single_valued)]
-    moving = min([*lagging, *turning], key=lambda name: _least(trial, [name]))
-    if still <= LEAST * trial.stroke or _least(trial, [moving]) >= BETTER * still:
-        return NO_STRUCTURE
-    if not trial.consistent(moving, CURVE):
-        return NO_STRUCTURE
-    if not spread >= SEVERAL:
-        return ONE_RATE
-    lag, turn = _least(trial, lagging), _least(trial, turning)
-    if _least(trial, [name for name in lagging if trial.explains(name)]) < BETTER * min(turn, still):
-        return LAG
-    explained = _least(trial, [name for name in turning if trial.explains(name)])
-    return HYSTERESIS if explained < BETTER * min(lag, still) else NO_STRUCTURE
-
-
-def _still(trial: Trial, linear: Rival | None, single_valued: bool = False) -> float:
-    """Error of the best model without memory; the law is one if it is `single_valued`."""
-    straight = linear is not None and linear.is_line
-    return _least(trial, [CURVE, *[RIVAL] * straight, *[LAW] * single_valued])
-
-
-def _lagging(linear: Rival | None) -> list[str]:
-    straight = linear is not None and linear.is_line
-    return [RELAXATIONS, *[RIVAL] * (not straight)]
-
-
-def _least(trial: Trial, names: Sequence[str]) -> float:
-    errors = (trial.errors[name] + FLOOR * trial.stroke for name in names)
-    return min((error for error in errors if not math.isnan(error)), default=math.inf)
 
 
 def _response(law: Law, u: FloatArray) -> FloatArray | None:
@@ -199,20 +425,6 @@ def _response(law: Law, u: FloatArray) -> FloatArray | None:
         return law.response(u)
     except SimulationError:
         return None
-
-
-def _width(law: Law, record: Record) -> float:
-    y = _response(law, record.u)
-    if y is None or not complete_cycles(record.u, TOLERANCE):
-        return math.nan
-    return metrics.loop_metrics(record.u, y).relative_width
-
-
-def _rival_widths(linear: Rival | None, k: int, record: Record) -> tuple[float, ...]:
-    cycles = complete_cycles(record.u, TOLERANCE)  # between the extremes: one about a level is no steady cycle
-    if linear is None or not cycles:
-        return (math.nan,) * len(RATES)
-    return tuple(steady_width(linear.plants[k], record[cycles[0].path], rate) for rate in RATES)
 
 
 def _loops(law: Law, u: FloatArray) -> list[metrics.LoopMetrics | None]:

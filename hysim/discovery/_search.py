@@ -19,7 +19,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from hysim._basics.frozen import FloatArray
-from hysim.discovery._held_out import about_trends, rms
+from hysim.discovery._judgement import about_trends, rms
 from hysim.discovery._refinement import POLISH, AnyExponent, Candidate, FreeRun, Samples, Terms, Work, bic_of, shifts
 from hysim.discovery._selection import (
     ALIKE,
