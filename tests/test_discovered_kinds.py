@@ -11,8 +11,8 @@ import hysim as hs
 from hysim import plot
 from hysim.cli import main
 from hysim.discovery import discover
+from hysim.discovery._hidden_memory import Oscillator, Response
 from hysim.discovery._oscillator import Search, _Fitted, _tried
-from hysim.discovery._oscillator_response import Oscillator, Response
 from hysim.laws.differential.terms import RELAXATION, Term, bouc_wen_terms, power_term
 from hysim.plants.equation_of_motion import linear_plant
 
@@ -63,7 +63,7 @@ def vibrating(law: dict[Term, float], structure: object, u: np.ndarray) -> tuple
     elastic = search._without_memory(linear_plant(structure.motion(record)))
     stderr = dict.fromkeys((*PLANT, *(term.named("z") for term in law)), 1e-3)
     stderr |= {"n": 1e-3} if not all(term.is_polynomial or term.relaxing for term in law) else {}
-    fitted = _Fitted(oscillator, stderr, search.response.measured - y)
+    fitted = _Fitted(search, oscillator, stderr, search.response.measured - y)
     regression = search.response.regression(oscillator, fitted.residual, search.library)
     return search._described(_tried(fitted, regression), elastic, {}), record
 

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import hysim as hs
-from hysim.discovery._oscillator_response import Oscillator, Response
+from hysim.discovery._hidden_memory import Oscillator, Response
 from hysim.kernels import memory_terms
 from hysim.laws.differential.terms import bouc_wen_terms
 from hysim.plants.oscillator import attracting_state

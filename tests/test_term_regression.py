@@ -9,7 +9,7 @@ TERMS = tuple(power_term(False, power, even=False) for power in range(4))
 
 
 def regression(features, target):
-    return TermRegression(TERMS, (), features, target, np.ones(len(TERMS)), 1.0, 1e-9, 0, [slice(0, len(target))])
+    return TermRegression(TERMS, (), features, target, 1.0, 1e-9, 0, [np.arange(len(target))])
 
 
 def losses(features, target, kept):

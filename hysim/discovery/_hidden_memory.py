@@ -11,6 +11,20 @@ several shares of the stiffness. Noise lengthens the path of y, a bias of about 
 scaled so that the coefficients of all terms together have standard errors of one: a threshold is then a number of
 standard errors. Where terms are nearly collinear a small coefficient is no sign of a small loss, so that STLSQ's
 thresholds are accompanied by plain elimination.
+
+**The oscillator's output** as its terms make it: simulation, its slopes, and the regression on them.
+
+    y = y0 + sum of (coefficient - its value) times dy/d(coefficient) + the same for m, c and k
+
+About a law that simulates the record well the residual is white and the slopes are free of noise. Unlike one of z' on
+noisy signals, this regression has no bias, and its standard errors and BIC are right.
+
+hysim has models of these discovered oscillators:
+
+    z' = A y' - beta |y'| |z|^(n-1) z - gamma y' |z|^n    BoucWenOscillator
+    z' = A y' - r z                                       TransferFunction, since all of it is linear:
+
+    Y / U = (s + r) / ((m s^2 + c s + k) (s + r) + A s)
 """
 
 import itertools
@@ -20,19 +34,30 @@ from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
+import numpy.typing as npt
 from scipy.interpolate import CubicSpline
 
+from hysim import metrics, signals
 from hysim._basics.frozen import FloatArray
+from hysim._basics.parallel import in_chunks
+from hysim.discovery._judgement import HYSTERESIS, LAG, NO_STRUCTURE, signed_area
+from hysim.discovery._selection import best_subsets
 from hysim.discovery._slopes import independent, sparse_path
+from hysim.errors import SimulationError
+from hysim.identification import folds
 from hysim.identification.marquardt import Schedule, SumOfSquares, descend
 from hysim.kernels import memory_terms as kernels
-from hysim.laws.differential.terms import RELAXATION, Term, bouc_wen_terms
+from hysim.laws.differential.boucwen import BoucWen
+from hysim.laws.differential.terms import RELAXATION, Term, bouc_wen_exponent, bouc_wen_terms
 from hysim.metrics.criteria import information
 from hysim.plants.equation_of_motion import Filter, Linear, Motion, filtering, interpolated
+from hysim.plants.oscillator import ATTEMPTS, BoucWenOscillator, attracting_state
+from hysim.plants.oscillator_structure import OscillatorStructure
+from hysim.plants.transfer_function import TransferFunction
+from hysim.records import Record
 
 FLOOR = 1e-5  # of the rms output: smaller residuals are no evidence of a term
 BLOCKS = 4  # that are held out in turn, where there are no periods
-_RIDGE = 1e-13  # of unit columns: those that a draw of samples makes dependent cost rounding, and no failure
 DEPENDENT = 1e-5  # share of a slope that those before it do not explain, below which it is left out
 
 
@@ -40,40 +65,37 @@ DEPENDENT = 1e-5  # share of a slope that those before it do not explain, below 
 class TermRegression:
     """target = plant @ ... + features @ coefficients + noise of one, all about an oscillator.
 
-    `features` (n_samples, n_terms) and `target` have the plant projected out; `units` are the standard errors that
-    scale them. `dependent` are terms left out as combinations of others; `n_others` counts other fitted numbers.
+    `features` (n_samples, n_terms) and `target` have the plant projected out. `dependent` are terms left out as
+    combinations of others, `blocks` the samples held out in turn; `n_others` counts other fitted numbers.
     """
 
     terms: tuple[Term, ...]
     dependent: tuple[Term, ...]
     features: FloatArray
     target: FloatArray
-    units: FloatArray
     sigma: float
     floor: float
     n_plant: int
-    blocks: list[slice]
+    blocks: Sequence[npt.NDArray[np.intp]]
     n_others: int = 0
 
     @cached_property
     def triangle(self) -> FloatArray:
         return np.asarray(np.linalg.qr(np.column_stack([self.features, self.target]), mode="r"))
 
-    def thresholded(self) -> list[tuple[Term, ...]]:
+    def path(self) -> set[tuple[Term, ...]]:
+        """Structures of STLSQ's thresholds, and of plain elimination."""
         path = sparse_path(self.features, self.target) if self.terms else []
-        return [tuple(t for t, value in zip(self.terms, values, strict=True) if value != 0.0) for _, values in path]
+        thresholded = (tuple(itertools.compress(self.terms, values != 0.0)) for _, values in path)
+        return {*thresholded, *self.eliminated()}
 
     def eliminated(self) -> list[tuple[Term, ...]]:
         """Structures from dense to sparse, each without the term whose removal costs least."""
-        R, included, path = self.triangle, list(range(len(self.terms))), []
-        sizes = np.linalg.norm(R[:, :-1], axis=0)
-        columns = R[:, :-1] / np.where(sizes > 0.0, sizes, 1.0)
-        normal, right = columns.T @ columns + _RIDGE * np.eye(len(included)), columns.T @ R[:, -1]
-        while included:
-            path.append(tuple(self.terms[k] for k in included))
-            inverse = np.linalg.inv(normal[np.ix_(included, included)])
-            included.pop(int(np.argmin((inverse @ right[included]) ** 2 / np.diag(inverse))))
-        return path
+        if not self.terms:
+            return []
+        R, every = self.triangle, np.ones(len(self.terms), dtype=bool)
+        levels = best_subsets(R[:, :-1], -R[:, -1], np.zeros(every.size), every, width=1)
+        return [tuple(itertools.compress(self.terms, level.included[0])) for level in levels][:-1]
 
     def best(self, structures: Sequence[tuple[Term, ...]]) -> tuple[Term, ...]:
         return min([*structures, ()], key=self.bic)
@@ -93,27 +115,29 @@ class TermRegression:
         R = self.triangle[:, :-1]
         return float(np.linalg.cond(R / np.linalg.norm(R, axis=0))) if R.shape[1] else 1.0
 
-    def places(self, terms: Sequence[Term]) -> list[int]:
-        return [self.terms.index(term) for term in terms]
-
-    def squares(self, terms: Sequence[Term]) -> float:
-        included, goal = self.triangle[:, self.places(terms)], self.triangle[:, -1]
-        rest = goal - included @ np.linalg.lstsq(included, goal, rcond=None)[0]
-        return float(rest @ rest)
-
     def bic(self, terms: Sequence[Term]) -> float:
-        n, n_parameters = self.target.size, self.n_plant + self.n_others + len(terms)
-        return information(self.squares(terms) / n * self.sigma**2, n, n_parameters, floor=self.floor)
+        R, n = self.triangle, self.target.size
+        included, goal = R[:, self._places(terms)], R[:, -1]
+        rest = goal - included @ np.linalg.lstsq(included, goal, rcond=None)[0]
+        n_parameters = self.n_plant + self.n_others + len(terms)
+        return information(float(rest @ rest) / n * self.sigma**2, n, n_parameters, floor=self.floor)
 
     def held_out_rmse(self, terms: Sequence[Term]) -> float:
         """Rmse on each block of a structure that the other blocks have fitted [unit of y]."""
-        X, y = self.features[:, self.places(terms)], self.target
-        normal, right, total = X.T @ X, X.T @ y, 0.0
-        for block in self.blocks:
-            rest = normal - X[block].T @ X[block], right - X[block].T @ y[block]
-            error = y[block] - X[block] @ np.linalg.lstsq(*rest, rcond=None)[0]
-            total += float(error @ error)
-        return float(self.sigma * np.sqrt(total / y.size))
+        return self.sigma * held_out_rmse(self.features[:, self._places(terms)], self.target, self.blocks)
+
+    def _places(self, terms: Sequence[Term]) -> list[int]:
+        return [self.terms.index(term) for term in terms]
+
+
+def held_out_rmse(columns: FloatArray, target: FloatArray, blocks: Sequence[npt.NDArray[np.intp]]) -> float:
+    """Rmse on each block of a regression on the other blocks."""
+    total = 0.0
+    for block in blocks:
+        others = np.delete(columns, block, axis=0), np.delete(target, block)
+        error = target[block] - columns[block] @ np.linalg.lstsq(*others, rcond=None)[0]
+        total += float(np.sum(error**2))
+    return float(np.sqrt(total / target.size))
 
 
 def term_regression(
@@ -122,7 +146,7 @@ def term_regression(
     slopes: FloatArray,
     target: FloatArray,
     floor: float,
-    blocks: list[slice],
+    blocks: Sequence[npt.NDArray[np.intp]],
 ) -> TermRegression:
     """Regression of `target` (n_samples,) on slopes (n_samples, n_terms), the plant's (n_samples, n) projected out."""
     sizes = np.linalg.norm(plant, axis=0)
@@ -142,7 +166,6 @@ def term_regression(
         dependent=tuple(term for k, term in enumerate(terms) if k not in included),
         features=features * units / sigma,
         target=goal / sigma,
-        units=units,
         sigma=sigma,
         floor=floor,
         n_plant=n_plant,
@@ -160,12 +183,13 @@ _FINER = 4  # increments of y for each sample
 _DEGREE = 3
 
 
-class Regressed(NamedTuple):
-    """A law, the plant that goes with it, and the unexplained share of the filtered force."""
-
-    coefficients: dict[Term, float]
+class Oscillator(NamedTuple):
     plant: dict[str, float]
-    error: float
+    coefficients: dict[Term, float]
+
+
+Regressed = tuple[float, Oscillator]
+"""The unexplained share of the filtered force, and the oscillator that leaves it."""
 
 
 class _Along(NamedTuple):
@@ -251,10 +275,8 @@ class HiddenMemory:
         if rows is None:
             raise ValueError("the displacement is not finite or too large")
         target = self._target - rows[0] + rows[1] * x[0]
-        edges = [target.size * k // BLOCKS for k in range(BLOCKS + 1)]
-        blocks = [slice(*pair) for pair in itertools.pairwise(edges)]
         floor = FLOOR * self._size / float(np.sqrt(target.size))
-        return term_regression(terms, self._columns, rows[1:].T, target, floor, blocks)
+        return term_regression(terms, self._columns, rows[1:].T, target, floor, folds(BLOCKS, target.size))
 
     def _descended(self, terms: Sequence[Term], start: FloatArray) -> Regressed | None:
         def residuals(points: FloatArray) -> FloatArray:
@@ -274,18 +296,14 @@ class HiddenMemory:
             lambda x, residual: -self._projected(columns(x)),
             sizes=lambda x: np.linalg.norm(columns(x), axis=0),  # those of slopes that the plant explains are tiny
         )
-        reached = descend(problem, start[np.newaxis], relative=1e-7, steps=100, schedule=OSCILLATOR_SCHEDULE)
-        return self._regressed(terms, reached.x[0])
-
-    def _regressed(self, terms: Sequence[Term], x: FloatArray) -> Regressed | None:
+        x = descend(problem, start[np.newaxis], relative=1e-7, steps=100, schedule=OSCILLATOR_SCHEDULE).x[0]
         rows = self._memory(terms, x)
         if rows is None:
             return None
         goal = self._target - rows[0]
-        plant = np.linalg.lstsq(self._columns, goal, rcond=None)[0].tolist()
+        plant = dict(zip(self._free, np.linalg.lstsq(self._columns, goal, rcond=None)[0].tolist(), strict=True))
         error = float(np.linalg.norm(self._projected(goal))) / self._size
-        coefficients = dict(zip(terms, x.tolist(), strict=True))
-        return Regressed(coefficients, self.known | dict(zip(self._free, plant, strict=True)), error)
+        return error, Oscillator(self.known | plant, dict(zip(terms, x.tolist(), strict=True)))
 
     def _memory(self, terms: Sequence[Term], x: FloatArray) -> FloatArray | None:
         """Filtered memory and its slopes along the coefficients, (1 + n_terms, n_rows); None if it diverges."""
@@ -312,7 +330,7 @@ class HiddenMemory:
 
 
 def _best(laws: Iterable[Regressed | None]) -> Regressed | None:
-    return min((each for each in laws if each is not None), key=lambda each: each.error, default=None)
+    return min((each for each in laws if each is not None), key=lambda each: each[0], default=None)
 
 
 def _along(motion: Motion, linear: Linear) -> _Along:
@@ -324,3 +342,242 @@ def _along(motion: Motion, linear: Linear) -> _Along:
     places = np.arange((motion.y.size - 1) * _FINER + 1) / _FINER
     fine = CubicSpline(np.arange(motion.y.size), motion.y)(places)
     return _Along(filtering(motion, linear), np.diff(fine), h, slice(None, None, _FINER))
+
+
+RATE_DEPENDENT = "rate-dependent hysteresis"
+
+Model = BoucWenOscillator | TransferFunction
+
+SPRING = bouc_wen_terms(1.0)[0]
+_CYCLES = 10
+_SAMPLES = 128
+
+
+class State(NamedTuple):
+    y: float
+    velocity: float
+    z: float
+
+
+def verdict(terms: Iterable[Term]) -> str:
+    present = set(terms)
+    if RELAXATION in present:
+        return LAG if present <= {SPRING, RELAXATION} else RATE_DEPENDENT
+    return HYSTERESIS if present - {SPRING} else NO_STRUCTURE
+
+
+def model(
+    plant: Mapping[str, float], law: Mapping[Term, float], structure: OscillatorStructure, state: State
+) -> Model | None:
+    """Model of an oscillator that begins in a state; None where hysim has none."""
+    kind, n = verdict(law), bouc_wen_exponent(law)
+    if kind == LAG:
+        return _lag(plant, law[RELAXATION], law.get(SPRING, 0.0), structure.hold, state)
+    if n is None and kind != NO_STRUCTURE:
+        return None
+    A, dissipative, conservative = (law.get(term, 0.0) for term in bouc_wen_terms(n or 1.0))
+    shape = {"A": A, "beta": -dissipative, "gamma": -conservative, "n": n or 1.0}
+    oscillator: BoucWenOscillator = structure.assemble({**plant, **shape})
+    if not any(state):
+        return oscillator
+    return replace(oscillator, initial_state=state[:2], law=replace(oscillator.law, z0=state.z))
+
+
+def diverges(oscillator: Model | None, y: FloatArray) -> bool:
+    """Whether a model's memory diverges on cycles over the range of the displacements `y`, or a lag is unstable."""
+    if isinstance(oscillator, TransferFunction):
+        return bool((oscillator.poles.real > 0.0).any())
+    try:
+        steady_loop(oscillator, y)
+    except SimulationError:
+        return True
+    return False
+
+
+def steady_loop(oscillator: Model | None, y: FloatArray) -> tuple[float, float]:
+    """Relative width and signed area of the memory's loop over the range of `y`; nan if it is no Bouc-Wen law."""
+    law = oscillator.law if isinstance(oscillator, BoucWenOscillator) else None
+    if not isinstance(law, BoucWen):
+        return np.nan, np.nan
+    u = signals.triangle(float(y.min()), float(y.max()), cycles=_CYCLES, samples_per_cycle=_SAMPLES)
+    loop = metrics.loop_metrics(u, law.gain * law.memory(u))
+    return loop.relative_width, signed_area(loop)
+
+
+def _lag(plant: Mapping[str, float], relaxation: float, A: float, hold: str, state: State) -> TransferFunction:
+    m, c, k = plant["mass"], plant["damping"], plant["stiffness"]
+    without_memory = np.polymul([m, c, k], [1.0, -relaxation])
+    force = -c * state.velocity - k * state.y - state.z  # of the free response, which no input pushes
+    return TransferFunction(
+        num=(1.0, -relaxation),
+        den=tuple(np.polyadd(without_memory, [A, 0.0]).tolist()),
+        hold="zoh" if hold == "zoh" else "foh",
+        initial_state=(state.y, state.velocity, force / m) if any(state) else (),
+    )
+
+
+_DIFFERENCES = (3e-4, 3e-5, 3e-6)  # of a parameter, for its slope: the first with which nothing diverges
+_STEADY = 1e-9  # relative change of the state from period to period
+
+
+@dataclass(frozen=True)
+class Response:
+    """Outputs of oscillators on records that were made as `structure` says; names in `known` are not free."""
+
+    structure: OscillatorStructure
+    records: Sequence[Record]
+    known: Mapping[str, float]
+
+    @cached_property
+    def measured(self) -> FloatArray:
+        return np.concatenate([record.y for record in self.records])
+
+    @cached_property
+    def widest(self) -> FloatArray:
+        return max((record.y for record in self.records), key=lambda y: float(np.ptp(y)))
+
+    @cached_property
+    def floor(self) -> float:
+        """Residual below which nothing counts as evidence [unit of y]."""
+        return FLOOR * float(np.sqrt(np.mean(self.measured**2)))
+
+    @cached_property
+    def free(self) -> tuple[str, ...]:
+        return tuple(name for name in PLANT if name not in self.known)
+
+    @cached_property
+    def _inputs(self) -> list[tuple[FloatArray, float]]:
+        return [(self.structure.fine_input(r.u), r.sample_time / self.structure.oversampling) for r in self.records]
+
+    def outputs(self, oscillators: Sequence[Oscillator]) -> FloatArray:
+        outputs = np.full((len(oscillators), self.measured.size), np.inf)
+        begins = np.cumsum([0, *map(len, self.records)])
+
+        def work(start: int, stop: int) -> None:
+            for k in range(start, stop):
+                for record, begin, force_and_step in zip(self.records, begins, self._inputs, strict=False):
+                    run = self._run(oscillators[k], *force_and_step)
+                    if run is not None:
+                        y = np.resize(self.structure.sampled(run[0]), len(record))
+                        outputs[k, begin : begin + len(record)] = y
+
+        in_chunks(work, len(oscillators), minimum=1)
+        return outputs
+
+    def initial_states(self, oscillator: Oscillator) -> tuple[State, ...]:
+        """State at the first sample of each record: rest, or that of the steady motion under a periodic input."""
+        runs = [
+            self._run(oscillator, *force_and_step) if self.structure.period else None for force_and_step in self._inputs
+        ]
+        missing = np.nan if self.structure.period else 0.0
+        return tuple(State(*([missing] * 3 if run is None else run[1].tolist())) for run in runs)
+
+    def _run(self, oscillator: Oscillator, force: FloatArray, h: float) -> tuple[FloatArray, FloatArray] | None:
+        degree = max((int(term.degree) for term in oscillator.coefficients if term.is_polynomial), default=0)
+        polynomial, extra, power, relaxation = memory_arrays(oscillator.coefficients, degree)
+        plant = np.array([*(oscillator.plant[name] for name in PLANT), relaxation, power])
+        state = np.zeros(3)
+        if self.structure.period is None:
+            y = np.zeros(force.size)
+            return (y, state) if kernels.motion(plant, polynomial, extra, force, h, state, y[1:]) else None
+        y, force, largest = np.empty(force.size), np.append(force, force[0]), np.zeros(3)
+
+        def after(x: FloatArray) -> FloatArray:
+            end = x.copy()
+            if not kernels.motion(plant, polynomial, extra, force, h, end, y):
+                raise SimulationError("the motion diverges")
+            return end
+
+        try:
+            for n_periods in range(ATTEMPTS[-1] + 2):
+                if n_periods in ATTEMPTS:
+                    steady = attracting_state(after, state, largest, _STEADY)
+                    state = state if steady is None else steady
+                before, state = state, after(state)
+                largest = np.maximum(largest, np.abs(state))
+                if np.all(np.abs(state - before) <= _STEADY * np.maximum(np.abs(state), np.abs(before))):
+                    return np.roll(y, 1), state
+        except SimulationError:
+            return None
+        return None
+
+    def slopes(self, oscillator: Oscillator, terms: Sequence[Term]) -> FloatArray:
+        """Derivatives of the output by free parameters and coefficients of `terms`, (n_samples, n); zero if unknown."""
+        slopes = np.zeros((self.measured.size, len(self.free) + len(terms)))
+        missing = np.arange(slopes.shape[1])
+        for difference in _DIFFERENCES:
+            if missing.size:
+                columns = self._differences(oscillator, terms, missing, difference)
+                is_finite = np.isfinite(columns).all(axis=0)
+                slopes[:, missing[is_finite]] = columns[:, is_finite]
+                missing = missing[~is_finite]
+        return slopes
+
+    def _differences(
+        self, oscillator: Oscillator, terms: Sequence[Term], places: npt.NDArray[np.intp], difference: float
+    ) -> FloatArray:
+        """Central differences by the parameters at some places; not finite where one diverges."""
+        plant, coefficients = oscillator
+        spring = plant["stiffness"] + next(iter(coefficients.values()), 0.0)
+        size = spring * float(np.sqrt(np.mean(self.measured**2)))
+        frequency = np.sqrt(abs(spring) / plant["mass"])
+        units = {"mass": plant["mass"], "damping": plant["mass"] * frequency, "stiffness": spring}
+        steps = [units[name] for name in self.free]
+        steps += [frequency if term.relaxing else spring / size**term.degree for term in terms]
+
+        def displaced(k: int, by: float) -> Oscillator:
+            if k < len(self.free):
+                return Oscillator(plant | {self.free[k]: plant[self.free[k]] + by}, coefficients)
+            term = terms[k - len(self.free)]
+            return Oscillator(plant, coefficients | {term: coefficients.get(term, 0.0) + by})
+
+        by = difference * np.array(steps)[places]
+        both = [displaced(int(k), sign * step) for sign in (1.0, -1.0) for k, step in zip(places, by, strict=True)]
+        with np.errstate(invalid="ignore"):
+            ahead, behind = np.split(self.outputs(both), 2)
+            return np.asarray((ahead - behind).T / (2.0 * by))
+
+    def descended(self, oscillator: Oscillator) -> Oscillator:
+        terms = tuple(oscillator.coefficients)
+
+        def at(x: FloatArray) -> Oscillator:
+            plant = oscillator.plant | dict(zip(self.free, x.tolist(), strict=False))
+            return Oscillator(plant, dict(zip(terms, x[len(self.free) :].tolist(), strict=True)))
+
+        def residuals(points: FloatArray) -> FloatArray:
+            oscillators = [at(x) for x in points]
+            possible = [k for k, each in enumerate(oscillators) if each.plant["mass"] > 0.0]
+            residuals = np.full((len(points), self.measured.size), np.inf)
+            residuals[possible] = self.measured - self.outputs([oscillators[k] for k in possible])
+            return residuals
+
+        def slopes(x: FloatArray, residual: FloatArray) -> FloatArray:
+            return -self.slopes(at(x), terms)
+
+        start = [oscillator.plant[name] for name in self.free] + list(oscillator.coefficients.values())
+        problem = SumOfSquares(residuals, slopes)
+        return at(descend(problem, np.array([start]), relative=1e-7, steps=100, schedule=OSCILLATOR_SCHEDULE).x[0])
+
+    def regression(self, oscillator: Oscillator, residual: FloatArray, library: Sequence[Term]) -> TermRegression:
+        """Regression about an oscillator with this residual on all terms of the library and its own."""
+        terms = (*library, *(term for term in oscillator.coefficients if term not in library))
+        slopes = self.slopes(oscillator, terms)
+        n_plant = len(self.free)
+        values = np.array([oscillator.coefficients.get(term, 0.0) for term in terms])
+        target = residual + slopes[:, n_plant:] @ values
+        return term_regression(terms, slopes[:, :n_plant], slopes[:, n_plant:], target, self.floor, self._blocks)
+
+    def held_out_rmse(self, oscillator: Oscillator, residual: FloatArray) -> float:
+        """Rmse on each block, predicted by a linear fit about the oscillator to the other blocks [unit of y]."""
+        slopes = self.slopes(oscillator, tuple(oscillator.coefficients))
+        sizes = np.linalg.norm(slopes, axis=0)
+        return held_out_rmse(slopes / np.where(sizes > 0.0, sizes, 1.0), residual, self._blocks)
+
+    @cached_property
+    def _blocks(self) -> list[npt.NDArray[np.intp]]:
+        blocks, begins = [], np.cumsum([0, *map(len, self.records)])
+        for begin, record in zip(begins, self.records, strict=False):
+            period = self.structure.period
+            n = len(record) // period if period is not None and len(record) >= 2 * period else BLOCKS
+            blocks += [begin + block for block in folds(n, len(record))]
+        return blocks

@@ -5,7 +5,7 @@
    (`_hidden_memory`); the search begins with the nearest one.
 3. It is refined by simulation error (`hysim.identify`).
 4. About the refined law the whole library is regressed: PySINDy's STLSQ and plain elimination from dense to sparse, one
-   structure by BIC, inclusion by bagging (`_oscillator_response`). Terms that are not chosen leave the law, which is
+   structure by BIC, inclusion by bagging. Terms that are not chosen leave the law, which is
    refined again. If terms come in, the Bouc-Wen law is refined with n free and with n at the nearest whole number, and
    where terms come in about these too, the law of these terms. All this is done for each structure of the records.
 5. Of all refined laws that do not diverge, the linear spring among them, the one of the lowest BIC is taken; every
@@ -22,19 +22,21 @@ import numpy as np
 from hysim import metrics
 from hysim._basics.frozen import FloatArray, check_positive
 from hysim._basics.progress import Progress, Reports, reports
-from hysim.discovery._hidden_memory import PLANT, HiddenMemory, Regressed, TermRegression
-from hysim.discovery._judgement import NO_STRUCTURE
-from hysim.discovery._oscillator_response import (
+from hysim.discovery._hidden_memory import (
+    PLANT,
     RATE_DEPENDENT,
     SPRING,
+    HiddenMemory,
     Oscillator,
     Response,
     State,
+    TermRegression,
     diverges,
     model,
     steady_loop,
     verdict,
 )
+from hysim.discovery._judgement import NO_STRUCTURE
 from hysim.discovery._result import OscillatorDiscovery
 from hysim.identification import identify
 from hysim.laws.differential.terms import (
@@ -70,8 +72,9 @@ _DIVERGES = "A law of lower BIC diverges on cycles over the measured range, and 
 
 
 class _Fitted(NamedTuple):
-    """A refined oscillator, the standard errors by name, its residual (n_samples,), and warnings."""
+    """An oscillator that a search refined, the standard errors by name, its residual (n_samples,), and warnings."""
 
+    search: "Search"
     oscillator: Oscillator
     stderr: dict[str, float]
     residual: FloatArray
@@ -81,8 +84,15 @@ class _Fitted(NamedTuple):
     def terms(self) -> tuple[Term, ...]:
         return tuple(self.oscillator.coefficients)
 
-    def bic(self, floor: float) -> float:
-        return information(float(np.mean(self.residual**2)), self.residual.size, len(self.stderr), floor=floor)
+    @property
+    def bic(self) -> float:
+        n, floor = self.residual.size, self.search.response.floor
+        return information(float(np.mean(self.residual**2)), n, len(self.stderr), floor=floor)
+
+    @property
+    def diverges(self) -> bool:
+        response = self.search.response
+        return diverges(model(*self.oscillator, response.structure, State(0.0, 0.0, 0.0)), response.widest)
 
 
 class _Tried(NamedTuple):
@@ -96,6 +106,10 @@ class _Tried(NamedTuple):
     @property
     def beyond(self) -> set[Term]:
         return set(self.chosen) - set(self.fitted.terms)
+
+
+def _bic(tried: _Tried) -> float:
+    return tried.fitted.bic
 
 
 class Search(NamedTuple):
@@ -127,38 +141,36 @@ class Search(NamedTuple):
         if nearest is None:
             return self._described(first, elastic, {}, ("Every law tried diverges along the measured displacement.",))
         refined, failures = [], []
-        for search in (self, *(self._made(structure) for structure in others)):
+        structures = (self.response.structure, *others)
+        for search in [self._replace(response=replace(self.response, structure=each)) for each in structures]:
             try:
-                refined.append((search, search._refined(nearest)))
+                refined.append(search._refined(nearest[1]))
             except ValueError as error:
                 failures.append(f"A law with memory was tried and could not be refined: {error}.")
         self.progress(4, _STEPS)
         if not refined:
             return self._described(first, elastic, {}, tuple(failures[:1]))
-        best, fitted = min(refined, key=lambda each: float(each[1].residual @ each[1].residual))
-        first = best._about(fitted)
-        candidates = [(best, each) for each in best._candidates(first)]
+        best = min(refined, key=lambda each: float(each.residual @ each.residual))
+        first = best.search._about(best)
+        candidates = best.search._candidates(first)
         if first.beyond:  # a law that is not the one decided how the records were made
-            candidates += [pair for search, _ in refined if search is not best for pair in search._again(candidates)]
-        return _chosen(candidates, elastic, nearest)
+            candidates += [each for other in refined if other is not best for each in other.search._again(candidates)]
+        regressed, ranked = nearest[1].coefficients, sorted(candidates, key=_bic)
+        for rank, each in enumerate(ranked):
+            if _bic(each) < elastic.bic and not each.fitted.diverges:
+                return each.fitted.search._described(each, elastic, regressed, (_DIVERGES,) if rank else ())
+        lost = (_DIVERGES,) if _bic(ranked[0]) < elastic.bic else ()
+        return ranked[0].fitted.search._described(ranked[0]._replace(fitted=elastic), elastic, regressed, lost)
 
-    def _made(self, structure: OscillatorStructure) -> "Search":
-        return self._replace(response=replace(self.response, structure=structure))
-
-    def _again(self, candidates: "Sequence[tuple[Search, _Tried]]") -> "list[tuple[Search, _Tried]]":
+    def _again(self, candidates: Sequence[_Tried]) -> list[_Tried]:
         """Candidates by this structure of the records; none if it suits the best Bouc-Wen law less."""
-        laws = [each for _, each in candidates if bouc_wen_exponent(each.fitted.terms) is not None]
-        if not laws:
-            return []
-        law = min(laws, key=self._bic).fitted
-        with contextlib.suppress(ValueError):  # the candidates by the other belief stay
+        laws = [each.fitted for each in candidates if bouc_wen_exponent(each.fitted.terms) is not None]
+        with contextlib.suppress(ValueError):  # there is no such law, or the candidates by the other belief stay
+            law = min(laws, key=lambda each: each.bic)
             begun = self._bouc_wen(law.terms if _is_polynomial(law.terms) else ())
-            if begun.bic(self.response.floor) < law.bic(self.response.floor):
-                return [(self, each) for each in self._candidates(self._about(begun))]
+            if begun.bic < law.bic:
+                return self._candidates(self._about(begun))
         return []
-
-    def _bic(self, tried: _Tried) -> float:
-        return tried.fitted.bic(self.response.floor)
 
     def _without_memory(self, linear: Linear) -> _Fitted:
         """The linear spring. Where the stiffness is known, z = A y is the rest of the spring."""
@@ -170,10 +182,9 @@ class Search(NamedTuple):
         stderr = {"stiffness" if name == SPRING.name else name: value for name, value in refined.stderr.items()}
         return refined._replace(oscillator=Oscillator(plant, {}), stderr=stderr)
 
-    def _refined(self, nearest: Regressed) -> _Fitted:
-        if RELAXATION in nearest.coefficients:
-            return self._simulated(Oscillator(nearest.plant, nearest.coefficients))
-        return self._bouc_wen(tuple(nearest.coefficients))
+    def _refined(self, nearest: Oscillator) -> _Fitted:
+        terms = tuple(nearest.coefficients)
+        return self._simulated(nearest) if RELAXATION in terms else self._bouc_wen(terms)
 
     def _candidates(self, first: _Tried) -> list[_Tried]:
         """Step 4: the first law; where it lacks terms, also n free, n at the nearest whole number, and these terms."""
@@ -186,10 +197,10 @@ class Search(NamedTuple):
             n = float(max(round(bouc_wen_exponent(free.fitted.terms) or 1.0), 1))
             if n != bouc_wen_exponent(first.fitted.terms):
                 candidates += self._pruned(self._about(self._bouc_wen(bouc_wen_terms(n))))
-        if not min(candidates, key=self._bic).beyond:
+        if not min(candidates, key=_bic).beyond:
             return candidates
         lacking = [each for each in candidates if each.beyond and _is_polynomial(each.chosen)]
-        more = self._extended(min(lacking, key=self._bic)) if lacking else None
+        more = self._extended(min(lacking, key=_bic)) if lacking else None
         return candidates if more is None else [*candidates, more]
 
     def _pruned(self, tried: _Tried) -> list[_Tried]:
@@ -219,10 +230,9 @@ class Search(NamedTuple):
 
     def _bouc_wen(self, terms: Sequence[Term]) -> _Fitted:
         """Identified with these terms of a Bouc-Wen law; without any, with all of them and n free."""
-        fixed: dict[str, float] = {} if not terms else {"n": bouc_wen_exponent(terms) or 1.0}
-        for rectified, name in ((True, "beta"), (False, "gamma")):
-            if terms and all(term.rectified != rectified for term in terms if term != SPRING):
-                fixed[name] = 0.0
+        fixed = {"n": bouc_wen_exponent(terms) or 1.0} if terms else {}
+        lacking = zip(_LAW, bouc_wen_terms(fixed.get("n", 1.0)), strict=True)
+        fixed |= {name: 0.0 for name, term in lacking if terms and term not in (SPRING, *terms)}
         fit = identify(
             self.response.structure,
             self.response.records,
@@ -230,20 +240,17 @@ class Search(NamedTuple):
             bounds={} if terms else {"n": _EXPONENTS},
         )
         numbers = fit.estimates
-        law = {
-            term: (sign * numbers[name], name)
-            for term, name, sign in zip(bouc_wen_terms(numbers["n"]), _LAW, (1.0, -1.0, -1.0), strict=True)
-            if name not in fixed
+        law = dict(zip(_LAW, bouc_wen_terms(numbers["n"]), strict=True))
+        coefficients = {
+            term: numbers[name] if name == "A" else -numbers[name] for name, term in law.items() if name not in fixed
         }
-        stderr = {name: value for name, value in fit.stderr.items() if name not in _LAW}
-        stderr |= {term.named("z"): fit.stderr[name] for term, (_, name) in law.items()}
+        stderr = {law[name].named("z") if name in law else name: value for name, value in fit.stderr.items()}
         plant = {name: numbers[name] for name in PLANT}
         warnings: list[str] = [] if fit.success else [f"The refinement did not converge: {fit.message}."]
         if not terms:
             reached = [bound for bound in _EXPONENTS if abs(numbers["n"] - bound) < _AT_BOUND * bound]
             warnings += [f"The exponent n reached its search bound {bound:g}." for bound in reached]
-        coefficients = {term: value for term, (value, _) in law.items()}
-        return _Fitted(Oscillator(plant, coefficients), stderr, fit.residual, tuple(warnings))
+        return _Fitted(self, Oscillator(plant, coefficients), stderr, fit.residual, tuple(warnings))
 
     def _simulated(self, oscillator: Oscillator) -> _Fitted:
         """A law of any terms, refined by the simulation behind the regression; a ValueError if it diverges."""
@@ -260,7 +267,7 @@ class Search(NamedTuple):
         variance = float(residual @ residual) / max(residual.size - size.size, 1)
         errors = np.sqrt(variance * np.diag(np.linalg.pinv((J / size).T @ (J / size)))) / size
         names = (*self.response.free, *(term.named("z") for term in terms))
-        return _Fitted(refined, dict(zip(names, errors.tolist(), strict=True)), residual)
+        return _Fitted(self, refined, dict(zip(names, errors.tolist(), strict=True)), residual)
 
     def _about(self, fitted: _Fitted) -> _Tried:
         """The library about a law; where n is free, without the terms that differ from the law's own by their power."""
@@ -269,10 +276,6 @@ class Search(NamedTuple):
         library = [t for t in self.library if not t.degree or (t.rectified, t.is_even_in_memory) not in same]
         regression = self.response.regression(fitted.oscillator, fitted.residual, library)
         return _tried(fitted, regression if _is_polynomial(fitted.terms) else replace(regression, n_others=1))
-
-    def _diverges(self, fitted: _Fitted) -> bool:
-        plant, law = fitted.oscillator
-        return diverges(model(plant, law, self.response.structure, State(0.0, 0.0, 0.0)), self.response.widest)
 
     def _described(
         self,
@@ -304,11 +307,11 @@ class Search(NamedTuple):
             scores={
                 "fit_percent": metrics.fit_percent(measured, measured - fitted.residual),
                 "rmse": float(np.sqrt(np.mean(fitted.residual**2))),
-                "bic": fitted.bic(response.floor),
+                "bic": fitted.bic,
                 "held_out_rmse": response.held_out_rmse(fitted.oscillator, fitted.residual),
                 "linear_rmse": float(np.sqrt(np.mean(elastic.residual**2))),
                 "linear_held_out_rmse": response.held_out_rmse(elastic.oscillator, elastic.residual),
-                "linear_bic": elastic.bic(response.floor),
+                "linear_bic": elastic.bic,
                 "n_terms": len(coefficients),
                 "n_structures": len(structures),
                 "condition": regression.condition,
@@ -332,22 +335,11 @@ class Search(NamedTuple):
         )
 
 
-def _chosen(candidates: Sequence[tuple[Search, _Tried]], elastic: _Fitted, nearest: Regressed) -> OscillatorDiscovery:
-    """Step 5: the law of the lowest BIC of those that do not diverge, or none."""
-    ranked = sorted(candidates, key=lambda each: each[0]._bic(each[1]))
-    search, lowest = ranked[0]
-    linear = elastic.bic(search.response.floor)
-    for rank, (believed, each) in enumerate(ranked):
-        if believed._bic(each) < linear and not believed._diverges(each.fitted):
-            return believed._described(each, elastic, nearest.coefficients, (_DIVERGES,) if rank else ())
-    lost = (_DIVERGES,) if search._bic(lowest) < linear else ()
-    return search._described(lowest._replace(fitted=elastic), elastic, nearest.coefficients, lost)
-
-
 def _tried(fitted: _Fitted, regression: TermRegression) -> _Tried:
     law = tuple(term for term in regression.terms if term in fitted.terms)
-    paths = {*regression.thresholded(), *regression.eliminated(), *([law] if law else [])}
-    structures = sorted(paths, key=lambda terms: (-len(terms), regression.bic(terms), terms))
+    structures = sorted(
+        (regression.path() | {law}) - {()}, key=lambda terms: (-len(terms), regression.bic(terms), terms)
+    )
     return _Tried(fitted, regression, structures, regression.best(structures))
 
 
