@@ -317,8 +317,7 @@ def _regressed(outcome: Outcome) -> dict[str, float]:
     structure, start = outcome.candidate.structure, outcome.start
     if not set(structure.terms) <= set(start.regression.terms):
         return {}
-    shift = [start.feedthrough] * structure.feedthrough + [start.offset] * structure.offset
-    numbers = np.array([*start.regression.ridge(structure.terms, 0.0), *shift])
+    numbers = np.array([*start.regression.ridge(structure.terms, 0.0), *start.shift(structure)])
     return coefficients(structure, numbers, outcome.library.letter)
 
 

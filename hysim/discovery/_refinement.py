@@ -17,7 +17,7 @@ y0 = offset + feedthrough u0 is no free number.
 """
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Generic, NamedTuple, Self, TypeVar
@@ -26,7 +26,6 @@ import numpy as np
 import numpy.typing as npt
 
 from hysim._basics.frozen import FloatArray
-from hysim.discovery._slopes import Regression
 from hysim.identification.marquardt import Schedule, SumOfSquares, descend, differences
 from hysim.laws.differential.boucwen import BoucWen
 from hysim.laws.differential.duhem_runs import free_runs
@@ -39,6 +38,9 @@ Bounds = tuple[FloatArray, FloatArray]
 _MOST_STEPS = 100  # between two samples, of which each serves some three of the memory: more are steps of the law
 
 
+Name = Term | str
+
+
 class Terms(NamedTuple):
     terms: tuple[Term, ...]
     feedthrough: bool = False
@@ -49,12 +51,15 @@ class Terms(NamedTuple):
     def size(self) -> int:
         return len(self.terms) + self.feedthrough + self.offset
 
-    def without(self, k: int) -> Self:
-        if k < len(self.terms):
-            return self._replace(terms=self.terms[:k] + self.terms[k + 1 :])
-        if self.feedthrough and k == len(self.terms):
-            return self._replace(feedthrough=False)
-        return self._replace(offset=False)
+    @property
+    def names(self) -> list[Name]:
+        """The terms, then ``"feedthrough"`` and ``"offset"`` where it has them: one name for each number."""
+        return [*self.terms, *["feedthrough"] * self.feedthrough, *["offset"] * self.offset]
+
+    def of(self, names: Sequence[Name]) -> Self:
+        """The structure of these of its names."""
+        terms = tuple(name for name in names if isinstance(name, Term))
+        return self._replace(terms=terms, feedthrough="feedthrough" in names, offset="offset" in names)
 
     def units(self, record: Record, stroke: float) -> FloatArray:
         """Changes of the numbers (size,) that move the output by about a stroke."""
@@ -113,12 +118,6 @@ class AnyExponent:
 Structure = Terms | AnyExponent
 
 
-def output_at_rest(structure: Structure, numbers: FloatArray, u0: float) -> FloatArray:
-    """Outputs (n_sets,) at the input `u0` where the memory is zero, of numbers (n_sets, size)."""
-    feedthrough, offset = shifts(structure, numbers)
-    return offset + feedthrough * u0
-
-
 def shifts(structure: Structure, numbers: FloatArray) -> tuple[FloatArray, FloatArray]:
     zero, first = np.zeros(len(numbers)), structure.size - structure.feedthrough - structure.offset
     feedthrough = numbers[:, first] if structure.feedthrough else zero
@@ -138,7 +137,6 @@ _STEPS_TO_RANK = 20  # a structure that is still on its way then is not taken fo
 _STEPS = 200
 _FEWEST_STEPS = 2  # where the work is done
 _SCHEDULE = Schedule(factors=(1e-3, 1e-1, 1.0, 10.0), success=1.0, failure=1e4, least=1e-12, most=1e8)
-_RIDGES = tuple(10.0**power for power in range(-9, 1))
 _SINGULAR = 1e-10
 _STIFFEST = 200.0  # units that a number may reach: a memory that turns within 1/200 of the range of u is a step
 _AMPLITUDES = (1.0, 0.5)  # of the steady loops, in ranges of the input
@@ -282,8 +280,9 @@ class FreeRun:
         self, structure: S, starts: FloatArray, *, tolerance: float = RANKING, hopeless: float = math.inf
     ) -> Candidate[S] | None:
         """Optimum from the best of `starts` (n_starts, size + n_records); None if all diverge. See `descend`."""
-        units = self.units(structure)
-        lower, upper = self._bounds(structure, units)
+        units, free = self.units(structure), np.full(len(self.records), np.inf)
+        sides = zip(structure.bounds(self.signs), (-free, free), strict=True)
+        lower, upper = (np.clip(np.concatenate(side), -_STIFFEST * units, _STIFFEST * units) for side in sides)
         starts, before = np.clip(starts, lower, upper), self.work.done
         costs = np.sum(self.residuals(structure, starts) ** 2, axis=1)
         if costs.min() >= DIVERGED**2:
@@ -304,7 +303,10 @@ class FreeRun:
             schedule=_SCHEDULE,
         )
         x, residual = reached.x[0], reached.evaluated[0][0]
-        unknowns = self._with_starts(structure, x * units)
+        unknowns = x * units
+        unknowns[structure.size :] = [
+            self._first(structure, unknowns[np.newaxis], k)[0] for k in range(len(self.records))
+        ]
         return Candidate(structure, unknowns, slopes(x, residual) / units, residual, self._settles(structure, unknowns))
 
     def _scaled(self, structure: Structure) -> Callable[[FloatArray], FloatArray]:
@@ -317,29 +319,12 @@ class FreeRun:
         residual = residuals(x[np.newaxis])[0]
         return residual, differences(residuals, x, residual, central=True)
 
-    def regressed(
-        self, regression: Regression, structure: Terms, feedthrough: float = 0.0, offset: float = 0.0
-    ) -> FloatArray:
-        """Starts (n_ridges, size + n_records) from ridge regressions of increasing weight."""
-        shift = [feedthrough] * structure.feedthrough + [offset] * structure.offset
-        ends = [*shift, *self.measured_starts]
-        return np.array([[*regression.ridge(structure.terms, weight), *ends] for weight in _RIDGES])
-
-    def _bounds(self, structure: Structure, units: FloatArray) -> tuple[FloatArray, FloatArray]:
-        free = np.full(len(self.records), np.inf)
-        lower, upper = structure.bounds(self.signs)
-        limit = _STIFFEST * units
-        return (
-            np.maximum(np.concatenate([lower, -free]), -limit),
-            np.minimum(np.concatenate([upper, free]), limit),
-        )
-
-    def _with_starts(self, structure: Structure, unknowns: FloatArray) -> FloatArray:
+    def _first(self, structure: Structure, unknowns: FloatArray, k: int) -> FloatArray:
+        """First output of a record, (n_sets,): y0, or that where the memory is zero."""
         if not structure.rest:
-            return unknowns
-        numbers = unknowns[np.newaxis, : structure.size]
-        starts = [output_at_rest(structure, numbers, float(record.u[0])) for record in self.records]
-        return np.concatenate([unknowns[: structure.size], *starts])
+            return unknowns[:, structure.size + k]
+        feedthrough, offset = shifts(structure, unknowns)
+        return offset + feedthrough * float(self.records[k].u[0])
 
     def _settles(self, structure: Structure, unknowns: FloatArray) -> bool:
         k = max(range(len(self.records)), key=lambda k: float(np.ptp(self.records[k].u)))
@@ -348,8 +333,8 @@ class FreeRun:
             middle, reach = 0.5 * (u.max() + u.min()), 0.5 * share * float(np.ptp(u))
             path = np.concatenate([u, np.tile([middle - reach, middle + reach], _CYCLES)])
             path.setflags(write=False)
-            numbers, y0 = unknowns[np.newaxis, : structure.size], unknowns[np.newaxis, structure.size + k]
-            y = structure.run(path, numbers, y0, BOUND * self.stroke)[0][0]
+            numbers, y0 = np.split(unknowns[np.newaxis], [structure.size], axis=1)
+            y = structure.run(path, numbers, y0[:, k], BOUND * self.stroke)[0][0]
             if not np.isfinite(y).all() or np.abs(y[-4:-2] - y[-2:]).max() > _STEADY * self.stroke:
                 return False
         return True
@@ -357,10 +342,8 @@ class FreeRun:
     def _residual(self, structure: Structure, unknowns: FloatArray, k: int) -> FloatArray:
         record, visible = self.records[k], self.visible[k]
         bound = BOUND * self.stroke + float(np.abs(visible.y).max())
-        numbers, y0 = unknowns[:, : structure.size], unknowns[:, structure.size + k]
-        if structure.rest:
-            y0 = output_at_rest(structure, numbers, float(record.u[0]))
-        y, terms = structure.run(record.u, numbers, y0, bound)
+        y0 = self._first(structure, unknowns, k)
+        y, terms = structure.run(record.u, unknowns[:, : structure.size], y0, bound)
         self.work.done += terms / self.n_samples
         if self.masks is not None:
             y = y[:, self.masks[k]]

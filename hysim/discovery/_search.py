@@ -202,7 +202,7 @@ def _better_form(records: Sequence[Record], library: Library, optimizer: str) ->
             continue
         starts = shifted(rows, library.terms, feedthrough=library.feedthrough != "no", offset=library.offset)
         runs = [
-            free_run.residuals(structure, free_run.regressed(start.regression, structure, *start[1:]))[:, held_out]
+            free_run.residuals(structure, start.unknowns(structure, free_run))[:, held_out]
             for start in starts[:2]  # the output itself, and the best place of the scan
             for _, structure in _path(start, library, optimizer)
         ]
@@ -306,8 +306,7 @@ def _refined(free_run: FreeRun, of_memory: Outcome, structure: AnyExponent) -> C
     for start in of_memory.search.starts:
         for n in _EXPONENTS.tolist():
             columns, target = of_memory.slopes.equations(_features(n), start.feedthrough, start.offset)
-            shift = [start.feedthrough] * structure.feedthrough + [start.offset] * structure.offset
-            ends = [n, *shift, *free_run.measured_starts]
+            ends = [n, *start.shift(structure), *free_run.measured_starts]
             starts += [[*_ridge(columns, target, weight), *ends] for weight in _RIDGES]
     return free_run.refine(structure, np.array(starts))
 

@@ -30,6 +30,7 @@ positive costs, so that nothing cancels where the residual is rounding.
 Source: G. M. Furnival and R. W. Wilson, Regressions by leaps and bounds, Technometrics 16 (1974) 499.
 """
 
+import itertools
 import math
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
@@ -39,7 +40,7 @@ import numpy as np
 import numpy.typing as npt
 
 from hysim._basics.frozen import FloatArray
-from hysim.discovery._refinement import Candidate, FreeRun, Terms, bic_of, cost_of
+from hysim.discovery._refinement import Candidate, FreeRun, Structure, Terms, bic_of, cost_of
 from hysim.discovery._slopes import Regression
 from hysim.laws.differential.terms import Term, bouc_wen_exponent
 from hysim.records import Record
@@ -124,13 +125,24 @@ _LIKELY = 8.0  # predicted BIC above the lowest one, beyond which a structure is
 _TWINS = 6
 MOST_WORK = 2.5e5  # slopes for each sample, of one library: smooth laws take a tenth to a half of it
 PATH_SHARE, SEARCH_SHARE = 0.45, 0.7  # of that, after which no further structure is tried; the rest is for last digits
+_RIDGES = tuple(10.0**power for power in range(-9, 1))
 _EXPECTED = 40.0  # structures of one search, of which there are 30 to 100
 
 
 class Start(NamedTuple):
+    """A regression of z = y - feedthrough u - offset, where laws begin."""
+
     regression: Regression
     feedthrough: float = 0.0
     offset: float = 0.0
+
+    def shift(self, structure: Structure) -> list[float]:
+        return [self.feedthrough] * structure.feedthrough + [self.offset] * structure.offset
+
+    def unknowns(self, structure: Terms, free_run: FreeRun) -> FloatArray:
+        """Starts (n_ridges, size + n_records) from ridge regressions of increasing weight."""
+        ends = [*self.shift(structure), *free_run.measured_starts]
+        return np.array([[*self.regression.ridge(structure.terms, weight), *ends] for weight in _RIDGES])
 
 
 class Prediction(NamedTuple):
@@ -192,7 +204,7 @@ class Search:
         """Refine a structure once, from its regressions and these starts; in a `race` it may be given up."""
         if structure not in self.tried:
             regressed = [
-                self.free_run.regressed(start.regression, structure, start.feedthrough, start.offset)
+                start.unknowns(structure, self.free_run)
                 for start in self.starts
                 if set(structure.terms) <= set(start.regression.terms)
             ]
@@ -259,10 +271,13 @@ class Search:
         """Predictions with or without rest; the unknowns are the numbers of `largest` and each record's first z."""
         free_run, size = self.free_run, largest.size
         u0 = np.array([record.u[0] for record in free_run.records])
-        x = _placed(candidate, largest)
+        values = dict(zip(candidate.structure.names, candidate.unknowns.tolist(), strict=False))
+        starts = candidate.unknowns[candidate.structure.size :]
+        x = np.concatenate([[values.get(name, 0.0) for name in largest.names], starts])
         residual, jacobian = free_run.linearised(largest._replace(rest=False), x)
         jacobian /= free_run.units(largest)
-        shift = _shift_columns(largest, u0)
+        columns = {"feedthrough": u0, "offset": np.ones(u0.size)}  # change of the first outputs while the memory stays
+        shift = np.stack([columns.get(str(name), np.zeros(u0.size)) for name in largest.names], axis=1)
         jacobian[:, :size] += jacobian[:, size:] @ shift
         x[size:] -= shift @ x[:size]
         if rest:
@@ -277,35 +292,14 @@ class Search:
                 bic = bic_of(float(subsets.cost[k]), free_run.n_samples, int(included.sum()))
                 starts = (np.zeros(u0.size) if rest else unknowns[size:]) + shift @ unknowns[:size]
                 numbers = unknowns[:size][included[:size]]
-                yield Prediction(bic, _of(largest, included, rest), np.concatenate([numbers, starts]))
+                structure = largest.of(list(itertools.compress(largest.names, included)))._replace(rest=rest)
+                yield Prediction(bic, structure, np.concatenate([numbers, starts]))
 
     def _worth_refining(self, subsets: Subsets, largest: Terms) -> list[int]:
         n_terms = len(largest.terms)
         wanted = np.array([self.free_run.signs.get(term, 0) for term in largest.terms])
         allowed = (subsets.x[:, :n_terms] * wanted >= 0.0).all(axis=1) & subsets.included[:, :n_terms].any(axis=1)
         return [int(k) for k in np.flatnonzero(allowed)[:MET]]
-
-
-def _placed(candidate: Candidate[Terms], largest: Terms) -> FloatArray:
-    own, size = candidate.structure, candidate.structure.size
-    values = dict(zip(_names(own), candidate.unknowns[:size].tolist(), strict=True))
-    return np.concatenate([[values.get(name, 0.0) for name in _names(largest)], candidate.unknowns[size:]])
-
-
-def _names(structure: Terms) -> list[Any]:
-    return [*structure.terms, *["feedthrough"] * structure.feedthrough, *["offset"] * structure.offset]
-
-
-def _shift_columns(largest: Terms, u0: FloatArray) -> FloatArray:
-    """Change of each record's first output, (n_records, size), with the numbers while its memory stays."""
-    columns = {"feedthrough": u0, "offset": np.ones(u0.size)}
-    return np.stack([columns.get(name, np.zeros(u0.size)) for name in _names(largest)], axis=1)
-
-
-def _of(largest: Terms, included: npt.NDArray[np.bool_], rest: bool) -> Terms:
-    names = [name for name, is_kept in zip(_names(largest), included.tolist(), strict=False) if is_kept]
-    terms = tuple(name for name in names if isinstance(name, Term))
-    return Terms(terms, "feedthrough" in names, "offset" in names, rest)
 
 
 def preferred(candidates: Sequence[Candidate[Terms]], letter: str) -> Candidate[Terms]:
@@ -320,7 +314,7 @@ def pruned(
 ) -> Candidate[Terms]:
     structure = candidate.structure
     for k in np.argsort(candidate.significance).tolist():
-        smaller = structure.without(k)
+        smaller = structure.of(structure.names[:k] + structure.names[k + 1 :])
         needed = not smaller.terms or ("feedthrough" in required and not smaller.feedthrough)
         if candidate.significance[k] >= SIGNIFICANT:
             break
