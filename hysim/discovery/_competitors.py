@@ -97,7 +97,11 @@ def relaxations(records: Sequence[Record]) -> Yardstick:
     n = max(2, int(np.ceil(_PER_DECADE * np.log10(longest / shortest))) + 1)
     times = np.geomspace(shortest, longest, n)
     hats = np.array([np.interp(np.linspace(0.0, 1.0, n), _PLACES, row) for row in np.eye(_PLACES.size)])
-    parts = [np.stack([_relaxed(record, float(tau)) for tau in times], axis=1) @ hats.T for record in records]
+    lags = [TransferFunction(num=(1.0,), den=(tau, 1.0), hold="foh") for tau in times.tolist()]
+    parts = [
+        np.stack([lag.response(record.u - record.u[0], record.sample_time) for lag in lags], axis=1) @ hats.T
+        for record in records
+    ]
     return _yardstick(records, [_inputs(records)[:, np.newaxis], np.concatenate(parts)])
 
 
@@ -182,11 +186,6 @@ def _positions(u: FloatArray, side: float) -> FloatArray:
     thresholds = np.arange(1.0, _PLAYS + 1.0) / (_PLAYS + 1.0)
     starts = tuple((u[0] + side * thresholds).tolist())
     return PrandtlIshlinskii(thresholds=tuple(thresholds.tolist()), weights=starts, z0=starts).memory(u)
-
-
-def _relaxed(record: Record, tau: float) -> FloatArray:
-    lag = TransferFunction(num=(1.0,), den=(tau, 1.0), hold="foh")
-    return lag.response(record.u - record.u[0], record.sample_time)
 
 
 def _inputs(records: Sequence[Record]) -> FloatArray:

@@ -19,7 +19,7 @@ from hysim import metrics
 from hysim._basics.blas import one_blas_thread
 from hysim._basics.frozen import FloatArray, check_choice
 from hysim._basics.progress import Progress, Reports, reports
-from hysim.discovery._judgement import HYSTERESIS, LAG, NO_STRUCTURE, Judgement, Trial, competitors, doubts, judge
+from hysim.discovery._judgement import HYSTERESIS, LAG, NO_STRUCTURE, Trial, competitors, doubts, judge
 from hysim.discovery._refinement import DIVERGED, AnyExponent, Candidate, FreeRun, Samples, Work
 from hysim.discovery._result import Discovery, coefficients, law_from
 from hysim.discovery._search import Library, Options, Outcome, or_any_exponent, searched
@@ -200,7 +200,9 @@ def discover(
     if cross_validate is not None:
         error = left_out_rmse(records, again, cross_validate, lambda done, _: report(1.0 + done))
     warnings = [*result.warnings, swapped_columns(records)]
-    if route == "auto" and result.verdict != LAG and _may_be_an_oscillators(records, outcomes[0].candidate):
+    is_even = all(r.t is not None and np.ptp(np.diff(r.t)) < 1e-6 * np.ptp(r.t) for r in records)
+    is_poor = _scores(outcomes[0].candidate, records)["fit_percent"] <= _POOR
+    if route == "auto" and result.verdict != LAG and is_even and is_poor:
         warnings.append(_OSCILLATOR)
     return replace(result, warnings=tuple(filter(None, warnings)), cv_rmse=error)
 
@@ -222,14 +224,6 @@ def _rests(initial: str, library: Library, records: Sequence[Record]) -> tuple[b
     if initial != "auto":
         return (initial == "rest",)
     return (False, True) if library.letter == "z" or all(record.u[0] == 0.0 for record in records) else (False,)
-
-
-def _may_be_an_oscillators(records: tuple[Record, ...], candidate: Candidate[Any]) -> bool:
-    return _scores(candidate, records)["fit_percent"] <= _POOR and all(_is_even(record) for record in records)
-
-
-def _is_even(record: Record) -> bool:
-    return record.t is not None and float(np.ptp(np.diff(record.t))) < 1e-6 * float(np.ptp(record.t))
 
 
 def _checked(record_or_records: Record | Sequence[Record]) -> tuple[Record, ...]:
@@ -276,7 +270,17 @@ def _discovery(
 ) -> Discovery:
     letter, structure = outcome.library.letter, candidate.structure
     law = law_from(candidate, records, "z" if isinstance(structure, AnyExponent) else letter)
-    judgement = _judged(records, candidate, letter, law.models, others)
+
+    def refit(some: Sequence[Record], weights: Sequence[FloatArray]) -> Sequence[Any]:
+        masks = tuple(each > 0.0 for each in weights)
+        refined = FreeRun(tuple(some), masks, work=Work(_OF_REFIT)).refine(structure, candidate.unknowns[np.newaxis])
+        if refined is None:
+            raise ValueError("the law diverges")
+        return law_from(refined, some, letter).models
+
+    judgement = judge(records, law.models, refit, others)
+    message = [f"{letter} is held at zero at the first sample"] * structure.rest
+    message += [_SHORT] * outcome.is_short + [_CUT] * outcome.is_cut
     path = [(threshold, outcome.search.refine(each)) for threshold, each in outcome.path]
     path_scores = [_scores(each, outcome.search.free_run.records) for _, each in path]
     return Discovery(
@@ -302,15 +306,9 @@ def _discovery(
         path_n_terms=np.array([len(structure.terms) for _, structure in outcome.path], dtype=float),
         path_fit_percent=np.array([scores["fit_percent"] for scores in path_scores]),
         path_bic=np.array([scores["bic"] for scores in path_scores]),
-        message=_message(outcome, structure.rest),
+        message="; ".join(message),
         warnings=doubts(judgement),
     )
-
-
-def _message(outcome: Outcome, rest: bool) -> str:
-    parts = [f"{outcome.library.letter} is held at zero at the first sample"] * rest
-    parts += [_SHORT] * outcome.is_short + [_CUT] * outcome.is_cut
-    return "; ".join(parts)
 
 
 def _regressed(outcome: Outcome) -> dict[str, float]:
@@ -319,21 +317,6 @@ def _regressed(outcome: Outcome) -> dict[str, float]:
         return {}
     numbers = np.array([*start.regression.ridge(structure.terms, 0.0), *start.shift(structure)])
     return coefficients(structure, numbers, outcome.library.letter)
-
-
-def _judged(
-    records: tuple[Record, ...], candidate: Candidate[Any], letter: str, models: Sequence[Any], others: Trial
-) -> Judgement:
-    structure = candidate.structure
-
-    def refit(some: Sequence[Record], weights: Sequence[FloatArray]) -> Sequence[Any]:
-        masks = tuple(each > 0.0 for each in weights)
-        refined = FreeRun(tuple(some), masks, work=Work(_OF_REFIT)).refine(structure, candidate.unknowns[np.newaxis])
-        if refined is None:
-            raise ValueError("the law diverges")
-        return law_from(refined, some, letter).models
-
-    return judge(records, models, refit, others)
 
 
 def _scores(candidate: Candidate[Any] | None, records: Sequence[Record]) -> dict[str, float]:

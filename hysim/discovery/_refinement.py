@@ -179,8 +179,14 @@ class Candidate(Generic[S]):
     @property
     def covariance(self) -> FloatArray:
         """Covariance of the unknowns, zero for y0 at rest; nan where the records do not determine all of them."""
-        covariance, free = np.zeros((self.unknowns.size,) * 2), slice(self.n_parameters)
-        covariance[free, free] = _covariance(self.jacobian[:, free], self.cost)
+        n, d, covariance = self.residual.size, self.n_parameters, np.zeros((self.unknowns.size,) * 2)
+        jacobian, covariance[:d, :d] = self.jacobian[:, :d], np.nan
+        sizes = np.linalg.norm(jacobian, axis=0)
+        if n > d and (sizes > 0.0).all():
+            singular, right = np.linalg.svd(jacobian / sizes, full_matrices=False)[1:]
+            if singular[-1] >= _SINGULAR * singular[0]:
+                root = (right / singular[:, np.newaxis]).T / sizes[:, np.newaxis]
+                covariance[:d, :d] = root @ root.T * (self.cost / (n - d))
         return covariance
 
     @property
@@ -189,18 +195,6 @@ class Candidate(Generic[S]):
         size = self.structure.size
         spread = np.sqrt(np.diag(self.covariance)[:size])
         return np.where(spread > 0.0, np.abs(self.unknowns[:size]) / np.where(spread > 0.0, spread, 1.0), np.inf)
-
-
-def _covariance(jacobian: FloatArray, cost: float) -> FloatArray:
-    n, d = jacobian.shape
-    sizes = np.linalg.norm(jacobian, axis=0)
-    if n <= d or not (sizes > 0.0).all():
-        return np.full((d, d), np.nan)
-    singular, right = np.linalg.svd(jacobian / sizes, full_matrices=False)[1:]
-    if singular[-1] < _SINGULAR * singular[0]:
-        return np.full((d, d), np.nan)
-    root = (right / singular[:, np.newaxis]).T / sizes[:, np.newaxis]
-    return np.asarray(root @ root.T * (cost / (n - d)))
 
 
 def cost_of(bic: float, n_samples: int, n_parameters: int) -> float:

@@ -12,6 +12,7 @@ import math
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import field
+from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -48,7 +49,7 @@ class ModelledLaw(NamedTuple):
 
 def law_from(candidate: Candidate[Any], records: Sequence[Record], letter: str) -> ModelledLaw:
     structure, unknowns = candidate.structure, candidate.unknowns
-    numbers = _numbers(structure, letter)
+    numbers = partial(_numbers, structure, letter)
     values = numbers(unknowns[: structure.size])
     models = tuple(
         _model(structure, values, letter, float(y0), float(record.u[0]))
@@ -64,37 +65,23 @@ def law_from(candidate: Candidate[Any], records: Sequence[Record], letter: str) 
 
 
 def coefficients(structure: Terms, unknowns: FloatArray, letter: str) -> dict[str, float]:
-    return _coefficients(_numbers(structure, letter)(unknowns[: structure.size]))
+    return _coefficients(_numbers(structure, letter, unknowns[: structure.size]))
 
 
-def _numbers(structure: Structure, letter: str) -> Callable[[FloatArray], dict[str, float]]:
-    """From a structure's unknowns to the numbers that a user reads: a Bouc-Wen law with a feedthrough has A = 1."""
+def _numbers(structure: Structure, letter: str, unknowns: FloatArray) -> dict[str, float]:
+    """The numbers that a user reads (size,): a Bouc-Wen law with a feedthrough has A = 1."""
     shifts = ["feedthrough"] * structure.feedthrough + ["offset"] * structure.offset
-
     if isinstance(structure, AnyExponent):
-        return lambda unknowns: _of_any_exponent(unknowns, shifts)
-    names = [*(term.named(letter) for term in structure.terms), *shifts]
-    n = bouc_wen_exponent(structure.terms)
-
-    def numbers(unknowns: FloatArray) -> dict[str, float]:
+        A, dissipative, conservative, n, *others = unknowns.tolist()
+        _, rectified, plain = bouc_wen_terms(n)
+        terms = {_A: A, plain.named("z"): conservative, rectified.named("z"): dissipative}
+        values = terms | dict(zip(["n", *shifts], [n, *others], strict=True))
+    else:
+        n = bouc_wen_exponent(structure.terms)
+        names = [*(term.named(letter) for term in structure.terms), *shifts]
         values = dict(zip(names, unknowns.tolist(), strict=True))
-        return values if n is None or not structure.feedthrough else _normalised(values, float(n))
-
-    return numbers
-
-
-def _of_any_exponent(unknowns: FloatArray, shifts: Sequence[str]) -> dict[str, float]:
-    n = float(unknowns[3])
-    A, dissipative, conservative, *others = unknowns.tolist()
-    _, rectified, plain = bouc_wen_terms(n)
-    terms = {_A: A, plain.named("z"): conservative, rectified.named("z"): dissipative}
-    values = terms | dict(zip(["n", *shifts], others, strict=True))
-    return _normalised(values, n) if "feedthrough" in shifts else values
-
-
-def _normalised(values: dict[str, float], n: float) -> dict[str, float]:
     gain = values.get(_A, 0.0)
-    if gain == 0.0:
+    if n is None or not structure.feedthrough or gain == 0.0:
         return values
     odd = abs(gain) ** (n - 1.0)
     even = math.copysign(odd, gain)

@@ -12,6 +12,7 @@ Its exponent is scanned; from the best regressions on the three terms the free r
 The law is taken where its BIC is lower by more than INDISTINCT.
 """
 
+import itertools
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -169,7 +170,9 @@ def searched(
     is_short = options.enough is not None and not _least_rmse(search) <= _HOPELESS * options.enough()
     is_cut = not is_short and not search.explore(library.structure(starts[0].regression.terms))
     chosen = _on_all_samples(free_run, search, library, options.seed, restarts=0 if is_short or is_cut else _RESTARTS)
-    start = _start_at(rows, library, chosen)
+    feedthrough, offset = shifts(chosen.structure, chosen.unknowns[np.newaxis])
+    place = float(feedthrough[0]), float(offset[0])
+    start = Start(rows.regression(library.terms, *place), *place)
     return Outcome(library, chosen, search, start, rows, _path(start, library, optimizer), is_short, is_cut)
 
 
@@ -186,18 +189,15 @@ def _path(start: Start, library: Library, optimizer: str) -> list[tuple[float, T
     return [(threshold, library.structure(regression.included(coefficients))) for threshold, coefficients in path]
 
 
-def _start_at(rows: Slopes, library: Library, candidate: Candidate[Terms]) -> Start:
-    feedthrough, offset = shifts(candidate.structure, candidate.unknowns[np.newaxis, : candidate.structure.size])
-    place = float(feedthrough[0]), float(offset[0])
-    return Start(rows.regression(library.terms, *place), *place)
-
-
 def _better_form(records: Sequence[Record], library: Library, optimizer: str) -> str:
-    free_run, errors = FreeRun(tuple(records)), {}
+    free_run, errors, training = FreeRun(tuple(records)), {}, []
+    for record in records:
+        included = (np.arange(len(record)) % _HELD_OUT != 1) | turning(record.u)
+        training.append(Record(u=record.u[included], y=record.y[included]))
     held_out = np.concatenate([np.arange(len(record)) % _HELD_OUT == 1 for record in records])
     for form in FORMS:
         try:
-            rows = slopes([_training(record) for record in records], form)
+            rows = slopes(training, form)
         except ValueError:
             continue
         starts = shifted(rows, library.terms, feedthrough=library.feedthrough != "no", offset=library.offset)
@@ -208,11 +208,6 @@ def _better_form(records: Sequence[Record], library: Library, optimizer: str) ->
         ]
         errors[form] = min((float(np.mean(run**2, axis=1).min()) for run in runs), default=math.inf)
     return min(errors, key=lambda form: errors[form], default="smoothed")
-
-
-def _training(record: Record) -> Record:
-    included = (np.arange(len(record)) % _HELD_OUT != 1) | turning(record.u)
-    return Record(u=record.u[included], y=record.y[included])
 
 
 def _on_all_samples(free_run: FreeRun, search: Search, library: Library, seed: int, restarts: int) -> Candidate[Terms]:
@@ -245,29 +240,15 @@ def _restarted(free_run: FreeRun, chosen: Candidate[Terms], seed: int, restarts:
 def shifted(slopes: Slopes, terms: tuple[Term, ...], *, feedthrough: bool, offset: bool) -> tuple[Start, ...]:
     """Regressions to begin at: that of the output itself, and those at the best places of the scan."""
     trial = symmetric(terms, "odd") or terms  # about the origin of z a law is odd, or nearly
-    places = sorted(
-        (slopes.misfit(trial, slope, level), slope, level)
-        for slope in (_slopes_tried(slopes) if feedthrough else (0.0,))
-        for level in (_levels(slopes, slope) if offset else (0.0,))
-    )
+    chord = max((np.copysign(np.ptp(r.y) / np.ptp(r.u), np.cov(r.u, r.y)[0, 1]) for r in slopes.rows), key=abs)
+    places = []
+    for slope in [0.0, *(chord * _FEEDTHROUGHS).tolist()] if feedthrough else [0.0]:
+        memory = np.concatenate([rows.y - slope * rows.u for rows in slopes.rows])
+        levels = (memory.min() + (memory.max() - memory.min()) * _OFFSETS).tolist() if offset else []
+        places += [(slopes.misfit(trial, slope, level), slope, level) for level in (0.0, *levels)]
     chosen = [(0.0, 0.0)] if feedthrough or offset else []
-    chosen += [(slope, level) for _, slope, level in places[:_KEPT]]
+    chosen += [(slope, level) for _, slope, level in sorted(places)[:_KEPT]]
     return tuple(Start(slopes.regression(terms, *place), *place) for place in dict.fromkeys(chosen))
-
-
-def _slopes_tried(slopes: Slopes) -> list[float]:
-    chord = max((_chord(rows.u, rows.y) for rows in slopes.rows), key=abs)
-    return [0.0, *(chord * _FEEDTHROUGHS).tolist()]
-
-
-def _chord(u: FloatArray, y: FloatArray) -> float:
-    return float(np.copysign(np.ptp(y) / np.ptp(u), np.cov(u, y)[0, 1]))
-
-
-def _levels(slopes: Slopes, feedthrough: float) -> list[float]:
-    memory = np.concatenate([rows.y - feedthrough * rows.u for rows in slopes.rows])
-    low, high = float(memory.min()), float(memory.max())
-    return [0.0, *(low + (high - low) * _OFFSETS).tolist()]
 
 
 def or_any_exponent(
@@ -277,28 +258,22 @@ def or_any_exponent(
     thin, best = of_memory.search.free_run, chosen.searched
     if chosen.candidate.cost < free_run.n_samples * ALIKE**2:
         return chosen.candidate
-    candidates = [_refined(thin, of_memory, structure) for structure in _structures(of_memory.library)[:1]]
-    least = min((c.cost for c in candidates if c is not None), default=math.inf)
-    fewest = _structures(of_memory.library)[-1].size + (0 if True in of_memory.library.rests else len(thin.records))
+    library = of_memory.library
+    feedthroughs = {"no": (False,), "may": (True, False), "must": (True,)}[library.feedthrough]
+    offsets = (True, False) if library.offset else (False,)
+    largest, *others = itertools.starmap(AnyExponent, itertools.product(feedthroughs, offsets, library.rests))
+    candidates = [_refined(thin, of_memory, largest)]
+    least = math.inf if candidates[0] is None else candidates[0].cost
+    smallest = [largest, *others][-1]
+    fewest = smallest.size + (0 if True in library.rests else len(thin.records))
     if not bic_of(least, thin.n_samples, fewest) < best.bic - INDISTINCT:
         return chosen.candidate
-    candidates += [_refined(thin, of_memory, structure) for structure in _structures(of_memory.library)[1:]]
+    candidates += [_refined(thin, of_memory, structure) for structure in others]
     sound = [candidate for candidate in candidates if candidate is not None and candidate.settles]
     lowest = min(sound, key=lambda candidate: candidate.bic, default=None)
     if lowest is None or lowest.bic >= best.bic - INDISTINCT or gap(best, lowest) < ALIKE:
         return chosen.candidate
     return free_run.refine(lowest.structure, lowest.unknowns[np.newaxis], tolerance=POLISH) or chosen.candidate
-
-
-def _structures(library: Library) -> list[AnyExponent]:
-    feedthroughs = {"no": (False,), "may": (True, False), "must": (True,)}[library.feedthrough]
-    offsets = (True, False) if library.offset else (False,)
-    return [
-        AnyExponent(feedthrough, offset, rest)
-        for feedthrough in feedthroughs
-        for offset in offsets
-        for rest in library.rests
-    ]
 
 
 def _refined(free_run: FreeRun, of_memory: Outcome, structure: AnyExponent) -> Candidate[AnyExponent] | None:
