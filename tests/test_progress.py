@@ -7,6 +7,7 @@ import sys
 from types import SimpleNamespace
 
 import numba
+import numpy as np
 import pytest
 import sweep_tasks
 
@@ -164,3 +165,14 @@ def test_the_shell_reports_until_it_is_told_to_be_quiet(tmp_path, capsys, at_onc
     assert "identify: " in capsys.readouterr().err
     assert main(["identify", str(path), "--model", "play", "--quiet"]) == 0
     assert capsys.readouterr().err == ""
+
+
+def test_a_loop_that_the_callers_function_closes_is_not_reported_to_it():
+    plant, t, calls = hs.Actuator(hysteresis=hs.BoucWen()), 0.01 * np.arange(100.0), []
+
+    def seen(done, total):
+        calls.append(done)
+        hs.close_loop(plant, hs.PID(ki=1.0), t, t)
+
+    hs.close_loop(plant, hs.PID(ki=1.0), t, t, progress=seen)
+    assert calls == [100]

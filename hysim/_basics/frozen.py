@@ -24,6 +24,7 @@ Interval = typing.Annotated[tuple[float, ...], "lowest and highest"]
 Count = typing.Annotated[int, "at least 1"]
 """Hints of fields that are checked where a specification is made; so are families and choices (`Literal`)."""
 
+_RULES = (Positive, NotNegative, Interval, Count)
 LAST = {"last": True}  # metadata of a field of a base class that stands behind those of its families
 T = TypeVar("T")
 
@@ -225,11 +226,16 @@ def _coercions(cls: Any, finite: bool) -> dict[str, Callable[[Any, str], Any]]:
 
 @functools.cache
 def _checks(cls: Any) -> dict[str, tuple[Any, ...]]:
-    """Kinds of the fields for which `_check_kind` has a rule; of an optional one None is a kind, too."""
+    """Kinds of hysim's own fields for which `_check_kind` has a rule; of an optional one None is a kind, too."""
+    own = {
+        name for base in cls.__mro__ if base.__module__.startswith("hysim.") for name in inspect.get_annotations(base)
+    }
+    own &= {each.name for each in dataclasses.fields(cls)}
     checks = {}
-    for name, hint in typing.get_type_hints(cls, include_extras=True).items():
+    for name, hint in typing.get_type_hints(cls, include_extras=True).items() if own else ():
         kinds = typing.get_args(hint) if typing.get_origin(hint) in (types.UnionType, typing.Union) else (hint,)
-        if typing.get_origin(kinds[0]) in (typing.Literal, typing.Annotated) or dataclasses.is_dataclass(kinds[0]):
+        is_literal = typing.get_origin(kinds[0]) is typing.Literal
+        if name in own and (is_literal or kinds[0] in _RULES or dataclasses.is_dataclass(kinds[0])):
             checks[name] = kinds
     return checks
 

@@ -68,7 +68,8 @@ def along(progress: Reports) -> Iterator[None]:
 
 def followed(done: int, total: int) -> None:
     if (progress := _along.get()) is not None:
-        progress(done, total)
+        with along(False):  # what the caller's function runs is not reported to it
+            progress(done, total)
 
 
 def announced_by(progress: Reports) -> Callable[[str], None] | None:

@@ -274,19 +274,19 @@ class RestingPlant:
         self, controller: Controller, reference: FloatArray, progress: Reports = None, begin: float = 0.0
     ) -> Signals:
         """Signals of the loop that a controller closes from the time `begin` [s]; a SimulationError if it diverges."""
-        with along(progress):
-            signals = self.attempt(controller, reference)
+        signals = self.attempt(controller, reference, progress)
         if signals.lost >= 0:
             time = begin + signals.lost * self.sample_time
             raise SimulationError(f"the loop diverges at t = {time:g}: it is unstable")
         return signals
 
-    def attempt(self, controller: Controller, reference: FloatArray) -> Signals:
+    def attempt(self, controller: Controller, reference: FloatArray, progress: Reports = None) -> Signals:
         """As `run`; where the loop diverges, the signals name the sample."""
         compiled = begun(controller, self.sample_time, self.u0, self.y0)
         samples = min(preview(controller, self.sample_time), reference.size)
         ahead = read_only(np.append(reference[samples:], np.full(samples, reference[-1])))
-        signals: Signals = self.chain.run(compiled, self.state, ahead)[0]
+        with along(progress or False):
+            signals: Signals = self.chain.run(compiled, self.state, ahead)[0]
         return signals._replace(held=held_samples(compiled))
 
     def attempt_each(

@@ -38,7 +38,7 @@ from hysim.identification import identify
 from hysim.laws.operators.prandtl_ishlinskii import PrandtlIshlinskii
 from hysim.laws.static import SingleValued
 from hysim.metrics.criteria import information
-from hysim.models.protocols import Identifiable
+from hysim.models.protocols import Subject
 from hysim.models.search_space import ALL_FREE, Freedom, Parameters, SearchSpace
 from hysim.plants.transfer_function import FREQUENCY, TransferFunction, TransferFunctionStructure
 from hysim.records import Record
@@ -254,7 +254,7 @@ def steady_width(plant: TransferFunction, cycle: Record, rate: float) -> float:
 
 
 @dataclass(frozen=True)
-class _Affine(Identifiable):
+class _Affine(Subject):
     """A transfer function with an offset, as `identify` takes it; the search begins at `start`, if given."""
 
     structure: TransferFunctionStructure

@@ -302,10 +302,9 @@ def _of_stated(
     is_same = choice.sample_time in (None, step)
     require(is_same, f"{where} states a step of {step:g} s: leave out sample_time, or correct the line")
     numbers = number_list(lines, decimal, skip)
-    values = _in_stated_unit(numbers, choice, unit)
-    advice = "the file is incomplete, or the line is to be corrected"
-    require(values.size == n, f"{where} states {n} values, but {values.size} follow: {advice}")
-    return (0.0, step), values
+    size, advice = numbers.values.size, "the file is incomplete, or the line is to be corrected"
+    require(size == n, f"{where} states {n} values, but {size} follow: {advice}")
+    return (0.0, step), _in_stated_unit(numbers, choice, unit)
 
 
 def _in_stated_unit(numbers: NumberList, choice: _Choice, unit: str) -> FloatArray:
@@ -365,8 +364,8 @@ def _motion_column(table: Table, choice: _Choice, time: Column | None) -> Column
     if choice.acceleration is not None:
         return table.column(choice.acceleration)
     others = [name for name in _signals(table) if time is None or name != time.label]
-    names = [name for name in others if _MOTION_NAME.fullmatch(name)] or others
-    which = "no column is" if names == others else "several columns are"
+    called = [name for name in others if _MOTION_NAME.fullmatch(name)]
+    names, which = called or others, "several columns are" if called else "no column is"
     columns = f"the columns are: {listed(table.labels)}"
     require(len(names) == 1, f"{which} called acceleration, {columns}; pass one as acceleration=")
     return table.column(names[0])

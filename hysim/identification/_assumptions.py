@@ -27,6 +27,7 @@ from hysim.identification._problem import Initial, Problem, Setting, problem
 from hysim.identification._search import brief_optima, brief_optimum, optima
 from hysim.laws.operators.reversal_filter import ReversalFilter
 from hysim.metrics.criteria import information
+from hysim.models.by_structure import searched
 from hysim.models.dependent_structure import DependentStructure
 from hysim.models.protocols import PartByPart, Rescalable, Variant
 from hysim.models.search_space import SearchSpace
@@ -189,6 +190,7 @@ def decided(family: Any, setting: Setting) -> Decision:
 
 
 def _decided(family: Any, setting: Setting) -> Decision:
+    family = searched(family)
     if not decides(family, setting.records):
         return Decision(setting.problems(family))
     variants = family.variants() or (Variant(family, ""),)
@@ -252,6 +254,7 @@ def _longer(variant: Variant, times: int) -> Variant:
 
 def decides(family: Any, records: Sequence[Record]) -> bool:
     """Whether a family leaves something to these records."""
+    family = searched(family)
     return bool(family.variants() or family.longer_past() or any(family.assumed_states(each) for each in records))
 
 

@@ -19,7 +19,7 @@ from hysim.identification._result import Identification
 from hysim.identification.forms import Stored
 from hysim.models.dependent import Dependent
 from hysim.models.parameters import Coordinate, space_of
-from hysim.models.protocols import Identifiable
+from hysim.models.protocols import Subject
 from hysim.models.search_space import ALL_FREE, Freedom, Parameters, SearchSpace
 from hysim.models.varying import ChannelPolynomial, power_coefficients, weights
 from hysim.records import Record
@@ -216,7 +216,7 @@ def estimate_channel(
 
 
 @dataclass(frozen=True)
-class _UnknownChannel(Identifiable):
+class _UnknownChannel(Subject):
     """A law with one number to be found, the value of a channel, beside its state at the first sample."""
 
     model: Dependent

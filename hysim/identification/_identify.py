@@ -31,6 +31,7 @@ from hysim.identification._starts import begun, begun_by_parts
 from hysim.identification.forms import CONSTANT
 from hysim.identification.swapped import swapped_columns, swapped_for
 from hysim.metrics.rows import LoopRows
+from hysim.models.by_structure import searched
 from hysim.models.dependent import Dependent, on_record
 from hysim.models.dependent_structure import DependentStructure
 from hysim.models.model import family_named
@@ -287,7 +288,7 @@ def _family(model_or_class: Any, depends: Mapping[str, tuple[str, int]] | None) 
                 "or use discover"
             )
         family = model_or_class()
-    return family if depends is None else Dependent.structure(family, depends)
+    return family if depends is None else Dependent.structure(searched(family), depends)
 
 
 @runtime_checkable

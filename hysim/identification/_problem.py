@@ -22,6 +22,7 @@ from hysim._columns.channels import taken
 from hysim._columns.repeats import repeated_cycle
 from hysim._names import meant
 from hysim.identification.marquardt import Settled, least_squares, triangle
+from hysim.models.by_structure import searched
 from hysim.models.protocols import Identifiable, placed
 from hysim.models.search_space import STATES, STATES_IN_WORDS, Freedom, Parameters, SearchSpace
 from hysim.models.stages import BASE, Stage
@@ -84,7 +85,7 @@ class Part:
 class Problem:
     """Least-squares problem of one family; `space` is that of all records, `own` the family's for one."""
 
-    family: Identifiable
+    family: Any
     space: SearchSpace
     own: SearchSpace
     parts: tuple[Part, ...]
@@ -404,12 +405,12 @@ def _at(part: Part, chosen: npt.NDArray[np.intp]) -> Part:
     return replace(part, record=short, weights=None if part.weights is None else part.weights[chosen])
 
 
-def problem(family: Identifiable, records: Sequence[Record], freedom: Freedom, initial: Initial) -> Problem:
+def problem(family: Any, records: Sequence[Record], freedom: Freedom, initial: Initial) -> Problem:
     """Put the records of one family together; a ValueError says why `initial` or `freedom` does not fit.
 
     The memory of a law that stands somewhere is that at the first sample of each record.
     """
-    family = placed(family, None)
+    family = searched(placed(family, None))
     alone = _alone(family, records, freedom, initial)
     simple = family.simpler()
     if simple is None or alone.own.encoded is None:
@@ -420,6 +421,7 @@ def problem(family: Identifiable, records: Sequence[Record], freedom: Freedom, i
 
 def problems(family: Any, records: Sequence[Record], freedom: Freedom, initial: Initial) -> list[Problem]:
     """The problems of a search in stages, the simplest first, among which a criterion may choose; else one problem."""
+    family = searched(family)
     stages = [each for each in family.freed_in_turn() if each.is_open(freedom)]
     if not stages:
         return [problem(family, records, freedom, initial)]

@@ -13,13 +13,13 @@ from hysim.laws.static import linear_space
 from hysim.models.batch import Batch, Reduction, Sets
 from hysim.models.composable import Composable
 from hysim.models.model import Example, family
-from hysim.models.protocols import CompiledLaw, Identifiable, Startable, needed_time, positive_time
+from hysim.models.protocols import CompiledLaw, Startable, Subject, needed_time, positive_time
 from hysim.models.search_space import ALL_FREE, Freedom, Parameters, SearchSpace
 from hysim.models.tables import tables_of
 from hysim.records import Record
 
 
-class RatePart(Identifiable, Composable):
+class RatePart(Subject, Composable):
     """A part ``y = c f(u')``; a family has the field c, its step, f, and the power of the speed that f is."""
 
     dynamic: ClassVar[bool] = True

@@ -6,17 +6,17 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from hysim._basics.frozen import FloatArray
-from hysim.models.protocols import Identifiable, Numbered, Variant
+from hysim.models.protocols import Numbered, Searched, Subject, Variant
 from hysim.models.search_space import ALL_FREE, Freedom, Parameters, SearchSpace
 from hysim.models.stages import Simpler, Stage
 from hysim.records import Record
 
 
-class ByStructure(Identifiable, ABC):
+class ByStructure(Searched, ABC):
     """A model that passes `hysim.identify` on to a structure."""
 
     @abstractmethod
-    def as_structure(self) -> Identifiable:
+    def as_structure(self) -> Subject:
         """The structure that is searched, beginning with this model."""
 
     def search_space(self, record: Record, freedom: Freedom = ALL_FREE) -> SearchSpace:
@@ -51,10 +51,10 @@ class ByStructure(Identifiable, ABC):
 class Holding(ByStructure):
     """A structure of which some parameters are held at values unless the user frees them."""
 
-    structure: Identifiable
+    structure: Any
     values: Mapping[str, float]
 
-    def as_structure(self) -> Identifiable:
+    def as_structure(self) -> Any:
         return self.structure
 
     @property
@@ -62,10 +62,10 @@ class Holding(ByStructure):
         return {**(self.structure.scalars if isinstance(self.structure, Numbered) else {}), **self.values}
 
     def freed_in_turn(self) -> tuple[Stage, ...]:
-        return self.structure.freed_in_turn()
+        return tuple(self.structure.freed_in_turn())
 
     def simpler(self) -> Simpler | None:
-        simple = self.structure.simpler()
+        simple: Simpler | None = self.structure.simpler()
         return simple and simple._replace(family=Holding(simple.family, simple.carried(self.values)))
 
     def known_to(self, tolerance: float) -> Any:
@@ -74,4 +74,32 @@ class Holding(ByStructure):
 
     def search_space(self, record: Record, freedom: Freedom = ALL_FREE) -> SearchSpace:
         held = {name: value for name, value in self.values.items() if name not in freedom.free}
-        return self.structure.search_space(record, replace(freedom, fixed={**held, **freedom.fixed}))
+        space: SearchSpace = self.structure.search_space(record, replace(freedom, fixed={**held, **freedom.fixed}))
+        return space
+
+
+@dataclass(frozen=True)
+class _Foreign(Subject):
+    """A subject of a user's own class, which says nothing of its search."""
+
+    subject: Any
+
+    def search_space(self, record: Record, freedom: Freedom = ALL_FREE) -> Any:
+        return self.subject.search_space(record, freedom)
+
+    def regressors(self, parameters: Parameters, record: Record) -> Any:
+        return self.subject.regressors(parameters, record)
+
+    def steady(self, parameters: Parameters, record: Record) -> Any:
+        return self.subject.steady(parameters, record)
+
+    def assemble(self, parameters: Mapping[str, float]) -> Any:
+        return self.subject.assemble(parameters)
+
+    def notes(self, record: Record, model: Any) -> Any:
+        return self.subject.notes(record, model)
+
+
+def searched(subject: Any) -> Any:
+    """A subject of `identify` that says all of `Searched`."""
+    return subject if isinstance(subject, Searched) else _Foreign(subject)

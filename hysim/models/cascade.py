@@ -44,6 +44,7 @@ from hysim.models.protocols import (
     Placeable,
     Startable,
     StepwiseInvertible,
+    Subject,
     UnitGainStructure,
     Variant,
     needs_time,
@@ -55,7 +56,7 @@ from hysim.records import Record
 
 
 @checked
-class CascadeStructure(Identifiable, Composable):
+class CascadeStructure(Subject, Composable):
     """Stages to be identified one behind the other; see `hysim.Cascade.structure`."""
 
     stages: tuple[Any, ...]

@@ -21,7 +21,7 @@ import numpy.typing as npt
 from hysim._basics.frozen import FloatArray, checked
 from hysim._columns.channels import value_in
 from hysim._names import among
-from hysim.models.protocols import Identifiable, Numbered, PartByPart, Recorded, Variant
+from hysim.models.protocols import Identifiable, Numbered, PartByPart, Recorded, Subject, Variant
 from hysim.models.search_space import ALL_FREE, Freedom, Parameters, SearchSpace
 from hysim.models.stages import Simpler, Stage
 from hysim.models.varying import ChannelPolynomial, check_memory_is_its_own, columns_along, names_of, places, weights
@@ -134,7 +134,7 @@ def _coordinate(space: SearchSpace, x: FloatArray, k: int, name: str, value: flo
 
 
 @checked
-class DependentStructure(Identifiable):
+class DependentStructure(Subject):
     """A law to be identified, some of whose parameters depend on channels; see `hysim.Dependent.structure`."""
 
     law: Any

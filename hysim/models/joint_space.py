@@ -15,6 +15,7 @@ import numpy as np
 
 from hysim._basics.frozen import FloatArray
 from hysim._names import among
+from hysim.models.by_structure import searched
 from hysim.models.parts import own
 from hysim.models.protocols import Variant
 from hysim.models.search_space import Freedom, SearchSpace
@@ -157,13 +158,13 @@ def _starts(spaces: Sequence[SearchSpace]) -> FloatArray:
 
 def common_states(parts: Mapping[str, Any], record: Record) -> tuple[str, ...]:
     """Values of `initial` that every part with a state leaves to the record; empty if one leaves nothing open."""
-    offered = [part.assumed_states(record) for part in parts.values() if part.search_space(record).state]
+    offered = [searched(part).assumed_states(record) for part in parts.values() if part.search_space(record).state]
     return tuple(state for state in offered[0] if all(state in each for each in offered)) if offered else ()
 
 
 def combined_variants(parts: Mapping[str, Any], assembled: Callable[[Mapping[str, Any]], Any]) -> tuple[Variant, ...]:
     """Every combination of the parts' variants; `assembled` gives the whole with other parts by their labels."""
-    choices = {label: found for label, part in parts.items() if (found := part.variants())}
+    choices = {label: found for label, part in parts.items() if (found := searched(part).variants())}
     if not choices:
         return ()
     return tuple(

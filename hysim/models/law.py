@@ -29,7 +29,7 @@ from hysim.models.compiled_step import compiled_start, compiled_step
 from hysim.models.composable import Placed
 from hysim.models.inverse_search import inverse_at_rest, inverse_response, not_reached, searched_inverse
 from hysim.models.parameters import Parameter, declared_space
-from hysim.models.protocols import UNLIMITED, CompiledLaw, Identifiable, Limits, Startable
+from hysim.models.protocols import UNLIMITED, CompiledLaw, Limits, Searched, Startable
 from hysim.models.search_space import ALL_FREE, Freedom, Parameters, SearchSpace
 from hysim.models.slope import HOOKS, states_of, step_of
 from hysim.models.stages import Simpler, Stage, Subset
@@ -69,7 +69,7 @@ class Stepping(NamedTuple):
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Law(Placed, Identifiable, ABC):
+class Law(Placed, Searched, ABC):
     """A rate-independent law that is known by its step, or by its slope, of which the step follows.
 
     A family is a subclass under the decorator `hysim.family`: its fields, and the class attributes below. A field is
@@ -584,6 +584,10 @@ class Law(Placed, Identifiable, ABC):
     def freed_in_turn(self) -> tuple[Stage, ...]:
         """The `stages` of the family."""
         return self.stages
+
+    def notes(self, record: Record, model: Any) -> tuple[str, ...]:
+        """Remarks on the identified model, as phrases."""
+        return ()
 
     def simpler(self) -> Simpler | None:
         """The law that this one `contains`, with the values that both have."""

@@ -256,10 +256,7 @@ class Variant(NamedTuple):
 
 @runtime_checkable
 class Identifiable(Protocol):
-    """A subject of `identify`: a model class, a model as the start, or a structure.
-
-    What inherits this class has the methods that have a body.
-    """
+    """A subject of `identify`: a model class, a model as the start, or a structure."""
 
     def search_space(self, record: Record, freedom: Freedom = ALL_FREE) -> SearchSpace:
         """Declare the box for `record`."""
@@ -284,6 +281,10 @@ class Identifiable(Protocol):
     def notes(self, record: Record, model: Any) -> tuple[str, ...]:
         """Remarks on the identified model, as phrases."""
         return ()
+
+
+class Searched:
+    """What a subject of `identify` may say of its search; by default it leaves nothing open."""
 
     def freed_in_turn(self) -> tuple[Stage, ...]:
         """Parameters that a search frees in turn; see `hysim.models.stages`."""
@@ -315,6 +316,10 @@ class Identifiable(Protocol):
         It is the number of samples where there is none.
         """
         return len(record)
+
+
+class Subject(Searched, Identifiable):
+    """Base class of what is made for `identify`: it has the methods that have a body."""
 
 
 @runtime_checkable

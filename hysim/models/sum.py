@@ -46,6 +46,7 @@ from hysim.models.protocols import (
     Responding,
     Startable,
     Stretched,
+    Subject,
     Variant,
     needs_time,
     placed,
@@ -214,7 +215,7 @@ def assembled(members: Sequence[Any], searched: Mapping[str, Any], parameters: P
 
 
 @checked
-class SumStructure(Identifiable, Composable):
+class SumStructure(Subject, Composable):
     """Parts to be identified side by side; see `hysim.Sum.structure`."""
 
     parts: tuple[Any, ...]

@@ -25,7 +25,7 @@ import numpy as np
 from hysim._basics.frozen import FloatArray, checked
 from hysim.models.joint_space import columns_beside, declared, together
 from hysim.models.parts import own
-from hysim.models.protocols import Doubt, Identifiable
+from hysim.models.protocols import Doubt, Identifiable, Subject
 from hysim.models.search_space import ALL_FREE, Freedom, Parameters, SearchSpace
 from hysim.plants.actuator_search import MOST_LATE, as_points, between_samples, columns_through, finer, points
 from hysim.plants.amplifier import Amplifier
@@ -66,7 +66,7 @@ _NEAR = 1e-6  # relative distance of a bound
 
 
 @checked
-class ActuatorStructure(Identifiable):
+class ActuatorStructure(Subject):
     """An actuator to be identified; see `hysim.Actuator.structure`, whose class is `family`."""
 
     family: type

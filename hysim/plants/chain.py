@@ -151,13 +151,13 @@ class Chain:
         samples, path = np.empty((4, n)), np.empty((2, n * self.substeps))
 
         def piece(k: slice) -> int:
-            lost = kernels.close(
-                *controller, *law, self._parameters, plant_state, inputs, k.start, k.stop, samples, path
-            )
+            with np.errstate(all="ignore"):  # an unstable loop may overflow before it is lost
+                lost = kernels.close(
+                    *controller, *law, self._parameters, plant_state, inputs, k.start, k.stop, samples, path
+                )
             return lost - k.start if lost >= 0 else -1
 
-        with np.errstate(all="ignore"):  # an unstable loop may overflow before it is lost
-            lost = in_pieces(piece, n)
+        lost = in_pieces(piece, n)
         voltages, x, past, readings = np.split(plant_state, np.cumsum([part.size for part in parts])[:-1])
         remaining = np.append(np.roll(readings[:-1], -n), readings[-1])
         end = ChainState(state.samples + n, voltages, law, x, np.roll(past, -n * self.substeps), remaining)

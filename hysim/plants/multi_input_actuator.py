@@ -20,11 +20,12 @@ import numpy.typing as npt
 from hysim._basics.frozen import FloatArray, read_only
 from hysim._columns.channels import Channels, checked_channels, value_in
 from hysim.laws.static import Line
+from hysim.models.by_structure import searched
 from hysim.models.dependent import AlongRecord
 from hysim.models.joint_space import columns_beside, declared, together, without_repetition
 from hysim.models.model import family
 from hysim.models.parts import check_parts, own, response_of
-from hysim.models.protocols import Identifiable, Placeable, law_at, needs_time, placed
+from hysim.models.protocols import Identifiable, Placeable, Subject, law_at, needs_time, placed
 from hysim.models.search_space import ALL_FREE, Freedom, Parameters, SearchSpace
 from hysim.records import Record
 
@@ -150,7 +151,7 @@ class MultiInputActuator:
 
 
 @dataclass(frozen=True)
-class InputSum(Identifiable):
+class InputSum(Subject):
     """Laws by the names of their inputs, in their order; their outputs are added."""
 
     laws: Mapping[str, Any]
@@ -185,7 +186,7 @@ class InputSum(Identifiable):
 
 
 @dataclass(frozen=True)
-class ModalGains(Identifiable):
+class ModalGains(Subject):
     """Inputs in place of their laws, each with a gain in each of so many modes, and one offset."""
 
     inputs: tuple[str, ...]
@@ -232,7 +233,7 @@ def checked_laws(laws: Mapping[str, Any]) -> InputSum:
 
 def _widest(law: Any) -> Any:
     """The law with the widest of its choices, such as weights of both signs: no loop of one input alone decides."""
-    variants = law.variants()
+    variants = searched(law).variants()
     return variants[-1].family if variants else law
 
 
@@ -245,7 +246,7 @@ def seen_by(record: Record, name: str) -> Record:
 
 
 @dataclass(frozen=True)
-class Scaled(Identifiable):
+class Scaled(Subject):
     """The output of `law`, or of None the input itself, times a gain, and an offset."""
 
     law: Any

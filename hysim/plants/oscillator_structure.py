@@ -28,7 +28,7 @@ from hysim.errors import SimulationError
 from hysim.kernels import boucwen as kernels
 from hysim.laws.differential import _boucwen_search
 from hysim.laws.differential.boucwen import BoucWen
-from hysim.models.protocols import Identifiable
+from hysim.models.protocols import Subject
 from hysim.models.search_space import ALL_FREE, Freedom, Parameters, SearchSpace
 from hysim.plants.equation_of_motion import (
     HALF_FILTER,
@@ -175,7 +175,7 @@ def _apart(laws: SearchSpace, points: FloatArray, errors: FloatArray, distance: 
 
 
 @checked
-class OscillatorStructure(Identifiable):
+class OscillatorStructure(Subject):
     """An oscillator to be identified; see `BoucWenOscillator.structure`, whose class is `family`.
 
     The box reaches from a tenth of the mass that the search begins with to ten times that mass, from no damping to

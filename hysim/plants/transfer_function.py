@@ -20,7 +20,7 @@ from hysim._basics.frozen import FloatArray, NotNegative, checked, read_only
 from hysim.errors import SimulationError
 from hysim.models.composable import Composable
 from hysim.models.model import family
-from hysim.models.protocols import CompiledLaw, Identifiable, Startable, Variant, needed_time, positive_time
+from hysim.models.protocols import CompiledLaw, Startable, Subject, Variant, needed_time, positive_time
 from hysim.models.search_space import ALL_FREE, Freedom, Parameters, SearchSpace
 from hysim.plants._linear_response import LinearPlants, LinearState, affine_columns
 from hysim.plants._transfer_function_search import (
@@ -276,7 +276,7 @@ class TransferFunction(Composable):
 
 
 @checked
-class TransferFunctionStructure(Identifiable, Composable):
+class TransferFunctionStructure(Subject, Composable):
     """The shape of a transfer function, to be identified; see `TransferFunction.structure`.
 
     The search runs over second-order sections s^2 + 2 zeta omega s + omega^2 (and one of first order for an

@@ -15,7 +15,14 @@ import hashlib
 import inspect
 import pickle
 from collections.abc import Callable, Iterator, Mapping
-from concurrent.futures import FIRST_COMPLETED, CancelledError, Future, wait
+from concurrent.futures import (
+    FIRST_COMPLETED,
+    CancelledError,
+    Future,
+    ProcessPoolExecutor,
+    ThreadPoolExecutor,
+    wait,
+)
 from contextlib import contextmanager, nullcontext
 from functools import partial
 from pathlib import Path
@@ -70,7 +77,8 @@ def workers_of(executor: Any, number: int | None, task: Task) -> Iterator[Worker
     elif isinstance(executor, _DaskClient):
         pool, size = nullcontext(executor.get_executor()), lambda: max(1, sum(executor.nthreads().values()))
     elif isinstance(executor, _Submits):
-        pool, size = nullcontext(executor), lambda: vars(executor).get("_max_workers", cores())
+        is_pool = isinstance(executor, (ThreadPoolExecutor, ProcessPoolExecutor))
+        pool, size = nullcontext(executor), (lambda: vars(executor)["_max_workers"]) if is_pool else cores
     else:
         words = 'executor must be "threads", "processes", a dask client, or have the method submit of an Executor'
         raise (ValueError if isinstance(executor, str) else TypeError)(f"{words}, got {executor!r}")

@@ -43,7 +43,7 @@ from hysim.laws.differential.terms import (
 from hysim.models.composable import Composable
 from hysim.models.law import Law, Packed, State
 from hysim.models.model import Example, family
-from hysim.models.protocols import CompiledLaw, Identifiable
+from hysim.models.protocols import CompiledLaw, Identifiable, Subject
 from hysim.models.search_space import ALL_FREE, Freedom, Parameters, SearchSpace
 from hysim.models.tables import Tables
 from hysim.records import Record
@@ -111,7 +111,7 @@ def _units(terms: Mapping[str, Term], defaults: Mapping[str, float], record: Rec
 
 
 @dataclass(frozen=True, kw_only=True)
-class DuhemStructure(Identifiable, Composable):
+class DuhemStructure(Subject, Composable):
     """The terms of a Duhem law without their coefficients; see `Duhem.structure`. `family` is any law of the family."""
 
     family: Identifiable

@@ -21,7 +21,7 @@ from hysim.models.batch import Reduction
 from hysim.models.composable import Placed
 from hysim.models.law import Law, State
 from hysim.models.parameters import Parameter, declared_space, rate_spans
-from hysim.models.protocols import CompiledLaw, Identifiable, Startable, needed_time, positive_time
+from hysim.models.protocols import CompiledLaw, Startable, Subject, needed_time, positive_time
 from hysim.models.search_space import ALL_FREE, Freedom, Parameters, SearchSpace
 from hysim.models.tables import Tables, arguments_of, check_signs, scalars_of
 from hysim.records import Record
@@ -31,7 +31,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class RatedLaw(Identifiable, Placed, ABC):
+class RatedLaw(Subject, Placed, ABC):
     """A law that depends on the rate of its input, and so on time.
 
     A family is a subclass under the decorator `hysim.family`.

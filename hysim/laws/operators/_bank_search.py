@@ -43,7 +43,7 @@ from hysim._basics.frozen import FloatArray, check_whole, checked, read_only
 from hysim.kernels import play_sums as kernels
 from hysim.models.composable import Composable
 from hysim.models.parameters import Coordinate, Parameter, rate_spans, space_of, spans, unit_of
-from hysim.models.protocols import Identifiable, Variant
+from hysim.models.protocols import Subject, Variant
 from hysim.models.search_space import ALL_FREE, Freedom, Parameters, SearchSpace
 from hysim.models.tables import Tables
 from hysim.records import Record
@@ -65,7 +65,7 @@ class Axis(NamedTuple):
     starts: tuple[float, ...]
 
 
-class SignedStructure(Identifiable, Composable):
+class SignedStructure(Subject, Composable):
     """A bank whose weights may have one sign: that of the record's loop, or the other one."""
 
     law: Any

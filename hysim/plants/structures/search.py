@@ -29,7 +29,7 @@ from hysim._basics.parallel import in_chunks
 from hysim._basics.printing import printed, summary_text
 from hysim.errors import SimulationError
 from hysim.models.parameters import Coordinate, free_coordinate, space_of
-from hysim.models.protocols import Identifiable
+from hysim.models.protocols import Subject
 from hysim.models.search_space import ALL_FREE, Freedom, Parameters, SearchSpace
 from hysim.plants.structures.moving import MovingStructure
 from hysim.plants.structures.parts import OF_ELEMENTS, OF_NODES, expanded, is_shared, scalars_of, sharing, unknown
@@ -194,7 +194,7 @@ def laid(record: Record | StructureRecord, widths: Mapping[str, int], output: Se
     )
 
 
-class SearchedStructure(MovingStructure, Identifiable):
+class SearchedStructure(MovingStructure, Subject):
     """Base class of a structure whose named numbers `hysim.identify` searches, beginning with its own."""
 
     @property
