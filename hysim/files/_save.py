@@ -67,7 +67,7 @@ def save_record(record: Record, path: str | Path) -> None:
     True
     """
     if (own := as_record(record, "save_record")) is None:
-        advice = "make one by hs.Record(u=..., y=..., t=...); hs.save(model, path) writes a model"
+        advice = "make one by hs.Record(u=result.u, y=result.y, t=result.t); hs.save(model, path) writes a model"
         raise TypeError(f"save_record takes a Record, got {type(record).__name__}: {advice}")
     record = own
     varying = along(record.channels)
