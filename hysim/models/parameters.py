@@ -214,8 +214,9 @@ def space_of_chart(
         lower, upper = np.where(free, np.minimum(lower, own), lower), np.where(free, np.maximum(upper, own), upper)
 
     def decoded(x: FloatArray) -> dict[str, FloatArray]:
-        fixed = {name: np.full(len(np.atleast_2d(x)), value) for name, value in held.items() if name not in columns}
-        return fixed | chart.decode(x)
+        known = chart.decode(x)
+        others = (name for name in held if name not in known and name not in columns)
+        return {name: np.full(len(np.atleast_2d(x)), held[name]) for name in others} | known
 
     def encoded(parameters: Mapping[str, float]) -> FloatArray:
         return np.asarray(np.clip(chart.encode({**chart.values, **parameters}), lower, upper))
