@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import hysim as hs
-from hysim.identification import Candidate
+from hysim.identification import Candidate, _descent, marquardt
 from hysim.identification._diagnostics import left_out
 from hysim.identification._problem import Problem, problem
 from hysim.identification._searched import _phrases
@@ -68,6 +68,8 @@ def long_record():
 def test_a_search_on_a_thinned_record_ends_in_the_optimum_of_the_search_on_all_samples(monkeypatch):
     thinned = hs.identify(hs.BoucWen, long_record(), fixed={"n": 1.0})
     monkeypatch.setattr(Problem, "thinned", lambda *_: None)
+    monkeypatch.setattr(_descent, "_MOST_AT_ONCE", 1)  # sets descend one by one, and rows are taken in pieces, as on
+    monkeypatch.setattr(marquardt, "_LONG", 100)  # records of more than 100 000 samples
     whole = hs.identify(hs.BoucWen, long_record(), fixed={"n": 1.0})
     assert thinned.rmse == pytest.approx(whole.rmse, rel=1e-9)
     assert thinned.residual.size == 3001
