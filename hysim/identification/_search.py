@@ -225,10 +225,7 @@ def brief_optima(problem: Problem) -> tuple[FloatArray, FloatArray]:
 
 
 def polish(problem: Problem, starts: FloatArray) -> list[Optimum]:
-    """The ends of descents from `starts` (n_sets, n_x): on the close law, and on the law itself where it fits as well.
-
-    That is as well as the two laws agree.
-    """
+    """Ends of descents from `starts` (n_sets, n_x) on the close law, and on the law itself if it fits as closely."""
     problem = problem.condensed()
     close = problem.close()
     found = _optima(problem, _polished(close, starts))

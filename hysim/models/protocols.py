@@ -284,7 +284,7 @@ class Identifiable(Protocol):
 
 
 class Searched:
-    """What a subject of `identify` may say of its search; by default it leaves nothing open."""
+    """The choices in a search that a subject of `identify` may leave open; by default there are none."""
 
     def freed_in_turn(self) -> tuple[Stage, ...]:
         """Parameters that a search frees in turn; see `hysim.models.stages`."""
