@@ -1,4 +1,4 @@
-"""Write `experiments/README.md` and the figures that the README quotes, from the stored results.
+"""Write `experiments/README.md` and the table of the README, from the stored results.
 
     python experiments/table.py           writes both
     python experiments/table.py --check   names each difference, and exits with 1 if there is one
@@ -12,14 +12,17 @@ import difflib
 import json
 import re
 import sys
-import textwrap
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
+from typing import TypeVar
 
 HERE = Path(__file__).parent
 sys.path.insert(0, str(HERE))
 
-from findings import GROUPS, HIGHLIGHTS, Finding  # noqa: E402  from beside this file
+from findings import GROUPS, Finding, Result  # noqa: E402  from beside this file
+from headlines import HEADLINES  # noqa: E402
+
+T = TypeVar("T")
 
 PAGE, README = HERE / "README.md", HERE.parent / "README.md"
 BEGIN, END = "<!-- experiments/table.py writes what follows -->\n", "<!-- to here -->\n"
@@ -59,13 +62,18 @@ def question(path: Path) -> str:
     return text[: text.index("?") + 1]
 
 
-def answer(finding: Finding) -> str:
-    """The sentences of a finding, computed from its stored result; `ValueError` if it does not support them."""
-    path = HERE / "results" / finding.__name__ / "result.json"
+def stored(sentences: Callable[[Result], T]) -> T:
+    """What a finding or a headline says of its stored result; `ValueError` if the result does not support it."""
+    path = HERE / "results" / sentences.__name__ / "result.json"
     try:
-        return " ".join(finding(json.loads(path.read_text(encoding="utf-8"))))
+        return sentences(json.loads(path.read_text(encoding="utf-8")))
     except (KeyError, OSError, ValueError) as error:
-        raise ValueError(f"{finding.__name__}: {type(error).__name__}: {error}") from error
+        raise ValueError(f"{sentences.__name__}: {type(error).__name__}: {error}") from error
+
+
+def answer(finding: Finding) -> str:
+    """The sentences of a finding."""
+    return " ".join(stored(finding))
 
 
 def table_row(finding: Finding, path: Path) -> str:
@@ -89,15 +97,13 @@ def page() -> str:
 
 
 def quoted() -> str:
-    """What the README quotes, as a list."""
+    """The table of the README."""
     paths = experiments()
-    items = []
-    for finding in HIGHLIGHTS:
-        path = paths[finding.__name__]
-        text = f"[{question(path)}](experiments/{path.name}) {answer(finding)}".replace(" %", "\u00a0%")
-        lines = textwrap.wrap(text, 118, break_long_words=False, break_on_hyphens=False)
-        items.append("- " + "\n  ".join(lines).replace("\u00a0", " "))
-    return "\n".join(items) + "\n"
+    lines = ["| question | hysim | beside it | where hysim is not good |", "|---|---|---|---|"]
+    for headline in HEADLINES:
+        question, *cells = stored(headline)
+        lines.append(f"| [{question}](experiments/{paths[headline.__name__].name}) | {' | '.join(cells)} |")
+    return "\n".join(lines) + "\n"
 
 
 def readme(text: str) -> str:
