@@ -156,6 +156,11 @@ class _Stopped(BaseException):
     """Raised in a thread to stop it."""
 
 
+# Until a thread runs, CPython up to 3.11 knows it by the identity of the thread that starts it, so an exception that is
+# raised in the one could reach the other.
+_starting = threading.Lock()
+
+
 class _Threads(Executor):
     """A pool of threads that can be stopped: the interpreter waits at its end for those of `concurrent.futures`."""
 
@@ -164,8 +169,9 @@ class _Threads(Executor):
         self._is_shut = False
         self._serving: set[int] = set()  # threads in which an exception is caught, by their identity
         self._threads = [threading.Thread(target=self._serve, daemon=True) for _ in range(number)]
-        for thread in self._threads:
-            thread.start()
+        with _starting:
+            for thread in self._threads:
+                thread.start()
 
     def submit(self, function: Callable[..., Any], /, *args: Any, **options: Any) -> Future[Any]:
         if self._is_shut:
@@ -194,8 +200,9 @@ class _Threads(Executor):
         """Cancel work that has not begun, raise an exception in every thread, and wait so many seconds for them."""
         self._cancel()
         serving, self._serving = self._serving, set()
-        for ident in serving:
-            ctypes.pythonapi.PyThreadState_SetAsyncExc(ctypes.c_ulong(ident), ctypes.py_object(_Stopped))
+        with _starting:
+            for ident in serving:
+                ctypes.pythonapi.PyThreadState_SetAsyncExc(ctypes.c_ulong(ident), ctypes.py_object(_Stopped))
         self.shutdown(wait=False)
         deadline = time.monotonic() + patience
         for thread in self._threads:
