@@ -20,8 +20,8 @@ class FadingDahl(hs.Law):
     z0: float = 0.0
 
     searched = (
-        hs.Parameter("k", 1e-2, 1e3, unit="y/u", log=True),
-        hs.Parameter("coulomb", 1e-2, 1e1, unit="y", log=True),
+        hs.Parameter("k", 1e-1, 1e2, unit="y/u", log=True),
+        hs.Parameter("coulomb", 1e-1, 1e1, unit="y", log=True),
         hs.Parameter("fading", 0.0, 2.0),
         hs.Parameter("c", affine=True),
         hs.Parameter("offset", affine=True),
