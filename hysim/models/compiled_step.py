@@ -7,7 +7,7 @@ from typing import Any
 
 from numba.core.dispatcher import Dispatcher
 
-from hysim.kernels.stepping import Start, Step, compile_start, compile_step
+from hysim.kernels.stepping import START, STEP, Start, Step, by_address, compile_start, compile_step
 from hysim.models.protocols import Startable, Stepwise
 
 
@@ -26,6 +26,18 @@ def compiled_step(function: Callable[[Any, Any, float], float]) -> Step:
 def compiled_start(function: Callable[[Any, Any, float], None]) -> Start:
     """The start of a family, as `compiled_step`; TypeError if it is no function of (parameters, state, u0)."""
     return function if _is_kernel(function) else _compiled(function, compile_start, "start(parameters, state, u0)")
+
+
+@functools.lru_cache(maxsize=256)
+def pointer(step: Step) -> Step:
+    """A compiled step as kernels are given it again and again: numba would look up its address in each call."""
+    return by_address(step, STEP.signature)
+
+
+@functools.lru_cache(maxsize=256)
+def start_pointer(start: Start) -> Start:
+    """A compiled start, as `pointer`."""
+    return by_address(start, START.signature)
 
 
 def _is_kernel(function: Any) -> bool:

@@ -25,7 +25,7 @@ from hysim.errors import SimulationError, warn_beyond
 from hysim.kernels import stepping
 from hysim.kernels.stepping import Start, Step, drive
 from hysim.models.batch import Batch, Reduction, Sets
-from hysim.models.compiled_step import compiled_start, compiled_step
+from hysim.models.compiled_step import compiled_start, compiled_step, pointer, start_pointer
 from hysim.models.composable import Placed
 from hysim.models.inverse_search import inverse_at_rest, inverse_response, not_reached, searched_inverse
 from hysim.models.parameters import Parameter, declared_space
@@ -179,7 +179,7 @@ class Law(Placed, Searched, ABC):
     @classmethod
     def path(cls, law: CompiledLaw, u: FloatArray, y: FloatArray) -> int:
         """Outputs at `u` into `y`; the first sample that is not finite, or -1. A family may register a faster one."""
-        return int(drive(law.step, law.parameters, law.state, u, y))
+        return int(drive(pointer(law.step), law.parameters, law.state, u, y))
 
     @classmethod
     def rows(cls, tables: Tables, u: FloatArray, y: FloatArray) -> None:
@@ -803,4 +803,4 @@ def rows_by_step(step: Step, start: Start, laws: Packed, workspace: int, u: Floa
 
     parameters, memory = (read_only(table, finite=False) for table in laws)
     with np.errstate(all="ignore"):
-        drive_each(step, start, parameters, memory, workspace, u, y, 0, len(y))
+        drive_each(pointer(step), start_pointer(start), parameters, memory, workspace, u, y, 0, len(y))
