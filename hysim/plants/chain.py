@@ -34,6 +34,7 @@ from hysim.plants.sensor import Sensor
 _chain_step = functools.lru_cache(maxsize=256)(kernels.chain_step)
 _chain_start = functools.lru_cache(maxsize=256)(kernels.chain_start)
 
+_NO_AMPLIFIER, _NO_LAW, _NO_SENSOR = Amplifier(), Line(slope=1.0), Sensor()
 _PER_TIME_CONSTANT = 4  # sub-steps
 _FEWEST, _MOST = 4, 64  # sub-steps of a sample
 
@@ -84,10 +85,10 @@ class Chain:
     def __init__(self, stages: Stages, sample_time: float, substeps: int | None = None) -> None:
         amplifier, hysteresis, creep, vibration, sensor = stages
         positive_time(sample_time)
-        self.amplifier, self.sensor = amplifier or Amplifier(), sensor or Sensor()
+        self.amplifier, self.sensor = amplifier or _NO_AMPLIFIER, sensor or _NO_SENSOR
         self.substeps = _substeps(self.amplifier, sample_time, substeps)
         self.step = sample_time / self.substeps
-        self.hysteresis = Line(slope=1.0) if hysteresis is None else law_at(hysteresis, self.step)
+        self.hysteresis = _NO_LAW if hysteresis is None else law_at(hysteresis, self.step)
         self.delay = 0.0 if vibration is None else vibration.delay
         self.linear = linear_stage(creep, vibration, self.step)
         between = {"linear": self.amplifier.dynamic}
