@@ -1,4 +1,4 @@
-"""What does a sweep cost beside its tasks, how well do two workers share them, and what would a thousand do?
+"""What does a sweep cost in addition to its tasks, how well do two workers share them, and what would a thousand do?
 
 Tasks of a microsecond, of 1 and 10 ms in kernels, of 10 ms with large arrays, and fits of 0.2 s, on threads, on
 processes and on a dask cluster whose scheduler and workers are processes on the loopback; against the number of workers

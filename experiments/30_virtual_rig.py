@@ -1,4 +1,4 @@
-"""What does the camera of Table 1 cost, and what does a part of a pixel give back?
+"""What does the camera of Table 1 cost, and what does a displacement to parts of a pixel improve?
 
 The simulated rig of Table 1 climbs the table's staircase under the textures and noises of 20 seeds. Its frames give
 tables of 52 rows: by parts of a pixel, at 30 and at 20 dB; by whole pixels, as the paper's; and by whole pixels where

@@ -1,4 +1,4 @@
-"""How exact is the Jiles-Atherton law, forwards and driven by B, and what does a sample cost beside explicit schemes?
+"""How exact is the Jiles-Atherton law, forwards and driven by B, and how does its cost compare with explicit schemes?
 
 Five questions, one run:
 

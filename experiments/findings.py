@@ -128,7 +128,7 @@ def work_precision(result: Result) -> list[str]:
         f"On the oscillator the fastest package with an error of at most 1e-6 is {second['method']} "
         f"({second['setting']}): it takes {number(second['times_hysim'])} times as long. hysim takes "
         f"{number(scheme['median'])} times as long as its own scheme in C.",
-        f"Ratios that were asked for and not reached: {'; '.join(missed) or 'none'}.",
+        f"Ratios that were asked for and not reached: {'; '.join(missed)}." if missed else "Every ratio was reached.",
     ]
 
 
@@ -410,7 +410,7 @@ def sindy_recovery(result: Result) -> list[str]:
     unlikely = sum(seeds - own[name]["as_likely"] for name in short)
     loud, loud_peer = own["noise 10%"], peer["noise 10%"]
     losses = [
-        f"{name} ({peer[name]['exact']} beside {own[name]['exact']})"
+        f"{name} ({peer[name]['exact']} against {own[name]['exact']})"
         for name in own
         if own[name]["exact"] < peer[name]["exact"]
     ]
@@ -421,7 +421,7 @@ def sindy_recovery(result: Result) -> list[str]:
         "law.",
         f"With the memory measured and 10 % noise it is exact in {loud['exact']} of {seeds} seeds (PySINDy: "
         f"{loud_peer['exact']}); with the memory hidden in {hidden}, in {own[hidden]['exact']} (PySINDy: "
-        f"{peer[hidden]['exact']}). PySINDy is ahead at: {', '.join(losses) or 'none'}.",
+        f"{peer[hidden]['exact']}). PySINDy is ahead at: {', '.join(losses) or 'no condition'}.",
         f"The worst coefficient is {number(worst['worst_error_percent'], 2)} % off ({worst['condition']}). The library "
         "of ten terms contains the true ones. PySINDy runs with its defaults, and is told the true velocity.",
     ]
@@ -436,11 +436,11 @@ def sindy_table1(result: Result) -> list[str]:
     require(own["bic"] < bic["bic"], "the discovered law has the lowest BIC")
     return [
         f"A law of {len(result['terms'])} terms and {own['n_parameters']} parameters fits "
-        f"{percent(own['fit_percent'], 2)} (BIC {own['bic']:.1f}). The best fit of the Bouc-Wen laws beside it is "
+        f"{percent(own['fit_percent'], 2)} (BIC {own['bic']:.1f}). The best fit of the Bouc-Wen laws is "
         f"{percent(fit['fit_percent'], 2)} ({fit['model']}, {fit['n_parameters']} parameters), their lowest BIC "
         f"{bic['bic']:.1f} ({bic['model']}).",
-        f"{count(result['draws'])} records drawn anew from the law give back {len(often)} of its terms in at least "
-        f"{100 * min(often):.0f} % of the draws, and the last one in {100 * seldom:.0f} %. The verdict is "
+        f"{count(result['draws'])} records are drawn anew from the law: {len(often)} of its terms are found again in "
+        f"at least {100 * min(often):.0f} % of the draws, and the last one in {100 * seldom:.0f} %. The verdict is "
         f'"{result["verdict"]}".',
     ]
 
@@ -891,8 +891,8 @@ def virtual_rig(result: Result) -> list[str]:
     repeated = whole[key]["least"] == whole[key]["most"]
     spread = "one result, repeated in every run" if repeated else f"{percent(whole[key]['least'])} at worst"
     return [
-        f"A known actuator under a simulated microscope, {fine['tables']} times. From parts of a pixel the loop's "
-        f"width comes back within {number(off, 2)} %, and the inverse of the identified law takes "
+        f"A known actuator under a simulated microscope, {fine['tables']} times. With displacements to parts of a "
+        f"pixel, the loop's width is within {number(off, 2)} % of the true one, and the inverse of the identified law takes "
         f"{percent(min(fine[key]['least'], dim[key]['least']))} of the true hysteresis away at worst, as that of the "
         f"true law ({percent(best)}). From whole pixels it takes {percent(whole[key]['median'])}, {spread}.",
         f"Where the microscope shakes as well, the median is {percent(shaken[key]['median'])}, the best "
@@ -962,7 +962,7 @@ def first_contact(result: Result) -> list[str]:
         f"On {count(result['records'])} records, {count(result['measured'])} of them measured, at least "
         f"{result['verbs']} verbs report the same fit, to {number(result['largest_difference'], 1)} %.",
         f"On {count(result['noisy_twins'])} simulated records with noise of the input, the error of the returned model "
-        f"is {number(result['over_floor_median'], 2)} times that of the true law behind the best filter in the median "
+        f"is {number(result['over_floor_median'], 2)} times that of the true law with the best filter in the median "
         f"and {number(result['over_floor_worst'])} times at worst; 95 % intervals hold "
         f"{percent(result['held_percent'])} of {count(result['parameters'])} parameters.",
         f"The README's flow ran on {count(result['flows'])} records, without a command beyond the record that was not "
@@ -1008,8 +1008,8 @@ def structures_work_precision(result: Result) -> list[str]:
         f"To 1e-4 a sample and element takes {number(ours)} ns, the faster of SciPy's methods {number(scipy)} ns, and "
         f"a plain compiled Verlet loop around hysim's laws {number(verlet)} ns.",
         f"With the same Newmark steps OpenSees' Steel01 and hysim's law differ by {error_of(steel['value'])}. Twenty "
-        f"storeys on isolators: drifts {error_of(tower['error'])} wrong. "
-        f"Figures that were asked for and not reached: {'; '.join(missed) or 'none'}.",
+        f"storeys on isolators: drifts {error_of(tower['error'])} wrong.",
+        f"Figures that were asked for and not reached: {'; '.join(missed)}." if missed else "Every figure was reached.",
     ]
 
 
@@ -1099,8 +1099,8 @@ def evidence(result: Result) -> list[str]:
     seconds = column(whole, "cpu_seconds")
     beside = sum(the(found, model=row["model"], factor=1.0)["cpu_seconds"] for row in nested)
     return [
-        f"Of {len(ordered)} models, with the rounding to pixels as noise, and boxes of the priors halved, as they are "
-        f"and doubled: {result['sentence']}. With the boxes as they are, ln Z below {ordered[0]['model']}: {values}; "
+        f"Of {len(ordered)} models, with the rounding to pixels as noise, and boxes of the priors halved, unchanged "
+        f"and doubled: {result['sentence']}. With unchanged boxes, ln Z below {ordered[0]['model']}: {values}; "
         f"errors by bridge sampling at most {error_of(result['largest_error'])}. Half boxes cut off the optimum of "
         "some models.",
         f"Nested sampling of {len(nested)} of them, with errors of {span(column(nested, 'error'), 2)}, differs by at "
@@ -1200,7 +1200,7 @@ def magnetic_loops(result: Result) -> list[str]:
     require(max(each["default_over_refined"] for each in sets.values()) <= 1.01, "the default finds the best optimum")
     better = {name: each["default_over_evolution"] for name, each in sets.items()}
     lost = {name: ratio for name, ratio in better.items() if ratio > 1.001}
-    named = listed([f"{name} ({number(ratio)})" for name, ratio in lost.items()]) if lost else "none"
+    named = listed([f"{name} ({number(ratio)})" for name, ratio in lost.items()]) if lost else "no material"
     predicted = sorted(
         (row for row in rows if row["left_out_percent"] is not None), key=lambda row: row["left_out_percent"]
     )

@@ -33,7 +33,7 @@ HEAD = """\
 Each file asks one question of hysim through its public functions, and answers it with a table, a figure and numbers in
 `results/`. The findings below are computed from these numbers by `python experiments/table.py`; `--check` names every
 sentence that no longer agrees with its result. Where hysim was told something that a user would not know, the finding
-says so, and it gives the bad end of a distribution beside the median.
+says so, and it gives the bad end of a distribution as well as the median.
 
 ```shell
 pip install -e '.[test,bench,vision,dask,tables,io]'  # bench: the peers of 03, 39; vision: 29, 30; dask: 28
@@ -99,7 +99,7 @@ def page() -> str:
 def quoted() -> str:
     """The table of the README."""
     paths = experiments()
-    lines = ["| question | hysim | beside it | where hysim is not good |", "|---|---|---|---|"]
+    lines = ["| question | hysim | the alternative | where hysim is not good |", "|---|---|---|---|"]
     for headline in HEADLINES:
         question, *cells = stored(headline)
         lines.append(f"| [{question}](experiments/{paths[headline.__name__].name}) | {' | '.join(cells)} |")
