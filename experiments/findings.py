@@ -892,9 +892,9 @@ def virtual_rig(result: Result) -> list[str]:
     spread = "one result, repeated in every run" if repeated else f"{percent(whole[key]['least'])} at worst"
     return [
         f"A known actuator under a simulated microscope, {fine['tables']} times. With displacements to parts of a "
-        f"pixel, the loop's width is within {number(off, 2)} % of the true one, and the inverse of the identified law takes "
-        f"{percent(min(fine[key]['least'], dim[key]['least']))} of the true hysteresis away at worst, as that of the "
-        f"true law ({percent(best)}). From whole pixels it takes {percent(whole[key]['median'])}, {spread}.",
+        f"pixel, the loop's width is within {number(off, 2)} % of the true one, and the inverse of the identified law "
+        f"takes {percent(min(fine[key]['least'], dim[key]['least']))} of the true hysteresis away at worst, as that of "
+        f"the true law ({percent(best)}). From whole pixels it takes {percent(whole[key]['median'])}, {spread}.",
         f"Where the microscope shakes as well, the median is {percent(shaken[key]['median'])}, the best "
         f"{percent(shaken[key]['most'])} and the worst {percent(shaken[key]['least'], 0)}, a loop "
         f"{number(1.0 - 0.01 * shaken[key]['least'], 2)} times as wide as without a controller. The width is then "

@@ -188,7 +188,7 @@ def told_by(u: Any, y: Any, t: Any, units: Mapping[str, str]) -> tuple[Any, dict
 
 
 def heading(label: str) -> tuple[str, str]:
-    """Name and unit of a heading such as ``voltage [V]`` or ``voltage (V)``; an empty unit if it has none."""
+    """Name and unit of a heading such as ``voltage [V]`` or ``voltage (V)``; the unit may be empty."""
     parts = _HEADING.fullmatch(label.strip())
     return (parts["name"], parts["unit"].strip()) if parts else (label.strip(), "")
 

@@ -17,7 +17,7 @@ _WITHOUT_FIGURE = ("Selection", "Sweep", "Structure")
 
 
 def page(result: Any) -> str | None:
-    """The page of a result; None where its class has none, and the notebook shows its text."""
+    """The page of a result; None if its class has no page, so that the notebook shows its text."""
     names = [cls.__name__ for cls in type(result).__mro__ if cls.__module__.startswith("hysim.")]
     name = next((name for name in names if name in _FIGURES or name in _WITHOUT_FIGURE), None)
     if name is None:

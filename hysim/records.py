@@ -176,7 +176,7 @@ class Record:
         return np.array(middles, dtype=np.intp)
 
     def branches(self, tolerance: float = 0.0) -> tuple[Self, ...]:
-        """Branches on which the input rises or falls, in the order of time; none if the input is constant.
+        """Branches on which the input rises or falls, in the order of time; empty if the input is constant.
 
         A plateau between two branches is divided in its middle; the sample in the very middle, and a reversal without a
         plateau, belong to both. Reversals within the `tolerance`, as in `reversals`, do not end a branch, and are left
@@ -191,7 +191,7 @@ class Record:
         return tuple(self[samples] for samples in turns(self.u, tolerance).branches)
 
     def cycles(self, tolerance: float = TOLERANCE) -> tuple[Self, ...]:
-        """Complete cycles of the input, in the order of time; none if there is no complete cycle.
+        """Complete cycles of the input, in the order of time; empty without a complete cycle.
 
         A cycle goes from one extreme of the record to the other and back, each within 5 % of the input's span;
         `hysim.loop_metrics` measures the last one. Cycles are counted from the end and share no branch, so that the
@@ -473,7 +473,7 @@ def step_if_even(t: FloatArray) -> float | None:
 
 
 def last_digit(values: FloatArray) -> float:
-    """The place of the last digit of numbers that were written down, such as 0.001; 0 where there is none."""
+    """The place of the last digit of numbers that were written down, such as 0.001; 0 if it is not visible."""
     size = float(np.abs(values).max())
     for place in range(_MOST_DIGITS):
         digit = 10.0 ** (math.floor(math.log10(size)) - place) if size else 0.0

@@ -423,7 +423,7 @@ def test_bounds_that_cannot_be_kept_exit_with_1(run):
         (("law.json", *DESIGN, "--mode", "1,0.1", "--vary-mode", "100"), "expected a number above 0 and below 100"),
         (("law.json", *DESIGN, "--preview"), "--preview is for inverse, tracking, model-following"),
         (("law.json", *DESIGN, "--c", "x.h"), "call the file .c"),
-        (("lag.json", "--sample-time", "1e-6", "--range", "0,1"), "the plant is slow beside the sample time"),
+        (("lag.json", "--sample-time", "1e-6", "--range", "0,1"), "the plant is too slow for the sample time"),
         (("loop.csv", *DESIGN), "does not hold a model"),
     ],
 )

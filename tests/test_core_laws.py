@@ -280,7 +280,7 @@ def test_a_core_of_modelica_comes_back():
         (lambda: hs.Chan(squareness=1.0), "squareness, remanence over saturation, must be between 0 and 1, got 1.0"),
         (lambda: hs.Tellinen(z0=-1.5), "z0 must be from -1"),
         (lambda: hs.Chan(gap=-0.1), "gap must not be negative"),
-        (lambda: hs.Chan(gap=0.1, saturation=-1.0), "saturation must not be negative beside a gap"),
+        (lambda: hs.Chan(gap=0.1, saturation=-1.0), "saturation must not be negative with a gap"),
         (lambda: hs.Chan.from_ltspice(Hc=1.0, Bs=0.4, Br=0.1, A=0.0), "A must be positive"),
         (lambda: hs.Chan(feedthrough=1.0).to_ltspice(), "slope of vacuum at saturation"),
         (lambda: hs.Chan(offset=1.0).to_ltspice(), "no offset and no z0"),

@@ -99,8 +99,8 @@ def test_densities_at_the_edge_of_the_numbers_have_shares_that_sum_to_one():
     [
         ({"exponent": -1.0}, "exponent must be above -1"),
         ({"decay": 0.0}, "decay must be positive"),
-        ({"weight": 1.0}, "reach must be positive beside a weight"),
-        ({"reach": -1.0}, "reach must be positive beside a weight"),
+        ({"weight": 1.0}, "reach must be positive if a weight is not zero"),
+        ({"reach": -1.0}, "reach must be positive if a weight is not zero"),
         ({"plays": 2.5}, "plays must be whole and positive"),
         ({"plays": 0.0}, "plays must be whole and positive"),
         ({"z0": ()}, "z0 must hold at least one input"),

@@ -132,7 +132,7 @@ REFUSED = {
     ),
     "modes must be a number from 0 to 20": lambda: structure(modes=21),
     "a sensor with a delay is for one input": lambda: structure(sensor=hs.Sensor(delay=1e-3)),
-    "start has 2 modes behind u, and modes=1": lambda: hs.identify(structure(modes=1, start=STAGE), RECORDS),
+    "start has 2 modes after u, and modes=1": lambda: hs.identify(structure(modes=1, start=STAGE), RECORDS),
     "start has the inputs u; hysteresis those of u, right": lambda: hs.identify(structure(start=branch("u")), RECORDS),
     "fixed names 'hysteresis.slope'; the parameters are hysteresis.u": lambda: hs.identify(
         structure(), RECORDS, fixed={"hysteresis.slope": 1.0}

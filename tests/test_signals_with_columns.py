@@ -177,9 +177,9 @@ def test_signals_are_drawn_with_a_line_for_each_column(simulation):
     assert drift.lines[1].get_ydata().tolist() == simulation.signals["drift"][:, 1].tolist()
     assert (drift.get_ylabel(), kinetic.get_ylabel(), kinetic.get_xlabel()) == ("Drift [m]", "Kinetic", "Time [s]")
     assert kinetic.get_legend() is None
-    with pytest.raises(ValueError, match=r"give names of signals, of t, u, y, displacement, .* got velocity"):
+    with pytest.raises(ValueError, match=r"give signals out of t, u, y, displacement, .* got velocity"):
         hs.plot.signals(simulation, "velocity")
-    with pytest.raises(ValueError, match="got none"):
+    with pytest.raises(ValueError, match="got no name"):
         hs.plot.signals(simulation)
 
 

@@ -55,7 +55,7 @@ def in_unit(name: str, unit: str) -> str:
 
 
 def in_brackets(unit: str) -> str:
-    """A unit as a part of another one: ``(mm/s)`` for ``mm/s``, which would be ambiguous behind a stroke."""
+    """A unit as a part of another one: ``(mm/s)`` for ``mm/s``, which would be ambiguous after a stroke."""
     return f"({unit})" if re.search(r"[/ *·]", unit) and not unit.startswith("(") else unit
 
 

@@ -1,4 +1,4 @@
-"""Channels beside input and output, such as a temperature or a supply: one number for a record, or one a sample."""
+"""Channels of a record, such as a temperature or a supply: one number for the record, or one for each sample."""
 
 from collections.abc import Iterable, Mapping
 from typing import Any

@@ -179,7 +179,7 @@ def _visit(v: FloatArray, begin: int, end: int, near: list[tuple[int, int]]) -> 
 
 
 def _around(excursions: list[_Excursion], sides: npt.NDArray[np.int64]) -> tuple[int, int]:
-    """The sides of the turning points ahead of the first excursion and behind the last one; 0 where there is none."""
+    """The sides of the turning points before the first and after the last excursion; 0 without such a point."""
     before, after = sides[: excursions[0].turns.start], sides[excursions[-1].turns.stop :]
     return int(before[before != 0][-1]) if before.any() else 0, int(after[after != 0][0]) if after.any() else 0
 

@@ -33,7 +33,7 @@ _SMALLEST = 1e-280  # span: below it numbers lose digits
 
 
 def output_quantum(values: FloatArray) -> float | None:
-    """The greatest step of which all values are multiples up to a constant, rounded to its certain digits; or None."""
+    """The greatest step whose multiples, plus a constant, are all values, rounded to its certain digits; or None."""
     levels = np.unique(values)
     with np.errstate(over="ignore"):
         span = float(np.ptp(levels)) if levels.size else 0.0

@@ -98,7 +98,7 @@ class Hysim(click.Group):
         return [*COMMANDS]
 
     def get_command(self, ctx: click.Context, cmd_name: str) -> Command:
-        """The command of this name; a UsageError with the nearest one if there is none."""
+        """The command of this name; a UsageError with the nearest name if it is unknown."""
         if cmd_name not in COMMANDS:
             advice = suggestion(cmd_name, ["--help", *COMMANDS]) or f"there are {', '.join(COMMANDS)}"
             raise click.UsageError(f"there is no command {cmd_name!r}: {advice}", ctx)
@@ -200,7 +200,7 @@ def _line(error: BaseException) -> str:
 
 
 def _near_file(path: str) -> str:
-    """``did you mean FILE?`` for the nearest file in the same folder, an empty text if none is near."""
+    """``did you mean FILE?`` for the nearest file in the same folder, an empty text if no name is similar."""
     folder, name = os.path.split(path)
     try:
         near = suggestion(name, os.listdir(folder or "."))

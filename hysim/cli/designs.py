@@ -133,7 +133,7 @@ def variations(actuator: hs.Actuator, percent: float | None) -> list[hs.Actuator
 
 
 def task(actuator: hs.Actuator, options: DesignOptions, within: Pair | None) -> Task:
-    """The task of the loop; a ValueError if the range is unknown, the step is none, or the loop takes too long."""
+    """The task of the loop; a ValueError if the range is unknown, the step is zero, or the loop takes too long."""
     h, poles = options.sample_time, _poles(actuator)
     low, high = options.range or _reach(actuator, within)
     periods = [2.0 * math.pi / abs(pole) * (_SLOWER_THAN_MODE if pole.imag else _SLOWER_THAN_LAG) for pole in poles]
@@ -143,7 +143,7 @@ def task(actuator: hs.Actuator, options: DesignOptions, within: Pair | None) -> 
     longest = max(_CYCLES * period, duration) / h
     if longest > _CYCLES * _MOST_SAMPLES:
         raise ValueError(
-            f"the loop would take {longest:.2g} samples: the plant is slow beside the sample time; give --frequency "
+            f"the loop would take {longest:.2g} samples: the plant is too slow for the sample time; give --frequency "
             "and --duration, or a longer --sample-time"
         )
     step = 0.5 * (high - low) if options.step is None else options.step

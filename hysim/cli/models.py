@@ -227,7 +227,7 @@ class DesignOptions:
 
 
 def family(name: str) -> Any:
-    """The family with a name such as ``bouc-wen``; a ValueError, which lists the names, if there is none."""
+    """The family with a name such as ``bouc-wen``; a ValueError that lists the names if it is unknown."""
     from hysim.models.model import family_named
 
     if name == "structure":
@@ -242,7 +242,7 @@ def family(name: str) -> Any:
 
 
 def resolved(path: str) -> Any:
-    """The object at an import path, `module:name`, the current folder included; ValueError if there is none."""
+    """The object at an import path, `module:name`, the current folder included; ValueError if it is not found."""
     if os.getcwd() not in sys.path:
         sys.path.insert(0, os.getcwd())  # as `python -m hysim` has it
     try:

@@ -75,7 +75,7 @@ def keep(inputs: Iterable[str | None], results: Iterable[str | None]) -> None:
 
 
 def _behind(source: str) -> Iterator[os.stat_result]:
-    """Files behind an input: itself, the files of a folder, or the file that the standard input is read from."""
+    """Files that an input is read from: itself, the files of a folder, or the file of the standard input."""
     paths = [os.path.join(source, name) for name in os.listdir(source)] if os.path.isdir(source) else [source]
     for path in paths:
         with contextlib.suppress(OSError, ValueError):  # a file that cannot be read is an error where it is read
@@ -85,7 +85,7 @@ def _behind(source: str) -> Iterator[os.stat_result]:
 def write(
     files: Files, text: Callable[[], str] | None = None, document: Callable[[], Mapping[str, Any]] | None = None
 ) -> None:
-    """Write all files or none, and print `text`, or `document` with ``--json``, unless a path is standard output."""
+    """Write all files or no file; print `text`, or `document` with ``--json``, unless a path is standard output."""
     contents: dict[Any, bytes] = {
         path: _encoded(path, content()) for path, content in files.items() if path is not None
     }

@@ -168,7 +168,7 @@ def read_input(settings: InputOptions, path: str, *, of_the_ground: bool) -> "hs
 
 
 def read_with_weights(settings: WeighedOptions, path: str) -> "tuple[hs.Record, Any]":
-    """The record, with columns of sensors as channels (the first is y if none is named), and the column of weights."""
+    """The record, with columns of sensors as channels (by default the first is y), and the column of weights."""
     if settings.sensor and settings.y is None:
         settings.y = next(iter(settings.sensor.values()))
     settings.channels = {**(settings.channels or {}), **(settings.sensor or {})} or None
@@ -261,7 +261,7 @@ def _from_two_files(settings: RecordOptions, path: str, source: Source, y_file: 
 
 
 def _only_column(settings: InputOptions, source: Any, name: str) -> str:
-    """This name, or that of the only column beside the time; a ValueError if there are several others."""
+    """This name, or that of the only column apart from the time; a ValueError if there are several others."""
     from hysim.files import column_names
 
     others = [

@@ -117,7 +117,7 @@ def _document(result: "hs.Sweep") -> dict[str, Any]:
 def _picture(result: "hs.Sweep", output: str | None) -> Any:
     name = output or next(iter(result.outputs), None)
     if name is None or name not in result.outputs:
-        raise ValueError(f"no output {name!r} to draw: there are {', '.join(result.outputs) or 'none'}")
+        raise ValueError(f"no output {name!r} to draw: there are {', '.join(result.outputs) or 'no outputs'}")
     return outputs.drawn(lambda canvas: hs.plot.parallel_coordinates(result, name, ax=canvas.add_subplot()))
 
 
@@ -221,5 +221,5 @@ def _check(table: Mapping[str, Any], names: set[str], title: str) -> None:
 def _one_of(document: Mapping[str, Any], names: tuple[str, ...]) -> str:
     present = [name for name in names if name in document]
     if len(present) != 1:
-        raise ValueError(f"give one of {', '.join(names)}, got {', '.join(present) or 'none'}")
+        raise ValueError(f"give one of {', '.join(names)}, got {', '.join(present) or 'nothing'}")
     return present[0]

@@ -82,7 +82,7 @@ def in_shell_words(message: str, flags: Mapping[str, str]) -> str:
 
 
 def _any(names: Iterable[str]) -> str:
-    """A pattern of any of some names, the longer before the shorter; of none it matches nothing."""
+    """A pattern of any of some names, the longer before the shorter; without names it matches nothing."""
     return "|".join(sorted(map(re.escape, names), key=len, reverse=True)) or r"(?!)"
 
 
@@ -112,6 +112,6 @@ def _typed(word: str) -> str:
 
 
 def suggestion(word: str, known: Iterable[str]) -> str:
-    """``did you mean NAME?`` for the nearest of some names, an empty text if none is near."""
+    """``did you mean NAME?`` for the nearest of some names, an empty text if no name is similar."""
     near = nearest(word.partition("=")[0], known)
     return "" if near is None else f"did you mean {near}?"

@@ -144,7 +144,7 @@ def _last_loop(record: Record) -> LoopMetrics:
     try:
         return loop_metrics(record.u, record.y)
     except ValueError as error:
-        raise ValueError(f"compare judges models by the loop of the record, and it has none: {error}") from None
+        raise ValueError(f"compare judges models by the loop of the record, and it has no loop: {error}") from None
 
 
 @dataclass(frozen=True)
@@ -271,7 +271,7 @@ def _distinct(records: tuple[Record, ...], subjects: dict[str, Any]) -> tuple[tu
         return records, subjects
     for name, subject in subjects.items():
         if isinstance(subject, Identification) and len(subject.models) == len(records):
-            raise ValueError(f"{name} was identified on records of which some are the same: give each record once")
+            raise ValueError(f"{name} was identified on records that are not all different: give each record once")
         if isinstance(subject, list | tuple):
             subjects = {**subjects, name: [subject[k] for k in places]}
     return tuple(records[k] for k in places), subjects
@@ -377,7 +377,7 @@ class OneByOne(NamedTuple):
 
 
 def together(subjects: Sequence[Any]) -> Any:
-    """Results one by one as one result with the parameters of all; the last model if none was fitted."""
+    """Results one by one as one result with the parameters of all; the last model if no model was fitted."""
     models = tuple(map(model_of, subjects))
     fits = [each for each in subjects if isinstance(each, Identification)]
     if not fits:

@@ -1,4 +1,4 @@
-"""Figures of a closed loop beside those of the same plant in open loop, driven with reference / secant gain.
+"""Figures of a closed loop, compared with the same plant in open loop, driven with reference / secant gain.
 
 Hysteresis loops and square waves are measured over their last cycle, steps by `hysim.metrics.vibration_reduction`.
 The reductions of a loop that is not stable are nan: a limit cycle along the reference may be narrower than any loop.
@@ -73,7 +73,7 @@ class LoopAssessment:
         )
 
     def row(self, quantum: float | None = None) -> dict[str, float | bool | None]:
-        """The columns beside a reduction in a table: numbers, None where one is infinite or unknown.
+        """The columns that a table should give with every reduction: numbers, None where one is infinite or unknown.
 
         They are ``"stable"``, ``"period"``, ``"tracking_rms"``, ``"limited_percent"``, ``"max_sensitivity"``,
         ``"max_sensitivity_with_delay"`` and ``"volts_per_quantum"``, for a step `quantum` of the readings [unit of y],

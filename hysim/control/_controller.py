@@ -155,7 +155,7 @@ class SampledController(ABC):
 
 
 class WithoutFeedback(SampledController):
-    """Controllers of which the measurement does not move the command itself."""
+    """Controllers whose command does not depend on the measurement."""
 
     def frequency_response(self, frequency: npt.ArrayLike, sample_time: float) -> npt.NDArray[np.complex128]:
         return np.zeros(np.shape(frequency), dtype=complex)

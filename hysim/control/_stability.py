@@ -85,7 +85,7 @@ class _Loop(NamedTuple):
 
 
 class LinearLoop:
-    """A plant behind a sampled controller's hold, its law replaced by a line of slope one.
+    """A plant after the hold of a sampled controller, its law replaced by a line of slope one.
 
     Parameters
     ----------

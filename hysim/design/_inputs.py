@@ -1,4 +1,4 @@
-"""Inputs by their turning points, and the usual ones beside which a design is judged.
+"""Inputs by their turning points, and the usual inputs with which a design is compared.
 
 Strokes are an array (n_strokes, 3): the turning point about the centre, how long it is held [s], and the speed on the
 way to it in parts of the full slew.

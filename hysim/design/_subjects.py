@@ -192,7 +192,7 @@ def _without_fast_modes(
 
 
 def _known(structure: ActuatorStructure, values: Mapping[str, float]) -> dict[str, float]:
-    """All parameters of the actuator, those of the parts beside the law by default where there is no value."""
+    """All parameters of the actuator; those of the other parts than the law have defaults where no value is given."""
     known = {f"{_LAW}.{name}": float(value) for name, value in structure.law.scalars.items()}
     for part, (_, defaults) in structure.parts([]).boxes().items():
         own_values = {f"{part}.{name}": value for name, value in defaults.items()}

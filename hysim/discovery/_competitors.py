@@ -1,4 +1,4 @@
-"""Models that need no law, beside which a law is judged: a curve, relaxations, plays, and a linear plant.
+"""Models that need no law, with which a law is compared: a curve, relaxations, plays, and a linear plant.
 
     curve         y = f(u) + trend
     relaxations   y = c_0 u + sum_i g(log tau_i) x_i + trend,       tau_i x_i' + x_i = u
@@ -239,7 +239,7 @@ def rival(records: Sequence[Record]) -> Rival:
 
 
 def steady_width(plant: TransferFunction, cycle: Record, rate: float) -> float:
-    """Relative width of the plant's steady loop where the cycle runs at `rate` times its rate; nan where it has none.
+    """Relative width of the plant's steady loop with the cycle at `rate` times its rate; nan without a steady loop.
 
     The coefficients of prod (x - exp(p T)), p the poles, take the free response out of as many periods and one more.
     """

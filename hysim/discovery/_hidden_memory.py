@@ -237,7 +237,7 @@ def _signs(term: Term) -> FloatArray:
 
 
 class HiddenMemory:
-    """Regressions of the memory along one or several motions of one plant, parts of which may be `known`."""
+    """Regressions of the memory along one or several motions of one plant; parts of the plant may be `known`."""
 
     def __init__(self, motions: Sequence[Motion], linear: Linear, known: Mapping[str, float]) -> None:
         self.linear, self.known = linear, dict(known)
@@ -254,7 +254,7 @@ class HiddenMemory:
         self._size = float(np.linalg.norm(force))
 
     def fit(self, terms: Sequence[Term]) -> Regressed | None:
-        """Law of these terms, the first of which is u', from the best of several starts; None if all diverge."""
+        """Law of these terms, u' first, from the best of several starts; None if all diverge."""
         spring = self.linear.stiffness
         shares = [1.0 - self.known["stiffness"] / spring] if "stiffness" in self.known else SHARES
         starts = [np.array([max(share, 0.01) * spring, *np.zeros(len(terms) - 1)]) for share in shares]
@@ -369,7 +369,7 @@ def verdict(terms: Iterable[Term]) -> str:
 def model(
     plant: Mapping[str, float], law: Mapping[Term, float], structure: OscillatorStructure, state: State
 ) -> Model | None:
-    """Model of an oscillator that begins in a state; None where hysim has none."""
+    """Model of an oscillator that begins in a state; None if hysim has no such model."""
     kind, n = verdict(law), bouc_wen_exponent(law)
     if kind == LAG:
         return _lag(plant, law[RELAXATION], law.get(SPRING, 0.0), structure.hold, state)

@@ -163,7 +163,7 @@ class Search(NamedTuple):
         return ranked[0].fitted.search._described(ranked[0]._replace(fitted=elastic), elastic, regressed, lost)
 
     def _again(self, candidates: Sequence[_Tried]) -> list[_Tried]:
-        """Candidates by this structure of the records; none if it suits the best Bouc-Wen law less."""
+        """Candidates by this structure of the records; an empty list if it suits the best Bouc-Wen law less."""
         laws = [each.fitted for each in candidates if bouc_wen_exponent(each.fitted.terms) is not None]
         with contextlib.suppress(ValueError):  # there is no such law, or the candidates by the other belief stay
             law = min(laws, key=lambda each: each.bic)
@@ -253,7 +253,7 @@ class Search(NamedTuple):
         return _Fitted(self, Oscillator(plant, coefficients), stderr, fit.residual, tuple(warnings))
 
     def _simulated(self, oscillator: Oscillator) -> _Fitted:
-        """A law of any terms, refined by the simulation behind the regression; a ValueError if it diverges."""
+        """A law of any terms, refined by simulation after the regression; a ValueError if it diverges."""
         refined = self.response.descended(oscillator)
         terms = tuple(refined.coefficients)
         residual = self.response.measured - self.response.outputs([refined])[0]

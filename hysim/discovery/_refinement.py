@@ -198,7 +198,7 @@ class Candidate(Generic[S]):
 
 
 def cost_of(bic: float, n_samples: int, n_parameters: int) -> float:
-    """Sum of squared residuals, in squared strokes, with this BIC; negative if there is none."""
+    """Sum of squared residuals, in squared strokes, with this BIC; negative if no sum has this BIC."""
     return n_samples * (math.exp((bic - n_parameters * math.log(n_samples)) / n_samples) - FLOOR**2)
 
 

@@ -112,7 +112,7 @@ class Outcome:
 
     @property
     def threshold(self) -> float:
-        """Largest one whose structure still has all terms of the law; nan if none has."""
+        """Largest threshold whose structure still has all terms of the law; nan if no structure has them."""
         terms = set(self.candidate.structure.terms)
         return max((t for t, structure in self.path if terms <= set(structure.terms)), default=math.nan)
 
@@ -137,7 +137,7 @@ def searched(
     best: float = math.inf,
     masks: Sequence[Samples] | None = None,
 ) -> Outcome | None:
-    """The best law of a library; None if none can come near the BIC `best`.
+    """The best law of a library; None if no law can come near the BIC `best`.
 
     Only outputs in the `masks`, (n_samples,) for each record, are used. The search is short if no law on the
     optimizer's path, which has the largest ones, comes near an rmse that is enough.

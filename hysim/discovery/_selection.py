@@ -220,7 +220,7 @@ class Search:
 
     @property
     def sound(self) -> list[Candidate[Terms]]:
-        """Those that come to a steady loop; all, if none does."""
+        """Candidates that come to a steady loop; all candidates if no candidate does."""
         refined = self.candidates
         return [candidate for candidate in refined if candidate.settles] or refined
 

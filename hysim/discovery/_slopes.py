@@ -391,7 +391,7 @@ def ridge(columns: FloatArray, target: FloatArray, weight: float) -> FloatArray:
 
 
 def independent(columns: FloatArray, basis: FloatArray, order: Sequence[int], least: float) -> list[int]:
-    """Columns, in `order`, of which a share of `least` is no combination of an orthonormal `basis` and those before."""
+    """Columns, in `order`, whose share outside an orthonormal `basis` and the earlier columns is at least `least`."""
     included = []
     for k in order:
         rest = columns[:, k]

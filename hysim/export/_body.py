@@ -211,7 +211,7 @@ class Body:
         return f"double {self.scope.c_name(target.id)}[{size}];"
 
     def _several(self, target: ast.Tuple, node: ast.expr) -> list[str]:
-        """Numbers or vectors assigned together: one after the other where none reads what another has changed."""
+        """Numbers or vectors assigned together: one after the other if no assignment reads what another has changed."""
         if isinstance(node, ast.IfExp) and isinstance(node.body, ast.Tuple) and isinstance(node.orelse, ast.Tuple):
             return self._chosen(target, node)
         if not isinstance(node, ast.Tuple):

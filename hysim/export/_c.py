@@ -101,7 +101,7 @@ Type = Scalar | Vector | Known | Several
 
 
 def joined(first: Type | None, second: Type) -> Type | None:
-    """The type that holds values of both, None where there is none."""
+    """The type that holds values of both, None if they have no common type."""
     if first is None or first == second:
         return second
     if isinstance(first, Scalar) and isinstance(second, Scalar):
@@ -130,7 +130,7 @@ class Routine(NamedTuple):
 
 
 def plain(function: Any) -> Any:
-    """The Python function behind a kernel, or the value itself where it is none."""
+    """The Python function of a kernel; any other value is returned unchanged."""
     if isinstance(function, Addressed):
         return plain(function.function)
     return plain(function.py_func) if isinstance(function, Dispatcher) else function

@@ -167,6 +167,6 @@ def compiled(source: str) -> bytes:
 
 
 def mark(source: str) -> bytes:
-    """Section of a module that tells of which text it was made: a custom one, that a browser passes over."""
+    """Custom section of a module with a mark of the text that it was made from; a browser ignores it."""
     content = b"\x06source" + hashlib.sha256(source.encode()).digest()
     return bytes([0, len(content)]) + content

@@ -62,7 +62,7 @@ class Expressions:
         return result
 
     def quietly(self, node: ast.expr) -> Value:
-        """An array of which the lengths alone are used."""
+        """An array; only its lengths are used."""
         used = set(self.scope.used)
         result = self.vector(node)
         self.scope.used = used
@@ -212,7 +212,7 @@ class Expressions:
     # ------------------------------------------------------------------------------ vectors
 
     def shape(self, node: ast.expr) -> Value | None:
-        """The array of which an expression is the shape; None where it is something else."""
+        """The array whose shape is this expression; None if the expression is something else."""
         if isinstance(node, ast.Attribute) and node.attr == "shape" and self._module(node.value) is None:
             return self.quietly(node.value)
         return None

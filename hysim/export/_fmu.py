@@ -304,7 +304,7 @@ class Variable(NamedTuple):
     description: str = ""
 
     def attributes(self) -> dict[str, str]:
-        """Those that stand in the XML of both versions beside each other."""
+        """Attributes that the XML of both versions contains."""
         named = {
             "name": self.name,
             "valueReference": str(self.reference),

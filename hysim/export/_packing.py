@@ -318,7 +318,7 @@ class Traced(np.ndarray[Any, np.dtype[np.object_]]):
 
 
 def _recorder(operation: str) -> Any:
-    """A ufunc that records the operation where one of its numbers is a symbol, and does it where none is."""
+    """A ufunc that records the operation if one of its numbers is a symbol, and computes it otherwise."""
     evaluate, text = OPERATIONS[operation]
 
     def apply(*operands: Number) -> Number:

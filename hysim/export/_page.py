@@ -190,7 +190,7 @@ def _inputs(amplitude: float, middle: float, timed: bool) -> list[dict[str, Any]
 
 
 def _stack(controls: list[dict[str, Any]], law: Any) -> list[dict[str, Any]]:
-    """Sliders for number, largest threshold and weights of the plays behind that of threshold zero, and its weight."""
+    """Sliders for number, largest threshold and weights of the plays after that of threshold zero, and its weight."""
     places = {name: k for k, name in enumerate(law.scalars)}
     most, weight = len(law.thresholds) - 1, sum(law.weights[1:])
     plays = sum(each != 0.0 for each in law.weights[1:])

@@ -44,7 +44,7 @@ def slider(name: str, value: float, lower: float, upper: float, **rest: Any) -> 
 
 
 def sliders_of(law: Law, free: Sequence[str], u: FloatArray, names: Sequence[str]) -> list[dict[str, Any]]:
-    """A slider for each number in `free`: long tuples share one, initial tuples have none; `names` says the places."""
+    """A slider for each number in `free`, one for a long tuple, not for initial tuples; `names` says the places."""
     reach = _Reach(law, u)
     sliders: list[dict[str, Any]] = []
     for base, group in itertools.groupby(free, lambda name: name.partition("[")[0]):
@@ -115,7 +115,7 @@ class _Reach:
         return value + sign * (reached or _FIRST * size)
 
     def _change(self, name: str, value: float) -> float:
-        """Largest change of the output by another value of a number, in its spans; infinite where there is none."""
+        """Largest change of the output by another value of a number, in its spans; infinite if no output exists."""
         other = self._with(name, value)
         if other is None:
             return math.inf
@@ -213,7 +213,7 @@ def _law(thing: Any, u: FloatArray, parts: Parts) -> tuple[dict[str, Any], list[
 
 
 def _at(thing: Any, sample_time: float) -> Any:
-    """A law that depends on the rate of its input, at a sample time; others as they are."""
+    """A law that depends on the rate of its input, at a sample time; other laws unchanged."""
     if isinstance(thing, RatedLaw):
         return thing.at_sample_time(sample_time)
     return thing.at(1.0) if isinstance(thing, RateDependentPrandtlIshlinskii) else thing
@@ -307,7 +307,7 @@ def about(thing: Any) -> tuple[str, str]:
 
 
 def output_of(family: type) -> str:
-    """Right side of the equation of y in the docstring of a family; empty if it has none."""
+    """Right side of the equation of y in the docstring of a family; empty without such an equation."""
     text = (getdoc(family) or "").split("\nParameters\n")[0]
     found = re.search(r"\b[yFT] *= ((?:offset|c (?:u'|sign)).*?)(?=``|,\s| {3}|\n|$)", text)
     return "" if found is None else found.group(1)

@@ -39,7 +39,7 @@ _LAW, _CONTROLLER, _FEEDFORWARD = ("u",), ("reference", "measurement"), ("refere
 
 @dataclass
 class Translation:
-    """C text of the functions translated so far, each behind those that it calls."""
+    """C text of the functions translated so far, each after those that it calls."""
 
     functions: dict[Any, Function] = field(default_factory=dict)
     helpers: set[str] = field(default_factory=set)
@@ -76,7 +76,7 @@ class Translation:
         return "\n\n".join([*parts, *self._texts]) + "\n"
 
     def _free(self, wanted: str) -> str:
-        """A name in C that is not taken; no public name ends with an underscore or a number behind one."""
+        """A name in C that is not taken; no public name ends with an underscore, or with an underscore and a number."""
         name, k = f"{wanted}_", 2
         while name in self._names:
             name, k = f"{wanted}_{k}", k + 1
@@ -314,7 +314,7 @@ def entries(step: Step, start: Start, sizes: tuple[int, int] | None = None) -> t
 def _entry(
     name: str, function: Function, inputs: tuple[str, ...], sizes: tuple[int, int] | None, every: tuple[str, ...]
 ) -> str:
-    """A C function of parameters, state and inputs (`every`, of which it uses `inputs`) around a translated one."""
+    """A C function of parameters, state and inputs (`every`; it uses `inputs`) around a translated one."""
     lengths = ("n_parameters", "n_state") if sizes is None else tuple(map(str, sizes))
     given: list[str] = []
     names = ("parameters", "state", *every)

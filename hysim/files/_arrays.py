@@ -227,7 +227,7 @@ def _entry(archive: zipfile.ZipFile, entry: zipfile.ZipInfo) -> Array:
 
 
 def _array(label: str, opener: Callable[[], AbstractContextManager[IO[bytes]]], size: int) -> tuple[Array, int, int]:
-    """The array in a file of this size, the bytes that its header promises, and those behind the header."""
+    """The array in a file of this size, the bytes that its header promises, and those after the header."""
     with opener() as file:
         header = BytesIO(file.read(_LONGEST_HEADER))
     is_old = np.lib.format.read_magic(header)[0] == 1
@@ -276,7 +276,7 @@ class _MatReader:
             at += 8 + length
 
     def tag(self, data: bytes | memoryview) -> tuple[int, int]:
-        """The type of an element, and the number of bytes behind these eight."""
+        """The type of an element, and the number of bytes after these eight."""
         kind, length = np.frombuffer(data, f"{self.order}u4", 2).tolist()
         return kind, length
 
@@ -315,7 +315,7 @@ class _MatReader:
             yield Array(label, shape, kind, 8, partial(self.value, matrix))
 
     def fields(self, struct: memoryview) -> Iterator[tuple[str, memoryview]]:
-        """Names and matrices of a struct's fields, which are behind its flags, dimensions and name."""
+        """Names and matrices of a struct's fields, which follow its flags, dimensions and name."""
         parts, at = [], 8
         while at < len(struct):
             kind, length = self.tag(struct[at : at + 8])

@@ -297,7 +297,7 @@ def _survey(text: Text) -> tuple[Lines, Lines, int]:
 
 
 def delimited(text: Text, delimiter: str | None, decimal: str | None, thousands: str | None = None) -> Delimited:
-    """The table that a text holds; ValueError with the number of the line if it holds none."""
+    """The table that a text holds; ValueError with the number of the line if it is not a table."""
     top, rest, n_lines = _survey(text)
     lines, first = top.texts, next(iter(top.numbers), 0)
     if lines and (said := _EXCEL.fullmatch(lines[0].strip())) is not None and first == 1:

@@ -272,7 +272,7 @@ def _of_text(lines: list[str], choice: _Choice, skip: int, delimiter: str | None
 
 
 def _table_below_titles(lines: list[str], delimiter: str | None, decimal: str | None) -> Table:
-    """The table below some titles: all lines of text above it are names and units, or the last two, one, or none."""
+    """The table below some titles; names and units are in all, in the last two or one, or in no line above it."""
     samples = (k for k, line in enumerate(lines) if line.strip() and not line.lstrip().startswith(COMMENTS))
     titles = [*takewhile(lambda place: not re.match(r"\s*\"?[+-]?[.,]?\d", lines[place]), samples)]
     errors = list[ValueError]()
@@ -296,7 +296,7 @@ def _count_in_list(lines: list[str], decimal: str | None, skip: int) -> int:
 def _of_stated(
     lines: list[str], header: StatedValues, choice: _Choice, skip: int, decimal: str | None, unit: str
 ) -> _Motion:
-    """The values below a line that states their number and step, in this unit if none is stated."""
+    """The values below a line that states their number and step, in this unit if the file states no other."""
     where, n, step = f"line {header.line}", header.n_values, header.step
     require(0.0 < step < np.inf, f"{where}: the step must be positive, got {step:g}; correct the line")
     is_same = choice.sample_time in (None, step)
@@ -417,7 +417,7 @@ def check_unit(unit: str | None) -> None:
 
 
 def stated_unit(header: str) -> str | None:
-    """The unit that the text above some numbers states, None if it states none; ValueError if it is not understood.
+    """The unit that the text above some numbers states, None without one; ValueError if it is not understood.
 
     First the word behind "unit", then what is in brackets or behind "in", then words such as cm/sec2.
     """
@@ -434,7 +434,7 @@ def stated_unit(header: str) -> str | None:
 
 
 def unit_of_column(label: str, unit: str) -> str:
-    """The unit of a column, m/s^2 if its header states none; ValueError if the name may end in a unit."""
+    """The unit of a column, m/s^2 by default; ValueError if the name may end in a unit."""
     if unit:
         return unit
     end = _ENDS_IN_UNIT.fullmatch(label.strip())

@@ -98,7 +98,7 @@ def packed(columns: Mapping[str, FloatArray], path: str | Path, notes: Notes) ->
 
 
 def ending(path: str | Path) -> str:
-    """The ending of a path, which names a format to save in; ValueError if it names none, or its library is missing."""
+    """The ending of a path, which names a format to save in; ValueError if it is unknown or its library is missing."""
     suffix = Path(path).suffix.lower()
     if suffix not in _WRITERS:
         raise ValueError(f"{Path(path).name}: the ending must be one of {', '.join(_WRITERS)}, got {suffix!r}")

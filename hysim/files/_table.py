@@ -51,7 +51,7 @@ class Table(Protocol):
         """Names of the columns."""
 
     def column(self, key: str | int) -> Column:
-        """The column of this name or number; ValueError if there is none, or more than one."""
+        """The column of this name or number; ValueError unless exactly one column matches."""
 
     def values(self, columns: list[Column]) -> FloatArray:
         """The numbers of the columns, shape (n_columns, n_samples), nan where one is missing."""

@@ -227,7 +227,7 @@ def effective_samples(residual: FloatArray) -> float:
 
 
 def _safest(search: Search, likely: list[LocalOptimum] | None) -> tuple[Search, list[LocalOptimum]] | None:
-    """The best admissible optimum that is met, in its own box, and others of this box behind it."""
+    """The best admissible optimum that was met, in its own box, followed by others of this box."""
     regions = search.problem.space.regions
     if regions:
         lower, upper = np.max([low for low, _ in regions.values()], 0), np.min([up for _, up in regions.values()], 0)
@@ -282,7 +282,7 @@ def _approached(search: Search, x: FloatArray) -> tuple[Search, list[LocalOptimu
 
 
 def _band(records: Sequence[Record]) -> tuple[FloatArray, float, float]:
-    """The line that fits all records best, and the lowest and highest output beside it."""
+    """The line that fits all records best, and the lowest and highest output less this line."""
     u, y = np.concatenate([record.u for record in records]), np.concatenate([record.y for record in records])
     slope = float(np.dot(u - u.mean(), y - y.mean()) / np.dot(u - u.mean(), u - u.mean()))
     line = np.array([slope, y.mean() - slope * u.mean()])

@@ -269,7 +269,7 @@ def _possible(family: Any, records: Sequence[Record]) -> list[str]:
 
 
 def _tried(attempt: Problem, state: _State, variant: Variant, before: Sequence[_Trial]) -> _Trial:
-    """A short search that begins, beside its own starts, where those `before` ended that it contains."""
+    """A short search that begins at its own starts, and at the ends of the trials `before` that it contains."""
     known = next((each.problem.settled for each in before if each.problem.settled is not None), None)
     attempt = attempt.with_settled(known)
     space = attempt.space

@@ -217,7 +217,7 @@ def estimate_channel(
 
 @dataclass(frozen=True)
 class _UnknownChannel(Subject):
-    """A law with one number to be found, the value of a channel, beside its state at the first sample."""
+    """A law with one unknown number, the value of a channel, and an unknown state at the first sample."""
 
     model: Dependent
     channel: str

@@ -153,7 +153,7 @@ def _cycles(records: Sequence[Record], cuts: Sequence[int]) -> list[npt.NDArray[
 def left_out_errors(
     problem: Problem, noise: Noise, optima: FloatArray, every_fold: Sequence[npt.NDArray[np.intp]]
 ) -> FloatArray:
-    """Error of each sample, shape (n,), in the fit that leaves it out; nan where none does, inf where it diverged."""
+    """Error of each sample, shape (n,), in the fit that leaves it out; nan without such a fit, inf if it diverged."""
     errors_of_all = np.full(problem.y.size, np.nan)
     if not every_fold:
         return errors_of_all

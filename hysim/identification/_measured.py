@@ -1,4 +1,4 @@
-"""The model as it is returned: behind the filter of its input, from its record's start, with its own residual."""
+"""The model that is returned: with the filter of its input, the start of its record, and its own residual."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
@@ -93,7 +93,7 @@ def _alone_in_words(models: Sequence[Any], records: Sequence[Record], spread: fl
 
 
 def _behind(front: ReversalFilter | None, model: Any) -> Any:
-    """A model behind a filter of its input; of an actuator the filter of its voltage stands in front of its law."""
+    """A model after a filter of its input; in an actuator the filter of the voltage stands in front of the law."""
     if front is None:
         return model
     if isinstance(model, Actuator) and model.amplifier is not None:

@@ -201,7 +201,7 @@ class Problem:
         return replace(self, parts=tuple(parts), simpler=self.simpler and self.simpler.weighted(weights))
 
     def begun(self, x: FloatArray) -> FloatArray:
-        """Coordinates (n_sets, n_x) of the models with the outputs of the `simpler` problem's at its `x`, or of none.
+        """Coordinates (n_sets, n_x) of models with the outputs of the `simpler` problem's at its `x`; may be empty.
 
         Those outside the box are brought to its side.
         """
@@ -339,7 +339,7 @@ class Problem:
         return ends, np.einsum("sii->si", ends - x[:, np.newaxis])
 
     def neighbours(self, x: FloatArray, share: float = 1.0) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Points a small step ahead of and behind each `x` (n_sets, n_x) along each coordinate, and their distance.
+        """Points a small step above and below each `x` (n_sets, n_x) along each coordinate, and their distance.
 
         `share` is the part of the step by which a difference is usually taken.
         """

@@ -146,7 +146,7 @@ class Identification(Stored):
 
     @property
     def family(self) -> str:
-        """Name of the model's family; of a law behind a filter of its input both, ``"ReversalFilter >> BoucWen"``."""
+        """Name of the model's family, with that of a filter of its input: ``"ReversalFilter >> BoucWen"``."""
         stages = self.model.stages if isinstance(self.model, Cascade) else (self.model,)
         return " >> ".join(type(stage).__name__ for stage in stages)
 

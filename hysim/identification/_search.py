@@ -253,7 +253,7 @@ def _optima(problem: Problem, reached: Reached) -> list[Optimum]:
 
 
 def _staged(problem: Problem, stage: Stage, begun: FloatArray, seed: int) -> FloatArray:
-    """Points (n_sets, n_x) to polish: random ones in what the stage frees, beside the `begun`, after its rounds."""
+    """Points (n_sets, n_x) to polish after the stage's rounds: the `begun`, and random ones in what the stage frees."""
     space, rough = problem.space, problem.rough()
     drawn = spread(space, stage.drawn, seed)
     around = begun if len(begun) else space.starts

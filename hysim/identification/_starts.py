@@ -153,7 +153,7 @@ def _with_law(plant: Any, setting: Setting) -> tuple[Any, _Law]:
 
 
 def _behind_inputs(plant: Any, law: Any, setting: Setting) -> tuple[Any, list[Coordinates]]:
-    """The plant and coordinates of its parts, behind a known law, or behind several inputs as they are."""
+    """The plant and coordinates of its parts, after a known law, or directly after several inputs."""
     plant, known = _grown(plant, law, setting)
     return _tried(plant, setting), known
 
@@ -170,7 +170,7 @@ def _all_at_once(plant: Any, known: Sequence[Coordinates], setting: Setting, spr
 
 
 def _beside_laws(whole: Problem, begun: FloatArray, seed: int) -> FloatArray:
-    """The best points of many laws beside the other coordinates of one point."""
+    """The best points of many laws, with the other coordinates of one point."""
     space = whole.space
     of_law = [k for k, name in enumerate(space.coordinates) if name.startswith("hysteresis.")]
     points = np.repeat(begun, _SPREAD_LAWS, axis=0)
@@ -233,7 +233,7 @@ def _tried(plant: Any, setting: Setting) -> Any:
 def _on_all(
     plant: Any, setting: Setting, shape: Mapping[str, float], known: Sequence[Coordinates]
 ) -> list[Coordinates]:
-    """The best coordinates of the parts on all records, beside the law's shape."""
+    """The best coordinates of the parts on all records, with the law's shape."""
     attempt = setting.beside(shape).problem(plant.begun(known))
     if not attempt.n_x:
         return []
@@ -327,7 +327,7 @@ def _short_search(law: Any, setting: Setting) -> dict[str, float] | None:
 
 
 def _groups(structure: DependentStructure, records: Sequence[Record]) -> dict[tuple[float, ...], list[int]]:
-    """Numbers of the records by the values of their channels; none if a channel varies along a record."""
+    """Numbers of the records by the values of their channels; empty if a channel varies along a record."""
     channels = sorted({channel for channel, _ in structure.depends.values()})
     groups: dict[tuple[float, ...], list[int]] = {}
     for k, record in enumerate(records):

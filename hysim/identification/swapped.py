@@ -32,7 +32,7 @@ _PERFECT = 1e-3  # forward errors below this leave nothing to suspect
 
 
 def swapped_columns(records: Sequence[Record]) -> str:
-    """A sentence where the output of each record is a generator's waveform and the input none; else the empty text."""
+    """A sentence if each record's output is a generator's waveform and its input is not; else the empty text."""
     if not all(_is_generated(record.y) and _moves(record.u) and not _is_generated(record.u) for record in records):
         return ""
     return (

@@ -1,4 +1,4 @@
-"""A flexible shaft, or a spring with a damper, behind a gap, along an even stroke.
+"""A gap in series with a flexible shaft, or with a spring and a damper, along an even stroke.
 
     T = k x + c x',    x = u - b,    |b| <= a
 

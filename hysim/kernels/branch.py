@@ -52,7 +52,7 @@ _MOST_AHEAD = 1e6  # times what a further state is: no error that is allowed for
 
 
 def workspace(n: int) -> int:
-    """Places of work behind `n` states."""
+    """Number of working places after `n` states."""
     return _ROOM * n + 2
 
 

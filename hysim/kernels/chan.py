@@ -33,7 +33,7 @@ _HALVINGS = 200
 
 @inlined
 def curve(x: float, knee: float) -> float:
-    """The curve from -1 to 1 of which both branches are."""
+    """The curve from -1 to 1 that both branches follow."""
     return float(x / (abs(x) + knee))
 
 

@@ -219,7 +219,7 @@ def near_saturation(w: float, forwards: bool, n: float, length: float, work: Flo
 def along_cells(
     w: float, forwards: bool, side: int, last: int, n: float, length: float, work: FloatArray
 ) -> tuple[float, float, float]:
-    """As `in_chart` in a line of cells, of which `last` is the uppermost."""
+    """As `in_chart` in a line of cells; `last` is the uppermost."""
     i = int(work[_VISITED + side]) & _NOT_NEGATIVE
     edge = _EDGES + side * (_N_CELLS + 1) + i
     if w < work[edge] or w > work[edge + 1] or w == (work[edge + 1] if forwards else work[edge]):

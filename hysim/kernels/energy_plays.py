@@ -1,4 +1,4 @@
-"""Plays of the field behind an anhysteretic curve, exactly.
+"""Plays of the field, followed by an anhysteretic curve, exactly.
 
     z_i  = min(max(z_i, u - r_i), u + r_i)
     y    = offset + feedthrough u + sum_i w_i L(z_i / field),    L(x) = coth x - 1 / x

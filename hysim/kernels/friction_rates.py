@@ -29,7 +29,7 @@ def stribeck(speed: float, coulomb: float, breakaway: float, stribeck_velocity: 
 
 @inlined
 def middle_speed(length: float, first: float, last: float, duration: float) -> float:
-    """Speed in the middle of a stroke of this length, from those at its ends; none is negative."""
+    """Speed in the middle of a stroke of this length, from the speeds at its ends; speeds are not negative."""
     if duration <= 0.0:
         return 0.5 * (first + last)
     return max(0.0, 1.5 * length / duration - 0.25 * (first + last))

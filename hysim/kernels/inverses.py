@@ -168,7 +168,7 @@ def _bracket(
     ahead: float,
     noise: float,
 ) -> tuple[float, float, float, float]:
-    """Two lengths with their errors, of which the second reaches the output; where none does, its error is negative.
+    """Two lengths with their errors. The second reaches the output; if no length does, its error is negative.
 
     The output turns before `limit`. Where `ahead` is not zero, it is evaluated by this part of a length beyond each
     end: where it falls there, the end is behind the turn. A `noise` of infinity stands for an output that rises in

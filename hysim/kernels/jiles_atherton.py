@@ -143,7 +143,7 @@ def reversible(low: float, high: float, target: float, of_x: float, of_m: float,
 def advance(
     x: float, rest: float, z: float, target: float, of_x: float, of_m: float, of_z: float, parameters: FloatArray
 ) -> tuple[float, float, float, float]:
-    """x, its rest, z and m at the first place ahead with of_x x + of_m m + of_z z = `target`; nan if there is none."""
+    """x, its rest, z and m at the first place ahead with of_x x + of_m m + of_z z = `target`; nan without one."""
     p, kappa = parameters[ANISOTROPY], parameters[PINNING]
     m, slope = curve(x, p)
     if z > m:
@@ -186,7 +186,7 @@ def is_steady(gap: float, slope: float, steepest: float, parameters: FloatArray)
 
 @inner
 def steady_length(x: float, gap: float, slope: float, length: float, parameters: FloatArray) -> float:
-    """A length, no more than the one given, on which H is sure to rise; 0 if there is none."""
+    """A length, no more than the one given, on which H is sure to rise; 0 without such a length."""
     kappa, p = parameters[PINNING], parameters[ANISOTROPY]
     while length > _SHORTEST:
         end = x + length

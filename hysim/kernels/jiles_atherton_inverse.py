@@ -17,7 +17,7 @@ from hysim.kernels.inverses import N_LIMITS, N_PLACE, within_limits
 
 @kernel
 def step(parameters: FloatArray, state: FloatArray, y: float) -> float:
-    """Field for the next output `y`, nan if there is none.
+    """Field for the next output `y`, nan if no field gives it.
 
     `parameters` are the limits and those of the law, `state` is (u, y) and the state of the copy of the law.
     """

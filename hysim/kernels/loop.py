@@ -140,7 +140,7 @@ _CHAIN_START = void(STEP, START, CONSTANTS, VECTOR, float64)
 
 
 def chain_step(law: Step) -> Step:
-    """The step of an amplifier, a law, a linear stage and a quantum one behind the other."""
+    """The step of an amplifier, a law, a linear stage and a quantum in series."""
     chain_by, law_by = by_address(chain, _CHAIN), by_address(law, STEP.signature)
 
     @signed_closure(STEP.signature)
@@ -164,7 +164,7 @@ def chain_start(law: Step, law_start: Start) -> Start:
 
 @inlined
 def rounded(y: float, quantum: float) -> float:
-    """The nearest whole number of quanta; a quantum of zero stands for none."""
+    """The nearest whole number of quanta; a quantum of zero means no rounding."""
     quanta = y / quantum + 0.5 if quantum > 0.0 else math.inf
     return quantum * math.floor(quanta) if abs(quanta) < _LARGEST_FRACTION else y
 

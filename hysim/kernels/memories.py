@@ -13,7 +13,7 @@ from hysim.kernels.stepping import CONSTANTS, STEP, VECTOR, Step, drive
 
 @signed_kernel(int64(STEP, CONSTANTS, VECTOR, CONSTANTS, ROWS))
 def drive_memory(step: Step, parameters: FloatArray, state: FloatArray, u: FloatArray, out: FloatArray) -> int:
-    """The state behind the last input after each input `u` into `out`; the first sample that is not finite, or -1."""
+    """Write the state without the last input after each `u` into `out`; the first sample that is not finite, or -1."""
     for k in range(u.size):
         y = step(parameters, state, u[k])
         for i in range(out.shape[1]):

@@ -57,7 +57,7 @@ def dead_zone(x: float, d: float) -> float:
 
 @inner
 def through_dead_zones(x: float, parameters: FloatArray, first: int) -> float:
-    """The sum of the dead zones, whose thresholds begin at the place `first`; x where there are none."""
+    """The sum of the dead zones, whose thresholds begin at the place `first`; x without dead zones."""
     count = (parameters.size - first) // 2
     if count == 0:
         return x
@@ -118,7 +118,7 @@ def step(parameters: FloatArray, state: FloatArray, u: float) -> float:
 
 @inner
 def solved(parameters: FloatArray, state: FloatArray, y: float, direction: float, side: float) -> float:
-    """Input in a direction from the last one that takes the output to `y`, on one side of it; nan if there is none.
+    """Input in a direction from the last one that takes the output to `y`, on one side of it; nan without one.
 
     The output of a law without dead zones is monotone in the input: Newton's method in a bracket that closes on the
     zero, and a bisection where the output stands still.

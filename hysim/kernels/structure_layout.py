@@ -13,7 +13,7 @@ BoolArray = npt.NDArray[np.bool_]
 
 
 class Elements(NamedTuple):
-    """Elements with memory, one behind the other.
+    """Elements with memory, one after the other.
 
     Element e has the nodes ``nodes[node_ends[e]:node_ends[e + 1]]`` with the weights of the drift, its elastic slope
     ``k0[e]``, the address of its step in ``steps[e]``; likewise its parameters, its state, and the stretches of the
@@ -106,7 +106,7 @@ class Motion(NamedTuple):
 
 
 class Tracks(NamedTuple):
-    """Tables of the samples, a row each; with one row the last sample only, without rows none."""
+    """Tables of the samples, a row each; with one row the last sample only, without rows no sample."""
 
     x: FloatArray
     carry: FloatArray

@@ -120,7 +120,7 @@ def dip(low: float, high: float, rate: float, path: Path) -> float:
 
 @inlined
 def turns(path: Path, middle: float, last: float) -> tuple[float, float, float, float]:
-    """Places of at most four turns, two in each half, in their order; 1 for none."""
+    """Places of at most four turns, two in each half, in their order; 1 for no turn."""
     one = two = three = four = 1.0
     if middle * last < 0.0:
         three = turn(0.5, 1.0, last, path)
@@ -181,7 +181,7 @@ def along(
 
 @inlined
 def together(one: Integrals, two: Integrals) -> Integrals:
-    """Integrals over two parts behind each other."""
+    """Integrals over two consecutive parts."""
     return (
         one[0] + two[0], one[1] + two[1], one[2] + two[2], one[3] + two[3], one[4] + two[4], one[5] + two[5], two[6],
         two[7],

@@ -44,7 +44,7 @@ _JUST, _TINY = 1e-15, 1e-300  # beyond a limit: the command where no input gives
 
 @inlined
 def push(ring: FloatArray, newest: float) -> None:
-    """Put a value before the others, of which the last one goes."""
+    """Put a value before the others and drop the last one."""
     for i in range(ring.size - 1, 0, -1):
         ring[i] = ring[i - 1]
     ring[0] = newest

@@ -1,1 +1,1 @@
-"""Hysteresis laws, and curves and dashpots beside them: one family a file, its equation on top."""
+"""Hysteresis laws, curves and dashpots: one family a file, its equation on top."""

@@ -109,7 +109,7 @@ class CustomLaw(Law):
         return tuple(self.state)
 
     def pack(self, tables: Tables) -> Packed:  # type: ignore[override]
-        """The parameters in their order, and the memory with the scratch behind it."""
+        """The parameters in their order, and the memory followed by the scratch."""
         constants = np.concatenate([tables[name] for name in self.parameters], axis=1)
         scratch = np.zeros((len(constants), self.scratch))
         memory = [np.zeros((len(constants), 1)), *(tables[name] for name in self.state), scratch]

@@ -170,7 +170,7 @@ def _strength(splines: _Splines, rows: _Rows, share: FloatArray, y: FloatArray) 
 
 
 def _blocks(n_groups: int) -> tuple[npt.NDArray[np.intp], int]:
-    """The block that each group is in, contiguous, and their number; the first and the last group are in none."""
+    """The block that each group is in, contiguous, and their number; the first and the last group are in no block."""
     inner = n_groups - 2
     n_blocks = min(_MOST_BLOCKS, max(inner // _GROUPS_IN_BLOCK, min(inner, 2)))
     block = np.full(n_groups, n_blocks)

@@ -140,7 +140,7 @@ class LoopMetrics:
 
     @property
     def lobes(self) -> tuple[Lobe, ...]:
-        """Parts between which the loop crosses itself, by increasing input; one if it does not, none without a width.
+        """Parts between crossings of the loop, by increasing input; one without a crossing, empty without a width.
 
         Parts that are no larger than the noise of the width, or 2 % of the whole, belong to their neighbours.
 
@@ -501,7 +501,7 @@ def magnetic_metrics(
 
 
 def _zero(u: FloatArray, y: FloatArray) -> float:
-    """First zero of a polyline; nan if it has none."""
+    """First zero of a polyline; nan without a zero."""
     crossed = np.flatnonzero(np.sign(y[:-1]) * np.sign(y[1:]) <= 0.0)
     if not crossed.size:
         return math.nan

@@ -121,14 +121,14 @@ def bic(residual: npt.ArrayLike, n_parameters: int, *, floor: float = 0.0) -> fl
 def _measured_and_model(y: npt.ArrayLike, y_model: npt.ArrayLike) -> tuple[FloatArray, FloatArray]:
     measured, model = vectors(y=y, y_model=y_model)
     if measured.size == 0:
-        raise ValueError("a fit needs at least 1 sample, got none")
+        raise ValueError("a fit needs at least 1 sample, got 0")
     return measured, model
 
 
 def _mean_square(residual: npt.ArrayLike, n_parameters: int) -> tuple[float, int, int]:
     e = read_only(residual, "residual", ndim=1)
     if e.size == 0:
-        raise ValueError("a criterion needs at least 1 residual, got none")
+        raise ValueError("a criterion needs at least 1 residual, got 0")
     if n_parameters < 0:
         raise ValueError(f"n_parameters must be at least 0, got {n_parameters}")
     return float(np.mean(e**2)), e.size, n_parameters

@@ -49,7 +49,7 @@ class ByStructure(Searched, ABC):
 
 @dataclass(frozen=True)
 class Holding(ByStructure):
-    """A structure of which some parameters are held at values unless the user frees them."""
+    """A structure that holds some parameters at values unless the user frees them."""
 
     structure: Any
     values: Mapping[str, float]

@@ -1,4 +1,4 @@
-"""Models one behind the other,  u -> stage 1 -> stage 2 -> ... -> y, and the search for their parameters.
+"""Models in series,  u -> stage 1 -> stage 2 -> ... -> y, and the search for their parameters.
 
 The last stage that is not a transfer function carries the gain: what it is linear in stays linear, each of its columns
 passing through the linear stages behind it. A structure of a transfer function before or behind it has the gain one at
@@ -57,7 +57,7 @@ from hysim.records import Record
 
 @checked
 class CascadeStructure(Subject, Composable):
-    """Stages to be identified one behind the other; see `hysim.Cascade.structure`."""
+    """Stages in series that are identified together; see `hysim.Cascade.structure`."""
 
     stages: tuple[Any, ...]
 
@@ -94,7 +94,7 @@ class CascadeStructure(Subject, Composable):
         return together(spaces)
 
     def regressors(self, parameters: Parameters, record: Record) -> FloatArray:
-        """The columns of the carrier and of the initial states behind it, through the stages behind them."""
+        """The columns of the carrier and of the initial states after it, through the following stages."""
         names, stages = labels(self.stages), self._by_label
         signals = record.u[np.newaxis, np.newaxis]
         for k in range(self.carrier):
@@ -130,13 +130,13 @@ class CascadeStructure(Subject, Composable):
 
     @property
     def _with_state(self) -> dict[str, Any]:
-        """The stages whose state can be free, by their labels: the carrier, and the structures behind it."""
+        """The stages whose state can be free, by their labels: the carrier, and the structures after it."""
         stages = list(zip(labels(self.stages), self.stages, strict=True))[self.carrier :]
         return {label: stage for label, stage in stages if isinstance(stage, Identifiable)}
 
     @property
     def _by_label(self) -> dict[str, Any]:
-        """The stages, structures of transfer functions beside the carrier with the gain one."""
+        """The stages; structures of transfer functions other than the carrier have the gain one."""
         return {
             label: stage.with_unit_gain() if isinstance(stage, LinearStructure) and k != self.carrier else stage
             for k, (label, stage) in enumerate(zip(labels(self.stages), self.stages, strict=True))
@@ -152,7 +152,7 @@ class CascadeStructure(Subject, Composable):
         }
 
     def _record_at(self, label: str, record: Record) -> Record:
-        """The record as a stage sees it: the carrier behind those before it, which have a gain of about one."""
+        """The record for one stage; the input of the carrier passes the stages before it, whose gain is about one."""
         if label != labels(self.stages)[self.carrier]:
             return record
         known = [stage for stage in self.stages[: self.carrier] if not isinstance(stage, LinearStructure)]
@@ -190,7 +190,7 @@ def _regressors(carrier: Any, parameters: Parameters, inputs: FloatArray, record
 
 @family
 class Cascade(Composite):
-    """Models one behind the other; ``first >> second`` is short for it.
+    """Models in series; ``first >> second`` is short for it.
 
     A law in front of linear dynamics is Hammerstein's structure, linear dynamics in front of a law are Wiener's. The
     input of a stage at the samples is the output of the stage before, and is between them as for any input.

@@ -290,7 +290,7 @@ class DependentStructure(Subject):
         return dict(self.law.scalars) if isinstance(self.law, Numbered) else {}
 
     def freed_in_turn(self) -> tuple[Stage, ...]:
-        """The law's stages, where nothing depends on a channel; else none."""
+        """The law's stages if nothing depends on a channel, else empty."""
         return () if self.at else tuple(self.law.freed_in_turn())
 
     def simpler(self) -> Simpler | None:

@@ -66,7 +66,7 @@ def one_signed(slopes: tuple[float, float]) -> bool:
 
 
 def inverse_response(inverse: CompiledLaw, y: FloatArray, unreached: Unreached | None = None) -> FloatArray:
-    """Inputs for the outputs `y`, by steps of the inverse; SimulationError if an output has none."""
+    """Inputs for the outputs `y`, by steps of the inverse; SimulationError if no input gives an output."""
     u = np.empty(y.size)
     with np.errstate(all="ignore"):  # a bracket may reach where a memory overflows
         lost = in_pieces(lambda k: drive(inverse.step, inverse.parameters, inverse.state, y[k], u[k]), y.size)
@@ -102,7 +102,7 @@ def first_input(law: Any, y: float) -> float:
             if error(end) * error(0.0) <= 0.0:
                 return float(brentq(error, 0.0, end, xtol=1e-300, rtol=4.0 * np.finfo(float).eps))
         reach *= 2.0
-    raise ValueError("the first output does not tell the first input: give u0")
+    raise ValueError("the first input cannot be computed from the first output: give u0")
 
 
 def _slope(output: Callable[[float], float], here: float) -> float:
@@ -132,7 +132,7 @@ def _slope(output: Callable[[float], float], here: float) -> float:
 
 
 def inverse_step(law: Any, u0: float, limits: Limits = UNLIMITED, sample_time: float = math.inf) -> CompiledLaw:
-    """The inverse of a law at rest at `u0`, as a step; TypeError or ValueError if it has none."""
+    """The inverse of a law at rest at `u0`, as a step; TypeError or ValueError if it has no inverse."""
     if isinstance(law, StepwiseInvertible):
         return law.compiled_inverse(u0, limits, sample_time)
     return searched_inverse(law, CompiledLaw(*law.compiled(u0)), limits=limits)

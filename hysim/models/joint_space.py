@@ -29,7 +29,7 @@ Space = Callable[[Freedom], SearchSpace]
 
 
 def together(spaces: Mapping[str, SearchSpace]) -> SearchSpace:
-    """The spaces of parts by their labels, one beside the other."""
+    """One space with the coordinates of several parts, by their labels."""
     parts = list(spaces.items())
 
     def named(names: Callable[[SearchSpace], Iterable[str]]) -> tuple[str, ...]:
@@ -150,7 +150,7 @@ def _alike(space: SearchSpace, shapes: FloatArray) -> list[list[str]]:
 
 
 def _starts(spaces: Sequence[SearchSpace]) -> FloatArray:
-    """Combinations of the parts' starts, the first ones of each first; the middle of the box where there are none."""
+    """Combinations of the parts' starts, the first ones of each first; the middle of the box without starts."""
     choices = [space.starts if len(space.starts) else 0.5 * (space.lower + space.upper)[np.newaxis] for space in spaces]
     ranked = sorted(product(*(range(len(rows)) for rows in choices)), key=sum)[:_MOST_STARTS]
     return np.array([np.concatenate([rows[k] for rows, k in zip(choices, places, strict=True)]) for places in ranked])

@@ -70,7 +70,7 @@ class Stepping(NamedTuple):
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Law(Placed, Searched, ABC):
-    """A rate-independent law that is known by its step, or by its slope, of which the step follows.
+    """A rate-independent law that is defined by its step, or by its slope, from which the step follows.
 
     A family is a subclass under the decorator `hysim.family`: its fields, and the class attributes below. A field is
     a float or a tuple of floats.
@@ -161,7 +161,7 @@ class Law(Placed, Searched, ABC):
 
     @classmethod
     def pack(cls, tables: Tables) -> Packed:
-        """Laws as the step takes them: by default the fields one behind the other, and the initial memory."""
+        """Laws as the step takes them: by default the fields one after the other, and the initial memory."""
         own = sum(tables[name].shape[1] for name in cls.initial)
         memory = cls.initial_memory(tables, further=max(0, cls.hidden_states - own))
         constants = [table for name, table in tables.items() if name not in cls.initial]
@@ -371,7 +371,7 @@ class Law(Placed, Searched, ABC):
         return z[:, 0] if single else z
 
     def remembered(self, u: npt.ArrayLike) -> FloatArray:
-        """The state behind the last input at the samples of `u`, shape (n_samples, n_memory)."""
+        """The state without the last input at the samples of `u`, shape (n_samples, n_memory)."""
         from hysim.kernels.memories import drive_memory  # compiled where it is needed
 
         inputs = read_only(u, "u", ndim=1)
@@ -445,7 +445,7 @@ class Law(Placed, Searched, ABC):
         return law
 
     def remembering(self, u0: float, memory: State) -> Self:
-        """The law with this memory, the state behind the last input, at the input `u0`."""
+        """The law with this memory, the state without the last input, at the input `u0`."""
         law = self.with_scalars(dict(zip(self.initial_names, memory, strict=False)))
         return law.placed(u0, self.u_range)
 
@@ -750,7 +750,7 @@ def _sizes(rest: FloatArray, u: FloatArray) -> FloatArray:
 
 
 def _corners(record: Record) -> npt.NDArray[np.intp]:
-    """First sample, turning points, and the place behind the last sample."""
+    """First sample, turning points, and the place after the last sample."""
     turns = record.reversals()
     turns = turns if turns.size < _FEW * len(record) else record.reversals(TOLERANCE)
     return np.array([0, *turns.tolist(), len(record)])

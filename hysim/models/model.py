@@ -80,7 +80,7 @@ def _in_words(self: Any) -> str:
 
 
 def in_brief(value: Any) -> str:
-    """A model in one line: its family, and the parameters that are not as they are by default."""
+    """A model in one line: its family, and the parameters that differ from their defaults."""
     if not _is_model(value):
         return type(value).__name__
     defaults = {each.name: each.default for each in fields(value)}
@@ -189,7 +189,7 @@ def short_names() -> dict[str, str]:
 
 
 def candidates_named(name: str) -> dict[str, Any]:
-    """Candidates of `hysim.compare` in the family of this name, by the names of rows; ValueError if there is none."""
+    """Candidates of `hysim.compare` in the family of this name, by the names of rows; ValueError if unknown."""
     family = family_named(name)
     found = _of_family(family.__name__, family)
     if not found:

@@ -131,7 +131,7 @@ def declared_space(
 
 
 def free_coordinate(name: str, lower: float, upper: float) -> Coordinate:
-    """A parameter of which nothing but its bounds is known: on a log scale where they are positive."""
+    """A parameter with nothing known but its bounds: on a log scale if they are positive."""
     return Coordinate(name, lower, upper, max(abs(lower), abs(upper)), log=lower > 0.0)
 
 

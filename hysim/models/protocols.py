@@ -240,7 +240,7 @@ class Offering(Protocol):
 
     @classmethod
     def candidates(cls) -> Mapping[str, Any]:
-        """Names to classes, models or structures; none where it is left out."""
+        """Names to classes, models or structures; empty by default."""
 
 
 class Variant(NamedTuple):
@@ -284,7 +284,7 @@ class Identifiable(Protocol):
 
 
 class Searched:
-    """The choices in a search that a subject of `identify` may leave open; by default there are none."""
+    """The choices in a search that a subject of `identify` may leave open; by default nothing is open."""
 
     def freed_in_turn(self) -> tuple[Stage, ...]:
         """Parameters that a search frees in turn; see `hysim.models.stages`."""
@@ -324,10 +324,10 @@ class Subject(Searched, Identifiable):
 
 @runtime_checkable
 class Recorded(Protocol):
-    """A subject of `identify` with records of its own kind beside `Record`."""
+    """A subject of `identify` with records of its own kind in addition to `Record`."""
 
     def as_records(self, records: Any) -> Any:
-        """Such records as records of one output; what is none is returned as it is."""
+        """Such records as records of one output; other objects are returned unchanged."""
 
 
 @runtime_checkable
@@ -353,7 +353,7 @@ class LinearStage(Protocol):
 
 @runtime_checkable
 class UnitGainStructure(Protocol):
-    """A linear structure whose gain at rest is one, beside a stage that carries the gain."""
+    """A linear structure whose gain at rest is one, since another stage carries the gain."""
 
     def search_space(self, record: Record, freedom: Freedom = ALL_FREE) -> SearchSpace:
         """Declare the box for `record`."""
@@ -416,7 +416,7 @@ def positive_time(sample_time: float) -> float:
 
 
 def law_at(law: Any, sample_time: float) -> Any:
-    """A law as it is stepped at a sample time [s]: what its ``at`` returns, or itself where it has none."""
+    """A law as it is stepped at a sample time [s]: what its ``at`` returns, or the law itself without ``at``."""
     return law.at(sample_time) if isinstance(law, Sampled) else law
 
 
@@ -434,7 +434,7 @@ class Doubt(NamedTuple):
 
 @runtime_checkable
 class PartByPart(Protocol):
-    """A subject of `identify` with a law, and parts behind and before it that move in time."""
+    """A subject of `identify` with a law, and parts before and after it that move in time."""
 
     law: Any
     """The law, which is searched alone on one record at first."""
@@ -464,23 +464,23 @@ class PartByPart(Protocol):
     """Names of its inputs, each with a law."""
 
     def behind(self, law: Any) -> Self:
-        """The plant behind a law that is known but for its gain, or behind its inputs as they are."""
+        """The plant after a law that is known except for its gain, or without laws, directly after its inputs."""
 
     def solved(self, estimates: Mapping[str, float]) -> Mapping[str, float]:
-        """Coordinates by name of what was solved for behind the inputs as they are, and is a coordinate behind laws."""
+        """Coordinates by name that are solved for without laws, and are searched with laws."""
 
     def begins(self) -> Mapping[str, float] | None:
         """Coordinates of the parts that grow, where the user lets the search begin at them; else None."""
 
     @property
     def names(self) -> frozenset[str]:
-        """Names of the parameters of the parts beside the law."""
+        """Names of the parameters of the parts other than the law."""
 
     def growing(self) -> Sequence[Self]:
         """The plant with more and more of its parts but for slow ones; each contains the one before."""
 
     def points(self, space: SearchSpace, known: Sequence[Mapping[str, float]]) -> FloatArray:
-        """Points of a space of this plant, spread over its last part, beside coordinates `known` of a smaller one."""
+        """Points of a space of this plant, spread over its last part, with coordinates `known` of a smaller one."""
 
     def finer(self, space: SearchSpace, best: FloatArray) -> FloatArray:
         """Points about the best of `points`, and these."""

@@ -60,7 +60,7 @@ def constants_of(cls: Any) -> dict[str, bool]:
         raise TypeError(f"{cls.__name__} has a field {taken[0]!r}, which is a name of the law by a slope itself")
     if early := [name for name in [*fields][:-1] if fields[name]]:
         raise TypeError(
-            f"{early[0]!r} of {cls.__name__} is a tuple: it must be the last field beside the initial memory"
+            f"{early[0]!r} of {cls.__name__} is a tuple: it must be the last field apart from the initial memory"
         )
     return {"tolerance": False} | fields
 
@@ -76,7 +76,7 @@ def states_of(cls: Any) -> int:
         if n < 1 or not plain or len(given) not in takes[name]:
             raise TypeError(f"the {name} of {cls.__name__} takes other arguments: see hysim.Law")
     if ("flow" in said) != ("flows" in said):
-        raise TypeError(f"{cls.__name__} must say both flow and flows, or none")
+        raise TypeError(f"{cls.__name__} must define both flow and flows, or neither")
     return n
 
 

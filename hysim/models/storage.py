@@ -24,7 +24,7 @@ _LONGEST, _BRIEF = 1000, 60  # signs of a message, and of a value in it
 
 
 def save(model: Any, path: str | Path, *, units: Mapping[str, str] | None = None) -> None:
-    """Write a model to a JSON file; every number comes back to the bit.
+    """Write a model to a JSON file; every number that is read back is identical to the bit.
 
     Parameters
     ----------
@@ -110,7 +110,7 @@ def _integer(digits: str) -> int:
 
 
 def _each_name_once(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
-    """A mapping of JSON, of which a name that stands there twice would keep the last value only."""
+    """A mapping of JSON whose names are unique; `json` would keep only the last value of a repeated name."""
     mapping = dict(pairs)
     if len(mapping) < len(pairs):
         twice = next(name for name, number in Counter(name for name, _ in pairs).items() if number > 1)

@@ -140,7 +140,7 @@ class Composite(ByStructure, Composable):
 
     @property
     def scalars(self) -> dict[str, float]:
-        """Numbers of the members that have names for them, behind their labels, as in ``"bouc_wen.beta"``."""
+        """Numbers of the members that have names for them, with the label first, as in ``"bouc_wen.beta"``."""
         named = zip(labels(self.members), self.members, strict=True)
         return {
             f"{label}.{name}": value

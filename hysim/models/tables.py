@@ -78,7 +78,7 @@ def tables_of(
 
 
 def table_of_one(value: Any) -> FloatArray:
-    """A number (1, 1), or a field with axes of its own behind one of length 1."""
+    """A number (1, 1), or a field with axes of its own after one of length 1."""
     return np.array([[value]]) if isinstance(value, float) else np.array([value], dtype=float)
 
 

@@ -144,7 +144,7 @@ def power_coefficients(at: tuple[float, ...]) -> FloatArray:
 def columns_along(
     subject: Any, parameters: Parameters, varying: Mapping[str, FloatArray], record: Record
 ) -> FloatArray:
-    """As `Identifiable.regressors`, with `varying` parameters (n_sets, n_samples), none affine; else TypeError."""
+    """As `Identifiable.regressors`, with `varying` parameters (n_sets, n_samples); TypeError if one is affine."""
     if not varying:
         return np.asarray(subject.regressors(parameters, record))
     if isinstance(subject, Sum):

@@ -261,7 +261,7 @@ def _cameras(
 
 
 def _searched_all(ideals: Mapping[float, Task], tasks: Mapping[_Camera, Task], noises: int) -> dict[_Camera, Found]:
-    """The best controller of each camera; it is searched near its neighbours', behind a few noises where they are slow.
+    """The best controller of each camera; it is searched near its neighbours', with a few noises if they are slow.
 
     In the end the best of all that were found is taken, by its task behind several noises.
     """
@@ -291,7 +291,7 @@ def _searched_all(ideals: Mapping[float, Task], tasks: Mapping[_Camera, Task], n
 
 
 def _behind(task: Task, sensor: tuple[float, float], noises: int, seed: int = 0) -> Task:
-    """A task behind a camera, with several noises if it shakes."""
+    """A task that is measured by a camera, with several noises if it shakes."""
     quantum, shake = sensor
     first, *others = (
         replace(
@@ -309,7 +309,7 @@ def _searched(task: Task, starts: Sequence[PID], effort: Effort) -> Found:
 
 
 def _runs(task: Task, pid: PID, reference: FloatArray, opened: FloatArray) -> Iterator[tuple[Any, FloatArray]]:
-    """The loop behind each noise of a task, and what its camera sees of the open loop."""
+    """The loop with each noise of a task, and what its camera measures in open loop."""
     for plant in (task.plant, *task.again):
         run = RestingPlant(plant, task.sample_time).run(pid, reference)
         yield run, replace(plant.sensor or Sensor(), delay=0.0).measure(np.append(opened[:1], opened[:-1]))

@@ -302,7 +302,7 @@ def proportional(of: Evidence) -> Value:
 
 
 def resolution_of_table2(of: Evidence) -> Value:
-    """Largest step of which Table 2's displacements are multiples, against the unit of the last digit."""
+    """Largest step that divides all displacements of Table 2, against the unit of the last digit."""
     step, swing = of.reidentification.information.quantum, of.reidentification.information.swing
     return Value(step, step <= 2.0 * half_unit(printed.LAST_DIGIT_UM), {"swing": swing, "steps": swing / step})
 

@@ -284,7 +284,7 @@ _INTERVALS = 4000
 
 @frozen
 class Approximation:
-    """A simpler model beside the one that it stands for.
+    """A simpler model and the one that it approximates.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""The closed loops behind the paper's 90 % and 97 %, on its linear models and on one that has memory.
+"""The closed loops for the paper's 90 % and 97 %, on its linear models and on one that has memory.
 
 Hysteresis: a triangle of 52 s. The plants are equation (1), whose loop is lag, and the identified Bouc-Wen law followed
 by the dynamics of (7) at a static gain of one.
@@ -156,7 +156,7 @@ def words(pid: PID) -> str:
 
 
 def law_plant(law: Any) -> Actuator:
-    """The plant of the hysteresis loops: a law, and the dynamics of (7) behind it."""
+    """The plant of the hysteresis loops: a law, followed by the dynamics of (7)."""
     return Actuator(hysteresis=law, vibration=DYNAMICS_7)
 
 

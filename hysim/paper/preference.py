@@ -71,13 +71,13 @@ _APART = 2.0  # standard errors of a difference that counts
 
 @cache
 def stored_evidence() -> Evidence:
-    """The stored evidences by bridge sampling, the largest with the boxes as they are first."""
+    """The stored evidences by bridge sampling, in falling order of those with unchanged boxes."""
     return Evidence(rows=tuple(map(_row, _lines())), factors=FACTORS, noise="quantised", method="bridge")
 
 
 @cache
 def by_nested_sampling() -> Mapping[str, tuple[float, float]]:
-    """ln Z by nested sampling, and its standard error, of the models that have it, with the boxes as they are."""
+    """ln Z by nested sampling, and its standard error, of the models that have it, with unchanged boxes."""
     return {
         line["model"]: (float(line["nested_ln_evidence"]), float(line["nested_error"]))
         for line in _lines()

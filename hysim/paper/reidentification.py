@@ -375,7 +375,7 @@ def _line(values: FloatArray) -> complex:
 
 
 def quantum(values: npt.ArrayLike, tolerance: float) -> float:
-    """The largest step of which every value is a whole multiple, to `tolerance` [unit of the values].
+    """The largest step that divides every value, to `tolerance` [unit of the values].
 
     Each number of steps in the largest value is tried in turn, with the step that suits all values best.
 

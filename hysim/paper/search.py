@@ -224,14 +224,14 @@ def _grid(loop: LinearLoop, frequencies: FloatArray) -> tuple[ComplexArray, Comp
 
 
 def stored_starts() -> Starts:
-    """The stored optima; none if they belong to another box or another bound."""
+    """The stored optima; empty if they belong to another box or another bound."""
     stored = json.loads((files("hysim") / "data" / "paper_optima.json").read_text(encoding="utf-8"))
     optima: Starts = stored.pop("optima")
     return optima if stored == _limits_of_search() else {}
 
 
 def as_stored(every: Iterable[Found]) -> str:
-    """The optima of full searches as they are stored."""
+    """The optima of full searches in the form in which they are stored."""
     optima = {found.name: {"point": found.point, "cost": found.cost} for found in every}
     lines = ",\n".join(f"{json.dumps(name)}: {json.dumps(start)}" for name, start in optima.items())
     return f'{json.dumps(_limits_of_search())[:-1]}, "optima": {{\n{lines}\n}}}}\n'
@@ -390,7 +390,7 @@ class _Tried:
         return costs
 
     def simulated(self, resting: RestingPlant, pids: Sequence[PID]) -> list[float]:
-        """Costs of stable controllers behind one noise."""
+        """Costs of stable controllers with one noise."""
         displacements, lost = resting.attempt_each(pids, self.task.reference)
         return [self.task.cost(y) if sample < 0 else _UNSTABLE for y, sample in zip(displacements, lost, strict=True)]
 

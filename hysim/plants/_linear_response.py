@@ -66,7 +66,7 @@ class LinearState(NamedTuple):
 
 
 class LinearPlants(NamedTuple):
-    """Plants as they are stepped at one sample time; see `kernels.outputs` and `scaled_companion`."""
+    """Plants in the form that is stepped at one sample time; see `kernels.outputs` and `scaled_companion`."""
 
     A: FloatArray
     B0: FloatArray

@@ -129,7 +129,7 @@ def _refined(
 
 
 def _instrumental(instruments: FloatArray, regressors: FloatArray, target: FloatArray) -> FloatArray:
-    """Solution of instruments^T (target - regressors theta) = 0; nan where there is none that is finite."""
+    """Solution of instruments^T (target - regressors theta) = 0; nan if no finite solution exists."""
     with np.errstate(all="ignore"):
         left, right = (np.linalg.norm(columns, axis=0) for columns in (instruments, regressors))
         left[left == 0.0], right[right == 0.0] = 1.0, 1.0

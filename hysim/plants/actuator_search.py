@@ -79,7 +79,7 @@ def columns_through(
 
 
 def _pass(chain: Chain, w: FloatArray, out: FloatArray) -> None:
-    """Columns `w` (n_columns, n_fine) through the stage behind the law; constant ones have its gain at rest."""
+    """Columns `w` (n_columns, n_fine) through the stage after the law; constant ones have its gain at rest."""
     stage, row = chain.stage, chain.output_row
     gain = float(row[0] + row[1] + row[2] + row[3:] @ stage.rest)
     still = (w == w[:, :1]).all(axis=1)
@@ -182,7 +182,7 @@ def _names(modes: int) -> tuple[str, str, str]:
 
 
 def _spread(space: SearchSpace, axes: Mapping[str, Any], base: FloatArray) -> FloatArray:
-    """Every combination of values of the axes that the space has, beside each of the base points."""
+    """Every combination of values of the axes that the space has, with each of the base points."""
     own = {name: values for name, values in axes.items() if name in space.coordinates}
     if not own:
         return base

@@ -178,7 +178,7 @@ class ActuatorStructure(Subject):
     # ------------------------------------------------------------------------------ as its search begins
 
     def over(self, records: Sequence[Record], freedom: Freedom) -> tuple["ActuatorStructure", Sequence[Record]]:
-        """The structure for these records, in the resolution of the sensor where they say none."""
+        """The structure for these records; records without a resolution get that of the sensor."""
         survey = Survey.of(records)
         quantum = 0.0 if self.sensor is None else self.sensor.quantum
         if quantum:
@@ -218,11 +218,11 @@ class ActuatorStructure(Subject):
         return replace(self, law=law)
 
     def behind(self, law: Any) -> "ActuatorStructure":
-        """The structure behind a law that is known but for its gain, or behind several inputs as they are."""
+        """The structure after a law that is known except for its gain, or directly after several inputs."""
         return replace(self, law=Scaled(law) if len(self.inputs) == 1 else ModalGains(self.inputs, self.modes))
 
     def solved(self, estimates: Mapping[str, float]) -> dict[str, float]:
-        """Coordinates by name of what was solved for behind a known law, and is a coordinate beside another one."""
+        """Coordinates by name that are solved for after a known law, and are searched with another law."""
         if not isinstance(self.law, ModalGains):
             return {}
         return {f"vibration.{name}": value for name, value in self.law.shares(own(estimates, _LAW)).items()}
@@ -265,7 +265,7 @@ class ActuatorStructure(Subject):
         return replace(self, starting=tuple(dict(each) for each in starting))
 
     def smaller(self, freedom: Freedom) -> tuple["ActuatorStructure", str] | None:
-        """The structure without its last mode; None where it has none, or the user names one of its parameters."""
+        """The structure without its last mode; None if it has no mode, or the user names one of its parameters."""
         k = self.modes - 1
         gains = [self.parts([]).gain_of(k, name) for name in self.inputs]
         mine = {f"vibration.{name}" for name in (f"{FREQUENCY}[{k}]", f"{DAMPING}[{k}]", *gains)}
@@ -279,7 +279,7 @@ class ActuatorStructure(Subject):
         return self._remarked(remark, modes=k, known=known), remark
 
     def doubts(self, estimates: Mapping[str, float], freedom: Freedom) -> Sequence[Doubt]:
-        """The parameters of the parts beside the law that the user does not name; at a bound only some of them."""
+        """The parameters of the other parts than the law that the user does not name; at a bound only some of them."""
         named = {*freedom.fixed, *freedom.free, *freedom.bounds, *self.known}
         found = []
         for part, (box, _) in self.parts([]).boxes().items():

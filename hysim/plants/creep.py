@@ -1,4 +1,4 @@
-"""Creep of a piezoelectric actuator: Kelvin-Voigt elements side by side, behind a spring.
+"""Creep of a piezoelectric actuator: a spring in series with Kelvin-Voigt elements.
 
 Creep is measured as a percentage per decade of time, y(t) = y(t_0) (1 + g log10(t / t_0)). That law has no finite
 state, and no limit at either end: a bank of elements follows it over a band of times, and is at rest outside.
@@ -18,7 +18,7 @@ _TIMES_PER_DECADE = 20  # at which the bank is fitted
 
 @family
 class Creep:
-    """A bank of Kelvin-Voigt elements side by side, behind a spring.
+    """A bank of Kelvin-Voigt elements in series with a spring.
 
     ::
 

@@ -149,7 +149,7 @@ def _prediction(u: FloatArray, order: int) -> FloatArray:
 
 
 def _continued(u: FloatArray, weights: FloatArray) -> FloatArray:
-    """The samples behind the last one as far as they can be predicted."""
+    """The samples after the last one as far as they can be predicted."""
     values = np.concatenate([u[u.size - weights.size :], np.zeros(_BEYOND)])
     for k in range(weights.size, values.size):
         values[k] = weights @ values[k - weights.size : k][::-1]

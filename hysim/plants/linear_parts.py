@@ -1,4 +1,4 @@
-"""The parts of an actuator beside its law: their coordinates, and the stages that values of these make.
+"""The parts of an actuator other than its law: their coordinates, and the stages that values of these make.
 
 The names of the parameters begin with those of the fields of `hysim.Actuator`:
 
@@ -118,12 +118,12 @@ def creep_bank(creep: Any, shortest: float, longest: float) -> CreepBank | Creep
 
 
 def checked_creep(creep: Any) -> Any:
-    """The argument `creep` of a structure; TypeError or ValueError if it is none."""
+    """The argument `creep` of a structure; TypeError or ValueError if it is not valid."""
     if creep is None or isinstance(creep, bool | Creep):
         return creep
     if isinstance(creep, int):
         if creep < 1:
-            raise ValueError(f"creep must be at least one element, got {creep}; False is for none")
+            raise ValueError(f"creep must be at least one element, got {creep}; False leaves it out")
         return creep
     times: FloatArray = read_only(creep, "creep", ndim=1)
     if not times.size or times.min() <= 0.0 or (np.diff(times) <= 0.0).any():
@@ -216,7 +216,7 @@ class LinearParts:
         return boxes
 
     def stages(self, values: Mapping[str, float], late: float = 0.0, name: str = MAIN) -> Stages:
-        """The stages behind the input of this name, at these values of all parameters, `late` by so much more [s]."""
+        """The stages after the input of this name, at these values of all parameters, `late` by so much more [s]."""
         amplifier = self.amplifier
         if amplifier == "first-order":
             amplifier = Amplifier(time_constant=values["amplifier.time_constant"])
@@ -247,7 +247,7 @@ class LinearParts:
         return f"{GAIN}[{k}]" if len(self.inputs) == 1 else f"{GAIN}[{k}].{name}"
 
     def coordinates_of(self, vibrations: Mapping[str, Any]) -> dict[str, float]:
-        """Coordinates by name where the vibration behind each input is this one; those of other parts are left out."""
+        """Coordinates by name if the vibration after each input is this one; those of other parts are left out."""
         first = vibrations[self.inputs[0]]
         values = {"delay": first.delay}
         for k in range(self.modes):
@@ -300,7 +300,7 @@ class LinearParts:
 
 
 def vibrations_of(start: Any, inputs: Sequence[str], modes: int) -> dict[str, Modes]:
-    """The modes behind each input of an actuator; ValueError if it has other inputs, or not so many modes."""
+    """The modes after each input of an actuator; ValueError if it has other inputs, or not so many modes."""
     several = isinstance(start, MultiInputActuator)
     actuators = dict(zip(start.inputs, start.actuators, strict=True)) if several else {MAIN: start}
     if tuple(actuators) != tuple(inputs):
@@ -309,5 +309,5 @@ def vibrations_of(start: Any, inputs: Sequence[str], modes: int) -> dict[str, Mo
     for name, each in found.items():
         if not isinstance(each, Modes) or len(each.gains) != modes:
             n = len(each.gains) if isinstance(each, Modes) else 0
-            raise ValueError(f"start has {n} modes behind {name}, and modes={modes}: the search grows none beside them")
+            raise ValueError(f"start has {n} modes after {name}, and modes={modes}: give modes={n}")
     return found

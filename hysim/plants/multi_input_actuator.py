@@ -181,7 +181,7 @@ class InputSum(Subject):
         return found
 
     def notes(self, record: Record, model: Any) -> tuple[str, ...]:
-        """None: the laws are seen only through what is behind them."""
+        """None: the laws are measured only through the parts after them."""
         return ()
 
 
@@ -217,7 +217,7 @@ class ModalGains(Subject):
 
 
 def checked_laws(laws: Mapping[str, Any]) -> InputSum:
-    """Laws by name as `InputSum`; ValueError or TypeError if a name or a law is none."""
+    """Laws by name as `InputSum`; ValueError or TypeError if a name or a law is not valid."""
     if MAIN not in laws:
         names = ", ".join(map(repr, laws))
         raise ValueError(
@@ -238,7 +238,7 @@ def _widest(law: Any) -> Any:
 
 
 def seen_by(record: Record, name: str) -> Record:
-    """The record with the input of this name as its input; ValueError if it has none."""
+    """The record with the input of this name as its input; ValueError if it has no such input."""
     if name == MAIN:
         return record
     values = value_in(record.channels, name, f"the record {record.name!r}" if record.name else "the record")

@@ -67,7 +67,7 @@ _SETTLING_CHUNK = 1 << 13
 
 
 def attracting_state(period: Period, state: FloatArray, scale: FloatArray, tolerance: float) -> FloatArray | None:
-    """State (3,) of the steady motion near `state`, or None if Newton's method finds none that may be used.
+    """State (3,) of the steady motion near `state`, or None if Newton's method finds no usable one.
 
     `scale` holds the largest value of each state, and `tolerance` is the largest change in a period in units of it.
 

@@ -342,7 +342,7 @@ class _Box(NamedTuple):
 
 
 def _unit_laws(y: FloatArray, held: Mapping[str, float], limits: Mapping[str, tuple[float, float]]) -> SearchSpace:
-    """Laws with A = 1 along the displacement y, of which only n may be known."""
+    """Laws with A = 1 along the displacement y; only n may be known."""
     fixed = {"A": 1.0, **_REST_OF_LAW} | {name: value for name, value in held.items() if name == "n"}
     bounds = {name: pair for name, pair in limits.items() if name == "n"}
     return _boucwen_search.search_space(BoucWen().scalars, (), Record(u=y, y=y), Freedom(fixed, (), bounds))

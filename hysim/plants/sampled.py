@@ -1,4 +1,4 @@
-"""Linear stages behind a law, stepped from sub-step to sub-step.
+"""Linear stages after a law, stepped from sub-step to sub-step.
 
     x' = F x + g v,    y = C x + D v
 
@@ -44,7 +44,7 @@ class Stage(NamedTuple):
         return float(self.C @ self.rest) + self.D
 
     def then(self, other: Self) -> "Stage":
-        """This stage and another behind it, in the time unit of the other."""
+        """This stage and another after it, in the time unit of the other."""
         n, m = self.g.size, other.g.size
         slower = self.rate / other.rate
         F = np.zeros((n + m, n + m))

@@ -165,7 +165,7 @@ class TransferFunction(Composable):
         return plant.startable(self.initial_state, hold=self.hold, sample=self.sample)
 
     def compiled(self, u0: float = 0.0, *, sample_time: float | None = None) -> CompiledLaw:
-        """The plant at rest at `u0`, beside the free response; ValueError without a sample time [s] or such a rest."""
+        """The plant at rest at `u0`, plus the free response; ValueError without a sample time [s] or such a rest."""
         law = self.startable(sample_time).law
         if u0:
             if self.order and not self.den[-1]:
@@ -374,7 +374,7 @@ class TransferFunctionStructure(Subject, Composable):
         return np.stack([np.atleast_1d(parameters[name]) for name in self.denominator], axis=1)
 
     def assumed_states(self, record: Record) -> tuple[str, ...]:
-        """Rest where input and output begin at zero, else what the record says; none where the structure says it."""
+        """Rest where input and output begin at zero, else what the record says; empty if the structure says it."""
         if self.initial is not None:
             return ()
         slack = _AT_ZERO * float(np.ptp(record.y))
@@ -385,7 +385,7 @@ class TransferFunctionStructure(Subject, Composable):
         return ()
 
     def with_unit_gain(self) -> UnitGain:
-        """The structure with the gain at rest one, beside a stage that carries the gain."""
+        """The structure with the gain at rest one, for use with a stage that carries the gain."""
         return UnitGain(self)
 
     def assemble(self, parameters: Mapping[str, float]) -> TransferFunction:

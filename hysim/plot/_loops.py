@@ -121,7 +121,7 @@ def width(*results: Any, ax: Axes | None = None) -> Axes:
 def animate(
     result: InputOutput, ax: Axes | None = None, *, frames: int = 100, interval: float = 40.0, trail: float = 0.15
 ) -> FuncAnimation:
-    """Animate a point that moves along the loop, with a trail behind it, over the whole path in light grey.
+    """Animate a point that moves along the loop and draws a trail, over the whole path in light grey.
 
     `result` is a Record, a Simulation or anything with arrays `u` and `y`. The number of `frames` is at least 2, else a
     ValueError is raised; they are evenly spaced in the result's time, if it has one, or in its samples, from the first

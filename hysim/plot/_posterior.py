@@ -94,7 +94,7 @@ def prediction(
 
 
 def evidence(evidence: Evidence, ax: Axes | None = None) -> Axes:
-    """Draw ln Z of each model below that of the best, with its boxes as they are, halved and doubled.
+    """Draw ln Z of each model below that of the best, with its boxes unchanged, halved and doubled.
 
     Bars are two standard errors to each side. The axis is logarithmic beyond -3 if a model is far behind. Left of the
     dotted line a model has odds of less than 1 : 3 against the best one.

@@ -176,7 +176,7 @@ def signals(result: Simulation, *names: str, axes: Sequence[Axes] | AxesArray | 
     """
     unknown = [name for name in names if name not in result.signals]
     if unknown or not names:
-        raise ValueError(f"give names of signals, of {', '.join(result.signals)}; got {', '.join(unknown) or 'none'}")
+        raise ValueError(f"give signals out of {', '.join(result.signals)}; got {', '.join(unknown) or 'no name'}")
     t = np.arange(float(result.u.size)) if result.t is None else result.t
     with several(axes, len(names), height=1.9) as panels:
         for ax, name in zip(panels, names, strict=True):

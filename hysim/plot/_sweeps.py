@@ -25,7 +25,7 @@ _COLOURS = "viridis"
 
 
 def sensitivities(indices: SobolIndices, output: str, ax: Axes | None = None) -> Axes:
-    """Draw the Sobol indices of an output, first order beside total, with their intervals.
+    """Draw the first-order and total Sobol indices of an output, with their intervals.
 
     `indices` is a result of `hysim.sobol_indices`, and `output` the name of one of its outputs.
 
@@ -172,7 +172,7 @@ def residual_map(
     tolerance: float = TOLERANCE,
     quanta: str = "quanta",
 ) -> AxesArray:
-    """Draw the residual, measured minus model, over the input and the cycles, loading beside unloading.
+    """Draw the residual, measured minus model, over the input and the cycles, for loading and for unloading.
 
     A change from left to right is an error of the loop's shape, a change of sign between the panels one of its width,
     and a change from bottom to top is drift. A cell is the mean over the samples of one branch in one interval of the
@@ -303,7 +303,7 @@ def _mean_residuals(
 
 
 def _means(u: FloatArray, values: FloatArray, edges: FloatArray) -> FloatArray:
-    """Mean of the values whose input is between two edges, nan if there are none."""
+    """Mean of the values whose input is between two edges, nan without values."""
     place = np.clip(np.searchsorted(edges, u, side="right") - 1, 0, edges.size - 2)
     count, total = (np.bincount(place, weights, edges.size - 1) for weights in (None, values))
     return np.asarray(np.divide(total, count, out=np.full(count.size, np.nan), where=count > 0))

@@ -51,7 +51,7 @@ class Given:
 
     @property
     def spread(self) -> float:
-        """Standard deviation of the prior; by its quartiles where it has none."""
+        """Standard deviation of the prior; from its quartiles if it is not defined."""
         if self.distribution is None:
             return (self.high - self.low) / math.sqrt(12.0)
         spread = float(self.distribution.std())

@@ -195,7 +195,7 @@ _BESIDE = 0.3  # by hand: share of all parts beside that mixture
 
 
 def grown(base: Proposal, target: Target, rng: np.random.Generator) -> tuple[Proposal, Proposal]:
-    """A mixture of many parts fitted to the points, beside `base` with the parts that grew; and the latter alone."""
+    """`base` with the parts that grew, mixed with many parts fitted to the points; and the former alone."""
     v = target.without_linear(base.draw(_FIRST, rng))
     log_density = _log_density(target, v)
     added: list[Proposal] = []
@@ -292,7 +292,7 @@ def proposal_for(
     v, early = (np.concatenate([each, near]) for each in population)
     if min(_distinct(v), _distinct(early)) < _fewest(target):
         raise ValueError(
-            f"the posterior was not found: {_distinct(v)} of {len(v)} draws from the priors are left beside the "
+            f"the posterior was not found: {_distinct(v)} of {len(v)} draws from the priors agree with the "
             "records; pass narrower priors"
         )
     reaching = _of(early, target, rng)

@@ -287,7 +287,7 @@ def _outputs(draws: Posterior, u: FloatArray, t: npt.ArrayLike | None, chosen: A
 
 
 def _own(name: str, model: Any) -> str:
-    """The model's name of a parameter; of a state of one record that of the first one, and none for the others."""
+    """The model's name of a parameter; of a state of one record that of the first one, and empty for the others."""
     if name in model.scalars:
         return name
     base, _, record = name.rpartition("[")

@@ -167,7 +167,7 @@ def _envelope(name: str, time: FloatArray, rise: float, plateau: float, end: flo
 
 
 def _soil_motion(noise: FloatArray, sample_time: float, frequency: float, damping: float) -> FloatArray:
-    """Noise behind the filter of Kanai and Tajimi, by its spectrum: a recursion would bend it at high frequencies."""
+    """Noise after the filter of Kanai and Tajimi, by its spectrum: a recursion would bend it at high frequencies."""
     from scipy.signal import freqs  # loading it takes longer than all other signals together
 
     viscous = 2.0 * damping * frequency
@@ -177,7 +177,7 @@ def _soil_motion(noise: FloatArray, sample_time: float, frequency: float, dampin
 
 
 def _high_passed(motion: FloatArray, sample_time: float, frequency: float, damping: float) -> FloatArray:
-    """A motion behind s^2 / (s^2 + 2 zeta w s + w^2), from rest, by the bilinear transform."""
+    """A motion filtered by s^2 / (s^2 + 2 zeta w s + w^2), from rest, by the bilinear transform."""
     from scipy.signal import bilinear, lfilter
 
     numerator, denominator = bilinear(

@@ -1,4 +1,4 @@
-"""A study on disk: an SQLite database with one row for each finished task, and arrays beside it.
+"""A study on disk: an SQLite database with one row for each finished task, and a folder of arrays.
 
     study      what the study is: its identity, its parameters, the axes of a grid, the layout of a row
     results    task, seed, seconds, error, shard; then the parameters, then the outputs that are numbers
@@ -351,7 +351,7 @@ class Store:
 
 @contextmanager
 def opened(path: str | Path, *, to_read: bool = False) -> Iterator[Store]:
-    """The store in a file, created if missing and to be written; OSError with the reason, ValueError if it is none."""
+    """The store in a file, created if missing and to be written; OSError with the reason, ValueError if unreadable."""
     path = Path(path)
     if to_read and not path.is_file():
         raise FileNotFoundError(errno.ENOENT, os.strerror(errno.ENOENT), str(path))

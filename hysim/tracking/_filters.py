@@ -1,4 +1,4 @@
-"""Filters of numbers that drift and of the memory that they leave behind.
+"""Filters of numbers that drift, and of the memory that depends on them.
 
     theta_k = theta_(k-1) + w_k,    (z_k, y_k) = step(theta_k, z_(k-1), u_k),    measured_k = y_k + noise
 

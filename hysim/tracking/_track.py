@@ -118,7 +118,7 @@ _LEAST, _MOST = -4.0, 1.0  # decades beside the first sizes
 def most_likely(
     log_likelihood: Callable[[FloatArray], float], sizes: FloatArray, searched: npt.NDArray[np.bool_]
 ) -> FloatArray:
-    """The most likely sizes (n_names,), of which only some are searched."""
+    """The most likely sizes (n_names,); only some are searched."""
     if not searched.any():
         return sizes
     exponents, best = np.zeros(sizes.size), log_likelihood(sizes)

@@ -276,7 +276,7 @@ def _angle_of(direction: float | str | None, *, whole: bool) -> float | None:
 
 
 def _best_direction(shift: FloatArray, covariance: FloatArray, visible: FloatArray) -> float:
-    """Direction in which the shifts spread more than their noise does; to the right where there is none."""
+    """Direction in which the shifts spread more than their noise does; by default to the right."""
     if np.trace(visible) < 1.5:
         vector = np.linalg.eigh(visible)[1][:, 1]
     else:

@@ -48,7 +48,7 @@ def saturation(A: float, beta: float, gamma: float, n: float) -> float:
 
 
 def memory_bound(A: float, beta: float, gamma: float, n: float, z0: float, stability_class: str) -> float:
-    """Bound of |z| for every input that begins with z0; inf where there is none."""
+    """Bound of |z| for every input that begins with z0; inf if |z| is not bounded."""
     if stability_class == "none":
         return math.inf
     if stability_class in ("II", "IV"):
@@ -166,12 +166,12 @@ class BoucWenLaw(BoucWenStep, MemoryLaw):
 
     @property
     def saturation(self) -> float:
-        """Limit of ``|z|`` on a long stroke of the input, (A / (beta + gamma))^(1/n) for A > 0; inf if it has none."""
+        """Limit of ``|z|`` on a long stroke of the input, (A / (beta + gamma))^(1/n) for A > 0; inf without a limit."""
         return saturation(self.A, self.beta, self.gamma, self.n)
 
     @property
     def memory_bound(self) -> float:
-        """Bound of ``|z|`` for every input that begins with z0; inf if it has none."""
+        """Bound of ``|z|`` for every input that begins with z0; inf if ``|z|`` is not bounded."""
         return memory_bound(self.A, self.beta, self.gamma, self.n, self.z0, self.stability_class)
 
     def limit_cycle(self, amplitude: float) -> LimitCycle:

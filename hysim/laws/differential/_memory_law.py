@@ -1,4 +1,4 @@
-"""Laws with one memory z beside a polynomial of the input.
+"""Laws with one memory z and a polynomial of the input.
 
     dz/du = f(u, z, sign(du))
     y = offset + c1 u + c2 u^2 + ... + gain z
@@ -59,7 +59,7 @@ class MemoryLaw(Law):
 
     @classmethod
     def order(cls, tables: Tables) -> npt.NDArray[np.intp] | None:
-        """Laws of equal n, which share their charts (`hysim.kernels.charts`), beside each other."""
+        """Order that groups laws of equal n, which share their charts (`hysim.kernels.charts`)."""
         n = tables["n"][:, 0]
         return None if (np.diff(n) >= 0.0).all() else np.argsort(n, kind="stable")
 
@@ -136,7 +136,7 @@ class MemoryLaw(Law):
         )
 
     def alike(self, record: Record, freedom: Freedom) -> tuple[tuple[str, ...], ...]:
-        """Groups of parameters of which one is held on this record."""
+        """Groups of parameters; one parameter of each group is held on this record."""
         return ()
 
     def inverse_begun(self, y: FloatArray, u0: float | None, state: State | None) -> CompiledLaw:
@@ -152,7 +152,7 @@ class MemoryLaw(Law):
         return self.search_inverse(state, terms=terms)
 
     def _check_memory_is_its_own(self, parameters: Parameters, u: FloatArray) -> None:
-        """It is: the polynomial and the gain stand behind it."""
+        """It is: the polynomial and the gain act after the memory."""
 
     def _passes(self, parameters: Parameters, u: FloatArray) -> PassOf:
         def of(sets: npt.NDArray[np.intp]) -> Pass:

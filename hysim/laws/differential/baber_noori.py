@@ -325,7 +325,7 @@ class BoucWenBaberNoori(MemoryLaw):
         return _wear_search.search_space(self.scalars, self.columns, record, freedom, held)
 
     def steady(self, parameters: Parameters, record: Record) -> dict[str, FloatArray]:
-        """Initial memory of a steady cycle; ValueError for a law that degrades or pinches, which has none."""
+        """Initial memory of a steady cycle; ValueError for a law that degrades or pinches: it has no steady cycle."""
         values = {**self.scalars, **parameters}
         if any(np.any(values[name]) for name in _WEARING):
             raise ValueError('a law that wears off has no steady cycle: use initial="free"')

@@ -113,7 +113,7 @@ def at_rest(law: Any, y: float) -> InverseState:
     c = law.input_polynomial
     if c[0] == 0.0:
         raise ValueError(
-            "the first output does not tell the first input, as the law has no slope beside its memory: give u0"
+            "the first input cannot be computed from the first output, since the law has no slope: give u0"
         )
     # a memory that stands still, with the kernel that the law's own inverse takes
     step, n, room = (

@@ -106,7 +106,7 @@ class GeneralizedBoucWen(MemoryLaw):
 
     @property
     def known_slopes(self) -> tuple[float, float]:
-        """Bounds for a law of which all four parts let the memory grow no further than to their saturation."""
+        """Bounds for a law whose four parts all limit the memory to their saturation."""
         laws = self.packed[0].reshape(4, -1)[:, :4].tolist()
         loading, unloading = ([gamma + side * beta for _, beta, gamma, _ in laws] for side in (1.0, -1.0))
         if not (self.A > 0.0 and min(loading) > 0.0):
@@ -120,7 +120,7 @@ class GeneralizedBoucWen(MemoryLaw):
         return static[0] + memory[0], static[1] + memory[1]
 
     def alike(self, record: Record, freedom: Freedom) -> tuple[tuple[str, ...], ...]:
-        """The pairs of which one is held where the input keeps its sign."""
+        """The pairs of parameters; if the input keeps its sign, one of each pair is held."""
         return _ONE_SIDED if (record.u >= 0.0).all() or (record.u <= 0.0).all() else ()
 
     def _memory_slope(self, direction: FloatArray, z: FloatArray, u: FloatArray, *_: FloatArray) -> FloatArray:

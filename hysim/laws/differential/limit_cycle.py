@@ -92,7 +92,7 @@ def limit_cycle(A: float, beta: float, gamma: float, n: float, amplitude: float)
 
 
 def escape_length(A: float, c: float, n: float) -> float:
-    """Input that takes w from 0 to infinity on w' = A - c w^n, A > 0; infinite if none does."""
+    """Input that takes w from 0 to infinity on w' = A - c w^n, A > 0; infinite if w stays finite."""
     if c >= 0.0 or n <= 1.0:
         return math.inf
     return float(math.pi / n / math.sin(math.pi / n) * (A / -c) ** (1.0 / n) / A)
@@ -112,7 +112,7 @@ def _half_difference(A: float, c: float, e: float, n: float, amplitude: float) -
 
 
 def _from_rest(A: float, c: float, n: float, lengths: FloatArray) -> FloatArray:
-    """Memory after each of the lengths on z' = A - c z^n from zero; inf beyond an escape."""
+    """Memory after each of the lengths on z' = A - c z^n from zero; inf where it has diverged."""
     laws = read_only(np.tile([A, c, 0.0, n, 0.0], (lengths.size, 1)))
     memory_itself = read_only(np.tile([1.0, 0.0], (lengths.size, 1)))
     u = read_only(np.stack([np.zeros(lengths.size), lengths], axis=1))

@@ -1,4 +1,4 @@
-"""The Bouc-Wen law beside a polynomial of the input, for asymmetric loops."""
+"""The sum of the Bouc-Wen law and a polynomial of the input, for asymmetric loops."""
 
 from hysim.laws.differential._boucwen_law import BoucWenLaw
 from hysim.laws.differential.boucwen import BoucWen
@@ -8,7 +8,7 @@ from hysim.models.stages import Subset
 
 @family
 class PolynomialBoucWen(BoucWenLaw):
-    """Bouc-Wen law beside a polynomial of the input, ``y = offset + sum c_k u^k + gain z``.
+    """Bouc-Wen law plus a polynomial of the input, ``y = offset + sum c_k u^k + gain z``.
 
     The memory is that of `BoucWen`. Source: Wang, Chen and Bai 2015, for asymmetric piezoelectric loops.
 

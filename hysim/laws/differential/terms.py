@@ -116,7 +116,7 @@ def bouc_wen_terms(n: float) -> tuple[Term, Term, Term]:
 
 
 def bouc_wen_exponent(terms: Iterable[Term]) -> float | None:
-    """The exponent n of the Bouc-Wen law that has these terms; None if there is none."""
+    """The exponent n of the Bouc-Wen law that has these terms; None if no Bouc-Wen law has them."""
     present = set(terms)
     n = max((term.degree for term in present), default=0)
     return n if n > 0 and present <= set(bouc_wen_terms(n)) else None

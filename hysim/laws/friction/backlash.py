@@ -11,7 +11,7 @@ from hysim.models.tables import Tables
 
 @family
 class ElasticBacklash(RatedLaw):
-    """Backlash of a flexible shaft with damping, or a spring and a damper behind a gap.
+    """Backlash of a flexible shaft with damping, or a gap in series with a spring and a damper.
 
     ::
 

@@ -65,7 +65,7 @@ class RatedLaw(Subject, Placed, ABC):
 
     @classmethod
     def further(cls, tables: Tables) -> int:
-        """Numbers of the memory that begin at zero, behind those that are fields."""
+        """Numbers of the memory that begin at zero, after those that are fields."""
         return 0
 
     @property
@@ -234,7 +234,7 @@ class AtSampleTime(Law):
 
 @functools.cache
 def _kind_at_sample_time(family: type[RatedLaw]) -> type[Law]:
-    """The laws of a family at one sample time: its fields behind ``sample_time``."""
+    """The laws of a family at one sample time: ``sample_time``, then the fields of the family."""
     named = [each for each in fields(cast(Any, family)) if each.name not in last_names(family)]
     defaults = {each.name: each.default for each in named if each.default is not MISSING}
     body = {

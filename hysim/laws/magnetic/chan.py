@@ -101,7 +101,7 @@ class Chan(BranchLaw):
         super().check(tables)
         for name in ("saturation", "feedthrough"):
             if ((tables["gap"] > 0.0) & (tables[name] < 0.0)).any():
-                raise ValueError(f"{name} must not be negative beside a gap, got {tables[name].min()}")
+                raise ValueError(f"{name} must not be negative with a gap, got {tables[name].min()}")
 
     @classmethod
     def pack(cls, tables: Tables) -> Packed:
@@ -117,13 +117,13 @@ class Chan(BranchLaw):
 
     @property
     def known_slopes(self) -> tuple[float, float]:
-        """Those of the core behind the gap."""
+        """Slopes of the core in series with the gap."""
         low, high = super().known_slopes
         return low / (1.0 + self.gap * low), high / (1.0 + self.gap * high)
 
     @property
     def columns(self) -> tuple[str, ...]:
-        """Names in which the output is affine and which are searched: with a gap none."""
+        """Names of searched parameters in which the output is affine: empty with a gap."""
         return super().columns if self.gap == 0.0 else ()
 
     def search_space(self, record: Record, freedom: Freedom = ALL_FREE) -> SearchSpace:

@@ -1,4 +1,4 @@
-"""The field of excess loss, the part of a core's field beside hysteresis and classical eddy currents."""
+"""The field of excess loss, which a core needs in addition to hysteresis and classical eddy currents."""
 
 import math
 from typing import Self

@@ -500,4 +500,4 @@ class JilesAtherton(Law):
         return np.stack([magnetisation, field, np.ones_like(field), np.zeros_like(field)], axis=-1)
 
     def _check_memory_is_its_own(self, parameters: Parameters, u: FloatArray) -> None:
-        """It is: gain, feedthrough and offset stand behind it."""
+        """It is: gain, feedthrough and offset act after the memory."""

@@ -60,7 +60,7 @@ class BranchLaw(Law):
 
     @classmethod
     def check(cls, tables: Tables) -> None:
-        """Refuse a coercivity that is not positive, a squareness that is none, and a place beyond a branch."""
+        """Refuse a coercivity that is not positive, an impossible squareness, and a place beyond a branch."""
         super().check(tables)
         squareness = tables["squareness"].ravel()
         wrong = squareness[~((squareness > 0.0) & (squareness < 1.0))]

@@ -80,7 +80,7 @@ class Bank(Elements, ByStructure):
 
     @classmethod
     def pushing(cls, parameters: Parameters, record: Record) -> Tables:
-        """What there is beside the input where it pushes the plays, as `rows_of` takes it."""
+        """Parameters that change how the input pushes the plays, as `rows_of` takes them."""
         return {}
 
     @classmethod
@@ -136,7 +136,7 @@ class Bank(Elements, ByStructure):
         return bool((lagging >= 0.0).all() or (lagging <= 0.0).all())
 
     def as_structure(self) -> BankStructure:
-        """The structure with the thresholds of this law, or with those by default where it has none."""
+        """The structure with the thresholds of this law, or with the default thresholds."""
         thresholds, own = tuple(self.elements[0].tolist()), items(self)
         one_signed = None if self.is_one_signed() else False
         axes = {each.parameter.name: own[each.parameter.name] for each in self.axes}
@@ -144,14 +144,14 @@ class Bank(Elements, ByStructure):
 
 
 class Clamps(Elements, Law):
-    """A sum of plays or stops beside a line."""
+    """A sum of plays or stops and a line."""
 
     step = staticmethod(kernels.step)
     feedthrough = 0.0
 
     @property
     def as_plays(self) -> tuple[float, FloatArray, FloatArray]:
-        """Slope c beside the plays, and their thresholds and weights v in the order of the thresholds."""
+        """Slope c of the line, and thresholds and weights v of the plays in the order of the thresholds."""
         thresholds, weights, _ = self.elements
         order = np.argsort(thresholds, kind="stable")
         if self.stops:

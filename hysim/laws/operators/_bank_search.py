@@ -59,7 +59,7 @@ _LARGEST = 4.0  # of a weight before dead zones, in slopes of the record, unless
 
 
 class Axis(NamedTuple):
-    """A coordinate beside thresholds and turning points, and where its search begins, in its unit."""
+    """A coordinate other than thresholds and turning points, and where its search begins, in its unit."""
 
     parameter: Parameter
     starts: tuple[float, ...]
@@ -243,7 +243,7 @@ class BankStructure(SignedStructure):
         return np.asarray(half * (steps / (self.plays + float(self.law.stops))) ** self.spacing)
 
     def _axes(self, record: Record) -> list[tuple[Coordinate, tuple[float, ...]]]:
-        """The coordinates beside thresholds and turning points, and where their search begins."""
+        """The coordinates other than thresholds and turning points, and where their search begins."""
         rated = any("v" in each.parameter.unit for each in self.axes)
         units, axes = rate_spans(record) if rated else spans(record), []
         for each, starts in self.axes:
@@ -314,7 +314,7 @@ def with_offset(*columns: FloatArray) -> FloatArray:
 
 
 def rows_of(tables: Tables) -> FloatArray:
-    """Rows as the kernels take them: offset, width, envelopes, thresholds, weights, and the dead zones behind.
+    """Rows as the kernels take them: offset, width, envelopes, thresholds, weights, and then the dead zones.
 
     Of the width, the envelopes `left` and `right`, and the dead zones there may be none in the tables; a right envelope
     without coefficients is the left one.
@@ -376,7 +376,7 @@ def conditioned(u: FloatArray) -> tuple[float, float]:
 
 
 def dominant_extremes(u: FloatArray) -> list[float]:
-    """The last input, behind the turning points that no later one has wiped out, the oldest first; at least two.
+    """The turning points that no later one has wiped out, the oldest first, then the last input; at least two.
 
     Seen from the end, they are where the input is higher or lower than ever: of highs in a row the highest, and so on.
     """

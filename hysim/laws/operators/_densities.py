@@ -130,7 +130,7 @@ def everett_from_curves(
 
 
 def _curves_of(record: Record, tolerance: float) -> list[ReversalCurve]:
-    """The curves of a record by their turning points, of equal ones the last; a ValueError if it has none."""
+    """The curves of a record by their turning points, of equal ones the last; a ValueError without a curve."""
     low, slack = float(record.u.min()), tolerance * float(np.ptp(record.u))
     branches = record.branches(tolerance)
     pairs = zip((None, *branches), branches, strict=False)

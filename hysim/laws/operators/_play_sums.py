@@ -21,7 +21,7 @@ EXAMPLE = {"thresholds": (0.0, 0.1, 0.2, 0.35, 0.5, 0.7), "weights": (0.4, 0.3, 
 
 
 class PlaySum(Law):
-    """A sum of plays behind envelopes, with wider thresholds or in front of dead zones: a bank of one of these."""
+    """A sum of plays after envelopes, with wider thresholds or in front of dead zones: a bank of one of these."""
 
     step = staticmethod(kernels.step)
 
@@ -31,7 +31,7 @@ class PlaySum(Law):
 
     @classmethod
     def pack(cls, tables: Tables) -> Packed:
-        """Rows with what the family has beside plays."""
+        """Rows with the parameters that the family has in addition to plays."""
         return Packed(rows_of(tables), cls.initial_memory(tables))
 
     @property

@@ -126,7 +126,7 @@ class PreisachStructure(SignedStructure):
     def _untold(
         self, record: Record, parameters: Parameters, signs: Mapping[str, tuple[float, float]]
     ) -> tuple[str, ...]:
-        """The weights of which others, within these signs, do the work on this record from every memory given."""
+        """The weights that others can replace on this record, within these signs, from every memory given."""
         columns = np.concatenate([*self.regressors(parameters, record)])[:, :-1]
         _, factor = np.linalg.qr(np.column_stack([columns, np.resize(record.y, len(columns))]))
         relays, goal = np.split(factor, [columns.shape[1]], axis=1)

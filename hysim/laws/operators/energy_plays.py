@@ -1,4 +1,4 @@
-"""Energy-based plays: cells of dry friction behind an anhysteretic curve."""
+"""Energy-based plays: cells of dry friction, each followed by an anhysteretic curve."""
 
 from dataclasses import replace
 from typing import ClassVar
@@ -125,7 +125,7 @@ class EnergyPlays(Bank, Law):
         return replace(plain, spacing=_SPACING)
 
     def as_structure(self) -> BankStructure:
-        """The structure with the thresholds of this law, its field first, or that by default where it has none."""
+        """The structure with the thresholds of this law, its field first, or the default structure."""
         own = {"field": self.field} if self.thresholds else {}
         return replace(self.structure(), thresholds=self.thresholds, own=own)
 

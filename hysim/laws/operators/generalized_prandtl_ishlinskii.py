@@ -145,7 +145,7 @@ class GeneralizedPrandtlIshlinskii(Bank, PlaySum):
         return left | named("right", right)
 
     def as_structure(self) -> BankStructure:
-        """The structure with the thresholds and envelopes of this law, or with free ones where it has none."""
+        """The structure with the thresholds and envelopes of this law, or with free ones by default."""
         left, right = (self.left, self.right) if self.thresholds else ((), ())
         one_signed = None if self.is_one_signed() else False
         return self.structure(thresholds=self.thresholds, one_signed=one_signed, left=left, right=right)

@@ -1,4 +1,4 @@
-"""The Maxwell-slip law: springs side by side, each of which slips at an elongation of its own."""
+"""The Maxwell-slip law: parallel springs, each with its own elongation at which it slips."""
 
 from typing import ClassVar, Self
 
@@ -14,7 +14,7 @@ from hysim.models.model import Example, family
 
 @family
 class MaxwellSlip(Bank, Clamps):
-    """Maxwell-slip law: springs side by side, each of which slips at an elongation of its own.
+    """Maxwell-slip law: parallel springs, each with its own elongation at which it slips.
 
     ::
 
@@ -110,7 +110,7 @@ class MaxwellSlip(Bank, Clamps):
         return sum(self.limits)
 
     def to_prandtl_ishlinskii(self) -> PrandtlIshlinskii:
-        """This law as a sum of plays: weights -k_i beside their sum at the threshold zero.
+        """This law as a sum of plays: weights -k_i, and their sum at the threshold zero.
 
         Raises ValueError if elements that slip at one elongation begin at different positions: no play stands at both.
         """

@@ -1,4 +1,4 @@
-"""The modified Prandtl-Ishlinskii law: plays, and behind them dead zones, for loops that are not odd.
+"""The modified Prandtl-Ishlinskii law: plays, followed by dead zones, for loops that are not odd.
 
 S is a broken line through zero, of the slope c_0 about zero and c_0 + c_1 + ... + c_j beyond the j-th threshold on
 either side. Where these sums have one sign it has an inverse of its own kind, each side by the formulas of the plays,
@@ -27,7 +27,7 @@ from hysim.models.tables import Tables
 
 @family
 class ModifiedPrandtlIshlinskii(Bank, PlaySum):
-    """Modified Prandtl-Ishlinskii law: plays, and behind them dead zones, for loops that are not odd.
+    """Modified Prandtl-Ishlinskii law: plays, followed by dead zones, for loops that are not odd.
 
     ::
 
@@ -134,7 +134,7 @@ class ModifiedPrandtlIshlinskii(Bank, PlaySum):
         return self.plays.inverted(x, u0, state)
 
     def as_structure(self) -> BankStructure:
-        """The structure with the thresholds of this law, or with those by default where it has none."""
+        """The structure with the thresholds of this law, or with the default thresholds."""
         own, known = named("weights", self.weights), self.dead_zones if self.thresholds else ()
         return replace(super().as_structure(), own=own, dead_zones=known)
 

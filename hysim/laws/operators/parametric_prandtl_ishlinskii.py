@@ -1,4 +1,4 @@
-"""The Prandtl-Ishlinskii law of a density with two parameters, beside a polynomial of the input.
+"""The sum of the Prandtl-Ishlinskii law of a density with two parameters and a polynomial of the input.
 
 The plays stand on a fixed grid, finer towards zero, where the density may be singular: play k has the thresholds
 between the edges e_(k-1) and e_k, their middle r_k, and their share m_k of the density,
@@ -35,7 +35,7 @@ _STRONG = 10.0  # difference of two BIC that is very strong evidence
 
 @family
 class ParametricPrandtlIshlinskii(Law):
-    """Plays of the density ``w(r) ~ r^exponent exp(-r / decay)`` beside a polynomial of the input.
+    """Plays of the density ``w(r) ~ r^exponent exp(-r / decay)``, plus a polynomial of the input.
 
     ::
 
@@ -129,7 +129,7 @@ class ParametricPrandtlIshlinskii(Law):
         if not (exponent > -1.0).all():
             raise ValueError(f"exponent must be above -1, got {exponent.min()}")
         if not ((reach > 0.0) | (idle & (reach == 0.0))).all():
-            raise ValueError(f"reach must be positive beside a weight, got {reach.min()}")
+            raise ValueError(f"reach must be positive if a weight is not zero, got {reach.min()}")
         if not ((plays >= 1.0) & (plays == np.round(plays))).all():
             raise ValueError(f"plays must be whole and positive, got {plays.min()}")
         if not tables["z0"].shape[1]:

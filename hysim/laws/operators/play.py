@@ -1,4 +1,4 @@
-"""The play and the stop, of which the other rate-independent operators are built.
+"""The play and the stop, from which the other rate-independent operators are built.
 
 Sources: M. A. Krasnosel'skii and A. V. Pokrovskii, Systems with Hysteresis, 1989.
 """

@@ -127,7 +127,7 @@ def parted(law: Any) -> Parted:
     if isinstance(law, Sum) and law.dynamic:
         parts = [parted(part) for part in law.parts]
         if rated := [type(part.law).__name__ for part in parts if isinstance(part.law, Rated)]:
-            raise TypeError(f"an element takes a {rated[0]} by itself: put the other parts into an element beside it")
+            raise TypeError(f"an element takes a {rated[0]} by itself: put the other parts into a parallel element")
         rests = tuple(each.law for part, each in zip(law.parts, parts, strict=True) if not isinstance(part, Dashpot))
         rest = Line(slope=0.0) if not rests else rests[0] if len(rests) == 1 else Sum(parts=rests)
         return Parted(rest, sum(each.viscosity for each in parts))
@@ -139,7 +139,7 @@ def parted(law: Any) -> Parted:
 
 
 def dissipates(law: Any, stroke: float) -> bool:
-    """Whether the second cycle between plus and minus `stroke` [m], without dashpots, takes energy or none."""
+    """Whether the second cycle between plus and minus `stroke` [m], without dashpots, takes energy or no energy."""
     drift = stroke * triangle(-1.0, 1.0, cycles=2, samples_per_cycle=_SAMPLES)
     try:
         force = parted(law).law.response(drift)
@@ -281,7 +281,7 @@ def is_shared(name: str) -> bool:
 
 
 def sharing(scalars: Mapping[str, float], name: str) -> list[str]:
-    """Names of the elements' numbers that a name of all elements stands for; ValueError if there are none."""
+    """Names of the elements' numbers that a name of all elements stands for; ValueError if no element has it."""
     last = name.removeprefix(f"{_ELEMENTS}.{_ALL}.")
     names = [each for each in scalars if each.startswith(f"{_ELEMENTS}.") and each.split(".", 2)[2] == last]
     if not names:

@@ -145,7 +145,7 @@ class StructureRecord:
 
 @checked
 class SensorRecord(Record):
-    """Outputs of several sensors one behind the other, each divided by its scale; the input as often."""
+    """Outputs of several sensors one after the other, each divided by its scale; the input as often."""
 
     sensors: Any = ()
     scales: tuple[float, ...] = ()
@@ -208,7 +208,7 @@ class SearchedStructure(MovingStructure, Subject):
         return {}
 
     def search_space(self, record: Record, freedom: Freedom = ALL_FREE) -> SearchSpace:
-        """The box around the free numbers, and where parts of the record say to begin; ValueError if there is none."""
+        """The box around the free numbers, and starts from parts of the record; ValueError without free numbers."""
         if freedom.initial not in (None, "rest"):
             raise ValueError("a structure begins with its initial_state: leave initial out")
         if np.ptp(record.u) == 0.0:

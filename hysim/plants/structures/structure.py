@@ -177,7 +177,7 @@ class _Push:
         return change[:n], float(change[n] * self.unit / largest)
 
     def corrected(self, x: FloatArray, factor: float) -> _Equilibrium:
-        """The equilibrium near displacements that have the control value; out of balance where none is found."""
+        """The equilibrium near displacements that have the control value; out of balance if no equilibrium is found."""
         at = self.balance(x, factor)
         for _ in range(_MOST_STEPS):
             if at.residual <= _BALANCED or not np.isfinite(at.residual):
