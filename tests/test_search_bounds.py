@@ -71,7 +71,7 @@ def test_limits_of_physics_are_declared(family, physical):
 
 
 def test_only_the_sides_that_are_open_are_widened():
-    space = box(physical={"a": (True, False)}, given={"b": (False, True)})
+    space = box(physical={"a": (True, False)}, by_user={"b": (False, True)})
     low, high = space.open_sides(np.array([0.0, 1.0, 1.0]))
     assert (low.tolist(), high.tolist()) == ([False] * 3, [False, False, True])
     wider = space.widened(low, high)

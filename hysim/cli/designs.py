@@ -289,13 +289,15 @@ def text(design: Design) -> str:
     """The printed design: the task of the loop, the tuning, the results and their conditions."""
     options, task, closed, units = design.options, design.task, design.triangle.closed, design.units
     u, y = (units.get(name, "") for name in "uy")
-    driven, moved = (label(units, name)[0].lower() + label(units, name)[1:] for name in "uy")
+    driven, stroke = (label(units, name)[0].lower() + label(units, name)[1:] for name in "uy")
     limits = closed.conditions["limits"]
     followed = "" if math.isnan(design.file_rms) else f", second column, tracking rms {quantity(design.file_rms, y)}"
     source = f", the extremes of {Path(options.record).name}" if options.record and not options.limits else ""
     rows = {
-        "record": "" if math.isnan(design.fit_percent) else f"the model fits the {moved} by {design.fit_percent:.2f} %",
-        "reference": f"{moved}: {Path(options.reference).name}{followed}",
+        "record": ""
+        if math.isnan(design.fit_percent)
+        else f"the model fits the {stroke} by {design.fit_percent:.2f} %",
+        "reference": f"{stroke}: {Path(options.reference).name}{followed}",
         "command": f"{driven}: {'no limits' if limits is None else extent(limits, u)}{source}",
         "triangle": f"{extent((task.low, task.high), y)}, {1.0 / task.period:.4g} Hz, cycle {_CYCLES}",
         "step": f"{quantity(task.step, y)} from rest at {quantity(task.u0, u)}",

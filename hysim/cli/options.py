@@ -129,14 +129,14 @@ def sections(subject: Any) -> dict[str, str]:
 
 def documented(subject: Any) -> dict[str, tuple[str, str]]:
     """Title and help of the parameters in a docstring, and of fields that a dataclass inherits."""
-    found = {}
+    entries = {}
     for title, text in sections(subject).items():
         for line in re.sub(r"\n +", " ", text).splitlines() if title not in ("", "Examples") else ():
             name, _, help_ = line.partition(" :")
-            found[name] = ("Options" if title == "Parameters" else title, help_.strip())
+            entries[name] = ("Options" if title == "Parameters" else title, help_.strip())
     for base in subject.__bases__ if isinstance(subject, type) else ():
-        found |= {name: text for name, text in documented(base).items() if name not in found}
-    return found
+        entries |= {name: text for name, text in documented(base).items() if name not in entries}
+    return entries
 
 
 def _declared(subject: Any, texts: Mapping[str, tuple[str, str]]) -> Iterator[Parameter]:

@@ -129,8 +129,8 @@ class AdaptiveInverse(WithoutFeedback):
             refusal = f"the step of a {type(law).__name__} does not take {name} as it is: it cannot be free"
             if name in law.structural:
                 raise ValueError(refusal)
-            moved = _PROBE * (abs(law.scalars[name]) or 1.0)
-            values = law.scalars[name] + np.array([moved, -moved])
+            change = _PROBE * (abs(law.scalars[name]) or 1.0)
+            values = law.scalars[name] + np.array([change, -change])
             (ahead, there), (behind, _) = (self._packed(name, value) for value in values)
             if not np.array_equal(memory, there):
                 raise ValueError("the memory at the first sample does not drift: leave it out of free")

@@ -150,8 +150,8 @@ def one_moved(strokes: FloatArray, limits: InputLimits, rng: np.random.Generator
     if rng.random() < _PAUSES:
         trial[place, 1] = max(0.0, trial[place, 1] + _PAUSE * share * limits.duration)
     else:
-        moved = trial[place, 0] + share * limits.amplitude
-        trial[place, 0] = min(max(moved, -limits.amplitude), limits.amplitude)
+        target = trial[place, 0] + share * limits.amplitude
+        trial[place, 0] = min(max(target, -limits.amplitude), limits.amplitude)
     return trial
 
 
@@ -247,11 +247,11 @@ def design_input(
         return merit(subject.information(u), criterion)
 
     judged = {name: max(((worth(u), u) for u in each), key=itemgetter(0)) for name, each in inputs.items()}
-    moved = shapes.with_another_segment if in_time else one_moved
+    varied = shapes.with_another_segment if in_time else one_moved
     strokes, best = searched(
         drawn,
         lambda strokes: worth(shapes.through(strokes, bounds)),
-        lambda strokes, progress: moved(strokes, bounds, rng, progress),
+        lambda strokes, progress: varied(strokes, bounds, rng, progress),
         moves,
     )
     u, first = shapes.through(strokes, bounds), max(judged.values(), key=itemgetter(0))
@@ -300,13 +300,13 @@ def _weak(subject: Subject, covariance: FloatArray) -> list[str]:
     ]
 
 
-def _highest(given: float | None, values: Mapping[str, float], limits: InputLimits) -> float:
+def _highest(requested: float | None, values: Mapping[str, float], limits: InputLimits) -> float:
     """Highest frequency of a multisine [Hz]."""
     nyquist = 0.5 / limits.sample_time
-    if given is not None:
-        if not 0.0 < given <= nyquist:
-            raise ValueError(f"highest_frequency must be positive and at most {nyquist:g} Hz, got {given}")
-        return given
+    if requested is not None:
+        if not 0.0 < requested <= nyquist:
+            raise ValueError(f"highest_frequency must be positive and at most {nyquist:g} Hz, got {requested}")
+        return requested
     modes = [value for name, value in values.items() if FREQUENCY in name]
     return min(_FASTER * max(modes, default=np.inf) / (2.0 * np.pi), _BELOW_NYQUIST * nyquist)
 

@@ -41,10 +41,10 @@ def spreads(matrix: FloatArray) -> FloatArray:
     size = np.sqrt(np.maximum(matrix.diagonal(), 0.0))
     usable = np.where(size > 0.0, size, 1.0)
     values, vectors = np.linalg.eigh(matrix / np.outer(usable, usable))
-    seen = values > _LEAST
-    variances = (vectors[:, seen] ** 2 / values[seen]).sum(axis=1)
-    unseen = (np.abs(vectors[:, ~seen]) > _TAKES_PART).any(axis=1) | (size == 0.0)
-    return np.asarray(np.where(unseen, np.inf, np.sqrt(variances) / usable))
+    determined = values > _LEAST
+    variances = (vectors[:, determined] ** 2 / values[determined]).sum(axis=1)
+    undetermined = (np.abs(vectors[:, ~determined]) > _TAKES_PART).any(axis=1) | (size == 0.0)
+    return np.asarray(np.where(undetermined, np.inf, np.sqrt(variances) / usable))
 
 
 _DIFFERENCE = 1e-4  # of a number, or of one where that is smaller: both errors of a central difference are near 1e-8

@@ -147,10 +147,10 @@ class Body:
             return self.scope.c_name(node.id)
         if not isinstance(node, ast.Subscript) or isinstance(node.slice, ast.Slice):
             raise self.refusal(node, "names and elements of vectors are assigned")
-        whole = self.of.vector(node.value)
-        for root in whole.roots:
+        array = self.of.vector(node.value)
+        for root in array.roots:
             self.scope.write(root)
-        return f"{whole.text}{self.of.place(node, whole)}"
+        return f"{array.text}{self.of.place(node, array)}"
 
     def _assignment(self, node: ast.Assign) -> list[str]:
         if isinstance(node.targets[0], ast.Tuple) and len(node.targets) == 1:

@@ -132,10 +132,10 @@ class Expressions:
             raise self.refusal(node, f"{ast.unparse(node)} is unknown")
         return self._literal(node, vars(owner)[node.attr], node.attr)
 
-    def _of_one_axis(self, node: ast.expr, whole: Value) -> Value:
-        if len(whole.lengths) != 1:
+    def _of_one_axis(self, node: ast.expr, array: Value) -> Value:
+        if len(array.lengths) != 1:
             raise self.refusal(node, "an array of one axis is expected here")
-        return whole
+        return array
 
     def _module(self, node: ast.expr) -> ModuleType | None:
         owner = self.scope.source.names.get(node.id) if isinstance(node, ast.Name) else None
@@ -225,40 +225,40 @@ class Expressions:
             return shaped.lengths[place]()
         if isinstance(node.slice, ast.Slice):
             return self._part(self.vector(node.value), node.slice)
-        whole = self.any(node.value)
-        if isinstance(whole.type, Vector):
-            return Value(f"{whole.within(_c.PRIMARY)}{self.place(node, whole)}", Scalar.DOUBLE)
-        if not isinstance(whole.type, Several) or not isinstance(place, int):
+        array = self.any(node.value)
+        if isinstance(array.type, Vector):
+            return Value(f"{array.within(_c.PRIMARY)}{self.place(node, array)}", Scalar.DOUBLE)
+        if not isinstance(array.type, Several) or not isinstance(place, int):
             raise self.refusal(node, "an array, or one of the results of a function, is expected here")
-        return Value(f"{whole.text}.at{place}", whole.type.members[place])
+        return Value(f"{array.text}.at{place}", array.type.members[place])
 
-    def _part(self, whole: Value, part: ast.Slice) -> Value:
+    def _part(self, array: Value, part: ast.Slice) -> Value:
         if part.step is not None:
             raise self.refusal(part.step, "a slice has no stride")
         first, upper = None if part.lower is None else self.index(part.lower), part.upper
 
         def length() -> Value:
-            stop = whole.lengths[0]() if upper is None else self.index(upper)
+            stop = array.lengths[0]() if upper is None else self.index(upper)
             return _length(stop.text if first is None else f"{stop.within(_c.SUM)} - {first.within(_c.SUM + 1)}")
 
-        lengths = (length, *whole.lengths[1:])
+        lengths = (length, *array.lengths[1:])
         if first is None:
-            return whole._replace(lengths=lengths)
+            return array._replace(lengths=lengths)
         offset = first
-        for each in whole.lengths[1:]:
+        for each in array.lengths[1:]:
             row = each().within(_c.PRODUCT + 1)
             offset = Value(f"{offset.within(_c.PRODUCT)} * {row}", Scalar.INT, _c.PRODUCT)
-        return whole._replace(text=f"{whole.text} + {offset.within(_c.SUM + 1)}", lengths=lengths, binds=_c.SUM)
+        return array._replace(text=f"{array.text} + {offset.within(_c.SUM + 1)}", lengths=lengths, binds=_c.SUM)
 
-    def place(self, node: ast.Subscript, whole: Value) -> str:
+    def place(self, node: ast.Subscript, array: Value) -> str:
         index = node.slice
         parts = index.elts if isinstance(index, ast.Tuple) else [index]
-        if len(parts) != len(whole.lengths):
+        if len(parts) != len(array.lengths):
             raise self.refusal(node, "an element has one index for each axis")
         if isinstance(index, ast.UnaryOp) and isinstance(index.operand, ast.Constant) and index.operand.value == 1:
-            return f"[{whole.lengths[0]().text} - 1]"
+            return f"[{array.lengths[0]().text} - 1]"
         total = self.index(parts[0])
-        for part, length in zip(parts[1:], whole.lengths[1:], strict=True):
+        for part, length in zip(parts[1:], array.lengths[1:], strict=True):
             next_ = self.index(part)
             if total.text == "0":
                 total = next_
@@ -296,9 +296,9 @@ class Expressions:
     def _reshaped(self, node: ast.Call, of: ast.expr) -> Value:
         if len(node.args) != 1 or not isinstance(node.args[0], ast.Tuple):
             raise self.refusal(node, "reshape takes a tuple of lengths")
-        whole, lengths = self._of_one_axis(of, self.vector(of)), node.args[0].elts
+        array, lengths = self._of_one_axis(of, self.vector(of)), node.args[0].elts
         extents = tuple(partial(self._extent, each) for each in lengths)
-        return whole._replace(type=Vector(len(lengths)), lengths=extents)
+        return array._replace(type=Vector(len(lengths)), lengths=extents)
 
     def _extent(self, node: ast.expr) -> Value:
         return _length(self.index(node).text)
@@ -337,17 +337,17 @@ class Expressions:
             raise self.refusal(node, f"{name} is no function that is known when the program is translated")
         function = self.library.function(called, types)
         pairs = zip(node.args, function.parameters, strict=True)
-        given = ", ".join(text for each, parameter in pairs for text in self._given(each, parameter))
-        return Value(f"{function.name}({given})", Scalar.INT if function.returns is None else function.returns)
+        arguments = ", ".join(text for each, parameter in pairs for text in self._given(each, parameter))
+        return Value(f"{function.name}({arguments})", Scalar.INT if function.returns is None else function.returns)
 
     def _given(self, node: ast.expr, parameter: Parameter) -> list[str]:
         """An argument as far as the function uses it, and its length where that is used."""
         if not isinstance(parameter.type, Vector):
             return [self.value(node).text] if parameter.is_used else []
-        whole = self.vector(node) if parameter.is_used else self.quietly(node)
-        for root in whole.roots if parameter.is_written else ():
+        array = self.vector(node) if parameter.is_used else self.quietly(node)
+        for root in array.roots if parameter.is_written else ():
             self.scope.write(root)
-        return [*[whole.text] * parameter.is_used, *(whole.lengths[axis]().text for axis in parameter.axes)]
+        return [*[array.text] * parameter.is_used, *(array.lengths[axis]().text for axis in parameter.axes)]
 
     def writes(self, node: ast.expr) -> bool:
         return bool(self._tried(node)[1])

@@ -233,11 +233,11 @@ def _commands(platforms: Sequence[str] | None, version: str) -> dict[Target, Seq
     commands: dict[Target, Sequence[str]] = {}
     for name in dict.fromkeys(platforms):
         targets = TARGETS[name][:1] if version == "2.0" and name == "linux" else TARGETS[name]
-        found = {each: command for each in targets if (command := compiler(each)) is not None}
-        if not found:
+        available = {each: command for each in targets if (command := compiler(each)) is not None}
+        if not available:
             advice = f"pip install 'hysim[export]', or leave {name!r} out of the platforms"
             raise ImportError(f"a shared library for {name} needs a compiler: {advice}")
-        commands |= found
+        commands |= available
     return commands
 
 

@@ -360,5 +360,5 @@ def _plain(values: Any) -> Any:
     numbers = values.ravel().tolist()
     if all(isinstance(number, (bool, np.bool_)) for number in numbers):
         return np.array(numbers, dtype=bool).reshape(values.shape)
-    whole = all(isinstance(number, (int, np.integer)) for number in numbers)
-    return np.array(numbers, dtype=np.int32 if whole else float).reshape(values.shape)
+    all_integers = all(isinstance(number, (int, np.integer)) for number in numbers)
+    return np.array(numbers, dtype=np.int32 if all_integers else float).reshape(values.shape)

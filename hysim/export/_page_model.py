@@ -309,8 +309,8 @@ def about(thing: Any) -> tuple[str, str]:
 def output_of(family: type) -> str:
     """Right side of the equation of y in the docstring of a family; empty without such an equation."""
     text = (getdoc(family) or "").split("\nParameters\n")[0]
-    found = re.search(r"\b[yFT] *= ((?:offset|c (?:u'|sign)).*?)(?=``|,\s| {3}|\n|$)", text)
-    return "" if found is None else found.group(1)
+    match = re.search(r"\b[yFT] *= ((?:offset|c (?:u'|sign)).*?)(?=``|,\s| {3}|\n|$)", text)
+    return "" if match is None else match.group(1)
 
 
 def heading(thing: Any) -> str:

@@ -316,16 +316,16 @@ def _entry(
 ) -> str:
     """A C function of parameters, state and inputs (`every`; it uses `inputs`) around a translated one."""
     lengths = ("n_parameters", "n_state") if sizes is None else tuple(map(str, sizes))
-    given: list[str] = []
+    values: list[str] = []
     names = ("parameters", "state", *every)
     for parameter, argument, length in zip(function.parameters, names, (*lengths, *every), strict=True):
-        given += [argument if argument in ("parameters", "state", *inputs) else "0.0"] * parameter.is_used
-        given += [length] * len(parameter.axes)
+        values += [argument if argument in ("parameters", "state", *inputs) else "0.0"] * parameter.is_used
+        values += [length] * len(parameter.axes)
     vectors = ["const double *parameters", "double *state"]
     if sizes is None:
         vectors = [vectors[0], "int n_parameters", vectors[1], "int n_state"]
     taken = ("parameters", "state", *inputs, *lengths * (sizes is None))
-    unused = "".join(f"    (void){each};\n" for each in taken if each not in given)
+    unused = "".join(f"    (void){each};\n" for each in taken if each not in values)
     result, call = ("void", "") if function.returns is None else ("double", "return ")
     arguments = ", ".join([*vectors, *(f"double {each}" for each in inputs)])
-    return f"static {result} {name}({arguments}) {{\n{unused}    {call}{function.name}({', '.join(given)});\n}}\n"
+    return f"static {result} {name}({arguments}) {{\n{unused}    {call}{function.name}({', '.join(values)});\n}}\n"

@@ -136,9 +136,9 @@ class Signs(NamedTuple):
         cell = cell.strip().replace("\u2212", "-")  # the minus sign of typesetters
         grouped = _GROUPED.fullmatch(cell)
         if grouped and grouped["mark"] != self.decimal and grouped["point"] in (None, self.decimal):
-            mark, whole = grouped["mark"], grouped["whole"]
-            if mark not in ".," or grouped["point"] or whole.count(mark) > 1 or mark == self.thousands:
-                cell = grouped["sign"] + whole.replace(mark, "") + grouped["rest"]
+            mark, digits = grouped["mark"], grouped["whole"]
+            if mark not in ".," or grouped["point"] or digits.count(mark) > 1 or mark == self.thousands:
+                cell = grouped["sign"] + digits.replace(mark, "") + grouped["rest"]
         if self.decimal == ",":
             cell = "" if "." in cell or cell.endswith(",") else cell.replace(",", ".")
         try:

@@ -187,7 +187,7 @@ def _part(space: SearchSpace, lower: FloatArray, upper: FloatArray) -> SearchSpa
         starts=np.clip(space.starts, lower, upper),
         drawn=drawn,
         regions={},
-        whole=space.whole or (space.lower, space.upper),
+        outer=space.outer or (space.lower, space.upper),
     )
 
 
@@ -258,11 +258,11 @@ def _approached(search: Search, x: FloatArray) -> tuple[Search, list[LocalOptimu
     """The safe optimum that is reached from safe coordinates (n_x,), box by box; on few samples first."""
     problem, half = search.problem, _LARGEST_BOX
     short = problem.thinned(_SHORT) if problem.y.size > _LONG else None
-    whole, box, reached = problem.space.upper - problem.space.lower, problem.space, None
+    size, box, reached = problem.space.upper - problem.space.lower, problem.space, None
     for part in filter(None, (short, problem)):
         cost, reached = math.inf, None
         for _ in range(_MOST_BOXES):
-            sides = np.clip([x - half * whole, x + half * whole], problem.space.lower, problem.space.upper)
+            sides = np.clip([x - half * size, x + half * size], problem.space.lower, problem.space.upper)
             inside = replace(part, space=_part(problem.space, *sides), ends=None, simpler=None)
             end = next(iter(polish(inside, x[np.newaxis])), None)
             if end is None or not _is_safe(search, problem.completed(end.x[np.newaxis])[0]):

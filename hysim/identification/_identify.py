@@ -156,8 +156,9 @@ def identify(
     if isinstance(model_or_class, str):
         model_or_class = family_named(model_or_class)
     model_or_class = model_of(model_or_class)
-    given = model_or_class.as_records(record_or_records) if isinstance(model_or_class, Recorded) else record_or_records
-    records: Sequence[Record] = several(given, "identify")
+    if isinstance(model_or_class, Recorded):
+        record_or_records = model_or_class.as_records(record_or_records)
+    records: Sequence[Record] = several(record_or_records, "identify")
     options = _freedom(fixed or {}, free, bounds or {})
     check_choice("intervals", intervals, ("linear", "profile", "bootstrap"))
     check_choice("input", input, ("auto", "raw", "filtered"))

@@ -388,8 +388,8 @@ def _thinned(part: Part, samples: int) -> Part:
 def _beginning(part: Part, samples: int) -> Part:
     u = part.record.u
     spans = np.maximum.accumulate(u) - np.minimum.accumulate(u)
-    whole = 1 + int(np.argmax(spans >= _MOST_OF_SPAN * spans[-1]))
-    return _at(part, np.arange(min(u.size, max(samples, whole))))
+    enough = 1 + int(np.argmax(spans >= _MOST_OF_SPAN * spans[-1]))
+    return _at(part, np.arange(min(u.size, max(samples, enough))))
 
 
 def _at(part: Part, chosen: npt.NDArray[np.intp]) -> Part:
@@ -500,8 +500,8 @@ def _alone(family: Identifiable, records: Sequence[Record], freedom: Freedom, in
     widest = max(records, key=lambda record: (float(np.ptp(record.u)), len(record)))  # it scales the box
     own = family.search_space(widest, replace(freedom, initial=shared))
     told = {name: freedom.bounds.get(name, freedom.bounds.get(name.partition("(")[0])) for name in own.names}
-    given = {name: (bool(np.isfinite(pair[0])), bool(np.isfinite(pair[1]))) for name, pair in told.items() if pair}
-    own = replace(own, given=given)
+    user_sides = {name: (bool(np.isfinite(pair[0])), bool(np.isfinite(pair[1]))) for name, pair in told.items() if pair}
+    own = replace(own, by_user=user_sides)
     if len(records) == 1:
         every = np.arange(len(own.coordinates)), np.arange(len(own.linear))
         return Problem(family, own, own, (Part(records[0], *every, _before(records[0], kinds[0]), {}),))
@@ -565,7 +565,7 @@ def _together(
         regions={name: (box(lower), box(upper)) for name, (lower, upper) in own.regions.items()},
         bounds={_called(name, k): own.bounds[name] for name, k in linear if name in own.bounds},
         physical={_called(name, k): own.physical[name] for name, k in searched if name in own.physical},
-        given={_called(name, k): own.given[name] for name, k in (*searched, *linear) if name in own.given},
+        by_user={_called(name, k): own.by_user[name] for name, k in (*searched, *linear) if name in own.by_user},
         state=free_states,
     )
     return Problem(family, space, own, parts)

@@ -228,11 +228,11 @@ def polish(problem: Problem, starts: FloatArray) -> list[Optimum]:
     """Ends of descents from `starts` (n_sets, n_x) on the close law, and on the law itself if it fits as closely."""
     problem = problem.condensed()
     close = problem.close()
-    found = _optima(problem, _polished(close, starts))
-    least = min((each.cost for each in found), default=math.inf)
+    optima = _optima(problem, _polished(close, starts))
+    least = min((each.cost for each in optima), default=math.inf)
     if close is problem or least > problem.y.size * (_FAR_FROM_CLOSE * close.accuracy * problem.scale) ** 2:
-        return found
-    return _optima(problem, _polished(problem, np.array([each.x for each in found])))
+        return optima
+    return _optima(problem, _polished(problem, np.array([each.x for each in optima])))
 
 
 def _polished(problem: Problem, starts: FloatArray) -> Reached:
@@ -292,11 +292,11 @@ def descended(problem: Problem, starts: FloatArray, *, exact: bool, steps: int |
 
 
 def _starts(
-    problem: Problem, screened: int, seed: int, most: int, given: FloatArray, *, are_kept: bool = True
+    problem: Problem, screened: int, seed: int, most: int, own_starts: FloatArray, *, are_kept: bool = True
 ) -> FloatArray:
-    candidates = np.concatenate([given, spread(problem.space, screened, seed)])
-    n_given = len(given) if are_kept else 0
-    return apart(problem.space, candidates, problem.costs(candidates), _APART, most, n_given)
+    candidates = np.concatenate([own_starts, spread(problem.space, screened, seed)])
+    n_own = len(own_starts) if are_kept else 0
+    return apart(problem.space, candidates, problem.costs(candidates), _APART, most, n_own)
 
 
 def spread(space: SearchSpace, n: int, seed: int) -> FloatArray:

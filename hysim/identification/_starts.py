@@ -71,12 +71,12 @@ class _End(NamedTuple):
     """A plant, its problem on all records, and the best coordinates (1, n_x) of one search."""
 
     plant: Any
-    whole: Problem
+    problem: Problem
     ends: FloatArray
 
     def criterion(self) -> float:
-        n = self.whole.n_samples
-        return information(max(float(self.whole.costs(self.ends)[0]), 1e-300) / n, n, len(self.whole.space.names))
+        n = self.problem.n_samples
+        return information(max(float(self.problem.costs(self.ends)[0]), 1e-300) / n, n, len(self.problem.space.names))
 
 
 class Begun(NamedTuple):
@@ -102,8 +102,8 @@ def begun_by_parts(structure: PartByPart, setting: Setting) -> Begun:
     else:
         end = _searched(plant, setting)
     plant, ends = end.plant, end.ends
-    if end.whole.n_x:
-        plant, ends = _told_apart(plant, setting, end.whole, _descended(end.whole, ends, exact=True))
+    if end.problem.n_x:
+        plant, ends = _told_apart(plant, setting, end.problem, _descended(end.problem, ends, exact=True))
     return Begun(plant, records, ends, setting.budget is not None and setting.budget.cut)
 
 
@@ -120,8 +120,8 @@ def _searched(plant: Any, setting: Setting) -> _End:
 
 
 def _gone_on(end: _End) -> _End:
-    points = end.plant.beyond(end.whole.space, end.ends)
-    return end._replace(ends=_descended(end.whole, points, exact=False)[:1]) if len(points) > 1 else end
+    points = end.plant.beyond(end.problem.space, end.ends)
+    return end._replace(ends=_descended(end.problem, points, exact=False)[:1]) if len(points) > 1 else end
 
 
 def _with_law(plant: Any, setting: Setting) -> tuple[Any, _Law]:
@@ -160,22 +160,22 @@ def _behind_inputs(plant: Any, law: Any, setting: Setting) -> tuple[Any, list[Co
 
 def _all_at_once(plant: Any, known: Sequence[Coordinates], setting: Setting, spread_laws: bool = False) -> _End:
     """End of a search for all parts from these coordinates, and if asked from laws all over their box."""
-    whole = setting.problem(plant.begun(known))
-    if not whole.n_x:
-        return _End(plant, whole, np.empty((1, 0)))
-    starts = _best_starts(whole)
+    problem = setting.problem(plant.begun(known))
+    if not problem.n_x:
+        return _End(plant, problem, np.empty((1, 0)))
+    starts = _best_starts(problem)
     if spread_laws:
-        starts = np.concatenate([starts, _beside_laws(whole, starts[:1], setting.seed)])
-    return _End(plant, whole, _descended(whole, starts, exact=False)[:1])
+        starts = np.concatenate([starts, _beside_laws(problem, starts[:1], setting.seed)])
+    return _End(plant, problem, _descended(problem, starts, exact=False)[:1])
 
 
-def _beside_laws(whole: Problem, begun: FloatArray, seed: int) -> FloatArray:
+def _beside_laws(problem: Problem, begun: FloatArray, seed: int) -> FloatArray:
     """The best points of many laws, with the other coordinates of one point."""
-    space = whole.space
+    space = problem.space
     of_law = [k for k, name in enumerate(space.coordinates) if name.startswith("hysteresis.")]
     points = np.repeat(begun, _SPREAD_LAWS, axis=0)
     points[:, of_law] = spread(space, _SPREAD_LAWS, seed)[:, of_law]
-    return apart(space, points, whole.costs(points), _APART_LAWS, _BEST)
+    return apart(space, points, problem.costs(points), _APART_LAWS, _BEST)
 
 
 def _grown(plant: Any, law: Any, setting: Setting) -> tuple[Any, list[Coordinates]]:
@@ -240,21 +240,21 @@ def _on_all(
     return _parts_only(attempt, _descended(attempt, _best_starts(attempt), exact=False)[:_KEPT])
 
 
-def _told_apart(plant: Any, setting: Setting, whole: Problem, ends: FloatArray) -> tuple[Any, FloatArray]:
+def _told_apart(plant: Any, setting: Setting, problem: Problem, ends: FloatArray) -> tuple[Any, FloatArray]:
     """The plant without what the records do not determine, and where its search ends."""
     for _ in range(_MOST_ROUNDS):
-        theta = whole.completed(ends[:1])[0]
-        spread = _stderr(whole, theta)
-        doubts = plant.doubts(whole.estimates(theta), setting.freedom)
+        theta = problem.completed(ends[:1])[0]
+        spread = _stderr(problem, theta)
+        doubts = plant.doubts(problem.estimates(theta), setting.freedom)
         sizes = [_excess(spread[doubt.name], doubt.largest) for doubt in doubts if doubt.name in spread]
         if not sizes or max(sizes) <= 1.0:
             break
-        known = _parts_only(whole, ends[:1])
+        known = _parts_only(problem, ends[:1])
         plant = _tried([doubt for doubt in doubts if doubt.name in spread][int(np.argmax(sizes))].without, setting)
-        whole = setting.problem(plant.begun(known))
-        if not whole.n_x:
+        problem = setting.problem(plant.begun(known))
+        if not problem.n_x:
             return plant, np.empty((1, 0))
-        ends = _descended(whole, _best_starts(whole)[:1], exact=True)
+        ends = _descended(problem, _best_starts(problem)[:1], exact=True)
     return plant, ends
 
 
@@ -262,11 +262,11 @@ def _excess(stderr: float, largest: float) -> float:
     return math.inf if math.isnan(stderr) else stderr / largest
 
 
-def _stderr(whole: Problem, theta: FloatArray) -> dict[str, float]:
-    residual = whole.y - whole.model(theta[np.newaxis])[0]
-    variance = float(np.average(residual**2, weights=whole.weights)) or 1e-300
-    covariance = uncertainty(whole, theta, np.full(residual.size, 1.0 / variance)).covariance
-    return dict(zip(whole.space.names, np.sqrt(np.diag(covariance)).tolist(), strict=True))
+def _stderr(problem: Problem, theta: FloatArray) -> dict[str, float]:
+    residual = problem.y - problem.model(theta[np.newaxis])[0]
+    variance = float(np.average(residual**2, weights=problem.weights)) or 1e-300
+    covariance = uncertainty(problem, theta, np.full(residual.size, 1.0 / variance)).covariance
+    return dict(zip(problem.space.names, np.sqrt(np.diag(covariance)).tolist(), strict=True))
 
 
 def _best_starts(attempt: Problem) -> FloatArray:

@@ -56,8 +56,8 @@ class Uncertainty:
         """
         if self.slopes is None:
             return self
-        moved = (disturbances * curvature) @ np.nan_to_num(self.slopes) @ self.with_names
-        return replace(self, covariance=self.covariance + moved.T @ moved / len(disturbances))
+        changes = (disturbances * curvature) @ np.nan_to_num(self.slopes) @ self.with_names
+        return replace(self, covariance=self.covariance + changes.T @ changes / len(disturbances))
 
 
 def uncertainty(problem: Problem, theta: FloatArray, curvature: FloatArray) -> Uncertainty:
@@ -202,17 +202,17 @@ def _bounds_in_words(
     space, x = problem.space, theta[: problem.n_x]
     values = dict(zip(space.names, problem.named(theta[np.newaxis])[0].tolist(), strict=True))
     is_open = np.logical_or(*space.open_sides(x))
-    search, physical, given = list[str](), list[str](), list[str]()
+    search, physical, user = list[str](), list[str](), list[str]()
     for k in np.flatnonzero(at_side).tolist():
         name, is_upper = space.coordinates[k], bool(space.upper[k] - x[k] < x[k] - space.lower[k])
-        moved = [each for each, slope in zip(space.names, way_back[:, k], strict=True) if slope]
-        told = given if space.given.get(name, (False, False))[is_upper] else physical
-        (search if is_open[k] else told).extend([name] if name in values else moved)
+        affected = [each for each, slope in zip(space.names, way_back[:, k], strict=True) if slope]
+        told = user if space.by_user.get(name, (False, False))[is_upper] else physical
+        (search if is_open[k] else told).extend([name] if name in values else affected)
     for name, value, low, high in zip(space.linear, theta[problem.n_x :].tolist(), *problem.linear_box(), strict=True):
         if value in (low, high):
-            (given if space.given.get(name, (False, False))[int(value == high)] else physical).append(name)
+            (user if space.by_user.get(name, (False, False))[int(value == high)] else physical).append(name)
     stopped = [f"{_at(search, values, 'reached', 'search bound')}: widen it with bounds="] if search else []
-    kinds = {"physical bound": physical, "given bound": given}
+    kinds = {"physical bound": physical, "given bound": user}
     others = [_at(names, values, "is at", kind) for kind, names in kinds.items() if names]
     return tuple(stopped), others
 

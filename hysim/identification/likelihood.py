@@ -62,11 +62,11 @@ def _freedom(
     own = problem(model, records, Freedom(), None).own
     names = {*own.names, *own.held}
     free = tuple(dict.fromkeys(name if name in names else name.rpartition("[")[0] for name in fit.free_names))
-    left = () if initial is None else own.state
-    fixed = {name: value for name, value in fit.estimates.items() if name in names and name not in (*free, *left)}
+    states = () if initial is None else own.state
+    fixed = {name: value for name, value in fit.estimates.items() if name in names and name not in (*free, *states)}
     if initial is None and set(own.state) & set(free):
         initial = "free"
-    return Freedom(fixed, tuple(name for name in free if name not in left), {}), initial
+    return Freedom(fixed, tuple(name for name in free if name not in states), {}), initial
 
 
 def _check_same(fit: Identification, problem: Problem, starts: Sequence[FloatArray]) -> None:

@@ -515,6 +515,6 @@ def _initial_curve(H: FloatArray, B: FloatArray, tolerance: float) -> tuple[floa
         return math.nan, math.nan
     first = turns(H, tolerance).branches[0]
     field, induction = H[first] - H[0], B[first] - B[0]
-    moved = field != 0.0
-    ratios = induction[moved] / field[moved]
+    nonzero = field != 0.0
+    ratios = induction[nonzero] / field[nonzero]
     return float(ratios[0]), float(ratios.max())

@@ -121,8 +121,8 @@ class CascadeStructure(Subject, Composable):
 
     def assumed_states(self, record: Record) -> tuple[str, ...]:
         """The states that the stages from the carrier on leave to the record; a cascade has no cycle ahead of it."""
-        seen = self._record_at(labels(self.stages)[self.carrier], record)
-        return tuple(state for state in common_states(self._with_state, seen) if state != "periodic")
+        stage_record = self._record_at(labels(self.stages)[self.carrier], record)
+        return tuple(state for state in common_states(self._with_state, stage_record) if state != "periodic")
 
     def variants(self) -> tuple[Variant, ...]:
         carrier = {labels(self.stages)[self.carrier]: self.stages[self.carrier]}

@@ -169,8 +169,8 @@ class Dependent:
         TypeError if a parameter that depends on a varying channel cannot change from sample to sample.
         """
         inputs = read_only(u, "u", ndim=1)
-        given = checked_channels(channels or {}, inputs.size)
-        values = self._needed(given)
+        checked = checked_channels(channels or {}, inputs.size)
+        values = self._needed(checked)
         self._warn(values)
         if not any(isinstance(value, np.ndarray) for value in values.values()):
             return response_of(self.constant(values), inputs, sample_time)

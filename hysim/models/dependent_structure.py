@@ -58,14 +58,14 @@ def expanded(
     def parameters(x: FloatArray) -> dict[str, FloatArray]:
         sets = np.atleast_2d(x)
         middle = base(sets)
-        found = dict(space.parameters(middle))
+        values = dict(space.parameters(middle))
         for each, columns in several.items():
-            del found[each]
+            del values[each]
             for name, j in zip(names[each], columns, strict=True):
                 at_place = middle.copy()
                 at_place[:, places[j]] = sets[:, j]
-                found[name] = space.parameters(at_place)[each]
-        return found
+                values[name] = space.parameters(at_place)[each]
+        return values
 
     def expanded_names(known: Sequence[str]) -> tuple[str, ...]:
         return tuple(name for each in known for name in names.get(each, (each,)))

@@ -164,7 +164,7 @@ def common_states(parts: Mapping[str, Any], record: Record) -> tuple[str, ...]:
 
 def combined_variants(parts: Mapping[str, Any], assembled: Callable[[Mapping[str, Any]], Any]) -> tuple[Variant, ...]:
     """Every combination of the parts' variants; `assembled` gives the whole with other parts by their labels."""
-    choices = {label: found for label, part in parts.items() if (found := searched(part).variants())}
+    choices = {label: variants for label, part in parts.items() if (variants := searched(part).variants())}
     if not choices:
         return ()
     return tuple(

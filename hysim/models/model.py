@@ -147,11 +147,11 @@ def candidates() -> dict[str, Any]:
     ['BoucWen', 'PolynomialBoucWen']
     """
     families = every_family()
-    found: dict[str, Any] = {}
+    collected: dict[str, Any] = {}
     for name in (*MODULE_OF, *(name for name in families if name not in MODULE_OF)):
         if name in families:
-            found |= _of_family(name, families[name])
-    return found
+            collected |= _of_family(name, families[name])
+    return collected
 
 
 def family_named(name: str) -> Any:
@@ -191,12 +191,12 @@ def short_names() -> dict[str, str]:
 def candidates_named(name: str) -> dict[str, Any]:
     """Candidates of `hysim.compare` in the family of this name, by the names of rows; ValueError if unknown."""
     family = family_named(name)
-    found = _of_family(family.__name__, family)
-    if not found:
+    collected = _of_family(family.__name__, family)
+    if not collected:
         raise ValueError(
             f"the family {family.__name__} needs more than its name: give a structure, or a model to start from"
         )
-    return found
+    return collected
 
 
 def is_identifiable(subject: Any) -> bool:

@@ -63,12 +63,12 @@ class SearchSpace:
         Random points that a search should try beside the starts, where one evaluation is dear; 0 for none.
     drawn : tuple of two arrays, shape (n_x,) each, optional
         Lower and upper side of the part of the box from which these points are drawn; by default all of it.
-    whole : tuple of two arrays, shape (n_x,) each, optional
+    outer : tuple of two arrays, shape (n_x,) each, optional
         The box of which this one is the part with the admissible laws: only its sides are search bounds.
     physical : mapping
         Coordinate to whether its lower and its upper side is a limit of physics or of the law itself: an optimum there
         is one. At other sides that the user has not given the search has stopped, and the box is widened.
-    given : mapping
+    by_user : mapping
         Searched or linear parameter to whether its lower and its upper bound is the user's.
     encoded : callable, optional
         The user's parameters by name, as far as they differ from the start, to coordinates, shape (n_x,).
@@ -89,20 +89,20 @@ class SearchSpace:
     state: tuple[str, ...] = ()
     screened: int | None = None
     drawn: tuple[FloatArray, FloatArray] | None = None
-    whole: tuple[FloatArray, FloatArray] | None = None
+    outer: tuple[FloatArray, FloatArray] | None = None
     physical: Mapping[str, tuple[bool, bool]] = field(default_factory=dict)
-    given: Mapping[str, tuple[bool, bool]] = field(default_factory=dict)
+    by_user: Mapping[str, tuple[bool, bool]] = field(default_factory=dict)
     encoded: Callable[[Mapping[str, float]], FloatArray] | None = None
 
     def sides(self, kind: Mapping[str, tuple[bool, bool]]) -> tuple[Flags, Flags]:
-        """Which lower and upper sides of the box (n_x,) are of a kind, such as `physical` or `given`."""
+        """Which lower and upper sides of the box (n_x,) are of a kind, such as `physical` or `by_user`."""
         lower, upper = np.array([kind.get(name, (False, False)) for name in self.coordinates]).reshape(-1, 2).T
         return lower.astype(bool), upper.astype(bool)
 
     def open_sides(self, x: FloatArray) -> tuple[Flags, Flags]:
         """The lower and the upper sides at which `x` (n_x,) stands, and which are neither physical nor the user's."""
-        closed = zip(self.ends(x), self.sides(self.physical), self.sides(self.given), strict=True)
-        low, high = (at & ~physical & ~given for at, physical, given in closed)
+        closed = zip(self.ends(x), self.sides(self.physical), self.sides(self.by_user), strict=True)
+        low, high = (at & ~physical & ~user for at, physical, user in closed)
         return low, high
 
     def at_sides(self, x: FloatArray) -> tuple[Flags, Flags]:
@@ -113,9 +113,9 @@ class SearchSpace:
     def ends(self, x: FloatArray) -> tuple[Flags, Flags]:
         """As `at_sides`, without the sides that part the admissible laws from the others."""
         low, high = self.at_sides(x)
-        if self.whole is None:
+        if self.outer is None:
             return low, high
-        return low & (self.lower <= self.whole[0]), high & (self.upper >= self.whole[1])
+        return low & (self.lower <= self.outer[0]), high & (self.upper >= self.outer[1])
 
     def widened(self, low: Flags, high: Flags) -> "SearchSpace":
         """The space whose box reaches a quarter of its width beyond these sides."""
@@ -125,8 +125,8 @@ class SearchSpace:
             name: (np.where(below == self.lower, lower, below), np.where(above == self.upper, upper, above))
             for name, (below, above) in self.regions.items()
         }
-        whole = None if self.whole is None else (np.minimum(self.whole[0], lower), np.maximum(self.whole[1], upper))
-        return replace(self, lower=lower, upper=upper, regions=regions, whole=whole)
+        outer = None if self.outer is None else (np.minimum(self.outer[0], lower), np.maximum(self.outer[1], upper))
+        return replace(self, lower=lower, upper=upper, regions=regions, outer=outer)
 
     @classmethod
     def without_coordinates(cls, names: tuple[str, ...]) -> "SearchSpace":

@@ -71,9 +71,9 @@ def states_of(cls: Any) -> int:
     n = len(inspect.signature(said["slope"]).parameters) - 3
     takes = {"slope": (n + 3,), "output": range(3, n + 3), "longest": (n + 3,), "flows": (1,), "flow": (4,)}
     for name, function in said.items():
-        given = inspect.signature(function).parameters.values()
-        plain = all(each.kind is each.POSITIONAL_OR_KEYWORD and each.default is each.empty for each in given)
-        if n < 1 or not plain or len(given) not in takes[name]:
+        taken = inspect.signature(function).parameters.values()
+        plain = all(each.kind is each.POSITIONAL_OR_KEYWORD and each.default is each.empty for each in taken)
+        if n < 1 or not plain or len(taken) not in takes[name]:
             raise TypeError(f"the {name} of {cls.__name__} takes other arguments: see hysim.Law")
     if ("flow" in said) != ("flows" in said):
         raise TypeError(f"{cls.__name__} must define both flow and flows, or neither")

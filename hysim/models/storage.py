@@ -133,18 +133,18 @@ def _members(value: Any) -> Iterable[Any]:
 
 def from_document(document: Mapping[str, Any], path: str | Path) -> Any:
     """The model of a family with its parameters, models among them; `path` is what the messages call its place."""
-    family, given = document["family"], document["parameters"]
+    family, stored = document["family"], document["parameters"]
     if not isinstance(family, str):
         raise ValueError(f"{path} does not hold a model of hysim: the family must be a name, got {_shown(family)}")
-    if not isinstance(given, Mapping):
-        raise ValueError(f"{path} does not hold a {family}: parameters must be a mapping, got {_shown(given)}")
+    if not isinstance(stored, Mapping):
+        raise ValueError(f"{path} does not hold a {family}: parameters must be a mapping, got {_shown(stored)}")
     if family in MODULE_OF:
         importlib.import_module(MODULE_OF[family])  # enters it into the families
     if family not in FAMILIES:
         known = ", ".join(sorted(every_family()))
         raise ValueError(f"{path} holds a model of the family {_shown(family)}; there are {known}")
     try:
-        parameters = {name: _value(value, path) for name, value in given.items()}
+        parameters = {name: _value(value, path) for name, value in stored.items()}
         loaded = FAMILIES[family](**parameters)
     except (ArithmeticError, AttributeError, LookupError, TypeError, ValueError) as error:
         raise ValueError(f"{path} does not hold a {family}: {_one_line(error)}") from None

@@ -225,9 +225,9 @@ class SumStructure(Subject, Composable):
 
     def search_space(self, record: Record, freedom: Freedom = ALL_FREE) -> SearchSpace:
         """The parts' spaces side by side; of columns that repeat each other one is free."""
-        found = self._identified
+        identified = self._identified
         spaces = declared(
-            {label: lambda free, part=part: part.search_space(record, free) for label, part in found.items()},  # type: ignore[misc]
+            {label: lambda free, part=part: part.search_space(record, free) for label, part in identified.items()},  # type: ignore[misc]
             freedom,
         )
         joint = together(spaces)
@@ -239,10 +239,10 @@ class SumStructure(Subject, Composable):
         )
 
     def regressors(self, parameters: Parameters, record: Record) -> FloatArray:
-        found = self._identified
+        identified = self._identified
         known = [part for part in self.parts if not isinstance(part, Identifiable)]
         fixed = sum((response_of(part, record.u, time_of(part, record)) for part in known), np.zeros(len(record)))
-        blocks = [part.regressors(own(parameters, label), record) for label, part in found.items()]
+        blocks = [part.regressors(own(parameters, label), record) for label, part in identified.items()]
         return columns_beside(blocks, fixed[np.newaxis, :, np.newaxis])
 
     def steady(self, parameters: Parameters, record: Record) -> dict[str, Any]:
@@ -251,10 +251,10 @@ class SumStructure(Subject, Composable):
         for label, part in self._identified.items():
             if part.search_space(moving).state:  # which does not depend on how the input moves, but needs it to
                 try:
-                    found = part.steady(own(parameters, label), record)
+                    states_of_part = part.steady(own(parameters, label), record)
                 except ValueError as error:
                     raise ValueError(f"{label}: {error}") from None
-                states |= {f"{label}.{name}": value for name, value in found.items()}
+                states |= {f"{label}.{name}": value for name, value in states_of_part.items()}
         return {**parameters, **states}
 
     def assemble(self, parameters: Mapping[str, float]) -> Any:
@@ -263,9 +263,9 @@ class SumStructure(Subject, Composable):
     def notes(self, record: Record, model: Any) -> tuple[str, ...]:
         return tuple(
             f"{label}: {note}"
-            for label, part, found in zip(labels(self.parts), self.parts, model.parts, strict=True)
-            if isinstance(part, Identifiable) and not needs_time(found)
-            for note in part.notes(record, found)
+            for label, part, fitted in zip(labels(self.parts), self.parts, model.parts, strict=True)
+            if isinstance(part, Identifiable) and not needs_time(fitted)
+            for note in part.notes(record, fitted)
         )
 
     def assumed_states(self, record: Record) -> tuple[str, ...]:

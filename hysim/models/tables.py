@@ -28,9 +28,9 @@ def scalars_of(values: Mapping[str, Any]) -> dict[str, float]:
 def arguments_of(scalars: Mapping[str, float]) -> dict[str, Any]:
     arguments: dict[str, Any] = {}
     for name, value in scalars.items():
-        whole, bracket, _ = name.partition("[")
+        base, bracket, _ = name.partition("[")
         number = value if type(value) is float else float(np.asarray(value).item())
-        arguments[whole] = (*arguments.get(whole, ()), number) if bracket else number
+        arguments[base] = (*arguments.get(base, ()), number) if bracket else number
     return arguments
 
 
@@ -56,12 +56,12 @@ def tables_of(
     if inputs.ndim != 2:
         raise ValueError(f"u must have 1 axis or 2, got shape {inputs.shape}")
     parameters = {name: value for name, value in parameters.items() if value is not None}
-    whole = {**defaults, **{name: value for name, value in parameters.items() if "[" not in name}}
+    complete = {**defaults, **{name: value for name, value in parameters.items() if "[" not in name}}
     elements = {name: value for name, value in parameters.items() if "[" in name}
-    for name in (*whole, *(name.partition("[")[0] for name in elements)):
+    for name in (*complete, *(name.partition("[")[0] for name in elements)):
         if name not in defaults:
             raise TypeError(f"unknown parameter {name!r}: {family} has {among(name, defaults)}")
-    tables = {name: _table(name, value, np.ndim(defaults[name])) for name, value in whole.items()}
+    tables = {name: _table(name, value, np.ndim(defaults[name])) for name, value in complete.items()}
     columns = {name: _table(name, value, 0) for name, value in elements.items()}
     lengths = {name: len(table) for name, table in {**tables, **columns, "u": inputs}.items() if len(table) != 1}
     if len(set(lengths.values())) > 1:

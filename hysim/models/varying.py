@@ -254,9 +254,9 @@ def check_memory_is_its_own(law: Any, names: Iterable[str], record: Record) -> N
         for name, part in zip(labels(law.parts), law.parts, strict=True):
             check_memory_is_its_own(part, own(dict.fromkeys(names), name), record)
     elif isinstance(law, Law) and names and law.initial_names:
-        moved = law.with_scalars({name: law.scalars[name] + k for k, name in enumerate(names, 1)})
+        changed = law.with_scalars({name: law.scalars[name] + k for k, name in enumerate(names, 1)})
         path_through = np.array([record.u[0], record.u.max(), record.u.min()])
-        before, after = (each.remembered(path_through) for each in (law, moved))
+        before, after = (each.remembered(path_through) for each in (law, changed))
         if not np.allclose(before, after, rtol=_DISTURBED, atol=0.0):
             raise ValueError(
                 f"{' or '.join(names)} of a {type(law).__name__} moves its memory, and cannot vary along a record; "

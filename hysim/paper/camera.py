@@ -111,10 +111,10 @@ def hysteresis_cameras(law: Any, starts: Starts) -> list[CameraLoop]:
         samples = round(PERIOD / task.sample_time)
         reference, last = _triangle(samples), slice(-MEASURED * samples, None)
         before = np.interp(task.sample_time * np.arange(reference.size), opened.t, opened.y)
-        run, seen = next(_runs(task, pid, reference, before))
+        run, reading = next(_runs(task, pid, reference, before))
         return {
             "true_reduction_percent": reduction_percent(open_width, _width(run.y, samples)),
-            "measured_reduction_percent": reduction_percent(_width(seen, samples), _width(run.measurement, samples)),
+            "measured_reduction_percent": reduction_percent(_width(reading, samples), _width(run.measurement, samples)),
             "tracking_rms": rmse(reference[last], run.y[last]),
             "saturated_percent": 100.0 * float(np.mean(run.drive != run.command)),
         }
@@ -135,8 +135,8 @@ def vibration_cameras(starts: Starts) -> list[CameraLoop]:
         reference = np.full(t.size, -1.0)
         opened = RestingPlant(plant, task.sample_time).driven(reference / plant.dc_gain)
         figures = []
-        for run, seen in _runs(task, pid, reference, opened):
-            pairs = ((opened, run.y), (seen, run.measurement))
+        for run, camera_open in _runs(task, pid, reference, opened):
+            pairs = ((opened, run.y), (camera_open, run.measurement))
             figures.append([_least(vibration_reduction(t, *pair, decay_rate=decay)) for pair in pairs])
         true, by_camera = (_middle([row[k] for row in figures]) for k in range(2))
         return {
@@ -245,15 +245,15 @@ def _cameras(
         for rate, ideal in ideals.items()
         for sensor in SENSORS
     }
-    found: dict[_Camera, Found] = {}
+    controllers: dict[_Camera, Found] = {}
     for camera, task in tasks.items():
         best = confirmed(task, starts, exact=False, check=_CHECKED)
         if best is None:
-            found = _searched_all(ideals, tasks, noises)
+            controllers = _searched_all(ideals, tasks, noises)
             break
-        found[camera] = best
+        controllers[camera] = best
     loops: list[CameraLoop] = []
-    for (rate, quantum, shake), best in found.items():
+    for (rate, quantum, shake), best in controllers.items():
         task = _behind(ideals[rate], (quantum, shake), NOISES, seed=_SEED)
         figures, step = measured(task, best.controller), quantum * PIXEL
         loops.append(CameraLoop(plant=plant, frame_rate=rate, quantum=step, shake=shake, found=best, **figures))
@@ -265,7 +265,7 @@ def _searched_all(ideals: Mapping[float, Task], tasks: Mapping[_Camera, Task], n
 
     In the end the best of all that were found is taken, by its task behind several noises.
     """
-    found: dict[_Camera, Found] = {}
+    controllers: dict[_Camera, Found] = {}
     slower: list[PID] = []  # controllers of the camera of a smaller rate
     for rate, ideal in ideals.items():
         pids: list[PID] = []
@@ -282,12 +282,12 @@ def _searched_all(ideals: Mapping[float, Task], tasks: Mapping[_Camera, Task], n
             (rate, *sensor): _searched(tasks[rate, *sensor], [*pids, *slower[k : k + 1]], _COMPARED)
             for k, sensor in enumerate(SENSORS)
         }
-        found |= best
+        controllers |= best
         slower = [  # next the derivative as smooth, at many times the rate
             replace(each.controller, derivative_filter=each.controller.derivative_filter + 0.7 * ideal.sample_time)
             for each in best.values()
         ]
-    return found
+    return controllers
 
 
 def _behind(task: Task, sensor: tuple[float, float], noises: int, seed: int = 0) -> Task:

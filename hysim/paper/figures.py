@@ -178,9 +178,9 @@ def periods_figure(rows: Sequence[Mapping[str, float]]) -> plot.Figure:
     return canvas
 
 
-def evidence_figure(found: Evidence) -> plot.Figure:
+def evidence_figure(evidence: Evidence) -> plot.Figure:
     """ln of the evidence of each model, for each size of the boxes."""
-    return _drawn(1.3 + 0.34 * len(found.rows), lambda canvas: plot.evidence(found, canvas.add_subplot()))
+    return _drawn(1.3 + 0.34 * len(evidence.rows), lambda canvas: plot.evidence(evidence, canvas.add_subplot()))
 
 
 @plot.house_style()

@@ -113,14 +113,14 @@ def on_equations(starts: Starts) -> Loops:
         supply = replace(supply, name=f"{name}, step within the supply")
         beyond = optimum(supply, starts, **(_longer(seed=2) if name == "eq4" else {}))
         cases = ((-1.0, SUPPLY, beyond), (-1.0, ABOUT_34_V, within), (1.0, ABOUT_34_V, within), (-1.0, None, within))
-        steps += [_step(name, plant, found, size, limits, DURATION, UNIT_STEP) for size, limits, found in cases]
+        steps += [_step(name, plant, best, size, limits, DURATION, UNIT_STEP) for size, limits, best in cases]
         squares += [_square(name, plant, within, period) for period in SQUARE_PERIODS]
     task = step_task(EQUATION_1, step=1.0, limits=SUPPLY, duration=40.0, sample_time=SAMPLE_TIME)
-    found = optimum(replace(task, name="eq1, step"), starts, **_longer(seed=6))
-    steps.append(_step("eq1", EQUATION_1, found, 1.0, SUPPLY, 60.0, SAMPLE_TIME))
+    best = optimum(replace(task, name="eq1, step"), starts, **_longer(seed=6))
+    steps.append(_step("eq1", EQUATION_1, best, 1.0, SUPPLY, 60.0, SAMPLE_TIME))
     alone = Actuator(vibration=EQUATION_1)
-    found = optimum(_triangle_task("eq1", alone, 0.0, cycles=3), starts, **_longer(seed=3, generations=60))
-    triangles = tuple(_triangle("eq1", alone, found, 0.0, limits) for limits in (SUPPLY, None))
+    best = optimum(_triangle_task("eq1", alone, 0.0, cycles=3), starts, **_longer(seed=3, generations=60))
+    triangles = tuple(_triangle("eq1", alone, best, 0.0, limits) for limits in (SUPPLY, None))
     return Loops(hysteresis=triangles, steps=tuple(steps), squares=tuple(squares), law_width=math.nan)
 
 
@@ -130,8 +130,8 @@ def with_law(others: Loops, law: Any, starts: Starts) -> Loops:
     The law gives the displacement [um] for the voltage [V], bounded over repeated cycles.
     """
     plant = law_plant(law)
-    found = optimum(_triangle_task("bouc-wen+eq7", plant, 0.1, cycles=2), starts)
-    on_law = tuple(_triangle("bouc-wen+eq7", plant, found, low, SUPPLY) for low in (0.1, 0.0))
+    best = optimum(_triangle_task("bouc-wen+eq7", plant, 0.1, cycles=2), starts)
+    on_law = tuple(_triangle("bouc-wen+eq7", plant, best, low, SUPPLY) for low in (0.1, 0.0))
     width = _width_of_law(law, on_law[0].assessment)
     return replace(others, hysteresis=(*on_law, *others.hysteresis), law_width=width)
 
@@ -173,10 +173,10 @@ def _triangle_task(name: str, plant: Actuator, low: float, cycles: int) -> Task:
     return replace(task, name=f"{name}, triangle")
 
 
-def _triangle(name: str, plant: Actuator, found: Found, low: float, limits: Limits) -> HysteresisCase:
-    pid = replace(found.controller, limits=limits)
+def _triangle(name: str, plant: Actuator, best: Found, low: float, limits: Limits) -> HysteresisCase:
+    pid = replace(best.controller, limits=limits)
     assessment = assess_hysteresis(plant, pid, low=low, high=HIGH, period=PERIOD, sample_time=SAMPLE_TIME)
-    return Case(name, f"triangle {low:g} to {HIGH:g} um, {PERIOD:g} s, 10 cycles", PERIOD, found, limits, assessment)
+    return Case(name, f"triangle {low:g} to {HIGH:g} um, {PERIOD:g} s, 10 cycles", PERIOD, best, limits, assessment)
 
 
 def _width_of_law(law: Any, assessment: HysteresisAssessment) -> float:
@@ -186,20 +186,20 @@ def _width_of_law(law: Any, assessment: HysteresisAssessment) -> float:
 
 
 def _step(
-    name: str, plant: TransferFunction, found: Found, size: float, limits: Limits, duration: float, sample_time: float
+    name: str, plant: TransferFunction, best: Found, size: float, limits: Limits, duration: float, sample_time: float
 ) -> StepCase:
-    pid = replace(found.controller, limits=limits)
+    pid = replace(best.controller, limits=limits)
     assessment = assess_step(plant, pid, step=size, duration=duration, sample_time=sample_time)
-    return Case(name, f"step {size:+g} um", None, found, limits, assessment)
+    return Case(name, f"step {size:+g} um", None, best, limits, assessment)
 
 
-def _square(name: str, plant: TransferFunction, found: Found, period: float) -> SquareCase:
+def _square(name: str, plant: TransferFunction, best: Found, period: float) -> SquareCase:
     periods = round(DURATION / period)
     assessment = assess_square_wave(
-        plant, found.controller, low=-0.5, high=0.5, period=period, sample_time=UNIT_STEP, periods=periods
+        plant, best.controller, low=-0.5, high=0.5, period=period, sample_time=UNIT_STEP, periods=periods
     )
     reference = f"square wave -0.5 to 0.5 um, period {period:g} samples"
-    return Case(name, reference, period, found, ABOUT_34_V, assessment)
+    return Case(name, reference, period, best, ABOUT_34_V, assessment)
 
 
 def _head(case: Case[Any]) -> Row:

@@ -92,9 +92,9 @@ def left_out(name: str) -> NestedError | None:
 
 def preference() -> str:
     """Which model the points prefer, and how surely; one sentence."""
-    found = stored_evidence()
+    evidence = stored_evidence()
     boxes = "the boxes of their priors halved, as they are and doubled"
-    return f"Of {len(found.rows)} models, {found.sentence} ({boxes})."
+    return f"Of {len(evidence.rows)} models, {evidence.sentence} ({boxes})."
 
 
 def beside_nested() -> str:
@@ -115,14 +115,14 @@ def beside_nested() -> str:
 
 def preference_measures() -> dict[str, Any]:
     """The evidences as the summary has them."""
-    found = stored_evidence()
+    evidence = stored_evidence()
     return {
         "sentence": preference(),
-        "noise": found.noise,
-        "boxes": list(found.factors),
-        "undecided": list(found.undecided),
-        "best": list(found.best),
-        "models": {name: _measures(found, name) for name in found.names},
+        "noise": evidence.noise,
+        "boxes": list(evidence.factors),
+        "undecided": list(evidence.undecided),
+        "best": list(evidence.best),
+        "models": {name: _measures(evidence, name) for name in evidence.names},
     }
 
 
@@ -138,13 +138,13 @@ def preference_rows() -> list[dict[str, Any]]:
     return rows
 
 
-def _measures(found: Evidence, name: str) -> dict[str, Any]:
-    row, error = found[name], left_out(name)
+def _measures(evidence: Evidence, name: str) -> dict[str, Any]:
+    row, error = evidence[name], left_out(name)
     return {
         "n_parameters": row.n_parameters,
         "log_evidence": list(row.log_evidence),
         "error": list(row.error),
-        "probability": [found.probabilities(factor)[name] for factor in found.factors],
+        "probability": [evidence.probabilities(factor)[name] for factor in evidence.factors],
         "nested_sampling": list(by_nested_sampling().get(name, ())) or None,
         "left_out_rmse_um": None if error is None else error.left_out_rmse,
     }

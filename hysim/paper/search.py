@@ -232,7 +232,7 @@ def stored_starts() -> Starts:
 
 def as_stored(every: Iterable[Found]) -> str:
     """The optima of full searches in the form in which they are stored."""
-    optima = {found.name: {"point": found.point, "cost": found.cost} for found in every}
+    optima = {each.name: {"point": each.point, "cost": each.cost} for each in every}
     lines = ",\n".join(f"{json.dumps(name)}: {json.dumps(start)}" for name, start in optima.items())
     return f'{json.dumps(_limits_of_search())[:-1]}, "optima": {{\n{lines}\n}}}}\n'
 

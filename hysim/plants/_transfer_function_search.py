@@ -232,23 +232,23 @@ class UnitGain:
     def assemble(self, parameters: Mapping[str, float]) -> Any:
         return self.structure.assemble(parameters)
 
-    def _parameters(self, found: dict[str, FloatArray], shape: FloatArray) -> dict[str, FloatArray]:
+    def _parameters(self, values: dict[str, FloatArray], shape: FloatArray) -> dict[str, FloatArray]:
         """With the numerator; it is den_n in front of the last power."""
         m = self.structure.zeros
-        end = found[self.structure.denominator[-1]]
+        end = values[self.structure.denominator[-1]]
         mean = end ** (1.0 / self.structure.poles)
         numerator = {f"num[{k}]": end * np.sinh(shape[:, k]) / mean ** (m - k) for k in range(m)}
-        return found | numerator | {f"num[{m}]": end}
+        return values | numerator | {f"num[{m}]": end}
 
     def _shape(self, x: FloatArray, own: SearchSpace, record: Record) -> FloatArray:
         """Coordinates of the numerator that is best in front of the record, of one denominator."""
-        found = own.parameters(x[np.newaxis])
-        columns = self.structure.regressors(found, record)[0, :, :-1]
+        values = own.parameters(x[np.newaxis])
+        columns = self.structure.regressors(values, record)[0, :, :-1]
         m, n = self.structure.zeros, self.structure.poles
         columns = np.column_stack([columns[:, : m + 1], np.ones(len(record))])
         scale = np.linalg.norm(columns, axis=0)
         numerator = np.linalg.lstsq(columns / np.where(scale > 0.0, scale, 1.0), record.y, rcond=None)[0] / scale
-        mean = float(found[self.structure.denominator[-1]][0]) ** (1.0 / n)
+        mean = float(values[self.structure.denominator[-1]][0]) ** (1.0 / n)
         ratios = numerator[:m] / (numerator[m] or 1.0) * mean ** np.arange(m, 0.0, -1.0)
         return np.asarray(np.clip(np.arcsinh(ratios), -_WIDEST, _WIDEST))
 

@@ -322,9 +322,9 @@ class Actuator:
 
     def startable(self, sample_time: float | None = None, *, substeps: int | None = None) -> Startable:
         """A step from the command to what `measured` reads without noise; ValueError without a needed time [s]."""
-        whole = self.as_read
-        at_end = isinstance(whole.vibration, TransferFunction) and whole.vibration.sample == "end"
-        return whole.chain(self._any_time(sample_time), substeps).startable(at_end=at_end)
+        actuator = self.as_read
+        at_end = isinstance(actuator.vibration, TransferFunction) and actuator.vibration.sample == "end"
+        return actuator.chain(self._any_time(sample_time), substeps).startable(at_end=at_end)
 
     def compiled(
         self, u0: float = 0.0, *, sample_time: float | None = None, substeps: int | None = None

@@ -172,8 +172,8 @@ def between_samples(space: SearchSpace, end: FloatArray) -> FloatArray:
     """The end (1, n_x) of a descent, and points between whole samples of delay, where slopes jump."""
     if _DELAY not in space.coordinates:
         return end
-    whole = np.round(end[0, space.coordinates.index(_DELAY)])
-    return np.unique(np.concatenate([end, _spread(space, {_DELAY: whole + np.array(_MIDDLES)}, end)]), axis=0)
+    nearest = np.round(end[0, space.coordinates.index(_DELAY)])
+    return np.unique(np.concatenate([end, _spread(space, {_DELAY: nearest + np.array(_MIDDLES)}, end)]), axis=0)
 
 
 def _names(modes: int) -> tuple[str, str, str]:

@@ -148,8 +148,10 @@ class ActuatorStructure(Subject):
         if isinstance(self.law, ModalGains):
             return self._by_mode(self.law, parts, others, record)
         blocks = [
-            columns_through(law, shape, parts.of_input(others, name), partial(parts.stages, late=late, name=name), seen)
-            for name, law, shape, seen in self._laws(own(parameters, _LAW), record)
+            columns_through(
+                law, shape, parts.of_input(others, name), partial(parts.stages, late=late, name=name), reading
+            )
+            for name, law, shape, reading in self._laws(own(parameters, _LAW), record)
         ]
         return columns_beside(blocks)
 
@@ -157,8 +159,8 @@ class ActuatorStructure(Subject):
         """The law's memory after an input that stood still; ValueError for one that moved."""
         if np.ptp(record.u) > 0.0:
             raise ValueError('an actuator begins at rest, not in a cycle: initial="periodic" is not for it')
-        found = self.law.steady(own(parameters, _LAW), self.static(record))
-        return {f"{_LAW}.{name}": value for name, value in found.items()}
+        states = self.law.steady(own(parameters, _LAW), self.static(record))
+        return {f"{_LAW}.{name}": value for name, value in states.items()}
 
     def assemble(self, parameters: Mapping[str, float]) -> Any:
         parts, law = self.parts([]), self.law.assemble(own(parameters, _LAW))
@@ -281,15 +283,15 @@ class ActuatorStructure(Subject):
     def doubts(self, estimates: Mapping[str, float], freedom: Freedom) -> Sequence[Doubt]:
         """The parameters of the other parts than the law that the user does not name; at a bound only some of them."""
         named = {*freedom.fixed, *freedom.free, *freedom.bounds, *self.known}
-        found = []
+        doubts = []
         for part, (box, _) in self.parts([]).boxes().items():
             for each in box:
                 name = f"{part}.{each.name}"
                 value = estimates[name]
                 at_end = value <= each.lower * (1.0 + _NEAR) or value >= each.upper * (1.0 - _NEAR)
                 if name not in named and (not at_end or FREQUENCY in name or value == 0.0):
-                    found.append(self._doubt(name, value, freedom))
-        return [doubt for doubt in found if doubt is not None]
+                    doubts.append(self._doubt(name, value, freedom))
+        return [doubt for doubt in doubts if doubt is not None]
 
     def _doubt(self, name: str, value: float, freedom: Freedom) -> Doubt | None:
         """A reason to doubt one parameter, and the structure without it."""
@@ -337,11 +339,11 @@ class ActuatorStructure(Subject):
 
     def _by_mode(self, law: ModalGains, parts: LinearParts, others: Parameters, record: Record) -> FloatArray:
         """Columns (n_sets, n_samples, n_columns + 1) of the inputs through each mode, one, and zero."""
-        seen = [seen_by(record, name) for name in self.inputs]
+        law_records = [seen_by(record, name) for name in self.inputs]
         behind: list[tuple[Parameters, partial[Stages]]] = [(others, partial(parts.stages))]
         if self.modes:
             behind = [(parts.of_mode(others, k), partial(parts.one_mode, k=k)) for k in range(self.modes)]
-        blocks = [columns_through(law, {}, mine, stages, one) for mine, stages in behind for one in seen]
+        blocks = [columns_through(law, {}, mine, stages, one) for mine, stages in behind for one in law_records]
         n_sets = max(len(block) for block in blocks)
         blocks = [np.broadcast_to(block, (n_sets, *block.shape[1:])) for block in blocks]
         return np.concatenate([*(block[..., :1] for block in blocks), blocks[0][..., 1:]], axis=-1)

@@ -95,11 +95,11 @@ class Chain:
         creeping = 0 if creep is None else len(creep.weights)
         self.stage = sampled(self.linear, self.step, self.delay, creeping=creeping, **between)
         self.samples_late, part = whole_and_part(self.sensor.delay / sample_time)
-        self.seen_in, seen = -1, self.stage.output
+        self.seen_in, reading = -1, self.stage.output
         if part:
             self.seen_in, at = whole_and_part((1.0 - part) * self.substeps)
-            seen = seen_within(self.linear, self.step, self.delay, at, **between)
-        self.outputs = read_only([self.stage.output, seen])
+            reading = seen_within(self.linear, self.step, self.delay, at, **between)
+        self.outputs = read_only([self.stage.output, reading])
 
     @property
     def linear_block(self) -> FloatArray:

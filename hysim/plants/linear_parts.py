@@ -106,8 +106,8 @@ def creep_bank(creep: Any, shortest: float, longest: float) -> CreepBank | Creep
     if creep is False or creep is None or isinstance(creep, Creep):
         return creep or None
     if creep is True:
-        whole = Creep.per_decade(1.0, band=(_BAND[0], max(_BAND[1], longest)))
-        return CreepBank(whole.time_constants, whole.weights)
+        bank = Creep.per_decade(1.0, band=(_BAND[0], max(_BAND[1], longest)))
+        return CreepBank(bank.time_constants, bank.weights)
     if isinstance(creep, int):
         taus = np.geomspace(shortest, longest, creep + 2)[1:-1]
         decades = math.log10(longest / shortest) / (creep + 1)
@@ -305,9 +305,9 @@ def vibrations_of(start: Any, inputs: Sequence[str], modes: int) -> dict[str, Mo
     actuators = dict(zip(start.inputs, start.actuators, strict=True)) if several else {MAIN: start}
     if tuple(actuators) != tuple(inputs):
         raise ValueError(f"start has the inputs {', '.join(actuators)}; hysteresis those of {', '.join(inputs)}")
-    found = {name: each.vibration for name, each in actuators.items()}
-    for name, each in found.items():
+    vibrations = {name: each.vibration for name, each in actuators.items()}
+    for name, each in vibrations.items():
         if not isinstance(each, Modes) or len(each.gains) != modes:
             n = len(each.gains) if isinstance(each, Modes) else 0
             raise ValueError(f"start has {n} modes after {name}, and modes={modes}: give modes={n}")
-    return found
+    return vibrations

@@ -126,9 +126,9 @@ class MultiInputActuator:
         """
         inputs = read_only(u, "u", ndim=1)
         others = checked_channels(channels or {}, inputs.size)
-        seen = {name: inputs if name == MAIN else value_in(others, name, "the input") for name in self.inputs}
+        input_of = {name: inputs if name == MAIN else value_in(others, name, "the input") for name in self.inputs}
         return {
-            name: response_of(part, read_only(np.broadcast_to(seen[name], inputs.shape)), sample_time)
+            name: response_of(part, read_only(np.broadcast_to(input_of[name], inputs.shape)), sample_time)
             for name, part in zip(self.inputs, self.actuators, strict=True)
         }
 
@@ -158,8 +158,8 @@ class InputSum(Subject):
 
     def search_space(self, record: Record, freedom: Freedom = ALL_FREE) -> SearchSpace:
         """The laws' spaces side by side; of offsets only the last is free."""
-        seen = {name: seen_by(record, name) for name in self.laws}
-        spaces = {name: lambda free, name=name: self.laws[name].search_space(seen[name], free) for name in self.laws}
+        records = {name: seen_by(record, name) for name in self.laws}
+        spaces = {name: lambda free, name=name: self.laws[name].search_space(records[name], free) for name in self.laws}
         joint = together(declared(spaces, freedom))
         return without_repetition(joint, lambda x: self.regressors(joint.parameters(x), record)[..., :-1], {}, freedom)
 
@@ -173,12 +173,12 @@ class InputSum(Subject):
 
     def steady(self, parameters: Parameters, record: Record) -> dict[str, Any]:
         """The laws' memories after inputs that stood still at their first values."""
-        found: dict[str, Any] = {}
+        states: dict[str, Any] = {}
         for name, law in self.laws.items():
-            seen = seen_by(record, name)
-            still = replace(seen, u=np.full(len(seen), seen.u[0]))
-            found |= {f"{name}.{state}": value for state, value in law.steady(own(parameters, name), still).items()}
-        return found
+            law_record = seen_by(record, name)
+            still = replace(law_record, u=np.full(len(law_record), law_record.u[0]))
+            states |= {f"{name}.{state}": value for state, value in law.steady(own(parameters, name), still).items()}
+        return states
 
     def notes(self, record: Record, model: Any) -> tuple[str, ...]:
         """None: the laws are measured only through the parts after them."""

@@ -285,8 +285,8 @@ class OscillatorStructure(Subject):
             return signal
         if signal.size < self.period:
             raise ValueError(f"the record holds {signal.size} samples, less than a period of {self.period}")
-        whole = signal.size // self.period * self.period
-        return np.asarray(signal[:whole].reshape(-1, self.period).mean(axis=0))
+        n_full = signal.size // self.period * self.period
+        return np.asarray(signal[:n_full].reshape(-1, self.period).mean(axis=0))
 
     def fine_input(self, u: FloatArray) -> FloatArray:
         u, factor = self._mean_period(u), self.oversampling
@@ -349,7 +349,7 @@ def _unit_laws(y: FloatArray, held: Mapping[str, float], limits: Mapping[str, tu
 
 
 def _limits(
-    linear: Linear, held: Mapping[str, float], given: Mapping[str, tuple[float, float]]
+    linear: Linear, held: Mapping[str, float], user: Mapping[str, tuple[float, float]]
 ) -> dict[str, tuple[float, float]]:
     """The user's bounds, those of the plant and of A completed by the default box."""
     units = {
@@ -358,10 +358,10 @@ def _limits(
         "stiffness": linear.stiffness,
         "A": linear.stiffness,
     }
-    limits = dict(given)
+    limits = dict(user)
     for name in units.keys() - held.keys():
         own = tuple(float(units[name] * side) for side in _BOX[name])
-        lower, upper = given.get(name, own)
+        lower, upper = user.get(name, own)
         limits[name] = (own[0] if np.isinf(lower) else lower, own[1] if np.isinf(upper) else upper)
     if limits.get("mass", (1.0, 1.0))[0] <= 0.0:
         limits["mass"] = (0.1 * min(linear.mass, limits["mass"][1]), limits["mass"][1])

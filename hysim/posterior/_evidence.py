@@ -247,19 +247,19 @@ def compare_evidence(
     evidence = partial(log_evidence, noise=noise, initial=initial, method=method, live_points=live_points, seed=seed)
     rows = list[EvidenceRow]()
     for name, fit in fits.items():
-        found = list[LogEvidence]()
+        results = list[LogEvidence]()
         for factor in FACTORS:
-            found.append(evidence(fit, records, priors=(priors or {}).get(name), factor=factor))
+            results.append(evidence(fit, records, priors=(priors or {}).get(name), factor=factor))
             if progress:
-                progress(len(FACTORS) * len(rows) + len(found), len(FACTORS) * len(fits))
+                progress(len(FACTORS) * len(rows) + len(results), len(FACTORS) * len(fits))
         rows.append(
             EvidenceRow(
                 name=name,
                 n_parameters=fit.n_parameters,
                 fit_percent=fit.fit_percent,
-                log_evidence=tuple(each.value for each in found),
-                error=tuple(each.error for each in found),
-                n_evaluations=sum(each.evaluations for each in found),
+                log_evidence=tuple(each.value for each in results),
+                error=tuple(each.error for each in results),
+                n_evaluations=sum(each.evaluations for each in results),
             )
         )
     rows.sort(key=lambda row: -row.log_evidence[FACTORS.index(1.0)])

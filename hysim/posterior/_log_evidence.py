@@ -100,9 +100,9 @@ def _walked(arguments: list[Any], log_likelihood: Callable[[FloatArray], FloatAr
             continue
         reached = log_likelihood(trial[places])
         better = reached > least[places]
-        moved = places[better]
-        u[moved], values[moved] = trial[moved], reached[better]
-        accepted[moved] += 1
+        replaced = places[better]
+        u[replaced], values[replaced] = trial[replaced], reached[better]
+        accepted[replaced] += 1
     unmoved = np.flatnonzero(accepted == 0)
     if unmoved.size:
         values[unmoved] = log_likelihood(u[unmoved])

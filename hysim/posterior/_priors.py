@@ -210,10 +210,10 @@ def _scale(problem: Problem, k: int) -> Scale:
 class Linear:
     """Prior of the linear parameters b, in units (n_sets, n_linear) in which it has about the width one.
 
-    With `given` by place, the others are flat in w from `centre` - `reach` to `centre` + `reach`.
+    With `priors` by place, the others are flat in w from `centre` - `reach` to `centre` + `reach`.
     """
 
-    given: Mapping[int, Given]
+    priors: Mapping[int, Given]
     reach: float
     span: float  # of the measured output
     mean: float
@@ -227,7 +227,7 @@ class Linear:
         unit = self.span / np.where(scale > 0.0, scale, 1.0)
         centre = np.where(is_level, self.mean / self.span * np.sign(low), 0.0)
         spread = np.full(unit.shape, self.reach / math.sqrt(3.0))
-        for k, prior in self.given.items():
+        for k, prior in self.priors.items():
             unit[:, k], centre[:, k], spread[:, k] = prior.spread, prior.centre / prior.spread, 1.0
         return unit, centre, spread
 
@@ -236,8 +236,8 @@ class Linear:
         unit, centre, _ = units
         total = np.zeros(len(w))
         for k in range(w.shape[1]):
-            if k in self.given:
-                total = total + self.given[k].log_density(unit[:, k] * w[:, k]) + np.log(unit[:, k])
+            if k in self.priors:
+                total = total + self.priors[k].log_density(unit[:, k] * w[:, k]) + np.log(unit[:, k])
             else:
                 inside = np.abs(w[:, k] - centre[:, k]) <= self.reach
                 total = total + np.where(inside, -math.log(2.0 * self.reach), -np.inf)
@@ -247,7 +247,7 @@ class Linear:
         """Parameters in their units from numbers that are uniform between 0 and 1."""
         unit, centre, _ = units
         w = centre + self.reach * (2.0 * share - 1.0)
-        for k, prior in self.given.items():
+        for k, prior in self.priors.items():
             w[:, k] = prior.quantile(share[:, k]) / unit[:, k]
         return w
 
@@ -255,7 +255,7 @@ class Linear:
         """The least and the largest values that the prior allows, in units, (n_sets, n_linear)."""
         unit, centre, _ = units
         low, high = centre - self.reach, centre + self.reach
-        for k, prior in self.given.items():
+        for k, prior in self.priors.items():
             low[:, k], high[:, k] = prior.low / unit[:, k], prior.high / unit[:, k]
         return low, high
 

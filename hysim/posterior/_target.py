@@ -117,7 +117,7 @@ class Target:
         }
         words |= {space.coordinates[k]: str(own) for k, (own, _) in self.x_prior.own.items()}
         flat = f"flat, within {self.b_prior.reach:g} spans of the output of what it adds to it"
-        words |= {name: str(self.b_prior.given.get(k, flat)) for k, name in enumerate(space.linear)}
+        words |= {name: str(self.b_prior.priors.get(k, flat)) for k, name in enumerate(space.linear)}
         low, high = np.exp(self.sigma_ends).tolist()
         return words | {SIGMA: str(self.sigma_given or f"flat in its logarithm from {low:.3g} to {high:.3g}")}
 

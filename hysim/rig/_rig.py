@@ -216,13 +216,13 @@ class Experiment:
         if lost := np.flatnonzero(np.isnan(rows).all(axis=1)).tolist():
             raise ValueError(f"no frame of the rows {lost} could be measured: take more frames or more light")
         means = np.nanmean(rows, axis=1)
-        whole = method == "whole-pixel" and rows.shape[1] == 1
+        is_whole_pixel = method == "whole-pixel" and rows.shape[1] == 1
         return Record(
             u=self.voltages[frames_per_row - 1 :: frames_per_row],
             y=means - means[0],
             t=self.at[frames_per_row - 1 :: frames_per_row],
             units=UNITS,
-            resolution=self.rig.camera.scale if whole else None,
+            resolution=self.rig.camera.scale if is_whole_pixel else None,
             name=f"virtual rig, {method}",
         )
 

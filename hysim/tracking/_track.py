@@ -123,16 +123,16 @@ def most_likely(
         return sizes
     exponents, best = np.zeros(sizes.size), log_likelihood(sizes)
     for step in _STEPS:
-        moved = True
-        while moved:
-            moved = False
+        improved = True
+        while improved:
+            improved = False
             for k in np.flatnonzero(searched):
                 for direction in (-step, step):
                     trial = exponents.copy()
                     trial[k] = min(max(trial[k] + direction, _LEAST), _MOST)
                     value = best if trial[k] == exponents[k] else log_likelihood(sizes * 10.0**trial)
                     if value > best:
-                        exponents, best, moved = trial, value, True
+                        exponents, best, improved = trial, value, True
     return np.asarray(sizes * 10.0**exponents)
 
 
@@ -224,48 +224,48 @@ def track_parameters(
     searched = np.array([name not in (drift or {}) for name in coordinates.names])
     by = "particle" if copies.memory.size > _MOST_MEMORIES else "sigma-point"
     drifts = most_likely(lambda sizes: filtered(sizes, by).log_likelihood, drifts, searched)
-    found = filtered(drifts, method)
-    return _result(law, coordinates, found, record, method, spread, drifts, searched)
+    estimates = filtered(drifts, method)
+    return _result(law, coordinates, estimates, record, method, spread, drifts, searched)
 
 
 def _result(
     law: Law,
     coordinates: Coordinates,
-    found: Filtered,
+    estimates: Filtered,
     record: Record,
     method: str,
     noise: float,
     drifts: FloatArray,
     searched: npt.NDArray[np.bool_],
 ) -> ParameterTrack:
-    values = coordinates.decode(found.mean)
+    values = coordinates.decode(estimates.mean)
     last: dict[str, float] = dict(zip(coordinates.names, values[-1].tolist(), strict=True))
     return ParameterTrack(
         names=coordinates.names,
         values=values,
-        lower=coordinates.decode(found.mean - _BAND * found.deviation),
-        upper=coordinates.decode(found.mean + _BAND * found.deviation),
-        predicted=found.predicted,
-        residual=record.y - found.predicted,
-        expected_error=found.expected_error,
-        jumps=found.jumps,
+        lower=coordinates.decode(estimates.mean - _BAND * estimates.deviation),
+        upper=coordinates.decode(estimates.mean + _BAND * estimates.deviation),
+        predicted=estimates.predicted,
+        residual=record.y - estimates.predicted,
+        expected_error=estimates.expected_error,
+        jumps=estimates.jumps,
         method=method,
         noise=noise,
         drift=dict(zip(coordinates.names, drifts.tolist(), strict=True)),
         searched=tuple(np.array(coordinates.names)[searched].tolist()),
-        log_likelihood=found.log_likelihood,
+        log_likelihood=estimates.log_likelihood,
         model=law.with_scalars(last),
     )
 
 
-def _sizes(coordinates: Coordinates, given: Mapping[str, Any], share: float, what: str) -> FloatArray:
+def _sizes(coordinates: Coordinates, user: Mapping[str, Any], share: float, what: str) -> FloatArray:
     """Sizes of changes (n_names,), those that are not given in parts of the values."""
-    if unknown := [name for name in given if name not in coordinates.names]:
+    if unknown := [name for name in user if name not in coordinates.names]:
         raise ValueError(f"{what} has {unknown[0]!r}, which is not free")
     usual = share * np.where(coordinates.values == 0.0, 1.0, np.abs(coordinates.values))
-    sizes = np.array([float(given.get(name, own)) for name, own in zip(coordinates.names, usual, strict=True)])
+    sizes = np.array([float(user.get(name, own)) for name, own in zip(coordinates.names, usual, strict=True)])
     if not (sizes >= 0.0).all():
-        raise ValueError(f"{what} must not be negative, got {dict(given)}")
+        raise ValueError(f"{what} must not be negative, got {dict(user)}")
     return sizes
 
 

@@ -113,7 +113,7 @@ def displacement(
         raise ValueError(f"method must be one of {', '.join(METHODS)}, got {method!r}")
     if isinstance(scale, (str, bool)) or not 0.0 < float(scale) < math.inf:
         raise ValueError(f"scale must be the length of a pixel, a positive number, got {scale}")
-    angle = _angle_of(direction, whole=method == "whole-pixel")
+    angle = _angle_of(direction, whole_pixels=method == "whole-pixel")
     source, total = _source(frames)
     first, pictures = _pictures(source, reference)
     start = Reference(first, _region(region, first.shape))
@@ -123,7 +123,7 @@ def displacement(
         places.append(place)
         if progress:
             progress(len(places), total)
-    return _along(places, start.visible, angle, float(scale), unit, whole=method == "whole-pixel")
+    return _along(places, start.visible, angle, float(scale), unit, whole_pixels=method == "whole-pixel")
 
 
 def _source(frames: Any) -> tuple[Iterable[Any], int]:
@@ -231,7 +231,7 @@ def _along(
     scale: float,
     unit: str,
     *,
-    whole: bool,
+    whole_pixels: bool,
 ) -> Displacement:
     """The displacements of located frames; `visible` projects on the directions in which there is structure."""
     shift = np.array([place.shift[::-1] for place in located])
@@ -239,13 +239,13 @@ def _along(
     visible = visible[::-1, ::-1]
     if angle is None:
         angle = _best_direction(shift, covariance, visible)
-        angle = 90.0 * round(angle / 90.0) if whole else angle
+        angle = 90.0 * round(angle / 90.0) if whole_pixels else angle
     unit_vector = _unit(angle)
     across = _unit(angle + 90.0)
     towards = _towards(unit_vector, visible)
     displacement, variance = shift @ towards, np.einsum("i,nij,j->n", towards, covariance, towards)
     beside = shift @ across if np.trace(visible) > 1.5 else np.full(len(shift), np.nan)
-    if whole:
+    if whole_pixels:
         shift, displacement, beside = np.rint(shift) + 0.0, np.rint(displacement) + 0.0, np.rint(beside) + 0.0
         variance = variance + 1.0 / 12.0
     return Displacement(
@@ -257,12 +257,12 @@ def _along(
         status=_statuses(located, towards / np.linalg.norm(towards)),
         scale=scale,
         direction=angle,
-        resolution=scale if whole else None,
+        resolution=scale if whole_pixels else None,
         units={"y": unit},
     )
 
 
-def _angle_of(direction: float | str | None, *, whole: bool) -> float | None:
+def _angle_of(direction: float | str | None, *, whole_pixels: bool) -> float | None:
     """The angle of a direction; None if it must be estimated."""
     if direction is None:
         return None
@@ -270,7 +270,7 @@ def _angle_of(direction: float | str | None, *, whole: bool) -> float | None:
         return _AXES[direction]
     if isinstance(direction, (str, bool)) or not math.isfinite(direction):
         raise ValueError(f'direction must be "x", "y", an angle in degrees or None, got {direction!r}')
-    if whole and direction % 90.0:
+    if whole_pixels and direction % 90.0:
         raise ValueError(f"whole pixels are counted along rows or columns: direction must be x or y, got {direction}")
     return float(direction)
 

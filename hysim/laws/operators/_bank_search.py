@@ -232,8 +232,8 @@ class BankStructure(SignedStructure):
         if not self.law.by_input or not set(space.coordinates) <= {*space.state}:
             return len(record)
         widest = 2.0 * table_of(self.law.thresholds_name, space.held).max(initial=0.0)
-        moved = np.maximum.accumulate(record.u) - np.minimum.accumulate(record.u)
-        return int(np.count_nonzero(moved <= widest * (1.0 + _ROUNDING)))
+        span = np.maximum.accumulate(record.u) - np.minimum.accumulate(record.u)
+        return int(np.count_nonzero(span <= widest * (1.0 + _ROUNDING)))
 
     def _thresholds(self, half: float) -> FloatArray:
         """The structure's own, or powers of even steps: from zero for plays, up to the end for stops."""

@@ -188,17 +188,17 @@ def chosen(
     strengths = STRENGTHS if strength is None else np.array([strength])
     centre, middle = columns.mean(axis=0), float(y.mean())  # about which the sums keep more digits
     columns, y = columns - centre, y - middle
-    whole, exact = _moments(columns, y), max(_EXACT * float(np.std(y)), np.finfo(float).tiny)
+    total, exact = _moments(columns, y), max(_EXACT * float(np.std(y)), np.finfo(float).tiny)
     score, squares = np.zeros(strengths.size), np.zeros(strengths.size)
     for kind in parts:
         for part in kind:
-            weights, offsets = _fits(whole - _moments(columns[part], y[part]), penalty, strengths)
+            weights, offsets = _fits(total - _moments(columns[part], y[part]), penalty, strengths)
             each = np.sum((y[part, np.newaxis] - columns[part] @ weights - offsets) ** 2, axis=0)
             rms = np.maximum(np.sqrt(each / part.size), exact)
             score += rms / rms.min() / len(kind)
             squares += each
     best = int(np.argmin(score))
-    weights, offsets = _fits(whole, penalty, strengths[[best]])
+    weights, offsets = _fits(total, penalty, strengths[[best]])
     left_out = float(np.sqrt(squares[best] / sum(part.size for each in parts for part in each)))
     return left_out, weights[:, 0], middle + float(offsets[0]) - float(centre @ weights[:, 0])
 
@@ -248,12 +248,12 @@ def parts_of(records: Sequence[Record]) -> list[Parts]:
     quarters = [part for each in samples for part in np.array_split(each, 4)]
     if len(records) > 1:
         reached = [_covered(record.u, [*records[:k], *records[k + 1 :]]) for k, record in enumerate(records)]
-        whole = [part for part, within in zip(samples, reached, strict=True) if within]
+        complete = [part for part, within in zip(samples, reached, strict=True) if within]
     else:
         curves = np.split(samples[0], records[0].reversals(TOLERANCE)[1::2])
         count = min(_MOST_CURVES, len(curves))
-        whole = [np.concatenate(curves[k::count]) for k in range(count if count > 2 else 0)]
-    return [whole, quarters] if whole else [quarters]
+        complete = [np.concatenate(curves[k::count]) for k in range(count if count > 2 else 0)]
+    return [complete, quarters] if complete else [quarters]
 
 
 def _covered(u: FloatArray, others: Sequence[Record]) -> bool:
@@ -352,6 +352,6 @@ def gamma_plays(tables: Tables) -> tuple[FloatArray, FloatArray]:
     edges = tables["reach"] * place**2
     power, decay = tables["exponent"] + 1.0, tables["decay"]
     with np.errstate(invalid="ignore", divide="ignore", over="ignore", under="ignore"):
-        whole = gammainc(power, tables["reach"] / decay)
-        below = np.where(whole > _SMALLEST, gammainc(power, edges / decay) / whole, place ** (2.0 * power))
+        total = gammainc(power, tables["reach"] / decay)
+        below = np.where(total > _SMALLEST, gammainc(power, edges / decay) / total, place ** (2.0 * power))
     return 0.5 * (edges[:, 1:] + edges[:, :-1]), np.diff(below, axis=1)

@@ -116,7 +116,7 @@ class PreisachStructure(SignedStructure):
         """Number of the weights that the record does not determine."""
         columns = self.regressors({**named("levels", law.levels), TURN: law.levels[0]}, record)[0, :, :-1]
         untold = columns.shape[1] - int(np.linalg.matrix_rank(columns))
-        told = f"this record does not tell {untold} of the {len(law.weights)} weights from the others"
+        told = f"{untold} of the {len(law.weights)} weights cannot be estimated separately from this record"
         return (told,) if untold else ()
 
     def assumed_states(self, record: Record) -> tuple[str, ...]:

@@ -173,8 +173,8 @@ class EnergyPlays(Bank, Law):
         [0.0, 16.251, 48.753]
         """
         curves = _anhysteretic(self.remembered(u) / self.field)
-        moved = np.abs(np.diff(curves, axis=0, prepend=curves[:1]))
-        return np.asarray(np.cumsum(moved, axis=0) @ (np.array(self.thresholds) * self.weights))
+        displacement = np.abs(np.diff(curves, axis=0, prepend=curves[:1]))
+        return np.asarray(np.cumsum(displacement, axis=0) @ (np.array(self.thresholds) * self.weights))
 
 
 def _anhysteretic(x: FloatArray) -> FloatArray:

@@ -274,13 +274,13 @@ class Preisach(RelayLaw):
         >>> bool(np.abs(found.response(inner) - law.response(inner)).max() < 0.01)
         True
         """
-        given = several(records, "Preisach.smoothed")
+        all_records = several(records, "Preisach.smoothed")
         if strength is not None and not 0.0 <= strength < math.inf:
             raise ValueError(f"strength must be finite and not negative, got {strength}")
         if intervals is not None:
             check_whole(intervals, "intervals")
         with one_blas_thread():
-            law: Self = smooth(cls, given, intervals, strength)
+            law: Self = smooth(cls, all_records, intervals, strength)
         return law
 
     def slope_bounds(self) -> tuple[float, float]:

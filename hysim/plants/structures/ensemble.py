@@ -34,9 +34,9 @@ class _Stack(NamedTuple):
     matrices: assembly.Matrices
 
 
-def values_by_name(structure: Any, given: Mapping[str, npt.ArrayLike] | npt.ArrayLike) -> dict[str, FloatArray]:
+def values_by_name(structure: Any, values: Mapping[str, npt.ArrayLike] | npt.ArrayLike) -> dict[str, FloatArray]:
     """Columns (n_sets,) by names without wildcards."""
-    named: Mapping[str, Any] = given if isinstance(given, Mapping) else {"scale": given}
+    named: Mapping[str, Any] = values if isinstance(values, Mapping) else {"scale": values}
     scales = {name: column for name, column in named.items() if name == "scale"}
     others = {name: column for name, column in named.items() if name != "scale"}
     return {

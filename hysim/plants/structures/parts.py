@@ -319,16 +319,16 @@ def _numbers(name: str, value: Any) -> dict[str, float]:
 
 
 def _changed(name: str, value: Any, numbers: Mapping[str, float]) -> Any:
-    whole = numbers.get(name)
+    present = numbers.get(name)
     if isinstance(value, Rayleigh):
         own = [numbers.get(f"{name}.{part}", vars(value)[part]) for part in ("mass", "stiffness")]
-        factor = 1.0 if whole is None else whole
+        factor = 1.0 if present is None else present
         return Rayleigh(mass=factor * own[0], stiffness=factor * own[1])
     is_modal = isinstance(value, ModalDamping)
     several = np.array(value.ratio if is_modal else value)
-    changed: Any = whole
+    changed: Any = present
     if several.ndim:
-        changed = _placed(name, several, numbers) * (1.0 if whole is None else whole)
+        changed = _placed(name, several, numbers) * (1.0 if present is None else present)
     return ModalDamping(ratio=changed) if is_modal else changed
 
 

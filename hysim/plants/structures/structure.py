@@ -497,7 +497,7 @@ class Structure(SearchedStructure):
             raise ValueError("pattern must not be zero")
         x = np.array(self.initial_state[:n] or np.zeros(n))
         push = _Push(self, x, loads, row)
-        values, found = control(float(row @ x)), []
+        values, equilibria = control(float(row @ x)), []
         for k, value in enumerate(values.tolist()):
             with np.errstate(all="ignore"):
                 reached = push.to(value)
@@ -506,15 +506,15 @@ class Structure(SearchedStructure):
                     f"no equilibrium was found at control value {k} ({value:g} m): control a displacement that grows "
                     "all along, or use smaller steps"
                 )
-            found.append(push.now)
+            equilibria.append(push.now)
         return StaticResponse(
             control=values,
-            factor=np.array([each.factor for each in found]),
+            factor=np.array([each.factor for each in equilibria]),
             pattern=loads,
-            displacement=np.array([each.x for each in found]).reshape(len(found), n),
-            drift=np.array([push.rows @ each.x for each in found]).reshape(len(found), n_elements),
-            force=np.array([each.force for each in found]).reshape(len(found), n_elements),
-            residual=np.array([each.residual for each in found]),
+            displacement=np.array([each.x for each in equilibria]).reshape(len(equilibria), n),
+            drift=np.array([push.rows @ each.x for each in equilibria]).reshape(len(equilibria), n_elements),
+            force=np.array([each.force for each in equilibria]).reshape(len(equilibria), n_elements),
+            residual=np.array([each.residual for each in equilibria]),
         )
 
     def _controlled(self, at: str) -> FloatArray:
