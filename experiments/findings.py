@@ -1008,8 +1008,12 @@ def structures_work_precision(result: Result) -> list[str]:
         f"To 1e-4 a sample and element takes {number(ours)} ns, the faster of SciPy's methods {number(scipy)} ns, and "
         f"a plain compiled Verlet loop around hysim's laws {number(verlet)} ns.",
         f"With the same Newmark steps OpenSees' Steel01 and hysim's law differ by {error_of(steel['value'])}. Twenty "
-        f"storeys on isolators: drifts {error_of(tower['error'])} wrong.",
-        f"Figures that were asked for and not reached: {'; '.join(missed)}." if missed else "Every figure was reached.",
+        f"storeys on isolators: drifts {error_of(tower['error'])} wrong. "
+        + (
+            f"Figures that were asked for and not reached: {'; '.join(missed)}."
+            if missed
+            else "All figures are reached."
+        ),
     ]
 
 
