@@ -163,6 +163,23 @@ def test_a_pool_takes_no_work_after_its_end_and_finishes_what_it_has():
         pool.submit(pow, 1, 2)
 
 
+def test_an_exception_for_a_thread_does_not_reach_one_that_it_starts(monkeypatch):
+    strays = []
+    monkeypatch.setattr(sys, "unraisablehook", strays.append)
+
+    def start_threads():
+        while True:
+            with threads(2) as pool:
+                pool.submit(time.sleep, 0.0).result()
+
+    for k in range(100):
+        with contextlib.suppress(KeyboardInterrupt), threads(2) as pool:
+            _ = pool.submit(start_threads), pool.submit(start_threads)
+            time.sleep(3e-3 + 1e-4 * (k % 17))
+            raise KeyboardInterrupt
+    assert strays == []
+
+
 def test_an_interrupt_of_a_comparison_stops_its_threads():
     """The thread that waits is interrupted, as the main thread is by Ctrl-C; a search never ends by itself."""
     begun, ended_at = threading.Event(), []

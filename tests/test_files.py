@@ -17,21 +17,7 @@ import hysim as hs
 from hysim.cli import main
 
 sys.path.insert(0, str(Path(__file__).parent.parent / "experiments"))
-from malformed_files import (
-    HAS_H5PY,
-    MAT73_TITLE,
-    MAT_TITLE,
-    U,
-    Y,
-    corpus,
-    corrupt,
-    hdf5,
-    lying,
-    mat,
-    npy,
-    npz,
-    whole,
-)
+from malformed_files import HAS_H5PY, MAT73_TITLE, MAT_TITLE, U, Y, corpus, corrupt, hdf5, lying, mat, npy, npz, whole
 
 CORPUS = corpus()
 ENDINGS = [".csv", ".tsv", ".npz", ".mat", *([".h5"] if HAS_H5PY else [])]

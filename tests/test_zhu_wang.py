@@ -20,12 +20,7 @@ def riccati(w, a, d, c, length):
 
 
 def _airy(x):
-    return (
-        mpmath.airyai(x),
-        mpmath.airybi(x),
-        mpmath.airyai(x, derivative=1),
-        mpmath.airybi(x, derivative=1),
-    )
+    return (mpmath.airyai(x), mpmath.airybi(x), mpmath.airyai(x, derivative=1), mpmath.airybi(x, derivative=1))
 
 
 def law(a, d, c, **others):
