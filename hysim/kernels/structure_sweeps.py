@@ -84,7 +84,7 @@ def largest_error(tolerance: float, room: Room) -> float:
 
 @unfolded
 def is_smooth(elements: Elements, h: float, motion: Motion, room: Room) -> bool:
-    """Whether each rest ends where its nodes lead, so that no kink between them is missed; the laws are put there."""
+    """Whether each rest ends where its nodes lead, so that no kink is missed; the laws are put there."""
     smooth = True
     for e in range(room.allowed.size):
         parameters = elements.parameters[elements.parameter_ends[e] : elements.parameter_ends[e + 1]]
