@@ -5,14 +5,18 @@
     python .ci/mutants.py --only metrics/_loop.py    those of one module among the sample
     python .ci/mutants.py --store mutants.json       resumes: a mutant is tried again if its module or tests changed
     python .ci/mutants.py --survivors                those that survived in the store, again
+    python .ci/mutants.py --count 60 --packages kernels laws control files identification --circles
+                                                     which circle of tests kills each? (15 CPU minutes in each ten)
 
 A mutant is one change of a token: a comparison, an operator of arithmetic, a number, `min` for `max`, `and` for `or`, a
 sign or an `abs` dropped, `True` for `False`. Half of the sample is from the kernels, a quarter each from the other two
 packages. It is drawn by a hash of the mutant's own text, so that an edit elsewhere leaves the rest of it as it was.
 
-Each mutant runs the test files that `MAPPED` names for its module, in a copy of the commit. It is killed if a test
-fails, if the tests cannot be collected, or if they take LONGER times as long as without a mutant. Survivors are printed
-last, with the reason why each is harmless from `.ci/harmless_mutants.csv`; the exit status is 1 if one has no reason.
+Each mutant runs the test files that `MAPPED` names for its module, in a copy of the commit; for a module of another
+package, the four that name its functions and classes most often. It is killed if a test fails, if the tests cannot be
+collected, or if they take LONGER times as long as without a mutant. Survivors are printed last, with the reason why
+each is harmless from `.ci/harmless_mutants.csv`; the exit status is 1 if one has no reason. With `--circles`, what
+survives the first circle meets the second circle of the same files, and the last line says how many each has killed.
 
 Run it in an environment that can run the tests; it takes an hour or two on two cores.
 """
@@ -20,6 +24,7 @@ Run it in an environment that can run the tests; it takes an hour or two on two 
 import argparse
 import ast
 import csv
+import functools
 import hashlib
 import json
 import os
@@ -40,6 +45,7 @@ from threading import Lock
 ROOT = Path(__file__).resolve().parent.parent
 HARMLESS = Path(__file__).with_name("harmless_mutants.csv")
 SHARES = {"kernels": 0.5, "metrics": 0.25, "identification": 0.25}
+CIRCLES = {"first": [], "second": ["-m", "page or smoke or digits or search or slow"]}
 LONGER, LEAST = 4.0, 150.0  # times the run without a mutant; seconds, since a kernel must be compiled anew
 
 # The quickest test first: the first failure ends a run.
@@ -215,11 +221,11 @@ class Places(ast.NodeVisitor):
 
 def mutants(package: str) -> Iterator[Mutant]:
     """All mutants of the modules of a package."""
-    for path in sorted((ROOT / "hysim" / package).glob("*.py")):
-        module = f"{package}/{path.name}"
+    for path in sorted((ROOT / "hysim" / package).rglob("*.py")):
+        module = path.relative_to(ROOT / "hysim").as_posix()
         if module in NOT_MUTATED or path.name == "__init__.py":
             continue
-        if module not in MAPPED:
+        if package in SHARES and module not in MAPPED:
             raise SystemExit(f"{module} has no tests in MAPPED: name its test files there")
         source = path.read_text()
         places = Places(source)
@@ -236,17 +242,25 @@ def mutants(package: str) -> Iterator[Mutant]:
             yield Mutant(module, line, start, end, new, f"{before.strip()}   ->   {after.strip()}", name)
 
 
-def sample(count: int, seed: int) -> list[Mutant]:
+def sample(count: int, seed: int, shares: dict[str, float]) -> list[Mutant]:
     """`count` mutants, those whose hashes with the seed are the smallest."""
     chosen = []
-    for package, share in SHARES.items():
+    for package, share in shares.items():
         drawn = sorted(mutants(package), key=lambda each: hashlib.sha256(f"{seed} {each.name}".encode()).hexdigest())
         chosen += drawn[: round(share * count)]
     return chosen
 
 
+@functools.cache
 def tests_of(module: str) -> list[str]:
     """The test files of a module."""
+    if module not in MAPPED:
+        body = ast.parse((ROOT / "hysim" / module).read_text()).body
+        defined = [each.name for each in body if isinstance(each, (ast.ClassDef, ast.FunctionDef))]
+        used = re.compile(rf"\b({'|'.join(defined)})\b") if defined else re.compile(rf"\b{Path(module).stem}\b")
+        counts = {path: len(used.findall(path.read_text())) for path in sorted((ROOT / "tests").glob("test_*.py"))}
+        most = sorted(filter(counts.__getitem__, counts), key=counts.__getitem__, reverse=True)[:4]
+        return [path.relative_to(ROOT).as_posix() for path in most or counts]
     names = [f"tests/test_{name}.py" for name in MAPPED[module].split()]
     if missing := [name for name in names if not (ROOT / name).exists()]:
         raise SystemExit(f"{module} is mapped to {', '.join(missing)}, which is not there")
@@ -278,18 +292,18 @@ class Copy:
 
     def __init__(self, folder: Path) -> None:
         self.folder, self.cache, self.trial = folder, folder / ".compiled", folder / ".trial"
-        self.seconds: dict[str, float] = {}
+        self.seconds: dict[tuple[str, str], float] = {}
         folder.mkdir(parents=True)
         archive = subprocess.run(["git", "-C", ROOT, "archive", "HEAD"], stdout=subprocess.PIPE, check=True)
         subprocess.run(["tar", "-x", "-C", folder], input=archive.stdout, check=True)
         shutil.copytree(ROOT / "tests", folder / "tests", dirs_exist_ok=True)
 
-    def run(self, module: str, cache: Path, limit: float | None) -> bool:
-        """Whether the tests of a module pass within the limit [s]."""
+    def run(self, module: str, cache: Path, limit: float | None, circle: str) -> bool:
+        """Whether the tests of a module in a circle pass within the limit [s]."""
         environment = {**os.environ, "NUMBA_CACHE_DIR": str(cache), "PYTHONPATH": str(self.folder), "MPLBACKEND": "agg"}
         command = [sys.executable, "-m", "pytest", "-x", "-q", "-p", "no:cacheprovider", "-p", "no:xdist"]
         process = subprocess.Popen(
-            [*command, *tests_of(module)],
+            [*command, *CIRCLES[circle], *tests_of(module)],
             cwd=self.folder,
             env=environment,
             stdout=subprocess.DEVNULL,
@@ -297,7 +311,7 @@ class Copy:
             start_new_session=True,
         )
         try:
-            return process.wait(limit) == 0
+            return process.wait(limit) in (0, 5)  # 5: this circle has no test in these files
         except subprocess.TimeoutExpired:
             return False
         finally:
@@ -305,19 +319,19 @@ class Copy:
                 os.killpg(process.pid, signal.SIGKILL)
                 process.wait()
 
-    def unharmed(self, module: str) -> float:
+    def unharmed(self, module: str, circle: str) -> float:
         """Seconds that the tests of a module take without a mutant, its kernels compiled."""
-        if module not in self.seconds:
-            if not self.run(module, self.cache, None):
+        if (module, circle) not in self.seconds:
+            if not self.run(module, self.cache, None, circle):
                 raise SystemExit(f"the tests of {module} fail without a mutant: {' '.join(tests_of(module))}")
             start = time.monotonic()
-            self.run(module, self.cache, None)
-            self.seconds[module] = time.monotonic() - start
-        return self.seconds[module]
+            self.run(module, self.cache, None, circle)
+            self.seconds[module, circle] = time.monotonic() - start
+        return self.seconds[module, circle]
 
-    def survives(self, mutant: Mutant) -> bool:
-        """Whether no test notices the mutant."""
-        limit = max(LEAST, LONGER * self.unharmed(mutant.module))
+    def survives(self, mutant: Mutant, circle: str) -> bool:
+        """Whether no test of the circle notices the mutant."""
+        limit = max(LEAST, LONGER * self.unharmed(mutant.module, circle))
         path = self.folder / "hysim" / mutant.module
         source, times = path.read_text(), path.stat()
         cache = self.cache
@@ -326,9 +340,12 @@ class Copy:
             shutil.rmtree(cache, ignore_errors=True)
             stale = tuple(f"{stem}." for stem in users(mutant.module))
             shutil.copytree(self.cache, cache, ignore=lambda _, names: [n for n in names if n.startswith(stale)])
+        elif mutant.module.startswith("laws/"):  # an equation is compiled into the kernels that step it
+            cache = self.trial
+            shutil.rmtree(cache, ignore_errors=True)
         path.write_text(mutant.applied(source))
         try:
-            return self.run(mutant.module, cache, limit)
+            return self.run(mutant.module, cache, limit, circle)
         finally:
             path.write_text(source)
             os.utime(path, ns=(times.st_atime_ns, times.st_mtime_ns))
@@ -350,9 +367,12 @@ def main() -> int:
     parser.add_argument("--only", default="", help="a part of the module's path")
     parser.add_argument("--workers", type=int, default=2)
     parser.add_argument("--store", type=Path, help="JSON file of outcomes, read first and written after each mutant")
+    parser.add_argument("--packages", nargs="+", help="in equal shares, in place of the usual three")
+    parser.add_argument("--circles", action="store_true", help="let the second circle try what survives the first")
     parser.add_argument("--survivors", action="store_true", help="try those again that survived in the store")
     given = parser.parse_args()
-    chosen = [mutant for mutant in sample(given.count, given.seed) if given.only in mutant.module]
+    shares = dict.fromkeys(given.packages, 1.0 / len(given.packages)) if given.packages else SHARES
+    chosen = [mutant for mutant in sample(given.count, given.seed, shares) if given.only in mutant.module]
     known = json.loads(given.store.read_text()) if given.store and given.store.exists() else {}
     outcomes = {
         mutant.name: known[mutant.name]["survived"]
@@ -363,26 +383,26 @@ def main() -> int:
     }
     if given.survivors:
         chosen = [mutant for mutant in chosen if known.get(mutant.name, {}).get("survived")]
-    lock = Lock()
+    lock, by_second = Lock(), 0
     with tempfile.TemporaryDirectory() as folder, ThreadPoolExecutor(given.workers) as threads:
         copies: SimpleQueue[Copy] = SimpleQueue()
         for k in range(given.workers):
             copies.put(Copy(Path(folder) / str(k)))
 
         def attempt(mutant: Mutant) -> None:
-            copy = copies.get()
+            nonlocal by_second
+            copy, word = copies.get(), "killed"
             try:
-                survived = copy.survives(mutant)
+                if (survived := copy.survives(mutant, "first")) and given.circles:
+                    survived, word = copy.survives(mutant, "second"), "2nd only"
             finally:
                 copies.put(copy)
             with lock:
+                by_second += word != "killed" and not survived
                 outcomes[mutant.name] = survived
                 known[mutant.name] = {"survived": survived, "state": state_of(mutant.module)}
-                word = "SURVIVED" if survived else "killed"
-                print(
-                    f"{len(outcomes):4} {word:8} {mutant.name} {mutant.module}:{mutant.line}  {mutant.shown}",
-                    flush=True,
-                )
+                place = f"{mutant.name} {mutant.module}:{mutant.line}  {mutant.shown}"
+                print(f"{len(outcomes):4} {'SURVIVED' if survived else word:8} {place}", flush=True)
                 if given.store:
                     given.store.write_text(json.dumps(known, indent=0))
 
@@ -396,6 +416,8 @@ def main() -> int:
     for mutant in survivors:
         why = reasons.get(mutant.name, "NOT EXPLAINED")
         print(f"  {mutant.name} {mutant.module}:{mutant.line}  {mutant.shown}\n      {why}")
+    if given.circles:
+        print(f"{len(chosen) - len(survivors) - by_second} killed by the first circle, {by_second} by the second alone")
     return 1 if open_ones else 0
 
 
