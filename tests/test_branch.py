@@ -9,6 +9,7 @@ import hysim as hs
 N_LAWS = 20 if numba.config.DISABLE_JIT else 100
 FINE = 4 if numba.config.DISABLE_JIT else 16
 PERTURBATION = 2.0**-48
+SAMPLES = hs.signals.triangle(-1.0, 1.0, cycles=1, samples_per_cycle=40)
 EXPONENTS = np.array([0.3, 0.5, 0.8, 1.0, 1.3, 2.0, 2.7, 4.0, 6.0, 8.0, 12.0])
 
 
@@ -173,3 +174,10 @@ def test_no_step_goes_over_a_pole(end):
     model = hs.ZhuWangBoucWen(A=-0.153528, beta=-519.368, gamma=-584.55, n=2.0, delta=-9.03205e-6, z0=-0.01197)
     with pytest.raises(hs.SimulationError, match="diverges"):
         model.response([2.77672, end])
+
+
+def test_a_search_gives_up_a_law_that_bends_between_two_samples_alone():
+    gentle, stiff = (hs.ZhuWangBoucWen(beta=beta, gamma=0.0, n=1.5) for beta in (1e2, 1e7))
+    assert np.isfinite([law.response(SAMPLES) for law in (gentle, gentle.known_to(1e-4), stiff)]).all()
+    with pytest.raises(hs.SimulationError):
+        stiff.known_to(1e-4).response(SAMPLES)

@@ -9,6 +9,7 @@ have a corner where its first state is zero, as `|z|^n` has, so a step that chan
 ends at z = 0. What is not smooth elsewhere makes the steps short, as a power of z does near zero.
 
 A law that diverges is `inf`: its steps become a rounding of the way while z grows. A stiff or undefined one is `nan`.
+A search asks for a coarse tolerance and tries many stiff laws: all steps of such a run together are limited, too.
 """
 
 import math
@@ -31,7 +32,7 @@ Longest = Callable[[FloatArray, FloatArray, float, float], float]
 TOLERANCE = 1e-12
 MAX_STEPS = 20_000
 LARGEST = 1.7976931348623157e308
-_ROOM = 16  # places for each state: thirteen stages, and three rows of work; behind them where the last stroke ended
+_ROOM = 16  # places for each state: thirteen stages, and three rows of work
 
 _FEW, _MANY = 6, 12  # stages before the slope at the end
 _A5 = read_only(np.pad(RK45.A, ((0, 0), (0, 1))).ravel())
@@ -48,12 +49,15 @@ _SAFETY, _LEAST, _MOST = 0.9, 0.1, 5.0  # of the next length: those of SciPy, bu
 _OF_LAST, _OF_SQUARE = 0.1, 0.01
 _NEWTON = 8  # tries to end at zero by Newton's rule; then by the rule of false position
 _AT_ZERO = 0.01  # of the tolerance
+# A tolerance above _COARSE is that of a search, whose run may take _ALWAYS steps and _EACH more for each sample. A
+# memory that bends within 1/100 of the way between two samples needs 20 to the next one, and no sample shows its bend.
+_COARSE, _ALWAYS, _EACH = 1e-9, 2000.0, 20.0
 _MOST_AHEAD = 1e6  # times what a further state is: no error that is allowed for what is ahead steps over a pole
 
 
 def workspace(n: int) -> int:
     """Number of working places after `n` states."""
-    return _ROOM * n + 2
+    return _ROOM * n + 3  # and input and direction where the last stroke ended, and steps, less those allowed
 
 
 @uncounted
@@ -143,7 +147,7 @@ def follower(
         """Move `state`, (last u, the `n` states, work), to the input `u`, and return how many slopes this takes.
 
         A step leaves out no more than the `tolerance`. The law may have a `corner` where its first state is zero. This
-        state is inf beyond `bound`, and nan where `most` steps do not reach the end.
+        state is inf beyond `bound`, and nan where `most` steps, or those left to a search, do not reach the end.
         """
         last = state[0]
         state[0] = u
@@ -159,6 +163,9 @@ def follower(
         if not is_known:
             rates(parameters, x, last, s, k[:n])
         ended[0], ended[1] = u, s
+        if tolerance > _COARSE:
+            ended[2] -= _EACH
+            most = min(most, int(_ALWAYS - ended[2]))
         # The slope of a memory that grows without end is no measure of what the stroke adds, and a memory that decays
         # from far away goes no further than one that begins at zero.
         steepest = abs(k[0])
@@ -172,7 +179,7 @@ def follower(
             largest[i] = abs(x[i])
         left = h = u - last
         aims, is_high, evaluated, done, before = 0, False, 1, 0.0, 0.0
-        for _ in range(most):
+        for step in range(most):
             h = math.copysign(min(abs(h), longest(parameters, x, k[0], s)), s)
             if abs(h) >= abs(left):
                 h = left
@@ -229,6 +236,7 @@ def follower(
                 x[0] = math.copysign(math.inf, x[0])
                 return evaluated
             if taken == left:
+                ended[2] += step
                 return evaluated
             left -= taken
             done += abs(taken)
