@@ -1,30 +1,40 @@
-"""Which tests take long? CPU seconds of all of them, by what tests/circles.toml says of them.
+"""Which tests take long, and what would the first circle miss without them?
 
-    python .ci/slowest.py [pytest's arguments]
+    python .ci/slowest.py [pytest's arguments]             CPU seconds of all tests, by what tests/circles.toml says
+    python .ci/slowest.py --coverage [pytest's arguments]  lines of hysim/ that each circle runs (needs pytest-cov)
 
-The suite runs twice, first to compile. The second circle should hold the tests of more than MOST CPU s a case, or of
-MOST_IN_ALL in all cases; what it lacks, and what it could give back, is printed.
+For the seconds the suite runs twice, first to compile. The second circle should hold the tests of more than MOST CPU s
+a case or MOST_IN_ALL in all cases; what it lacks, and what it could give back, is printed. A line counts for the first
+circle if one of its tests or an import runs it. Compiled lines of kernels are not counted.
 """
 
+import os
 import subprocess
 import sys
 import tempfile
 import tomllib
 import xml.etree.ElementTree as ET
 from collections import defaultdict
+from collections.abc import Sequence
 from pathlib import Path
 
-ROOT = Path(__file__).parent.parent
-MOST, MOST_IN_ALL = 2.0, 5.0
+ROOT = Path(__file__).resolve().parent.parent
+MOST, MOST_IN_ALL = 0.7, 2.0
+SUITE = [sys.executable, "-m", "pytest", "-n", "2", "-m", ""]
 
 
-def measured(arguments: list[str]) -> dict[str, list[float]]:
+def purposes() -> dict[str, str]:
+    """The purpose of each test of the second circle."""
+    circles = tomllib.loads((ROOT / "tests" / "circles.toml").read_text())
+    return {name: purpose for purpose, names in circles.items() for name in names}
+
+
+def measured(arguments: Sequence[str]) -> dict[str, list[float]]:
     """CPU seconds of the cases of each test."""
     with tempfile.TemporaryDirectory() as folder:
         report = Path(folder) / "report.xml"
-        command = [sys.executable, "-m", "pytest", "-n", "2", "-m", "", f"--junitxml={report}", *arguments]
         for _ in range(2):
-            subprocess.run(command, cwd=ROOT, stdout=subprocess.DEVNULL)
+            subprocess.run([*SUITE, f"--junitxml={report}", *arguments], cwd=ROOT, stdout=subprocess.DEVNULL)
         seconds = defaultdict(list)
         for case in ET.parse(report).iter("testcase"):
             *folders, file = case.get("classname", "").split(".")
@@ -36,16 +46,15 @@ def measured(arguments: list[str]) -> dict[str, list[float]]:
     return seconds
 
 
-def main() -> None:
-    seconds = measured(sys.argv[1:])
-    circles = tomllib.loads((ROOT / "tests" / "circles.toml").read_text())
-    purposes = {name: purpose for purpose, names in circles.items() for name in names}
+def print_seconds(arguments: Sequence[str]) -> None:
+    """What the circles take, and which tests stand in the wrong one."""
+    seconds, purpose_of = measured(arguments), purposes()
     sums: dict[str, float] = defaultdict(float)
     for name, cases in sorted(seconds.items(), key=lambda each: -sum(each[1])):
-        purpose = purposes.get(name, "first circle")
+        purpose = purpose_of.get(name, "first circle")
         sums[purpose] += sum(cases)
         is_slow = max(cases, default=0.0) > MOST or sum(cases) > MOST_IN_ALL
-        if is_slow != (name in purposes):
+        if is_slow != (name in purpose_of):
             print(
                 f"{sum(cases):6.1f} in {len(cases):3} cases, at most {max(cases, default=0.0):5.1f}  {purpose}: {name}"
             )
@@ -53,5 +62,35 @@ def main() -> None:
         print(f"{total:6.1f} CPU s  {purpose}")
 
 
+def print_coverage(arguments: Sequence[str]) -> None:
+    """Lines of each room that the whole suite runs, and the share of them that the first circle runs."""
+    from coverage import CoverageData
+
+    second = purposes()
+    lines: dict[str, list[int]] = defaultdict(lambda: [0, 0])
+    with tempfile.TemporaryDirectory() as folder:
+        file = Path(folder) / "coverage"
+        subprocess.run(
+            [*SUITE, "--cov=hysim", "--cov-context=test", "--cov-report=", *arguments],
+            cwd=ROOT,
+            stdout=subprocess.DEVNULL,
+            env={**os.environ, "COVERAGE_FILE": str(file)},
+        )
+        data = CoverageData(str(file))
+        data.read()
+        for path in data.measured_files():
+            room = Path(path).relative_to(ROOT / "hysim").parts[0]
+            for contexts in data.contexts_by_lineno(path).values():
+                tests = {each.partition("|")[0].partition("[")[0].removeprefix("tests/") for each in contexts}
+                for name in ("total", room):
+                    lines[name][0] += 1
+                    lines[name][1] += not tests <= second.keys()
+    for name, (whole, first) in sorted(lines.items(), key=lambda each: each[1][1] / each[1][0]):
+        print(f"{100.0 * first / whole:6.2f} % of {whole:6} lines  {name}")
+
+
 if __name__ == "__main__":
-    main()
+    if sys.argv[1:2] == ["--coverage"]:
+        print_coverage(sys.argv[2:])
+    else:
+        print_seconds(sys.argv[1:])
