@@ -5,7 +5,7 @@ import sys
 from functools import partial
 from pathlib import Path
 
-from jinja2 import FileSystemBytecodeCache
+from jinja2 import FileSystemBytecodeCache, FileSystemLoader
 from jinja2.sandbox import SandboxedEnvironment
 from numpydoc import docscrape_sphinx
 from sphinx.application import Sphinx
@@ -52,6 +52,7 @@ extensions = [
     "sphinx.ext.autosummary",
     "numpydoc",
     "mathml",
+    "breaks",
     "navigation",
     "notebook_cells",
 ]
@@ -63,13 +64,17 @@ smartquotes = False  # u' is a derivative
 
 html_theme = "furo"
 html_title = f"hysim {version}"
+html_logo = html_favicon = "_static/logo.svg"
 html_copy_source = False
 html_show_copyright = False
 html_static_path = ["_static"]
 html_css_files = ["page.css"]
 
 autodoc_typehints = "none"  # the docstrings say types with shapes and units
-# numpydoc would compile its template anew for each docstring.
+# A docstring begins with its example. numpydoc would compile its template anew for each docstring.
+docscrape_sphinx.FileSystemLoader = lambda _: FileSystemLoader(
+    HERE / "_templates" / "numpydoc"
+)
 docscrape_sphinx.SandboxedEnvironment = partial(
     SandboxedEnvironment, bytecode_cache=FileSystemBytecodeCache()
 )

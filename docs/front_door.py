@@ -10,6 +10,8 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any
 
+from formulas import as_tex
+
 import hysim
 from hysim.models.law import Law
 from hysim.models.model import is_identifiable
@@ -130,12 +132,8 @@ def families() -> str:
     """Every law of the registry, and what hysim can do with it, as a table."""
     lines = ["| family | law | identified | inverse |", "|---|---|---|---|"]
     for name, family in hysim.families().items():
-        summary = (
-            f"{inspect.getdoc(family)}".split("\n\n")[0]
-            .replace("\n", " ")
-            .replace("``", "`")
-            .replace("|", r"\|")
-        )
+        first = f"{inspect.getdoc(family)}".split("\n\n")[0].replace("\n", " ")
+        summary = as_tex(first.replace("``", "`")).replace("|", r"\|")
         inverse = _inverse(family)
         identified = "yes" if is_identifiable(family) else ""
         lines.append(

@@ -13,6 +13,7 @@ from typing import Any
 from urllib.parse import urlencode
 
 import numpy as np
+from formulas import as_tex
 from front_door import GROUPS, heading_of
 from numpy.typing import NDArray
 
@@ -133,7 +134,7 @@ def _sliders(name: str) -> str:
 
 
 def _first_sentence(value: Any) -> str:
-    return (
+    return as_tex(
         f"{inspect.getdoc(value)}".split("\n\n")[0].replace("\n", " ").replace("``", "`")
     )
 
