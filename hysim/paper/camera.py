@@ -169,6 +169,14 @@ def camera_rows(loops: Sequence[CameraLoop]) -> list[dict[str, Any]]:
     ]
 
 
+def with_own_camera(plant: str, cameras: Sequence[CameraLoop]) -> CameraLoop | None:
+    """The best loop with the paper's own pixels and shake; None if no such loop settles."""
+    quantum, shake = SENSORS[-1]
+    own = [each for each in cameras if (each.plant, each.quantum, each.shake) == (plant, quantum * PIXEL, shake)]
+    settled = [each for each in own if math.isfinite(each.true_reduction_percent)]
+    return max(settled, key=lambda each: each.true_reduction_percent, default=None)
+
+
 def needed(plant: str, cameras: Sequence[CameraLoop]) -> str:
     """The slowest and coarsest sensor tried that reaches a headline figure, in a sentence."""
     name, least = TARGETS[plant]
@@ -184,12 +192,9 @@ def needed(plant: str, cameras: Sequence[CameraLoop]) -> str:
             f"readings in steps of {worst.quantum:.4f} µm ({worst.quantum / PIXEL:g} pixel), "
             f"{worst.frame_rate:g} times a second, of an image that {shaking}"
         )
-    quantum, shake = SENSORS[-1]
-    own = [each for each in rows if (each.quantum, each.shake) == (quantum * PIXEL, shake)]
-    settled = [each for each in own if math.isfinite(each.true_reduction_percent)]
+    best = with_own_camera(plant, cameras)
     camera = "let no loop settle"
-    if settled:
-        best = max(settled, key=lambda each: each.true_reduction_percent)
+    if best is not None:
         camera = f"reach {best.true_reduction_percent:.0f} % at best, at {best.frame_rate:g} frames a second"
     return f"{name} needs {what}; the paper's own pixels and shake {camera}."
 

@@ -52,7 +52,7 @@ def figure4(record: Record) -> plot.Figure:
 def opening(comparison: Comparison) -> plot.Figure:
     """Table 1 with the printed linear model and the asymmetric Bouc-Wen law."""
     chosen = replace(comparison, rows=tuple(comparison[name] for name in ("eq1-printed", "bouc-wen-asymmetric")))
-    return _drawn(3.6, lambda canvas: plot.loops(chosen, plot.panels(canvas, 2, columns=2, sharey=True)))
+    return _drawn(3.0, lambda canvas: plot.loops(chosen, plot.panels(canvas, 2, columns=2, sharey=True)), width=5.0)
 
 
 @plot.house_style()
@@ -184,8 +184,8 @@ def evidence_figure(evidence: Evidence) -> plot.Figure:
 
 
 @plot.house_style()
-def _drawn(height: float, draw: Callable[[plot.Figure], Any]) -> plot.Figure:
-    canvas = plot.figure(height=height)
+def _drawn(height: float, draw: Callable[[plot.Figure], Any], *, width: float = 6.0) -> plot.Figure:
+    canvas = plot.figure(width, height)
     draw(canvas)
     return canvas
 

@@ -17,8 +17,8 @@ from typing import Any
 from hysim.datasets import PIXEL
 from hysim.identification import Identification
 from hysim.metrics import loop_metrics
-from hysim.paper.camera import PERIODS, TARGETS, needed
-from hysim.paper.claims import VERDICTS, Claim, as_text
+from hysim.paper.camera import PERIODS, TARGETS, CameraLoop, needed, with_own_camera
+from hysim.paper.claims import RULES, VERDICTS, Claim, as_text
 from hysim.paper.equations import EQUATION_1, EQUATION_4, EQUATION_6, EQUATION_7, Characteristics
 from hysim.paper.findings import Findings
 from hysim.paper.loops import ABOUT_34_V, GAINS, SAMPLE_TIME, SUPPLY, Case
@@ -63,11 +63,10 @@ def report_page(findings: Findings, summary: Mapping[str, Any], drawn: Mapping[s
         "style": Markup(_file("report.css")),
         "figures": {name: Markup(svg) for name, svg in drawn.items()},
         "tables": _tables(findings, summary),
-        "claims": _claims(findings.claims),
         "n_claims": len(findings.claims),
-        "claimed": {claim.id: claim.recomputed for claim in findings.claims},
-        "verdicts": numbers,
-        "verdict_counts": ", ".join(f"{numbers[name]} {_PLURAL.get(name, name)}" for name in reversed(VERDICTS)),
+        "claimed": {claim.id: {"here": claim.recomputed, "badge": _badge(claim.verdict)} for claim in findings.claims},
+        "with_camera": {plant: _with_camera(plant, findings.cameras) for plant in TARGETS},
+        "verdicts": {name: _badge(name, f"{numbers[name]} {_PLURAL.get(name, name)}") for name in VERDICTS},
         "needed": {plant: needed(plant, findings.cameras) for plant in TARGETS},
         "lag_loop": next(row for row in summary["control"]["hysteresis"] if row["plant"] == "eq1"),
         "periods": PERIODS,
@@ -129,6 +128,10 @@ def _tables(findings: Findings, summary: Mapping[str, Any]) -> dict[str, Markup]
         "hysteresis_gains": _table(columns["gains"], _gains(loops.hysteresis)),
         "step_gains": _table(columns["gains"], _gains(loops.steps)),
         **{name: _table(columns["parameters"], _parameters(fit)) for name, fit in study.fits.items()},
+        **{
+            verdict: _table(columns["claims"], [_claim_row(each) for each in findings.claims if each.verdict == verdict])
+            for verdict in VERDICTS
+        },
     }
 
 
@@ -199,34 +202,29 @@ def _evidence_row(name: str, row: Row) -> Row:
     return {**row, "model": name, "nested": f"{nested[0]:.2f} ± {nested[1]:.2f}" if nested else None}
 
 
-def _claims(claims: Sequence[Claim]) -> Markup:
-    """Every claim under its verdict, each group folded but those that need attention."""
-    groups = [(verdict, [claim for claim in claims if claim.verdict == verdict]) for verdict in VERDICTS]
-    return Markup(
-        "".join(
-            f"<details{' open' if verdict == 'not found' else ''}><summary>{verdict}: {len(group)}</summary>\n"
-            f"{''.join(map(_claim, group))}\n</details>\n"
-            for verdict, group in groups
-            if group
-        )
-    )
+def _claim_row(claim: Claim) -> Row:
+    """A claim with texts for its table."""
+    values = {"paper": claim.printed, "here": claim.recomputed}
+    unit = f" {claim.unit}" if claim.unit else ""
+    method = "" if claim.recomputed is None else f"{claim.method[:1].upper()}{claim.method[1:]}."
+    texts = {
+        **vars(claim),
+        **{name: "–" if value is None else f"{as_text(value)}{unit}" for name, value in values.items()},
+        "how": f"{method} {claim.note}".strip(),
+        "badge": _badge(claim.verdict),
+    }
+    return {name: text if isinstance(text, Markup) else _MICRO.sub("µm", str(text)) for name, text in texts.items()}
 
 
-def _claim(claim: Claim) -> str:
-    """One claim as a block that needs no width."""
-    values = {"printed": claim.printed, "recomputed": claim.recomputed}
-    unit, method = f" {claim.unit}" if claim.unit else "", f"{claim.method[:1].upper()}{claim.method[1:]}."
-    is_checked = claim.recomputed is not None
-    lines = [
-        ("verdict " + claim.verdict.replace(" ", "-"), claim.verdict),
-        ("where", claim.where),
-        ("statement", claim.statement),
-        ("facts", " · ".join(f"{name} {as_text(value)}{unit}" for name, value in values.items() if value is not None)),
-        ("note", f"{method if is_checked else ''} {claim.note}".strip()),
-        ("note", f"{'Conditions: ' if is_checked else ''}{claim.conditions}."),
-    ]
-    body = "".join(f'<div class="{kind}">{escape(_MICRO.sub("µm", text))}</div>' for kind, text in lines if text)
-    return f'<div class="claim" id="claim-{escape(claim.id)}">{body}</div>\n'
+def _badge(verdict: str, text: str = "") -> Markup:
+    return Markup(f'<span class="verdict {verdict.replace(" ", "-")}">{text or verdict}</span>')
+
+
+def _with_camera(plant: str, cameras: Sequence[CameraLoop]) -> Row:
+    """The best reduction with the paper's own camera [%], and whether it reaches the paper's figure."""
+    best = with_own_camera(plant, cameras)
+    reduction = math.nan if best is None else best.true_reduction_percent
+    return {"here": reduction, "badge": _badge(RULES["reach"][not reduction >= TARGETS[plant][1]])}
 
 
 def _rivals(fit: Identification, u: Any) -> str:
