@@ -100,6 +100,7 @@ def _file(name: str) -> str:
 def _tables(findings: Findings, summary: Mapping[str, Any]) -> dict[str, Markup]:
     """Every table by its name in the text."""
     columns = tomllib.loads(_file("tables.toml"))
+    columns |= dict.fromkeys(VERDICTS, columns["claims"])
     loops, control, study = findings.loops, summary["control"], findings.study
     measured = {key: summary["table1"][key] for key in ("max_width_um", "max_width_at_V", "area_um_V")}
     models = [{"model": name, **row} for name, row in summary["models"].items()]
@@ -123,15 +124,12 @@ def _tables(findings: Findings, summary: Mapping[str, Any]) -> dict[str, Markup]
         "nested": [{**each._asdict(), "start": each.start or None} for each in nested_errors()],
         "evidence": [_evidence_row(name, row) for name, row in summary["evidence"]["models"].items()],
         "dwell": findings.dwell,
+        **{verdict: [_claim_row(each) for each in findings.claims if each.verdict == verdict] for verdict in VERDICTS},
     }
     return {name: _table(columns[name], each) for name, each in rows.items()} | {
         "hysteresis_gains": _table(columns["gains"], _gains(loops.hysteresis)),
         "step_gains": _table(columns["gains"], _gains(loops.steps)),
         **{name: _table(columns["parameters"], _parameters(fit)) for name, fit in study.fits.items()},
-        **{
-            verdict: _table(columns["claims"], [_claim_row(each) for each in findings.claims if each.verdict == verdict])
-            for verdict in VERDICTS
-        },
     }
 
 
@@ -204,16 +202,17 @@ def _evidence_row(name: str, row: Row) -> Row:
 
 def _claim_row(claim: Claim) -> Row:
     """A claim with texts for its table."""
-    values = {"paper": claim.printed, "here": claim.recomputed}
+    here = f"{claim.recomputed:.5g}" if isinstance(claim.recomputed, float) else claim.recomputed
+    values = {"paper": claim.printed, "here": here}
     unit = f" {claim.unit}" if claim.unit else ""
     method = "" if claim.recomputed is None else f"{claim.method[:1].upper()}{claim.method[1:]}."
     texts = {
         **vars(claim),
         **{name: "–" if value is None else f"{as_text(value)}{unit}" for name, value in values.items()},
         "how": f"{method} {claim.note}".strip(),
-        "badge": _badge(claim.verdict),
     }
-    return {name: text if isinstance(text, Markup) else _MICRO.sub("µm", str(text)) for name, text in texts.items()}
+    plain = {name: _MICRO.sub("µm", str(text)).replace("^2", "²") for name, text in texts.items()}
+    return plain | {"badge": _badge(claim.verdict)}
 
 
 def _badge(verdict: str, text: str = "") -> Markup:
