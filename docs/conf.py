@@ -5,7 +5,7 @@ import sys
 from functools import partial
 from pathlib import Path
 
-from jinja2 import FileSystemBytecodeCache, FileSystemLoader
+from jinja2 import FileSystemBytecodeCache
 from jinja2.sandbox import SandboxedEnvironment
 from numpydoc import docscrape_sphinx
 from sphinx.application import Sphinx
@@ -53,12 +53,13 @@ extensions = [
     "numpydoc",
     "mathml",
     "breaks",
+    "examples",
     "navigation",
     "notebook_cells",
 ]
 html_math_renderer = "mathml"
 exclude_patterns = ["_build"]
-templates_path = ["_templates"]
+templates_path = ["_templates"]  # numpydoc's too: the example follows the first sentence
 default_role = "py:obj"
 smartquotes = False  # u' is a derivative
 
@@ -71,10 +72,7 @@ html_static_path = ["_static"]
 html_css_files = ["page.css"]
 
 autodoc_typehints = "none"  # the docstrings say types with shapes and units
-# A docstring begins with its example. numpydoc would compile its template anew for each docstring.
-docscrape_sphinx.FileSystemLoader = lambda _: FileSystemLoader(
-    HERE / "_templates" / "numpydoc"
-)
+# numpydoc would compile its template anew for each docstring.
 docscrape_sphinx.SandboxedEnvironment = partial(
     SandboxedEnvironment, bytecode_cache=FileSystemBytecodeCache()
 )

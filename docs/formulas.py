@@ -13,23 +13,20 @@ _RULES = (
     (r"(?<![\\{a-zA-Z])([a-zA-Z]{3,})(?![a-zA-Z])", lambda word: _word(word[1])),
     (r"\bd(?=[a-z]\b)", r"\\mathrm{d}"),
     (r"~", r"\\sim "),
-    (r"^([=+-]|\\sim) ", r"\1\\;"),
+    (r"^([+-]) ", r"\1\\;"),
 )
 
 
 def as_tex(text: str) -> str:
     """The text with each formula between dollars, in parts between which a line may end."""
-    return _FORMULA.sub(
-        lambda formula: " ".join(
-            f"${_tex(part)}$" for part in _parts(formula[1] or formula[2])
-        ),
-        text,
-    )
+    return _FORMULA.sub(lambda formula: _in_parts(formula[1] or formula[2]), text)
 
 
-def _parts(formula: str) -> list[str]:
-    """The parts of a formula: each begins with a relation or a sum, or follows a comma."""
-    return re.split(r" (?=[=+~-] )|(?<=,) ", formula)
+def _in_parts(formula: str) -> str:
+    """A part begins with a relation, which has its own room, or with a sum, or follows a comma."""
+    sides = re.split(r" (?=[=~] )", formula)
+    parts = [re.split(r" (?=[+-] )|(?<=,) ", side) for side in sides]
+    return "<wbr>".join(" ".join(f"${_tex(part)}$" for part in side) for side in parts)
 
 
 def _tex(part: str) -> str:

@@ -84,13 +84,13 @@ def groups() -> dict[str, str]:
         for heading in order
     }
     for name, module in modules.items():
-        members = [
-            member
-            for member in _members(module)
-            if getattr(module, member) not in names.values()
+        own = [
+            each
+            for each in members(module)
+            if getattr(module, each) not in names.values()
         ]
         texts[f"hysim.{name}"] = (
-            f"{_first_line(module)}\n{_summary(f'{name}.{each}' for each in members)}"
+            f"{_first_line(module)}\n{_summary(f'{name}.{each}' for each in own)}"
         )
     return texts
 
@@ -115,7 +115,7 @@ def _page(heading: str, text: str) -> str:
     return f"{_heading(heading, '=')}\n.. currentmodule:: hysim\n\n{text}"
 
 
-def _members(module: ModuleType) -> Iterable[str]:
+def members(module: ModuleType) -> Iterable[str]:
     """Functions and classes of a public module that are hysim's own."""
     names = getattr(
         module, "__all__", [name for name in vars(module) if not name.startswith("_")]
