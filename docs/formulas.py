@@ -4,7 +4,9 @@ import re
 
 _SIGNS = r"sum|alpha|beta|gamma|delta|sigma|tau|rho|theta|omega"
 _FUNCTIONS = r"sign|sgn|exp|min|max|law"
-_FORMULA = re.compile(r"`([^`]*[^\w`][^`]*)`|(?<![\w`])([a-z]_[a-z])(?![\w`])")
+_FORMULA = re.compile(
+    r"(?:`([^`]*[^\w`][^`]*)`|(?<![\w`])([a-z]_[a-z])(?![\w`]))([.,:;]?)"
+)
 _RULES = (
     (r"\bsqrt\(([^()]*)\)", r"\\sqrt{\1}"),
     (r"_\(([^()]*)\)|_(\w+)", lambda of: f"_{{{of[1] or of[2]}}}"),
@@ -19,13 +21,17 @@ _RULES = (
 
 def as_tex(text: str) -> str:
     """The text with each formula between dollars, in parts between which a line may end."""
-    return _FORMULA.sub(lambda formula: _in_parts(formula[1] or formula[2]), text)
+    return _FORMULA.sub(lambda of: _in_parts(of[1] or of[2], of[3]), text)
 
 
-def _in_parts(formula: str) -> str:
-    """A part begins with a relation, which has its own room, or with a sum, or follows a comma."""
+def _in_parts(formula: str, stop: str) -> str:
+    """The parts, the last one with the mark that follows it: else it might begin the next line.
+
+    A part begins with a relation, which has its own room, or with a sum, or follows a comma.
+    """
     sides = re.split(r" (?=[=~] )", formula)
     parts = [re.split(r" (?=[+-] )|(?<=,) ", side) for side in sides]
+    parts[-1][-1] += stop and rf"\text{{{stop}}}"
     return "<wbr>".join(" ".join(f"${_tex(part)}$" for part in side) for side in parts)
 
 
