@@ -24,7 +24,7 @@ function generated(setting) {
   const each = Math.floor(SAMPLES / (turns.length - 1));
   const u = new Float64Array(each * (turns.length - 1) + 1);
   for (let k = 0; k < u.length; k++) {
-    const from = Math.min(Math.floor(k / each), turns.length - 2), part = (k - from * each) / each;
+    const from = Math.min(Math.floor(k / each), turns.length - 2), part = k / each - from; // as np.interp rounds
     u[k] = setting.kind === "sine"
       ? setting.middle + setting.amplitude * Math.sin((Math.PI / 2) * ((from ? 2 * from - 1 : 0) + part * (from ? 2 : 1)))
       : turns[from] + (turns[from + 1] - turns[from]) * part;
