@@ -51,7 +51,8 @@ def figure4(record: Record) -> plot.Figure:
 
 def opening(comparison: Comparison) -> plot.Figure:
     """Table 1 with the printed linear model and the asymmetric Bouc-Wen law."""
-    chosen = replace(comparison, rows=tuple(comparison[name] for name in ("eq1-printed", "bouc-wen-asymmetric")))
+    titles = {"eq1-printed": "equation (1), as printed", "bouc-wen-asymmetric": "Bouc-Wen, 7 parameters"}
+    chosen = replace(comparison, rows=tuple(replace(comparison[key], name=title) for key, title in titles.items()))
     return _drawn(3.0, lambda canvas: plot.loops(chosen, plot.panels(canvas, 2, columns=2, sharey=True)), width=5.0)
 
 
