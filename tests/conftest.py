@@ -212,3 +212,11 @@ def discovered_table1(tmp_path_factory):
     import hysim as hs
 
     return once_for_all_processes(tmp_path_factory, "discovered_table1", lambda _: hs.discover(hs.datasets.table1()))
+
+
+@pytest.fixture(scope="session")
+def table1():
+    """The record of Table 1."""
+    import hysim as hs
+
+    return hs.datasets.table1()

@@ -1,6 +1,7 @@
-"""Random laws and inputs for the invariants."""
+"""What several tests share: random laws and inputs for the invariants, and tests of what is refused."""
 
 import numpy as np
+import pytest
 from hypothesis import strategies as st
 
 import hysim as hs
@@ -33,6 +34,18 @@ def assert_cut_and_continued_gives_the_same_bits(law, u, cut, **time) -> None:
     whole, whole_end = law.advance(u, **time)
     assert np.array_equal(np.concatenate([head, tail]), whole)
     assert end == whole_end
+
+
+def refused(*cases):
+    """Make a test of calls with their messages, and with their errors before these if they are no ValueError."""
+
+    @pytest.mark.parametrize("case", cases, ids=[case[-1] for case in cases])
+    def test(case):
+        call, *errors, message = case
+        with pytest.raises(*errors or [ValueError], match=message):
+            call()
+
+    return test
 
 
 @st.composite

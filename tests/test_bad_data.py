@@ -10,11 +10,6 @@ RISE = np.linspace(0.0, 1.0, 30)
 KINDS = ("linear", "profile", "bootstrap")
 
 
-@pytest.fixture(scope="module")
-def table1() -> hs.Record:
-    return hs.datasets.table1()
-
-
 def test_numbers_that_are_not_finite_are_named_by_their_sample():
     with pytest.raises(ValueError, match="y must be finite, got nan at index 1"):
         hs.Record(u=[0.0, 1.0, 2.0], y=[0.0, np.nan, 1.0])

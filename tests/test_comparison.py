@@ -20,11 +20,6 @@ from hysim.models.model import FAMILIES
 
 
 @pytest.fixture(scope="module")
-def table1() -> hs.Record:
-    return hs.datasets.table1()
-
-
-@pytest.fixture(scope="module")
 def comparison(table1) -> hs.Comparison:
     law = hs.PolynomialBoucWen(beta=0.004, gamma=0.06, gain=-0.0076, z0=-8.8, input_coefficients=(0.028, -4e-5))
     fit = hs.identify(law, table1, fixed={"n": 1.0}, cross_validate="loo")

@@ -9,11 +9,6 @@ from hysim.laws.differential.terms import Term
 
 
 @pytest.fixture(scope="module")
-def table1():
-    return hs.datasets.table1()
-
-
-@pytest.fixture(scope="module")
 def found(discovered_table1):
     return discovered_table1
 

@@ -9,11 +9,6 @@ import hysim as hs
 from hysim.models.search_space import SearchSpace
 
 
-@pytest.fixture(scope="module")
-def table1() -> hs.Record:
-    return hs.datasets.table1()
-
-
 def loop_record(law) -> hs.Record:
     u = np.concatenate([hs.signals.triangle(-1.0, 1.0, cycles=2, samples_per_cycle=60), [-0.4, 0.3, -0.2, 0.9]])
     return hs.Record(u=u, y=law.response(u))

@@ -27,11 +27,6 @@ def reverse(record):
     return hs.Record(u=record.y, y=record.u)
 
 
-@pytest.fixture(scope="module")
-def table1():
-    return hs.datasets.table1()
-
-
 @pytest.mark.parametrize("family", [hs.PrandtlIshlinskii, hs.Dahl, hs.ColemanHodgdon, hs.Preisach, hs.SingleValued])
 def test_an_output_that_only_a_generator_makes_is_suspected(table1, family):
     """The table's voltage runs to and fro by steps of 5 V; its displacement does not."""
