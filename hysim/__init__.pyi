@@ -70,6 +70,8 @@ from hysim.sweeps import structure_task as structure_task
 from hysim.sweeps import load_sweep as load_sweep
 from hysim.sweeps import sobol_indices as sobol_indices
 from hysim.sweeps import SobolIndices as SobolIndices
+from hysim.sweeps import fragility as fragility
+from hysim.sweeps import Fragility as Fragility
 from hysim.metrics import loop_metrics as loop_metrics
 from hysim.metrics import LoopMetrics as LoopMetrics
 from hysim.metrics import cycle_metrics as cycle_metrics

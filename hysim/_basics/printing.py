@@ -27,6 +27,7 @@ _PICTURES = {
     "Tuning": "hs.plot.trade_off(tuning)",
     "Sweep": 'hs.plot.parallel_coordinates(study, "output")',
     "SobolIndices": 'hs.plot.sensitivities(indices, "output")',
+    "Fragility": "hs.plot.fragility(curve)",
     "LoopMetrics": "hs.plot.width(metrics)",
 }
 """Functions that draw a result, by the name of its class."""

@@ -11,11 +11,11 @@ from matplotlib.figure import Figure
 from hysim.plot._comparisons import comparison, identification, loops, residuals, widths
 from hysim.plot._files import FORMATS, save_svg, to_bytes, to_svg
 from hysim.plot._loops import animate, cycles, minor_loops, width
-from hysim.plot._outcomes import describing_function, displacement, parameter, selection, track, trade_off
+from hysim.plot._outcomes import describing_function, displacement, fragility, parameter, selection, track, trade_off
 from hysim.plot._posterior import corner, evidence, prediction
 from hysim.plot._records import element_loops, history, loop, response, signals, traces
 from hysim.plot._style import DIVERGING, SEQUENTIAL, figure, house_style, panels
-from hysim.plot._sweeps import forc, heat_map, parallel_coordinates, quantile_bands, residual_map, sensitivities
+from hysim.plot._sweeps import forc, heat_map, ida, parallel_coordinates, quantile_bands, residual_map, sensitivities
 
 __all__ = [
     "DIVERGING",
@@ -33,9 +33,11 @@ __all__ = [
     "evidence",
     "figure",
     "forc",
+    "fragility",
     "heat_map",
     "history",
     "house_style",
+    "ida",
     "identification",
     "loop",
     "loops",

@@ -1,4 +1,4 @@
-"""Pictures of discoveries, tunings, camera measurements, describing functions and parameters that change."""
+"""Pictures of discoveries, tunings, camera measurements, describing functions, fragility and parameters that change."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -14,8 +14,9 @@ from hysim.control import Tuning
 from hysim.discovery import Discovery, OscillatorDiscovery
 from hysim.identification import Identification, ParameterCurve, parameter_curve
 from hysim.metrics import describing_function as describing_function_of
-from hysim.plot._style import MEASURED, POINTS, AxesArray, line, one, several
+from hysim.plot._style import MEASURED, POINTS, AxesArray, line, one, scattered, several
 from hysim.records import Record
+from hysim.sweeps import Fragility
 from hysim.tracking import ParameterTrack
 from hysim.vision import Displacement
 
@@ -49,6 +50,27 @@ def selection(discovery: Discovery | OscillatorDiscovery, axes: Sequence[Axes] |
         lower.xaxis.get_major_locator().set_params(integer=True)
         upper.legend()
     return np.array([upper, lower])
+
+
+def fragility(curve: Fragility, ax: Axes | None = None) -> Axes:
+    """Draw a `curve` of `hysim.fragility` with its confidence band, and the observed shares above the limit.
+
+    Examples
+    --------
+    >>> import hysim as hs
+    >>> curve = hs.fragility([0.2, 0.4, 0.6, 0.8, 1.0], [0, 4, 11, 15, 19], 20)
+    >>> hs.plot.fragility(curve, ax=hs.plot.figure().add_subplot()).get_xlabel()
+    'Intensity'
+    """
+    x = np.geomspace(curve.intensities.min(), curve.intensities.max(), 200)
+    with one(ax) as axes:
+        axes.fill_between(x, *curve.band(x), alpha=0.25, linewidth=0.0, color=line(0)["color"])
+        axes.plot(x, curve.probability(x), label="lognormal curve", **line(0))
+        shares = curve.n_exceeding / curve.n_records
+        axes.plot(curve.intensities, shares, color=MEASURED, label="observed", **scattered(shares.size))
+        axes.set(xlabel="Intensity", ylabel="Share above the limit")
+        axes.legend()
+    return axes
 
 
 def trade_off(tuning: Tuning, ax: Axes | None = None) -> Axes:

@@ -21,6 +21,7 @@ from hysim.simulation import Simulation, free_run
 from hysim.sweeps import SobolIndices, Sweep
 
 _BANDS = ((0.05, 0.95), (0.25, 0.75))
+_FRACTILES = (0.16, 0.5, 0.84)  # a normal distribution's mean and one standard deviation to each side
 _COLOURS = "viridis"
 
 
@@ -110,6 +111,44 @@ def quantile_bands(result: Sweep, parameter: str, output: str, ax: Axes | None =
             axes.fill_between(middles, *np.transpose(limits), alpha=0.25, linewidth=0.0, color=line(0)["color"])
         axes.plot(middles, [np.median(y[part]) for part in parts], label="median", **line(0))
         axes.set(xlabel=parameter, ylabel=output)
+    return axes
+
+
+def ida(
+    result: Sweep, output: str, ax: Axes | None = None, *, intensity: str = "scale", limit: float | None = None
+) -> Axes:
+    """Draw an incremental dynamic analysis: the intensity over a response, a line for each record, and its fractiles.
+
+    `result` is a study of a grid such as one of `hysim.structure_task`, `output` the name of a response, `intensity`
+    that of a parameter; each set of the others has a line. A response that is infinite is a collapse, at which its line
+    ends. The 16, 50 and 84 % fractiles are the smallest responses that so many records do not exceed. A `limit` is a
+    dashed line. Raises ValueError if the study is not of such a grid, or a task failed or is missing.
+
+    Examples
+    --------
+    >>> import hysim as hs
+    >>> study = hs.sweep(lambda record, scale: {"drift": scale * (1 + record)}, {"record": [0, 1], "scale": [1.0, 2.0]})
+    >>> len(hs.plot.ida(study, "drift", ax=hs.plot.figure().add_subplot()).lines)
+    5
+    """
+    if result.axes is None or intensity not in result.axes:
+        raise ValueError(f"an incremental dynamic analysis needs a grid with the parameter {intensity}")
+    if len(result) < result.n_tasks or np.isnan(result[output]).any():
+        raise ValueError("an incremental dynamic analysis needs every task, and some failed or are missing")
+    place, scales = [*result.axes].index(intensity), np.asarray(result.axes[intensity], dtype=float)
+    table = np.moveaxis(result[output].reshape([len(each) for each in result.axes.values()]), place, -1)
+    order = np.argsort(scales)
+    curves, scales = table.reshape(-1, scales.size)[:, order], scales[order]
+    with one(ax) as axes:
+        for curve in curves:
+            axes.plot(curve, scales, color=POINTS, linewidth=0.8)
+        for k, fractile in enumerate(_FRACTILES):
+            values = np.quantile(curves, fractile, axis=0, method="inverted_cdf")  # of infinite responses, too
+            axes.plot(values, scales, label=f"{fractile:.0%}", linewidth=2.0, **line(k))
+        if limit is not None:
+            axes.axvline(limit, color=GUIDE, linestyle="dashed", label="limit")
+        axes.set(xlabel=output, ylabel=intensity)
+        axes.legend()
     return axes
 
 
