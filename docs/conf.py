@@ -30,6 +30,7 @@ from gallery import (  # noqa: E402
     plant_cards,
 )
 from table import answer  # noqa: E402  from experiments
+from teaching.slides import slides  # noqa: E402  from beside this file
 
 project = "hysim"
 version = release = hysim.__version__
@@ -210,13 +211,14 @@ draw_families(HERE / LOOP_FOLDER)
 
 
 def setup(app: Sphinx) -> None:
-    """Beside the pages: the explorer, and a look at what the search finds."""
+    """Beside the pages: the explorer, the slides, and a look at what the search finds."""
     app.connect("build-finished", _finish)
 
 
 def _finish(app: Sphinx, exception: Exception | None) -> None:
     if exception is None and app.builder.name == "html":
         explorer(Path(app.outdir) / EXPLORER)
+        (Path(app.outdir) / "teaching" / "slides.html").write_text(slides(), "utf-8")
         if missing := [
             word for word in SEARCHED if not found_by_search(Path(app.outdir), word)
         ]:

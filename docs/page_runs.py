@@ -24,7 +24,7 @@ HERE = Path(__file__).parent
 _BLOCK = re.compile(
     r"^```python\n(.*?)^```\n(?:\n```text\n(.*?)^```\n)?", flags=re.MULTILINE | re.DOTALL
 )
-_FIGURE = re.compile(r"!\[[^\]]*\]\((figures/([\w-]+\.(?:svg|gif)))\)")
+_FIGURE = re.compile(r"!\[[^\]]*\]\(((?:\.\./)?figures/([\w-]+\.(?:svg|gif)))\)")
 _PART = re.compile(f"{_BLOCK.pattern}|{_FIGURE.pattern}", flags=re.MULTILINE | re.DOTALL)
 _NUMBER = re.compile(r"(?<![\w.])[-+]?\d+(?:\.\d+)?(?:e[-+]?\d+)?(?!\w)")
 _TEXT = re.compile(r"<text\b[^>]*>([^<]*)</text>")

@@ -12,7 +12,7 @@ import pytest
 import hysim as hs
 
 DOCS = Path(__file__).parent.parent / "docs"
-PAGES = sorted(DOCS.glob("*.md"))
+PAGES = sorted([*DOCS.glob("*.md"), *DOCS.glob("teaching/*.md")])
 NEEDS = {
     "camera": pytest.mark.extra("skimage"),
     "dataframes": pytest.mark.extra("pandas", "xarray"),
