@@ -39,14 +39,18 @@ sys.dont_write_bytecode = False
 
 gc.set_threshold(20_000, 20, 20)  # kernels are compiled in 12 % less time than with the usual ones
 
-for number, usual in ((signal.SIGINT, signal.default_int_handler), (signal.SIGHUP, signal.SIG_DFL)):
-    if signal.getsignal(number) == signal.SIG_IGN:  # as under nohup: what the tests start would not hear of it either
+for name, usual in {"SIGINT": signal.default_int_handler, "SIGHUP": signal.SIG_DFL}.items():
+    number = getattr(signal, name, None)  # Windows has no SIGHUP
+    # Ignored, as under nohup: what the tests start would not hear of it either.
+    if number is not None and signal.getsignal(number) == signal.SIG_IGN:
         signal.signal(number, usual)
 
 import hypothesis  # noqa: E402  numba must not be imported before the cache folder is set
 import pytest  # noqa: E402
 
 collect_ignore = ["data", "strangers"]  # scripts, which a search for doctests would run
+if sys.platform == "win32":
+    collect_ignore += ["test_ending_early.py", "test_kernel_cache.py"]  # signals and limits that Windows lacks
 
 uncompiled = os.environ.get("NUMBA_DISABLE_JIT", "0") not in ("", "0")  # a hundred times slower
 hypothesis.settings.register_profile("hysim", deadline=None, derandomize=True, max_examples=2 if uncompiled else 30)

@@ -4,6 +4,8 @@ import re
 import tomllib
 from pathlib import Path
 
+import hysim as hs
+
 ROOT = Path(__file__).parent.parent
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
 NAMES = {"NumPy": "numpy", "SciPy": "scipy", "PySINDy": "pysindy"}
@@ -19,6 +21,15 @@ def rows():
 def minor(version):
     """(3, 11) of "3.11.7"."""
     return tuple(map(int, version.split(".")[:2]))
+
+
+def test_the_conda_recipe_has_the_version_and_requirements_of_the_package():
+    recipe = (ROOT / "conda" / "recipe.yaml").read_text(encoding="utf-8")
+    run = recipe.partition("\n  run:\n")[2].partition("\n\n")[0]
+    required = dict(re.match(r"([\w-]+)(.*)", each).groups() for each in PROJECT["dependencies"])
+    required = {"python": ">=${{ python_min }}", "matplotlib-base": required.pop("matplotlib"), **required}
+    assert dict(re.findall(r"^    - (\S+) (.+)$", run, flags=re.MULTILINE)) == required
+    assert f'version: "{hs.__version__}"\n  python_min: "{PROJECT["requires-python"][2:]}"\n' in recipe
 
 
 def test_every_run_passed():

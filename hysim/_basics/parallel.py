@@ -250,7 +250,9 @@ def processes(number: int, begin: Callable[..., None], *arguments: Any) -> Itera
     """
     before = {*multiprocessing.active_children()}
     context = multiprocessing.get_context("fork" if sys.platform.startswith("linux") else None)
-    pool = ProcessPoolExecutor(number, context, _begin, (begin, arguments))
+    # Windows cannot wait for more than 61 processes.
+    most = 61 if sys.platform == "win32" else number
+    pool = ProcessPoolExecutor(min(number, most), context, _begin, (begin, arguments))
     try:
         with _one_blas_thread_if_loaded(), _without_signals():
             pool.submit(_do_nothing)  # which starts the processes, where they are forked
@@ -320,9 +322,8 @@ def _end_with_parent() -> None:
 
 def _print_to_nowhere() -> None:
     """Close the standard output, so that its reader need not wait for this process."""
-    nowhere = os.open(os.devnull, os.O_WRONLY)
-    os.dup2(nowhere, 1)
-    os.close(nowhere)
+    with open(os.devnull, "wb") as nowhere:
+        os.dup2(nowhere.fileno(), 1)
 
 
 class _AtOnce(Executor):

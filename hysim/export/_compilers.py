@@ -98,7 +98,7 @@ def _built(source: str, result: str, command: Sequence[str], libraries: Sequence
         name = f"{Path(result).stem}.c"
         Path(folder, name).write_text(source, encoding="utf-8")
         done = subprocess.run(
-            [*command, name, "-o", result, *libraries], cwd=folder, capture_output=True, text=True, check=False
+            [*command, name, "-o", result, *libraries], cwd=folder, capture_output=True, errors="replace", check=False
         )
         if done.returncode:
             lines = [line for line in done.stderr.splitlines() if "error" in line] or done.stderr.splitlines() or [""]
