@@ -180,6 +180,19 @@ def test_an_exception_for_a_thread_does_not_reach_one_that_it_starts(monkeypatch
     assert [stray for stray in strays if stray.err_msg] == []  # without a message: one that a weak reference swallowed
 
 
+def test_threads_without_work_end_under_a_tracer():
+    """As in a debugger, or where coverage is measured."""
+    failing = """
+import sys
+from hysim._basics.parallel import threads
+sys.settrace(lambda *_: None)
+with threads(2):
+    raise ValueError("said")
+"""
+    done = subprocess.run([sys.executable, "-c", failing], capture_output=True, text=True, timeout=60.0)
+    assert done.stderr.endswith("ValueError: said\n")
+
+
 def test_an_interrupt_of_a_comparison_stops_its_threads():
     """The thread that waits is interrupted, as the main thread is by Ctrl-C; a search never ends by itself."""
     begun, ended_at = threading.Event(), []

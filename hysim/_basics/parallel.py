@@ -199,11 +199,12 @@ class _Threads(Executor):
     def stop(self, patience: float) -> None:
         """Cancel work that has not begun, raise an exception in every thread, and wait so many seconds for them."""
         self._cancel()
+        # Wakes those without work: under a tracer CPython 3.11 calls no function while an exception waits for a thread.
+        self.shutdown(wait=False)
         serving, self._serving = self._serving, set()
         with _starting:
             for ident in serving:
                 ctypes.pythonapi.PyThreadState_SetAsyncExc(ctypes.c_ulong(ident), ctypes.py_object(_Stopped))
-        self.shutdown(wait=False)
         deadline = time.monotonic() + patience
         for thread in self._threads:
             thread.join(max(0.0, deadline - time.monotonic()))
