@@ -71,16 +71,12 @@ def stored(sentences: Callable[[Result], T]) -> T:
         raise ValueError(f"{sentences.__name__}: {type(error).__name__}: {error}") from error
 
 
-def answer(finding: Finding) -> str:
-    """The sentences of a finding."""
-    return " ".join(stored(finding))
-
-
-def table_row(finding: Finding, path: Path) -> str:
-    """The row of an experiment: its script, figure and numbers, its question, its finding."""
-    name = finding.__name__
-    links = f"[{path.stem[:2]}]({path.name}) [figure](results/{name}/figure.svg) [table](results/{name}/table.csv)"
-    return f"| {links} | {question(path)} | {answer(finding)} |"
+def section(finding: Finding, path: Path) -> str:
+    """An experiment: its script and its question, its figure and its numbers, and a line for each sentence found."""
+    folder = f"results/{finding.__name__}"
+    head = f"### [{path.stem[:2]}]({path.name}) {question(path)}\n"
+    links = f"[Figure]({folder}/figure.svg), [table]({folder}/table.csv)."
+    return "\n".join([head, links, *stored(finding)]) + "\n"
 
 
 def page() -> str:
@@ -89,10 +85,10 @@ def page() -> str:
     named = [finding.__name__ for group in GROUPS.values() for finding in group]
     if sorted(named) != sorted(paths):
         raise ValueError(f"experiments and findings differ: {sorted(set(named) ^ set(paths))}")
-    parts = [HEAD]
+    index = [f"| [{path.stem[:2]}]({path.name}) | {question(path)} |" for path in paths.values()]
+    parts = [HEAD, "\n".join(["| | question |", "|---|---|", *index, ""])]
     for title, group in GROUPS.items():
-        rows = "\n".join(table_row(finding, paths[finding.__name__]) for finding in group)
-        parts.append(f"## {title}\n\n| | question | finding |\n|---|---|---|\n{rows}\n")
+        parts += [f"## {title}\n", *(section(finding, paths[finding.__name__]) for finding in group)]
     return "\n".join(parts)
 
 
@@ -117,15 +113,16 @@ def readme(text: str) -> str:
 
 def differences(name: str, written: str, computed: str) -> Iterator[str]:
     """The sentences in which a text differs from the computed one, each with the line where it stands."""
-    places = dict.fromkeys(computed.splitlines(), "")
-    for line in places:
-        script = re.match(r"\| \[\d\d\]\((\w+)\.py\)", line)
-        places[line] = script[1] if script else "text"
     before, after = written.splitlines(), computed.splitlines()
+    place, places = "text", []
+    for line in after:
+        script = re.match(r"### \[\d\d\]\((\w+)\.py\)", line)
+        place = script[1] if script else "text" if line.startswith("## ") else place
+        places.append(place)
     for kind, a, b, c, d in difflib.SequenceMatcher(None, before, after, autojunk=False).get_opcodes():
         if kind == "equal":
             continue
-        place = ", ".join(dict.fromkeys(places[line] for line in after[c:d])) or "text"
+        place = ", ".join(dict.fromkeys(places[c:d])) or "text"
         old, new = (re.split(r"(?<=[.?:;]) ", " ".join(lines)) for lines in (before[a:b], after[c:d]))
         for line in difflib.ndiff(old, new):
             if line.startswith(("- ", "+ ")):

@@ -108,7 +108,7 @@ def test_a_difference_is_named_with_its_experiment():
 
 def test_every_link_of_the_page_leads_to_a_file():
     links = re.findall(r"\]\(([^)]+)\)", table.PAGE.read_text(encoding="utf-8"))
-    assert len(links) == 3 * len(FINDINGS)
+    assert len(links) == 4 * len(FINDINGS)  # twice the script, figure and table
     assert [link for link in links if not (EXPERIMENTS / link).exists()] == []
 
 
