@@ -83,6 +83,12 @@ def listed(parts: Sequence[str]) -> str:
     return parts[0] if len(parts) == 1 else f"{', '.join(parts[:-1])} and {parts[-1]}"
 
 
+def tabled(*rows: Sequence[str]) -> str:
+    """A table of Markdown; the first row names the columns."""
+    head, *others = (f"| {' | '.join(row)} |" for row in rows)
+    return "\n".join(["", head, "|---" * len(rows[0]) + "|", *others, ""])
+
+
 # Evaluation and speed ------------------------------------------------------------------------------------------------
 
 
@@ -142,13 +148,15 @@ def batch(result: Result) -> list[str]:
         "64 values": "64 values of n",
         "all differ": "all n different",
     }
-    speeds = [f"{number(row['million_samples_per_second'])} for {names[row['n']]}" for row in rows]
+    speeds = [(names[row["n"]], number(row["million_samples_per_second"])) for row in rows]
     slopes = result["slopes"].values()
     require(max(slopes) < 1.05, "the cost grows at most in proportion")
     return [
-        f"{count(rows[0]['sets'])} laws on {rows[0]['samples']} samples, on all cores, in million samples a second: "
-        f"{listed(speeds)}. That is {span(column(rows, 'times_exp'), 2)} times the time of `np.exp` on as many "
-        "numbers.",
+        f"A batch takes {span(column(rows, 'times_exp'), 2)} times as long as `np.exp` on as many numbers.",
+        tabled(
+            (f"{count(rows[0]['sets'])} laws, {rows[0]['samples']} samples, all cores", "million samples a second"),
+            *speeds,
+        ),
         f"The cost grows at most in proportion to samples and laws (powers of {span(slopes, 2)}).",
     ]
 
@@ -156,11 +164,10 @@ def batch(result: Result) -> list[str]:
 def cold_start(result: Result) -> list[str]:
     """The first call, compiled, from a wheel and from the cache."""
     rows = result["rows"]
-    seconds = [column(rows, name) for name in ("compiled", "from a wheel", "from the cache")]
-    compiled, wheel, cached = (f"{number(median(each), 2)} s and {number(max(each), 2)} s" for each in seconds)
+    kinds = {name: column(rows, name) for name in ("compiled", "from a wheel", "from the cache")}
+    seconds = [(name, number(median(each), 2), number(max(each), 2)) for name, each in kinds.items()]
     return [
-        f"The first of {len(rows)} calls takes, in the median and at worst, {compiled} of processor time where it is "
-        f"compiled, {wheel} with the code of a wheel, and {cached} in later processes.",
+        tabled((f"first of {len(rows)} calls [s of processor time]", "median", "worst"), *seconds),
     ]
 
 
@@ -185,10 +192,10 @@ def more_samples(result: Result) -> list[str]:
 def wear_and_pinching(result: Result) -> list[str]:
     """Backward Euler beside the integrated law."""
     rows = where(result["rows"], law="worn and pinched")
-    euler = [f"{number(row['backward_euler_percent'], 2)} % wrong at {row['steps']} steps a cycle" for row in rows]
+    euler = [(str(row["steps"]), f"{number(row['backward_euler_percent'], 2)} %") for row in rows]
     return [
-        f"On a spring that wears off and pinches, backward Euler, as OpenSees takes it, is {listed(euler)}.",
-        "The law differs from itself with half the steps by at most "
+        tabled(("steps a cycle, on a spring that wears off and pinches", "error of backward Euler"), *euler),
+        "OpenSees uses backward Euler. The law differs from itself with half the steps by at most "
         f"{error_of(max(column(result['rows'], 'law_percent')))} % of the memory's range. Euler's step is "
         "repeated here, not run in OpenSees.",
     ]
@@ -556,22 +563,23 @@ def compensation_matrix(result: Result) -> list[str]:
     held, with_n, normalised = result["parameters_within_5_percent"]
     names = "PID", "inverse + creep inverse", "model-following"
 
-    def off(draws: Row) -> str:
-        return (
-            f"{percent(draws['median'])} in the median, {percent(draws['fifth_percentile'])} in the 5th percentile "
-            f"and {percent(draws['worst_corner'])} at the worst corner"
-        )
+    def off(name: str, draws: Row) -> list[str]:
+        return [name, *(percent(draws[key]) for key in ("median", "fifth_percentile", "worst_corner"))]
 
     widths = [f"{name} {percent(rows[name]['hysteresis_reduction_percent'])}" for name in names]
     key, worst = "residual_rms_reduction_percent", "worst_residual_rms_reduction_percent"
-    shaken = [f"{name} {percent(rows[name][key])} and {percent(rows[name][worst])}" for name in (*names, _DAMPED)]
+    shaken = [(name, percent(rows[name][key]), percent(rows[name][worst])) for name in (*names, _DAMPED)]
     return [
         "Where the controller knows the actuator exactly, the hysteresis reduction of a triangle of 1 Hz is "
         f"{listed(widths)}.",
-        "Of the residual vibration after a step, with the mode as the controller believes and with a mode 10 % off, "
-        f"{'; '.join(shaken)} are taken away (a negative reduction is more vibration). {_beside(list(rows.values()))}",
-        f"With all parameters of law and creep within 5 % but the exponent, the inverse alone keeps {off(held)}; "
-        f"with n drawn too {off(with_n)}; in the law's normalised form {off(normalised)}.",
+        tabled(("reduction of the residual vibration after a step", "mode known", "mode 10 % off"), *shaken),
+        f"A negative reduction is more vibration. {_beside(list(rows.values()))}",
+        tabled(
+            ("inverse alone, parameters within 5 %", "median", "5th percentile", "worst corner"),
+            off("all but the exponent", held),
+            off("the exponent too", with_n),
+            off("in the law's normalised form", normalised),
+        ),
     ]
 
 
@@ -617,15 +625,17 @@ def rate_sweep(result: Result) -> list[str]:
     rows, key = result["rows"], "hysteresis_reduction_percent"
     rates = (1.0, 10.0, 100.0)
 
-    def at(name: str) -> str:
-        return listed([percent(the(rows, controller=name, frequency_hz=rate)[key]) for rate in rates])
+    def at(name: str) -> list[str]:
+        return [name, *(percent(the(rows, controller=name, frequency_hz=rate)[key]) for rate in rates)]
 
     follow = where(rows, controller="model-following")
     worst = min(follow, key=lambda row: row[key])
     return [
-        f"At {listed([f'{rate:g}' for rate in rates])} Hz model-following takes {at('model-following')} of the width "
-        f"away, the inverse of law and creep {at('inverse + creep inverse')}, a PID {at('PID')}; at worst, at "
-        f"{worst['frequency_hz']:g} Hz, model-following takes {percent(worst[key])}.",
+        tabled(
+            ("reduction of the loop's width", *(f"{rate:g} Hz" for rate in rates)),
+            *map(at, ("model-following", "inverse + creep inverse", "PID")),
+        ),
+        f"Model-following reduces it least at {worst['frequency_hz']:g} Hz, by {percent(worst[key])}.",
         "Every controller knows the actuator exactly; experiment 15 says what becomes of that when it does not.",
     ]
 
@@ -858,22 +868,19 @@ def registration(result: Result) -> list[str]:
     peer = min(others, key=lambda name: max(at(name, 30)))
     levels = sorted({row["snr_db"] for row in rows}, reverse=True)
 
-    def ends(method: str) -> str:
-        return listed(
-            [
-                f"{number(median(at(method, snr)), 2)} and {number(max(at(method, snr)), 2)} at {snr} dB"
-                for snr in levels
-            ]
-        )
+    def ends(method: str) -> list[str]:
+        errors = [at(method, snr) for snr in levels]
+        return [method, *(f"{number(median(each), 2)} ({number(max(each), 2)})" for each in errors)]
 
     bias = max(value for snr in levels if snr >= 20 for value in at("hysim", snr, "largest_bias_px"))
     honest = column(where(rows, method="hysim"), "error_over_standard_error")
     speed = result["speed_and_memory"]
     memory = column(speed, "peak_mib")
     return [
-        f"On {pictures} kinds of picture that were not used while developing, the error in pixels rms, median and "
-        f"worst, is {ends('hysim')}; {peer}, the better setting of scikit-image, has {ends(peer)}; whole pixels have "
-        f"{number(max(at('whole pixels', 30)), 2)}.",
+        f"The errors are those on {pictures} kinds of picture that were not used while developing, and of the better "
+        "setting of scikit-image.",
+        tabled(("rms error [pixels]: median (worst)", *(f"{snr} dB" for snr in levels)), *map(ends, ("hysim", peer))),
+        f"Whole pixels are off by {number(max(at('whole pixels', 30)), 2)} pixels.",
         f"The bias is at most {number(bias, 2)} pixels at 20 dB and better; the error is {span(honest, 2)} times its "
         f"own standard error. {min(column(speed, 'frames_per_second')):.0f} frames of 512 x 512 pixels a second of "
         f"one core, with {span(memory)} MiB for {speed[0]['frames']} and {speed[-1]['frames']} frames.",
@@ -1099,14 +1106,14 @@ def evidence(result: Result) -> list[str]:
     whole = [row for row in found if len(where(found, model=row["model"])) == 3]
     ordered = sorted(where(whole, factor=1.0), key=lambda row: -row["log_evidence"])
     require(result["largest_error"] < 0.3, "errors of ln Z are small")
-    values = ", ".join(f"{row['model']} {row['log_evidence'] - ordered[0]['log_evidence']:.1f}" for row in ordered[1:])
+    values = [(row["model"], f"{row['log_evidence'] - ordered[0]['log_evidence']:.1f}") for row in ordered]
     seconds = column(whole, "cpu_seconds")
     beside = sum(the(found, model=row["model"], factor=1.0)["cpu_seconds"] for row in nested)
     return [
         f"Of {len(ordered)} models, with the rounding to pixels as noise, and boxes of the priors halved, unchanged "
-        f"and doubled: {result['sentence']}. With unchanged boxes, ln Z below {ordered[0]['model']}: {values}; "
-        f"errors by bridge sampling at most {error_of(result['largest_error'])}. Half boxes cut off the optimum of "
-        "some models.",
+        f"and doubled: {result['sentence']}. Half boxes cut off the optimum of some models.",
+        tabled(("model, with unchanged boxes", "ln Z, less that of the first"), *values),
+        f"Errors of ln Z by bridge sampling are at most {error_of(result['largest_error'])}.",
         f"Nested sampling of {len(nested)} of them, with errors of {span(column(nested, 'error'), 2)}, differs by at "
         f"most {number(result['largest_difference_of_methods'], 2)} standard errors, and takes "
         f"{number(sum(column(nested, 'cpu_seconds')) / beside, 2)} times the processor time of bridge sampling.",

@@ -76,7 +76,7 @@ def section(finding: Finding, path: Path) -> str:
     folder = f"results/{finding.__name__}"
     head = f"### [{path.stem[:2]}]({path.name}) {question(path)}\n"
     links = f"[Figure]({folder}/figure.svg), [table]({folder}/table.csv)."
-    return "\n".join([head, links, *stored(finding)]) + "\n"
+    return "\n".join([head, links, *stored(finding)]).rstrip() + "\n"
 
 
 def page() -> str:
