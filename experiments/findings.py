@@ -1113,7 +1113,7 @@ def evidence(result: Result) -> list[str]:
         f"Of {len(ordered)} models, with the rounding to pixels as noise, and boxes of the priors halved, unchanged "
         f"and doubled: {result['sentence']}. Half boxes cut off the optimum of some models.",
         tabled(("model, with unchanged boxes", "ln Z, less that of the first"), *values),
-        f"Errors of ln Z by bridge sampling are at most {error_of(result['largest_error'])}.",
+        f"Errors of ln Z by bridge sampling are at most {error_of(result['largest_error'])}. "
         f"Nested sampling of {len(nested)} of them, with errors of {span(column(nested, 'error'), 2)}, differs by at "
         f"most {number(result['largest_difference_of_methods'], 2)} standard errors, and takes "
         f"{number(sum(column(nested, 'cpu_seconds')) / beside, 2)} times the processor time of bridge sampling.",
