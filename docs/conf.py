@@ -29,7 +29,7 @@ from gallery import (  # noqa: E402
     picture_cards,
     plant_cards,
 )
-from table import answer  # noqa: E402  from experiments
+from table import stored  # noqa: E402  from experiments
 from teaching.slides import slides  # noqa: E402  from beside this file
 
 project = "hysim"
@@ -187,8 +187,8 @@ myst_substitutions = {
     "ratios": ratios(),
     "benchmark": benchmark(),
     "benchmark_errors": benchmark_errors(),
-    "found_in_lag_of_equation_1": answer(lag_of_equation_1),
-    "found_in_preisach": answer(preisach),
+    "found_in_lag_of_equation_1": " ".join(stored(lag_of_equation_1)),
+    "found_in_preisach": " ".join(stored(preisach)),
     "benchmark_figure": shown(
         {
             "benchmark_bouc_wen": "Root mean square error on the clean test data "
