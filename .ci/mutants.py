@@ -6,7 +6,7 @@
     python .ci/mutants.py --store mutants.json       resumes: a mutant is tried again if its module or tests changed
     python .ci/mutants.py --survivors                those that survived in the store, again
     python .ci/mutants.py --count 60 --packages kernels laws control files identification --circles
-                                                     which circle of tests kills each? (15 CPU minutes in each ten)
+                                                     which circle of tests kills each?
 
 A mutant is one change of a token: a comparison, an operator of arithmetic, a number, `min` for `max`, `and` for `or`, a
 sign or an `abs` dropped, `True` for `False`. Half of the sample is from the kernels, a quarter each from the other two
