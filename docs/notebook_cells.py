@@ -1,9 +1,9 @@
-"""Notebooks as text: pages whose ``{code-cell}`` blocks run, in the format of MyST-NB, which Jupytext opens in Jupyter.
+"""The notebooks of `docs/notebooks` as pages, whose code cells run when the documentation is built.
 
-Sphinx runs the cells of a page in order, in one namespace and in its own process: no kernel is started, and no package
-of Jupyter is needed. What a notebook would show below a cell is shown: printed text, the page or the text of a last
-expression, and figures of pyplot. A cell that fails ends the build. Beside each page lies the notebook with its
-outputs, to download.
+The committed notebooks hold no outputs. Sphinx runs the cells of each in order, in one namespace and in its own
+process: no kernel is started, and no package of Jupyter is needed. A page shows what a notebook would show below a
+cell: printed text, the page or the text of a last expression, and figures of pyplot. A cell that fails ends the build.
+The notebook with its outputs can be downloaded from its page.
 """
 
 import ast
@@ -22,13 +22,9 @@ from typing import Any, NamedTuple
 import matplotlib.pyplot as plt
 from docutils import nodes
 from docutils.parsers.rst import Directive
+from myst_parser.parsers.sphinx_ import MystParser
 
 import hysim as hs
-
-_CELL = re.compile(
-    r"^```\{code-cell\}[^\n]*\n(.*?)^```\n", flags=re.MULTILINE | re.DOTALL
-)
-_FRONT = re.compile(r"\A---\n.*?^---\n", flags=re.MULTILINE | re.DOTALL)
 
 
 class Outputs(NamedTuple):
@@ -41,13 +37,10 @@ class Outputs(NamedTuple):
 
 
 def cells(document: str) -> list[tuple[str, str]]:
-    """Kind, ``"markdown"`` or ``"code"``, and source of each cell of a notebook in text."""
-    parts = _CELL.split(_FRONT.sub("", document))
-    kinds = ["code" if k % 2 else "markdown" for k in range(len(parts))]
+    """Kind, ``"markdown"`` or ``"code"``, and source of each cell of a notebook."""
     return [
-        (kind, part.strip("\n"))
-        for kind, part in zip(kinds, parts, strict=True)
-        if part.strip()
+        (cell["cell_type"], "".join(cell["source"]))
+        for cell in json.loads(document)["cells"]
     ]
 
 
@@ -91,40 +84,12 @@ def executed(page: Path) -> tuple[Outputs, ...]:
 
 
 def notebook(page: Path) -> str:
-    """The page as a notebook of Jupyter, with its outputs."""
-    outputs = iter(executed(page))
-    written = [
-        _cell(k, kind, source, outputs)
-        for k, (kind, source) in enumerate(cells(page.read_text()))
-    ]
-    kernel = {
-        "kernelspec": {
-            "display_name": "Python 3",
-            "language": "python",
-            "name": "python3",
-        }
-    }
-    return (
-        json.dumps(
-            {"cells": written, "metadata": kernel, "nbformat": 4, "nbformat_minor": 5},
-            indent=1,
-        )
-        + "\n"
-    )
-
-
-def _cell(number: int, kind: str, source: str, outputs: Any) -> dict[str, Any]:
-    cell = {
-        "cell_type": kind,
-        "id": f"cell-{number}",
-        "metadata": {},
-        "source": source.splitlines(keepends=True),
-    }
-    return (
-        cell
-        if kind == "markdown"
-        else cell | {"execution_count": None, "outputs": _stored(next(outputs))}
-    )
+    """The notebook with its outputs."""
+    document = json.loads(page.read_text())
+    code = [cell for cell in document["cells"] if cell["cell_type"] == "code"]
+    for cell, outputs in zip(code, executed(page), strict=True):
+        cell["outputs"] = _stored(outputs)
+    return json.dumps(document, indent=1, ensure_ascii=False) + "\n"
 
 
 def _stored(outputs: Outputs) -> list[dict[str, Any]]:
@@ -144,11 +109,29 @@ def _stored(outputs: Outputs) -> list[dict[str, Any]]:
     ]
 
 
+class NotebookParser(MystParser):
+    """A notebook as a page: its cells in order, and a link to the file below the heading."""
+
+    supported = ("ipynb",)
+
+    def parse(self, inputstring: str, document: nodes.document) -> None:
+        """Parse the cells as text of MyST."""
+        (_, first), *others = cells(inputstring)
+        heading, _, text = first.partition("\n")
+        file = Path(document["source"]).name
+        link = f'<a href="{file}" download>Download this notebook</a>, or write it with `hysim example {file}`.'
+        parts = [f"{heading}\n\n{link}\n{text}"]
+        parts += [
+            text if kind == "markdown" else f"```{{code-cell}}\n{text}\n```"
+            for kind, text in others
+        ]
+        super().parse("\n\n".join(parts), document)
+
+
 class CodeCell(Directive):
     """A cell and what it shows."""
 
     has_content = True
-    optional_arguments = 1
 
     def run(self) -> list[nodes.Node]:
         environment = self.state.document.settings.env
@@ -179,14 +162,16 @@ def _image(figure: str) -> str:
 def _write_notebooks(app: Any, error: Exception | None) -> None:
     """Lay the notebooks beside the pages."""
     for page in (
-        sorted(Path(app.srcdir, "notebooks").glob("*.md")) if error is None else ()
+        sorted(Path(app.srcdir, "notebooks").glob("*.ipynb")) if error is None else ()
     ):
-        Path(app.outdir, "notebooks", f"{page.stem}.ipynb").write_text(notebook(page))
+        Path(app.outdir, "notebooks", page.name).write_text(notebook(page))
 
 
 def setup(app: Any) -> dict[str, bool]:
     """Add the directive, and the notebooks to download."""
     os.environ.setdefault("MPLBACKEND", "agg")
+    app.add_source_suffix(".ipynb", "ipynb")
+    app.add_source_parser(NotebookParser)
     app.add_directive("code-cell", CodeCell)
     app.connect("build-finished", _write_notebooks)
     return {"parallel_read_safe": False}

@@ -62,13 +62,9 @@ def _best_loop(ax: Any, comparison: Any) -> None:
         plot.loop(record, model, ax=ax)
 
 
-def _path(ax: Any, discovery: Any) -> None:
-    shown = discovery.path_fit_percent > discovery.scores["fit_percent"] - 50.0
-    if discovery.path_n_terms.size:
-        ax.plot(discovery.path_n_terms[shown], discovery.path_fit_percent[shown], "o", label="path of thresholds")
-        ax.plot(discovery.scores["n_terms"], discovery.scores["fit_percent"], "D", label="chosen law")
-        ax.set(xlabel="Number of terms", ylabel="Fit in free run [%]")
-        ax.legend()
+def _fits(ax: Any, discovery: Any) -> None:
+    plot.selection(discovery, [ax, plot.figure().add_subplot()])
+    ax.set_xlabel("Number of terms")
 
 
 _FIGURES: dict[str, tuple[str, Callable[[Any, Any], object]]] = {
@@ -77,6 +73,6 @@ _FIGURES: dict[str, tuple[str, Callable[[Any, Any], object]]] = {
     "ClosedLoop": ("reference and displacement against time", lambda ax, run: plot.response(run, ax)),
     "Identification": ("residual of each sample", _residual),
     "Comparison": ("the record, and the best model over it", _best_loop),
-    "Discovery": ("fit against the number of terms", _path),
-    "OscillatorDiscovery": ("fit against the number of terms", _path),
+    "Discovery": ("fit against the number of terms", _fits),
+    "OscillatorDiscovery": ("fit against the number of terms", _fits),
 }

@@ -11,6 +11,7 @@ import click
 from click.shell_completion import BashComplete, FishComplete, ZshComplete
 
 import hysim as hs
+from hysim._basics.printing import listed
 from hysim.cli import options, outputs
 from hysim.cli.records import STANDARD
 
@@ -42,10 +43,8 @@ def _magnet() -> "hs.Record":
     """First-order reversal curves of relays with two bells of thresholds."""
     import numpy as np
 
-    def density(up: Any, down: Any) -> Any:
-        return np.asarray(np.exp(-((up + down) ** 2) / 800.0 - ((up - down - 80.0) ** 2) / 1800.0))
-
-    law = hs.Preisach.from_density(np.linspace(-100.0, 100.0, 41), density)
+    edges = np.linspace(-100.0, 100.0, 41)
+    law = hs.Preisach.from_density(edges, lambda a, b: np.exp(-((a + b) ** 2) / 800.0 - ((a - b - 80.0) ** 2) / 1800.0))
     u = hs.signals.reversal_curves(-100.0, 100.0, curves=20, samples_per_step=2)
     y = law.response(u)
     return hs.Record(u=u, y=1.5 * y / np.abs(y).max(), units={"u": "kA/m", "y": "T"}, name="magnet, simulated")
@@ -71,41 +70,54 @@ DEVICES = {
 """Devices that `--device` takes."""
 
 
-Kind = Annotated[str, options.one_of({name: device.what for name, device in DEVICES.items()})]
 _SCRIPTS = {"bash": BashComplete, "zsh": ZshComplete, "fish": FishComplete}
+Kind = Annotated[str, options.one_of({name: device.what for name, device in DEVICES.items()})]
+Example = Annotated[str, options.file("FILE")]
 
 
-def example(path: options.Table | None = None, *, device: Kind = "piezo") -> None:
-    """Write a file to try the other commands on.
+def _notebook(path: Path) -> str:
+    """Text of the notebook with the name of `path`, from a wheel or from a checkout."""
+    package = Path(hs.__file__).parent
+    folder = next(
+        each for each in (package / "data" / "notebooks", package.parent / "docs" / "notebooks") if each.is_dir()
+    )
+    if not (source := folder / path.name).is_file():
+        raise ValueError(f"the notebooks are {listed(sorted(each.name for each in folder.iterdir()))}, got {path.name}")
+    return source.read_text(encoding="utf-8")
 
-    Write a record as a file like one of your own.
+
+def example(path: Example | None = None, *, device: Kind = "piezo") -> None:
+    """Write a file to try the other commands on, or a notebook.
+
+    Write a record as a file like one of your own, or a notebook of Jupyter.
 
     The piezo's 52 samples were measured for a paper of 2016, which prints no times: one second a sample is an
-    assumption. The other devices are simulated.
+    assumption. The other devices are simulated. The notebooks are first_fit, discover, compensate and study.
 
     Parameters
     ----------
-    path : file to write (default: the device's name with the ending .csv)
+    path : file to write, a table or a notebook (default: the device's name with the ending .csv)
 
     Examples
     --------
     hysim example
     hysim example damper.csv --device damper
     hysim example curves.mat --device magnet
+    hysim example first_fit.ipynb
     """
     out = f"{device}.csv" if path is None else path
     if out != STANDARD and os.path.exists(out):
         raise ValueError(f"{out} is there already: give another name, as in hysim example mine.csv")
+    if out.endswith(".ipynb"):
+        notebook = _notebook(Path(out))
+        return outputs.write({out: lambda: notebook}, lambda: f"{out}: a notebook, to open as in: jupyter lab {out}")
     what, make, tries = DEVICES[device]
     record = make()
     columns = {name: values for name in "tuy" if (values := vars(record)[name]) is not None}
     content = outputs.table(out, columns, record.units, resolution=record.resolution, name=record.name)
     names = ", ".join(f"{name} [{record.units[name]}]" for name in columns)
-    lines = [
-        f"{out}: {len(record)} samples of {names}: {what}. Try:",
-        *(f"  hysim {each.format(out)}" for each in tries),
-    ]
-    outputs.write({out: lambda: content}, lambda: "\n".join(lines))
+    text = f"{out}: {len(record)} samples of {names}: {what}. Try:\n" + "\n".join(f"  hysim {each}" for each in tries)
+    return outputs.write({out: lambda: content}, lambda: text.replace("{}", out))
 
 
 def explore(*, out: options.Page | None = None, no_browser: bool = False) -> None:
