@@ -134,9 +134,8 @@ def _sliders(name: str) -> str:
 
 
 def _first_sentence(value: Any) -> str:
-    return as_tex(
-        f"{inspect.getdoc(value)}".split("\n\n")[0].replace("\n", " ").replace("``", "`")
-    )
+    first = f"{inspect.getdoc(value)}".split("\n\n")[0].replace("\n", " ")
+    return as_tex(first.replace("``", "`")) if inspect.isclass(value) else first
 
 
 def figure_of(call: str) -> str:
