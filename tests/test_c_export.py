@@ -39,6 +39,13 @@ LINEAR = hs.Actuator(hysteresis=hs.Line(offset=0.1, slope=0.02), creep=CREEP, se
 PID = hs.PID(
     kp=4.0, ki=800.0, kd=1e-3, derivative_filter=1e-3, limits=(5.0, 95.0), setpoint_weight=0.7, derivative_weight=0.3
 )
+LEARNER = lambda: {  # noqa: E731
+    "controller": hs.TrackingController(
+        feedforward=hs.InverseFeedforward.of(STACK), mode_inverse=hs.ModeInverse(**MODE), preview=True, limits=(0.0, 60.0)
+    ),
+    "model": STACK,
+    "stroke": (0.3, 2.5),
+}
 FILTERED = {
     "notch": hs.Notch(**MODE),
     "damping": hs.DampingLoop(gain=2.0, frequency=2.0 * math.pi * 500.0),
@@ -94,6 +101,8 @@ CONTROLLERS = {  # functions: a controller compiles its law, which no collection
         LINEAR,
         hs.TrackingController(feedforward=hs.InverseFeedforward.of(LINEAR), feedback=hs.PID(ki=500.0)),
     ),
+    "repetitive": lambda: (STACK, hs.RepetitiveControl(period=1.0 / 7.0 // H * H, **LEARNER())),
+    "iterative": lambda: (STACK, hs.IterativeLearning(duration=0.1, **LEARNER())),
 }
 STRICT = ["-std=c99", "-O2", "-ffp-contract=off", "-Wall", "-Wextra", "-Werror", "-pedantic"]
 DRIVER = """

@@ -21,6 +21,10 @@ from hysim.control._filters import DampingLoop as DampingLoop
 from hysim.control._filters import ModeInverse as ModeInverse
 from hysim.control._filters import Notch as Notch
 from hysim.control._filters import Shaper as Shaper
+from hysim.control._learning import IterativeLearning as IterativeLearning
+from hysim.control._learning import LearnedTrials as LearnedTrials
+from hysim.control._learning import LearningCondition as LearningCondition
+from hysim.control._learning import RepetitiveControl as RepetitiveControl
 from hysim.control._loop import ClosedLoop as ClosedLoop
 from hysim.control._loop import RestingPlant as RestingPlant
 from hysim.control._loop import as_actuator as as_actuator

@@ -109,23 +109,12 @@ class Feedback(NamedTuple):
         return Feedback(block_diag(self.A, other.A), B, C, self.D + other.D)
 
 
-class SampledController(ABC):
+class SteppedController(ABC):
     """Frozen settings of a controller that is stepped from sample to sample."""
 
     @abstractmethod
     def compiled(self, sample_time: float, u0: float = 0.0, y0: float = 0.0) -> CompiledController:
         """Compiled step, parameters and state at rest at the command `u0` and the displacement `y0`."""
-
-    @abstractmethod
-    def frequency_response(self, frequency: npt.ArrayLike, sample_time: float) -> npt.NDArray[np.complex128]:
-        """Response from the negative measurement to the command at frequencies [rad/s], in their shape, limits apart.
-
-        The frequencies must not be zero where there is an integral.
-        """
-
-    @abstractmethod
-    def linear(self, sample_time: float) -> Feedback:
-        """Linear system from the measurement to the command, limits apart."""
 
     def ahead(self, sample_time: float) -> int:
         """Samples by which the reference must be known ahead of its time."""
@@ -152,6 +141,21 @@ class SampledController(ABC):
         """
         after = state._replace(state=np.array(state.state))
         return kernels.guarded(after.step, after.parameters, after.state, reference, measurement), after
+
+
+class SampledController(SteppedController):
+    """A controller with a linear part, limits apart."""
+
+    @abstractmethod
+    def frequency_response(self, frequency: npt.ArrayLike, sample_time: float) -> npt.NDArray[np.complex128]:
+        """Response from the negative measurement to the command at frequencies [rad/s], in their shape, limits apart.
+
+        The frequencies must not be zero where there is an integral.
+        """
+
+    @abstractmethod
+    def linear(self, sample_time: float) -> Feedback:
+        """Linear system from the measurement to the command, limits apart."""
 
 
 class WithoutFeedback(SampledController):

@@ -1,0 +1,529 @@
+"""Control that learns from repetition: of trials from rest, or of a periodic reference.
+
+The reference r of a controller is replaced by r + c. With the linear response T from c to the measurement the error
+becomes e - T (change of c), and the correction of `hysim.kernels.learning` leaves at each frequency
+
+    rate = |q - l T|        l = gain q / T of the model
+
+of the error from one repetition to the next. Where it is below one for all T, the errors shrink. T is taken of plants
+whose natural frequencies and whose slope of the law are wrong by the `uncertainty`, and for the least and the largest
+slope of the model's law against the inverse in the controller along the stroke. Slopes that change along the stroke
+are frozen in that theory. q stops where it would not learn: near a resonance that may lie 10 % off the error of the
+model is larger than the model.
+
+Sources: S. Arimoto et al., J. Robotic Systems 1 (1984) 123; D. A. Bristow et al., IEEE Control Systems 26(3) (2006) 96;
+S. Hara et al., IEEE Trans. Automatic Control 33 (1988) 659.
+"""
+
+import functools
+import itertools
+import math
+import warnings
+from dataclasses import replace
+from typing import Any, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+from scipy.signal import firwin, kaiser_beta, kaiserord
+
+from hysim._basics.frozen import FloatArray, Interval, NotNegative, Positive, frozen, read_only, vectors
+from hysim._basics.printing import printed, quantity, summary_text
+from hysim._basics.results import model_of
+from hysim.control._controller import SteppedController, begun, preview
+from hysim.control._loop import RestingPlant, close_loop, sampled
+from hysim.control._open_loop import secant_gain
+from hysim.control._to_control import to_control
+from hysim.control._tracking import InverseFeedforward, TrackingController, is_fed_back
+from hysim.errors import HysimWarning
+from hysim.kernels import controllers, learning
+from hysim.laws.static import Line
+from hysim.models.model import family
+from hysim.models.protocols import CompiledController, law_at, positive_time
+from hysim.plants.actuator import Actuator, as_actuator
+from hysim.plants.sensor import Sensor
+from hysim.plants.structures.structure import Structure
+from hysim.signals import triangle
+
+_bound = functools.lru_cache(maxsize=64)(learning.learning)
+
+_LENGTH = 2**15  # samples of an impulse response: 0.6 Hz between frequencies at 20 kHz
+_CYCLE = 2000  # samples of the stroke along which slopes are taken
+_STEADY = 3  # cycles, the last of which counts
+_MOVES = 1e-6  # of the largest change of the inverse's output: smaller ones have no slope
+_TRUSTED = 0.8  # rate of an ideal filter above which the automatic low pass stops
+_CONVERGES = 0.95  # rate that the automatic low pass must reach
+_HIGHEST = 0.5  # of pi / sample_time: highest automatic cutoff
+_NARROWER, _TRIES = 0.85, 20
+_RIPPLE = 60.0  # dB: an error of 0.1 % in the pass band is learned no further
+_TRANSITION = 0.5  # of the cutoff
+_DAMPED = 1e-2  # of the response at rest: smaller responses are not inverted
+
+
+class LearningCondition(NamedTuple):
+    """What a repetition leaves of the error, at worst over frequencies, slopes of the law and uncertain plants.
+
+    `rate` is that part, `frequency` where it is reached and `cutoff` the corner of the low pass [rad/s], and `slopes`
+    the least and the largest slope of the law against the controller's inverse.
+    """
+
+    rate: float
+    frequency: float
+    cutoff: float
+    slopes: tuple[float, float]
+
+    @property
+    def converges(self) -> bool:
+        """Whether the errors shrink."""
+        return self.rate < 1.0
+
+    def __str__(self) -> str:
+        hertz, corner = self.frequency / (2.0 * math.pi), self.cutoff / (2.0 * math.pi)
+        verdict = "converges" if self.converges else "MAY DIVERGE"
+        left = f"a repetition leaves at most {100.0 * self.rate:.3g} % of the error, at {hertz:.4g} Hz"
+        return f"{verdict}: {left}; learns up to {corner:.4g} Hz"
+
+
+class _Filters(NamedTuple):
+    """Taps of q and l for the samples -m to m around one, and the condition that they meet."""
+
+    low_pass: FloatArray
+    inverse: FloatArray
+    condition: LearningCondition
+
+
+class _Learning(SteppedController):
+    controller: Any
+    model: Any
+    stroke: Interval
+    cutoff: Positive | None
+    gain: Positive
+    uncertainty: NotNegative
+
+    def __post_init__(self) -> None:
+        if not isinstance(self.controller, InverseFeedforward | TrackingController):
+            kind = type(self.controller).__name__
+            raise TypeError(f"controller must be an InverseFeedforward or a TrackingController, got {kind}")
+        if not self.uncertainty < 1.0:
+            raise ValueError(f"uncertainty must be below 1, got {self.uncertainty:g}")
+        as_actuator(self.model)
+
+    @property
+    def u0(self) -> float | None:
+        """Command at which the memory of the controller's law holds; None for the first one."""
+        return self.controller.u0
+
+    @property
+    def limits(self) -> tuple[float, ...] | None:
+        """Lowest and highest command of the controller [unit of u]."""
+        return getattr(self.controller, "limits", None)
+
+    def ahead(self, sample_time: float) -> int:
+        """Samples by which the reference must be known ahead, as of the controller."""
+        return preview(self.controller, sample_time)
+
+    def condition(self, sample_time: float) -> LearningCondition:
+        """What a repetition leaves of the error at worst, at a sample time [s]."""
+        return _filters(self, positive_time(sample_time)).condition
+
+    def _compiled(
+        self, duration: float, is_trial: bool, sample_time: float, u0: float, y0: float
+    ) -> CompiledController:
+        filters, inner = _filters(self, sample_time), self.controller.compiled(sample_time, u0, y0)
+        samples, reach = round(duration / sample_time), filters.low_pass.size // 2
+        if abs(samples * sample_time - duration) > 1e-6 * duration:
+            raise ValueError(f"a repetition of {duration:g} s is no whole number of samples of {sample_time:g} s")
+        if not is_trial:
+            samples *= reach // samples + 1
+        late = preview(self.controller, sample_time) + _delay(self.model) / sample_time
+        whole = math.floor(late + 1e-9)
+        room = (3 if is_trial else 2) * (samples if is_trial else samples + reach + 1)
+        head = [samples, reach, whole, max(late - whole, 0.0), float(is_trial), inner.state.size]
+        parameters = [np.array(head), filters.low_pass, filters.inverse, inner.state, inner.parameters]
+        state = [np.array([u0, 0.0]), np.full(whole + 2, y0), np.zeros(room), inner.state]
+        step = _bound(inner.step)
+        return CompiledController(step, read_only(np.concatenate(parameters), finite=False), np.concatenate(state))
+
+
+@family
+class RepetitiveControl(_Learning):
+    """Controller that learns a periodic reference: a model of the period corrects the reference of another controller.
+
+    Parameters
+    ----------
+    controller : InverseFeedforward or TrackingController
+        Follows the corrected reference.
+    model : Actuator, law or fit
+        What it drives, vibration and delay included; the law may be another one than the controller inverts.
+    stroke : (float, float)
+        Lowest and highest reference, along which slopes are taken [unit of y].
+    period : float
+        Of the reference [s], a whole number of samples. Where the low pass is longer than a period, the errors are those
+        of several periods before.
+    cutoff : float, optional
+        Corner of the low pass [rad/s]; by default the highest at which the errors shrink.
+    gain : float
+        Part of the error that is corrected at once.
+    uncertainty : float
+        Relative error of natural frequencies and slopes for which errors must shrink.
+
+    Raises
+    ------
+    TypeError
+        If the controller or the model is none.
+    ValueError
+        If a number is outside its range.
+
+    Examples
+    --------
+    A line stands for the law in the controller.
+
+    >>> import numpy as np, hysim as hs
+    >>> law = hs.BoucWen(beta=0.02, gamma=0.01, feedthrough=0.03, gain=-0.01)
+    >>> line = hs.InverseFeedforward(law=hs.Line(slope=0.025))
+    >>> learner = hs.RepetitiveControl(controller=line, model=law, stroke=(0.0, 2.0), period=0.1)
+    >>> learner.condition(1e-3).converges
+    True
+    >>> r = hs.signals.triangle(0.0, 2.0, cycles=10, samples_per_cycle=100)
+    >>> error = r - hs.close_loop(law, learner, 1e-3 * np.arange(r.size), r).y
+    >>> bool(np.abs(error[-100:]).max() < 0.05 * np.abs(error[:100]).max())
+    True
+    """
+
+    controller: Any
+    model: Any
+    stroke: Interval
+    period: Positive
+    cutoff: Positive | None = None
+    gain: Positive = 1.0
+    uncertainty: NotNegative = 0.1
+
+    def compiled(self, sample_time: float, u0: float = 0.0, y0: float = 0.0) -> CompiledController:
+        return self._compiled(self.period, False, positive_time(sample_time), u0, y0)
+
+    def margin(self, sample_time: float) -> float:
+        """One minus the largest rate over slopes and uncertain plants; the loop is stable where it is positive."""
+        return 1.0 - self.condition(sample_time).rate
+
+
+@family
+class IterativeLearning(_Learning):
+    """Learning from trials: after each, the reference of a controller is corrected by the errors of the whole trial.
+
+    `learn` runs trials on a plant or on a stage of your own. With a `duration` it is a controller, too, in loops and in
+    C: each time so many samples have passed it updates the corrections and begins again from rest.
+
+    Parameters
+    ----------
+    controller, model, stroke, cutoff, gain, uncertainty
+        As of `RepetitiveControl`.
+    duration : float, optional
+        Of a trial [s], where the device itself counts samples.
+
+    Raises
+    ------
+    TypeError, ValueError
+        As of `RepetitiveControl`.
+
+    Examples
+    --------
+    >>> import numpy as np, hysim as hs
+    >>> law = hs.BoucWen(beta=0.02, gamma=0.01, feedthrough=0.03, gain=-0.01)
+    >>> line = hs.InverseFeedforward(law=hs.Line(slope=0.025))
+    >>> learner = hs.IterativeLearning(controller=line, model=law, stroke=(0.0, 2.0))
+    >>> r = hs.signals.triangle(0.0, 2.0, cycles=1, samples_per_cycle=100)
+    >>> trials = learner.learn(law, 1e-3 * np.arange(r.size), r, trials=8)
+    >>> bool(trials.rms[-1] < 0.02 * trials.rms[0])
+    True
+    """
+
+    controller: Any
+    model: Any
+    stroke: Interval
+    cutoff: Positive | None = None
+    gain: Positive = 1.0
+    uncertainty: NotNegative = 0.1
+    duration: Positive | None = None
+
+    def compiled(self, sample_time: float, u0: float = 0.0, y0: float = 0.0) -> CompiledController:
+        if self.duration is None:
+            raise ValueError("a controller that counts trials needs their duration=; learn() runs them without")
+        return self._compiled(self.duration, True, positive_time(sample_time), u0, y0)
+
+    def following(self, correction: npt.ArrayLike, error: npt.ArrayLike, sample_time: float) -> FloatArray:
+        """Correction (n,) for the next trial from that of one and its error (n,) [unit of y].
+
+        The error is the reference, as the sensor would read it, minus the measurement; one that is not finite counts
+        as zero.
+        """
+        filters, (c, e) = _filters(self, positive_time(sample_time)), np.broadcast_arrays(correction, error)
+        following = np.empty(c.size)
+        errors = np.where(np.isfinite(e), e, 0.0)
+        learning.renew(filters.low_pass, filters.inverse, np.array(c, dtype=float), errors, following)
+        return following
+
+    def commands(self, reference: npt.ArrayLike, sample_time: float, u0: float | None = None) -> FloatArray:
+        """Commands (n,) of a controller without feedback for a reference (n,), from rest at `u0` [unit of u]."""
+        r = read_only(reference, "reference", ndim=1)
+        samples = min(preview(self.controller, sample_time), r.size)
+        ahead = read_only(np.append(r[samples:], np.full(samples, r[-1])))
+        compiled = begun(self.controller, sample_time, (self.u0 or 0.0) if u0 is None else u0, float(r[0]))
+        command, u = np.empty((2, r.size))
+        controllers.replay(compiled.step, compiled.parameters, compiled.state, ahead, ahead, command, u)
+        return u
+
+    def learn(
+        self,
+        trial: Any,
+        t: npt.ArrayLike,
+        reference: npt.ArrayLike,
+        *,
+        trials: int = 8,
+        u0: float | None = None,
+        correction: npt.ArrayLike | None = None,
+    ) -> "LearnedTrials":
+        """Run trials, and correct the reference after each.
+
+        A trial has a lead before the reference and one after it: corrections begin before the reference moves, and the
+        last ones need errors after it. The first lead goes from where the model rests to the first reference.
+
+        Parameters
+        ----------
+        trial : plant as of `hysim.close_loop`, or callable
+            A plant is at rest at `u0` before each trial, and the noise of its sensor differs between trials. A callable
+            is ``trial(command) -> measurement`` with arrays of one shape, or ``trial(reference) -> measurement`` where
+            the controller has feedback and runs on the stage. A sample of nan is missing.
+        t, reference : array, shape (n,)
+            Evenly spaced times [s] and the reference [unit of y].
+        trials : int
+            Number of trials, the first without learning.
+        u0 : float, optional
+            Command before each trial, as of `hysim.close_loop` [unit of u].
+        correction : array, shape (n_samples,), optional
+            Correction to continue from, of `LearnedTrials`.
+
+        Returns
+        -------
+        LearnedTrials
+
+        Raises
+        ------
+        ValueError
+            If lengths differ, or times are uneven.
+        """
+        times, r, h = sampled(t, reference)
+        lead = _filters(self, h).low_pass.size // 2
+        rest = RestingPlant(as_actuator(self.model), h, self.u0 if u0 is None else u0).y0
+        rising = 0.5 - 0.5 * np.cos(np.linspace(0.0, math.pi, lead))
+        times = times[0] + h * np.arange(-lead, r.size + 2 * lead)
+        r = np.concatenate([rest + rising * (r[0] - rest), r, np.full(2 * lead, r[-1])])
+        c = np.zeros(r.size) if correction is None else vectors(correction=correction, t=times)[0]
+        read = np.interp(times - _delay(self.model), times, r)
+        corrections, measurements = np.empty((2, trials, r.size))
+        for k in range(trials):
+            corrections[k] = c
+            with warnings.catch_warnings():
+                if k < trials - 1:
+                    warnings.simplefilter("ignore", HysimWarning)
+                measurements[k] = self._measured(trial, times, r + c, u0, k)
+            c = self.following(c, read - measurements[k], h)
+        errors = (read - measurements)[:, lead : -2 * lead]
+        return LearnedTrials(
+            t=times,
+            reference=r,
+            corrections=corrections,
+            measurements=measurements,
+            rms=np.sqrt(np.nanmean(errors**2, axis=1)),
+            condition=self.condition(h),
+        )
+
+    def _measured(self, trial: Any, t: FloatArray, r: FloatArray, u0: float | None, number: int) -> FloatArray:
+        """Measurement of a trial with the corrected reference."""
+        if callable(trial):
+            fed_back = is_fed_back(self.controller)
+            measurement = np.array(trial(r if fed_back else self.commands(r, float(t[1] - t[0]), u0)), dtype=float)
+            if measurement.shape != r.shape:
+                raise ValueError(f"trial must return a measurement of shape {r.shape}, got {measurement.shape}")
+            return measurement
+        plant = model_of(trial)
+        if not isinstance(plant, Structure) and (sensor := as_actuator(plant).sensor) is not None:
+            plant = replace(as_actuator(plant), sensor=replace(sensor, seed=sensor.seed + number))
+        return close_loop(plant, self.controller, t, r, u0=u0).measurement
+
+
+@printed
+@frozen
+class LearnedTrials:
+    """Trials of `IterativeLearning.learn`.
+
+    Parameters
+    ----------
+    t, reference : array, shape (n_samples,)
+        Times [s] and reference, with the rest before and after it [unit of y].
+    corrections, measurements : array, shape (n_trials, n_samples)
+        Corrections of the reference, and what the sensor read [unit of y].
+    rms : array, shape (n_trials,)
+        Rms of the error of each trial, without the rest but with the sensor's noise in it [unit of y].
+    condition : LearningCondition
+        What a trial leaves of the error at worst.
+    """
+
+    t: FloatArray
+    reference: FloatArray
+    corrections: FloatArray
+    measurements: FloatArray
+    rms: FloatArray
+    condition: LearningCondition
+
+    @property
+    def correction(self) -> FloatArray:
+        """Correction (n_samples,) of the trial with the smallest error: the one to run, or to continue from."""
+        return self.corrections[int(np.nanargmin(self.rms))]
+
+    def __str__(self) -> str:
+        first, last = quantity(self.rms[0]), quantity(self.rms[-1])
+        return summary_text(
+            [f"LearnedTrials: {self.rms.size} trials, rms error {first} in the first and {last} in the last"],
+            {"each trial": ", ".join(f"{value:.3g}" for value in self.rms), "condition": str(self.condition)},
+        )
+
+
+@functools.lru_cache(maxsize=32)
+def _filters(learner: _Learning, sample_time: float) -> _Filters:
+    """The filters of a learner with the cutoff asked for, or with the highest one at which errors shrink."""
+    actuator = as_actuator(learner.model)
+    slope, slopes = _slopes(learner.controller, actuator, learner.stroke)
+    off = learner.uncertainty
+    extremes = {slopes[0] * (1.0 - off), slopes[1] * (1.0 + off)}
+    speeds = {1.0 - off, 1.0, 1.0 + off} if actuator.vibration is not None else {1.0}
+    nominal = _response(learner.controller, actuator, slope, 0.5 * sum(slopes), 1.0, sample_time)
+    plants = np.stack(
+        [
+            _response(learner.controller, actuator, slope, each, speed, sample_time)
+            for each, speed in itertools.product(sorted(extremes), sorted(speeds))
+        ]
+    )
+    damped = (_DAMPED * abs(nominal[0])) ** 2
+    inverse = learner.gain * np.conj(nominal) / (np.abs(nominal) ** 2 + damped)
+    late = math.ceil(_delay(learner.model) / sample_time)
+    if learner.cutoff is not None:
+        return _with_cutoff(learner.cutoff, inverse, plants, late, sample_time, slopes)
+    doubtful = np.flatnonzero(np.abs(1.0 - inverse * plants).max(axis=0) > _TRUSTED)
+    edge = doubtful[0] / nominal.size if doubtful.size else 1.0
+    cutoff = min(edge / (1.0 + 0.5 * _TRANSITION), _HIGHEST) * math.pi / sample_time
+    for _ in range(_TRIES):
+        filters = _with_cutoff(cutoff, inverse, plants, late, sample_time, slopes)
+        if filters.condition.rate < _CONVERGES:
+            break
+        cutoff *= _NARROWER
+    return filters
+
+
+def _with_cutoff(
+    cutoff: float,
+    inverse: npt.NDArray[np.complex128],
+    plants: npt.NDArray[np.complex128],
+    late: int,
+    sample_time: float,
+    slopes: tuple[float, float],
+) -> _Filters:
+    """Taps of a low pass, and of it times the inverse, and what they leave of the error."""
+    corner = cutoff * sample_time / math.pi
+    if not corner < 1.0:
+        raise ValueError(f"cutoff must be below pi / sample_time, {math.pi / sample_time:.4g} rad/s, got {cutoff:.4g}")
+    half = kaiserord(_RIPPLE, min(_TRANSITION * corner, 1.0 - corner))[0] // 2
+    reach = min(half + max(half // 2, 16) + late, _LENGTH // 2 - 1)
+    taps = np.pad(firwin(2 * half + 1, corner, window=("kaiser", kaiser_beta(_RIPPLE))), reach - half)
+    low_pass = _spectrum(taps)
+    learns = np.fft.irfft(low_pass * inverse, _LENGTH)[-np.arange(-reach, reach + 1)]
+    rates = np.abs(low_pass - _spectrum(learns) * plants).max(axis=0)
+    worst = int(np.argmax(rates))
+    frequency = 2.0 * math.pi * worst / (_LENGTH * sample_time)
+    return _Filters(
+        taps, np.ascontiguousarray(learns), LearningCondition(float(rates[worst]), frequency, cutoff, slopes)
+    )
+
+
+def _spectrum(taps: FloatArray) -> npt.NDArray[np.complex128]:
+    """Response of taps for the samples -m ... m around a sample."""
+    reach, around = taps.size // 2, np.zeros(_LENGTH)
+    around[-np.arange(-reach, reach + 1)] = taps
+    return np.fft.rfft(around)
+
+
+def _delay(model: Any) -> float:
+    sensor = as_actuator(model).sensor
+    return 0.0 if sensor is None else float(sensor.delay)
+
+
+def _slopes(controller: Any, actuator: Actuator, stroke: Interval) -> tuple[float, tuple[float, float]]:
+    """Slope of the controller's law over the stroke, and the least and the largest of the model's against it."""
+    cycle = np.tile(triangle(*stroke, cycles=1, samples_per_cycle=_CYCLE), _STEADY) / _behind(actuator)
+    law = Line(slope=1.0) if actuator.hysteresis is None else law_at(actuator.hysteresis, math.inf)
+    forward = controller if isinstance(controller, InverseFeedforward) else controller.feedforward
+    if forward is None:
+        gain = secant_gain(Actuator(hysteresis=law), cycle[:_CYCLE])
+        inverted: Any = Line(slope=gain)
+    else:
+        inverted = Line(slope=1.0) if forward.law is None else law_at(forward.law, math.inf)
+    u = inverted.inverse_response(cycle)
+    level, v = np.diff(law.response(u))[-_CYCLE:], np.diff(inverted.response(u))[-_CYCLE:]
+    moves = np.abs(v) > _MOVES * np.abs(v).max()
+    ratios = level[moves] / v[moves]
+    last = u[-_CYCLE:]
+    slope = math.copysign(np.ptp(cycle) / np.ptp(last), float(np.diff(last) @ np.diff(cycle[-_CYCLE:])))
+    return slope, (float(ratios.min()), float(ratios.max()))
+
+
+def _behind(actuator: Actuator) -> float:
+    """Displacement at rest for each unit of the law's output."""
+    return replace(actuator, amplifier=None).dc_gain
+
+
+def _response(
+    controller: Any, actuator: Actuator, slope: float, ratio: float, speed: float, sample_time: float
+) -> npt.NDArray[np.complex128]:
+    """Frequency response from a change of the reference to that of the measurement, with lines in place of laws.
+
+    The plant's line has `ratio` times the controller's `slope`; its natural frequencies are `speed` times as high.
+    """
+    line, delay = Line(slope=slope), Sensor(delay=_delay(actuator))
+    plant = replace(
+        actuator,
+        amplifier=_unlimited(actuator.amplifier, controller),
+        hysteresis=Line(slope=slope * ratio),
+        vibration=None if actuator.vibration is None else _faster(actuator.vibration, speed),
+        sensor=delay,
+    )
+    if isinstance(controller, InverseFeedforward):
+        linear: Any = replace(controller, law=line, amplifier=None)
+    else:
+        forward, model = controller.feedforward, controller.model
+        linear = replace(
+            controller,
+            feedforward=None if forward is None else replace(forward, law=line, amplifier=None),
+            model=None if model is None else replace(model, hysteresis=line, amplifier=None),
+            limits=None,
+        )
+    impulse = np.zeros(_LENGTH)
+    at = preview(linear, sample_time)
+    impulse[at] = 1.0
+    measured = RestingPlant(plant, sample_time, 0.0).run(linear, impulse).measurement
+    return np.fft.rfft(np.roll(measured, -at))
+
+
+def _unlimited(amplifier: Any, controller: Any) -> Any:
+    """The amplifier of a plant, without what the controller inverts and without limits."""
+    plant = controller.plant
+    if amplifier is None or (plant is not None and plant.amplifier == amplifier):
+        return None
+    return replace(amplifier, offset=0.0, limits=None, slew_rate=None)
+
+
+def _faster(vibration: Any, speed: float) -> Any:
+    """A linear stage whose natural frequencies are `speed` times as high."""
+    import control
+
+    if speed == 1.0:
+        return vibration
+    system = control.ss(to_control(vibration))
+    return control.ss(speed * system.A, speed * system.B, system.C, system.D)

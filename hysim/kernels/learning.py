@@ -1,0 +1,109 @@
+"""Corrections of a reference that repeats, learned from the errors of its last repetition.
+
+A controller follows r + c in place of the reference r. From one repetition j to the next the correction becomes
+
+    c_(j+1)[k] = sum_i q_i c_j[k + i] + sum_i l_i e_j[k + i],       i = -m ... m
+
+with the error e, the reference as the sensor would read it minus the measurement. q is a low pass without phase, and l
+the same low pass times the inverse of the model from c to the measurement. Both look m samples ahead, which the
+repetition before allows.
+
+Of trials, each from rest, corrections and errors are zero before the trial. The corrections fade in along the first m
+samples; they fade out before the last m, which get none, since the errors that they need come after the trial. A
+weight of at most one enlarges nothing, so they shrink where they do on a line without ends. In a loop whose reference
+has a period of N samples j is the period before, and the errors of the last N samples and the corrections of the last
+N + m are kept in rings.
+"""
+
+from numba import float64, void
+
+from hysim._basics.frozen import FloatArray
+from hysim.kernels._compile import borrowed, by_address, kernel, signed_closure, signed_kernel
+from hysim.kernels.controllers import CONTROLLER, ControllerStep
+from hysim.kernels.stepping import CONSTANTS, VECTOR
+from hysim.kernels.tracking import push
+
+N_HEAD = 6
+N_PLACES = 2  # of the state before the ring of references
+
+
+@signed_kernel(void(CONSTANTS, CONSTANTS, CONSTANTS, CONSTANTS, VECTOR))
+def renew(
+    low_pass: FloatArray, inverse: FloatArray, corrections: FloatArray, errors: FloatArray, following: FloatArray
+) -> None:
+    """The corrections of the trial that follows, from the corrections and the errors of one."""
+    reach, end = low_pass.size // 2, corrections.size
+    for k in range(end):
+        total, faded = 0.0, min(1.0, (k + 1.0) / (reach + 1.0), (end - reach - k) / (reach + 1.0))
+        if faded > 0.0:
+            for i in range(max(0, reach - k), low_pass.size):
+                total += low_pass[i] * corrections[k + i - reach] + inverse[i] * errors[k + i - reach]
+        following[k] = faded * faded * (3.0 - 2.0 * faded) * total
+
+
+@kernel
+def learn(
+    inner: ControllerStep, parameters: FloatArray, state: FloatArray, reference: float, measurement: float
+) -> float:
+    """The command of a controller whose reference is corrected.
+
+    `parameters` are a head (samples of a repetition, m, whole samples and the rest of a sample by which the sensor is
+    late, whether trials begin from rest, length of the controller's state), q, l, the controller's state at rest, and
+    its parameters. `state` is (last command, sample of the repetition, ring of references, corrections, errors, room
+    for the next corrections of a trial, the controller's state).
+    """
+    parameters, state = borrowed(parameters), borrowed(state)
+    period, reach, late = int(parameters[0]), int(parameters[1]), int(parameters[2])
+    part, is_trial, size = parameters[3], parameters[4] > 0.0, int(parameters[5])
+    taps = 2 * reach + 1
+    p, s = N_HEAD, N_PLACES
+    low_pass, inverse, p = parameters[p : p + taps], parameters[p + taps : p + 2 * taps], p + 2 * taps
+    rest, p = parameters[p : p + size], p + size
+    room, spare = period + reach + 1, 0
+    if is_trial:
+        room = spare = period
+    past, s = state[s : s + late + 2], s + late + 2
+    corrections, s = state[s : s + room], s + room
+    errors, s = state[s : s + room], s + room
+    following, own = state[s : s + spare], state[s + spare :]
+
+    k = int(state[1])
+    if k == room:
+        k = 0
+        if is_trial:
+            renew(low_pass, inverse, corrections, errors, following)
+            for i in range(room):
+                corrections[i] = following[i]
+            for i in range(size):
+                own[i] = rest[i]
+    if is_trial and k == 0:
+        for i in range(late + 2):
+            past[i] = reference
+    push(past, reference)
+    if not is_trial:
+        total = 0.0
+        for i in range(taps):
+            at = k + 1 + i
+            if at >= room:
+                at -= room
+            total += low_pass[i] * corrections[at] + inverse[i] * errors[at]
+        corrections[k] = total
+    errors[k] = (1.0 - part) * past[late] + part * past[late + 1] - measurement
+    state[1] = float(k + 1)
+    u = inner(parameters[p:], own, reference + corrections[k], measurement)
+    state[0] = own[0]
+    return float(u)
+
+
+_LEARNING = float64(CONTROLLER, CONSTANTS, VECTOR, float64, float64)
+
+
+def learning(inner: ControllerStep) -> ControllerStep:
+    """The step `learn` around the step of a controller."""
+    learn_by, inner_by = by_address(learn, _LEARNING), by_address(inner, CONTROLLER.signature)
+
+    @signed_closure(CONTROLLER.signature)
+    def step(parameters: FloatArray, state: FloatArray, reference: float, measurement: float) -> float:
+        return learn_by(inner_by, parameters, state, reference, measurement)
+
+    return step
