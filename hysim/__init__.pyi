@@ -43,6 +43,7 @@ from hysim.control import InverseFeedforward as InverseFeedforward
 from hysim.control import AdaptiveInverse as AdaptiveInverse
 from hysim.control import IterativeLearning as IterativeLearning
 from hysim.control import RepetitiveControl as RepetitiveControl
+from hysim.control import PredictiveControl as PredictiveControl
 from hysim.control import ModeInverse as ModeInverse
 from hysim.control import Shaper as Shaper
 from hysim.control import Notch as Notch

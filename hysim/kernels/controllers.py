@@ -51,6 +51,26 @@ def pid(parameters: FloatArray, state: FloatArray, reference: float, measurement
 
 
 @signed_kernel(float64(CONSTANTS, VECTOR, float64, float64))
+def linear(parameters: FloatArray, state: FloatArray, reference: float, measurement: float) -> float:
+    """The command bias + C x + D e within the limits, then x' = A x + B e, with e = reference - measurement.
+
+    `parameters` are (bias, lowest and highest command, D, C, B, A); `state` is (command, x, room for it).
+    """
+    n, error, command = (state.size - 1) // 2, reference - measurement, parameters[0]
+    command += parameters[3] * error
+    for i in range(n):
+        command += parameters[4 + i] * state[1 + i]
+        total = parameters[4 + n + i] * error
+        for j in range(n):
+            total += parameters[4 + (2 + i) * n + j] * state[1 + j]
+        state[1 + n + i] = total
+    for i in range(n):
+        state[1 + i] = state[1 + n + i]
+    state[0] = command
+    return float(min(max(command, parameters[1]), parameters[2]))
+
+
+@signed_kernel(float64(CONSTANTS, VECTOR, float64, float64))
 def through(parameters: FloatArray, state: FloatArray, reference: float, measurement: float) -> float:
     """No controller: the voltage is the reference."""
     state[0] = reference

@@ -1,0 +1,182 @@
+"""Feedback by norms: python-control's H-infinity synthesis for the line that stands for a law, checked on a family.
+
+The sampled plant, hold and delay in it, is taken to the plane of w = 2 (z - 1) / (h (z + 1)), which keeps norms. There
+the controller K minimises the norm from the reference r and a disturbance d of the command to
+
+    W e,        effort u,          e = r - G (u + share d),        W = (w / M + b) / (w + b / 1000)
+
+with the bandwidth b, and returns to z the same way. Without the disturbance K would cancel the plant's resonance, and
+would depend on where it lies. Source: K. Zhou and J. C. Doyle, Essentials of Robust Control (1998), chapters 9 and 14.
+"""
+
+import itertools
+import math
+from collections.abc import Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+from scipy.signal import cont2discrete
+
+from hysim._basics.frozen import FloatArray, Interval, read_only
+from hysim.control._controller import Feedback, SampledController
+from hysim.control._loop import as_actuator
+from hysim.control._open_loop import secant_gain, slopes
+from hysim.control._stability import LinearLoop
+from hysim.kernels import controllers as kernels
+from hysim.models.model import family
+from hysim.models.protocols import CompiledController, positive_time
+from hysim.plants.state_space import StateSpace
+from hysim.signals import triangle
+
+_SLOW = 1e-3  # error at rest, in units of the reference
+_CYCLE = 2000  # samples of the stroke along which slopes are taken
+
+
+@family
+class LinearController(SampledController):
+    """Linear controller of the error, such as of a synthesis by python-control, sampled by the bilinear transform.
+
+    A command at a limit does not stop its states.
+
+    Parameters
+    ----------
+    system : StateSpace
+        From the error to the command, continuous and without dead time.
+    limits : (float, float), optional
+        Lowest and highest command; None for none [unit of u].
+
+    Raises
+    ------
+    ValueError
+        If the system has a dead time.
+
+    Examples
+    --------
+    >>> import hysim as hs
+    >>> integral = hs.control.LinearController(system=hs.StateSpace(A=[[0.0]], B=[1.0], C=[4.0]))
+    >>> u, state = integral.step(integral.initial(sample_time=0.5), reference=1.0, measurement=0.0)
+    >>> u, integral.step(state, 1.0, 0.0)[0]
+    (1.0, 3.0)
+    """
+
+    system: StateSpace
+    limits: Interval | None = None
+
+    def __post_init__(self) -> None:
+        if self.system.delay:
+            raise ValueError("system must have no dead time: model it in the sensor of the plant")
+
+    def _discrete(self, sample_time: float) -> tuple[FloatArray, FloatArray, FloatArray, float]:
+        system = self.system
+        parts = system.A, system.B[:, np.newaxis], system.C[np.newaxis], [[system.D]]
+        A, B, C, D, _ = cont2discrete(parts, positive_time(sample_time), method="bilinear")
+        return A, B[:, 0], C[0], float(D[0, 0])
+
+    def compiled(self, sample_time: float, u0: float = 0.0, y0: float = 0.0) -> CompiledController:
+        A, B, C, D = self._discrete(sample_time)
+        head = [u0, *(self.limits or (-math.inf, math.inf)), D]
+        parameters = read_only(np.concatenate([head, C, B, A.ravel()]), finite=False)
+        return CompiledController(kernels.linear, parameters, np.append(u0, np.zeros(2 * B.size)))
+
+    def frequency_response(self, frequency: npt.ArrayLike, sample_time: float) -> npt.NDArray[np.complex128]:
+        w = 2.0 / sample_time * 1j * np.tan(0.5 * np.asarray(frequency, dtype=float) * sample_time)
+        system = self.system
+        states = np.linalg.solve(w[..., None, None] * np.eye(system.B.size) - system.A, system.B[:, np.newaxis])
+        return np.asarray((system.C @ states)[..., 0] + system.D)
+
+    def linear(self, sample_time: float) -> Feedback:
+        A, B, C, D = self._discrete(sample_time)
+        return Feedback(A, -B, C, -D)
+
+
+class LoopShaping(NamedTuple):
+    """A controller, the norm that it reaches, and its largest sensitivity over slopes and plants."""
+
+    controller: LinearController
+    norm: float
+    max_sensitivity: float
+
+
+def loop_shaping(
+    plant: Any,
+    sample_time: float,
+    stroke: tuple[float, float],
+    *,
+    bandwidth: float,
+    max_sensitivity: float = 2.0,
+    effort: float = 0.1,
+    disturbance: float = 1.0,
+    variations: Sequence[Any] = (),
+    limits: tuple[float, float] | None = None,
+) -> LoopShaping:
+    """Design a feedback by python-control's `hinfsyn`, for the law's mean slope along a stroke.
+
+    Parameters
+    ----------
+    plant : Actuator, law, linear plant or fit
+    sample_time : float
+        Of the controller [s].
+    stroke : (float, float)
+        Lowest and highest reference, along which slopes are taken [unit of y].
+    bandwidth : float
+        Up to which errors are to be small [rad/s].
+    max_sensitivity : float
+        M, the sensitivity that is accepted beyond.
+    effort : float
+        Weight of the command, times the slope, beside errors.
+    disturbance : float
+        Part of the plant's output range that a disturbance of the command causes.
+    variations : sequence of plants
+        On which the controller is checked too.
+    limits : (float, float), optional
+        Lowest and highest command [unit of u].
+
+    Returns
+    -------
+    LoopShaping
+        Its largest sensitivity is infinite where a slope or a plant is unstable: ask for less bandwidth.
+
+    Raises
+    ------
+    ImportError
+        Without slycot, which python-control needs for it.
+    """
+    try:
+        import slycot  # noqa: F401
+    except ImportError:
+        raise ImportError("loop_shaping needs slycot: pip install 'hysim[synthesis]'") from None
+    import control
+
+    cycle, actuator = triangle(*stroke, cycles=1, samples_per_cycle=_CYCLE), as_actuator(plant)
+    gain = secant_gain(actuator, cycle)
+    along = slopes(actuator, cycle / gain)
+    slope = gain / actuator.dc_gain
+    loops = [LinearLoop(each, positive_time(sample_time)) for each in (plant, *variations)]
+    A, B, C, D = _in_w(loops[0].system, slope, sample_time)
+    n, b = B.size, bandwidth
+    # w: reference and disturbance, then the command; z: weighted error and effort, then the error
+    states = np.block([[A, np.zeros((n, 1))], [-C[np.newaxis], np.full((1, 1), -b * _SLOW)]])
+    inputs = np.block(
+        [[np.zeros(n)[:, None], disturbance / slope * B[:, None], B[:, None]], [1.0, -disturbance / slope * D, -D]]
+    )
+    error = np.append(-C, 0.0)
+    through = np.array([1.0, -disturbance / slope * D, -D])
+    weighted = error / max_sensitivity
+    weighted[n] = b - b * _SLOW / max_sensitivity
+    outputs = np.stack([weighted, np.zeros(n + 1), error])
+    direct = np.stack([through / max_sensitivity, [0.0, 0.0, effort * slope], through])
+    K, _, norm, _ = control.hinfsyn(control.ss(states, inputs, outputs, direct), 1, 1)
+    system = StateSpace(A=K.A, B=K.B[:, 0], C=K.C[0], D=float(K.D[0, 0]))
+    controller = LinearController(system=system, limits=limits)
+    worst = max(loop.max_sensitivity(controller, each) for loop, each in itertools.product(loops, along))
+    return LoopShaping(controller, float(norm), worst)
+
+
+def _in_w(system: Any, slope: float, sample_time: float) -> tuple[FloatArray, FloatArray, FloatArray, float]:
+    """A sampled plant behind a slope in the plane of w."""
+    n, root = len(system.A), 2.0 / math.sqrt(sample_time)
+    back = np.linalg.inv(system.A + np.eye(n))
+    B, C = root * back @ system.B[:, 0], root * system.C[0] @ back
+    D = -float(system.C[0] @ back @ system.B[:, 0])
+    return 2.0 / sample_time * back @ (system.A - np.eye(n)), slope * B, C, slope * D

@@ -1,0 +1,195 @@
+"""Linear predictive control around the inverse of a law; `hysim.kernels.predictive` has its equations."""
+
+import functools
+import math
+from typing import Any
+
+import numpy as np
+from scipy.linalg import block_diag, solve_discrete_are, toeplitz
+
+from hysim._basics.frozen import Count, FloatArray, Interval, NotNegative, Positive, read_only
+from hysim.control._controller import SteppedController
+from hysim.control._to_control import to_control
+from hysim.kernels import predictive as kernels
+from hysim.kernels.tracking import bound
+from hysim.laws.static import Line
+from hysim.models.inverse_search import inverse_step
+from hysim.models.model import family
+from hysim.models.protocols import CompiledController, law_at, positive_time
+from hysim.plants.actuator import Actuator, as_actuator
+from hysim.plants.amplifier import Amplifier
+from hysim.plants.sensor import Sensor
+
+_with_inverse = functools.lru_cache(maxsize=64)(bound)
+
+_LONGEST = 200  # samples of a horizon: K^-1 then has 40 000 numbers
+_STEP = 0.1  # rho, of the geometric mean of these: 30 iterations then miss the optimum by 1e-5 of a step's error
+_REGULAR = 1e-6  # sigma, of the largest eigenvalue of P
+_PROBED = 101  # places between the limits at which the law's slope is taken
+
+
+@family
+class PredictiveControl(SteppedController):
+    """Controller that minimises the predicted error over a horizon, within limits of the command and of its rate.
+
+    The linear stages are predicted, and the inverse of the law, creep apart, makes commands of what they need. Limits
+    of the command and of its rate hold exactly; in the prediction they are those of the law's mean slope.
+
+    Parameters
+    ----------
+    model : Actuator, law or fit
+        What it drives; an amplifier must act at once.
+    horizon : float
+        Time over which it predicts [s], at most 200 samples.
+    effort : float
+        Weight of changes of the law's output beside errors of the displacement.
+    limits : (float, float), optional
+        Lowest and highest command [unit of u].
+    rate : float, optional
+        Largest rate of the command [unit of u / s].
+    output_limits : (float, float), optional
+        Lowest and highest displacement, which are exceeded where nothing else is possible [unit of y].
+    softness : float
+        Weight of a displacement beyond these limits beside errors.
+    disturbance_time : float
+        Time constant with which a difference between measurement and model is taken for a disturbance [s]; 0 takes each
+        at once.
+    preview : bool
+        Whether the reference is known a horizon ahead.
+    iterations : int
+        Of the solver at each sample, from the solution before.
+
+    Raises
+    ------
+    ValueError
+        If a number is outside its range, the amplifier takes time, or the law has no inverse.
+
+    Examples
+    --------
+    >>> import numpy as np, hysim as hs
+    >>> law = hs.BoucWen(beta=0.02, gamma=0.01, feedthrough=0.03, gain=-0.01)
+    >>> stage = hs.Actuator(hysteresis=law, vibration=hs.mode(natural_frequency=500.0, damping_ratio=0.02))
+    >>> mpc = hs.PredictiveControl(model=stage, horizon=0.02, limits=(0.0, 60.0), rate=1e5)
+    >>> run = hs.close_loop(stage, mpc, 5e-4 * np.arange(200), np.where(np.arange(200) < 60, 0.0, 1.0))
+    >>> bool(run.y.max() < 1.01 and abs(run.y[-1] - 1.0) < 1e-3)
+    True
+    """
+
+    model: Any
+    horizon: Positive
+    effort: NotNegative = 1e-2
+    limits: Interval | None = None
+    rate: Positive | None = None
+    output_limits: Interval | None = None
+    softness: Positive = 100.0
+    model_error: Positive = 1.0
+    drift: Positive = 0.1
+    preview: bool = True
+    iterations: Count = 30
+
+    def __post_init__(self) -> None:
+        amplifier = as_actuator(self.model).amplifier
+        if amplifier is not None and (amplifier.dynamic or not amplifier.gain):
+            raise ValueError("the amplifier must act at once and have a gain")
+
+    @property
+    def u0(self) -> float | None:
+        """Command at which the memory of the model's law holds; None for the first one."""
+        return as_actuator(self.model).u0
+
+    def ahead(self, sample_time: float) -> int:
+        """Samples by which the reference must be known ahead."""
+        return self._samples(sample_time) if self.preview else 0
+
+    def _samples(self, sample_time: float) -> int:
+        samples = max(1, round(self.horizon / sample_time))
+        if samples > _LONGEST:
+            raise ValueError(
+                f"horizon must have at most {_LONGEST} samples, got {samples}: the loop is too fast for it"
+            )
+        return samples
+
+    def compiled(self, sample_time: float, u0: float = 0.0, y0: float = 0.0) -> CompiledController:
+        p, plant = self._samples(positive_time(sample_time)), as_actuator(self.model)
+        law = Line(slope=1.0) if plant.hysteresis is None else plant.hysteresis
+        amplifier = plant.amplifier or Amplifier()
+        low, high = sorted(amplifier.voltage(self.limits or (-math.inf, math.inf)).tolist())
+        inverse = inverse_step(law, float(amplifier.voltage(u0)), (low, high), sample_time)
+        level = inverse.state[1]
+        A, B, C, M = _linear(plant, sample_time)
+        x = np.linalg.solve(np.eye(B.size) - A, B * level)
+        free = np.empty((p, B.size))
+        power = C
+        pulse = np.empty(p)
+        for i in range(p):
+            pulse[i] = power @ B
+            power = power @ A
+            free[i] = power
+        respond = np.tril(toeplitz(pulse))
+        differ = np.eye(p) - np.eye(p, k=-1)
+        effort = self.effort * plant_gain(plant) ** 2
+        P = 2.0 * (respond.T @ respond + effort * differ.T @ differ)
+        values = np.linalg.eigvalsh(P)
+        rho, sigma = _STEP * math.sqrt(max(values[0], _REGULAR * values[-1]) * values[-1]), _REGULAR * values[-1]
+        bounds = np.eye(p) + differ.T @ differ
+        if self.output_limits is not None:
+            bounds = bounds + respond.T @ respond
+        K = np.linalg.inv(P + sigma * np.eye(p) + rho * bounds)
+        hardness = 2.0 * self.softness / (2.0 * self.softness + rho)
+        gains = _observer(A, B, M, self.model_error, self.drift)
+        correction = gains[-1]
+        change = math.inf if self.rate is None else abs(amplifier.gain) * self.rate * sample_time
+        head = [
+            B.size, p, self.iterations, float(self.preview), correction, low, high, change,
+            _mean_slope(law, low, high), effort, float(self.output_limits is not None),
+            *(self.output_limits or (-math.inf, math.inf)), hardness, rho, sigma, amplifier.gain, amplifier.offset,
+        ]  # fmt: skip
+        parameters = [head, A.ravel(), B, M, gains[:-1], free.ravel(), pulse, K.ravel(), inverse.parameters]
+        state: list[Any] = [
+            [u0, y0 - M @ x], x, np.zeros(B.size), np.full(p, y0), np.full(p, level), np.zeros(p),
+            np.full(p, level), np.zeros(2 * p), np.zeros(3 * p), np.zeros(p), inverse.parameters, inverse.state,
+        ]  # fmt: skip
+        return CompiledController(
+            _with_inverse(kernels.predict, inverse.step),
+            read_only(np.concatenate(parameters), finite=False),
+            np.concatenate(state),
+        )
+
+
+def _linear(plant: Actuator, sample_time: float) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+    """A, B, and the rows of the displacement and of the measurement, from the output of the law held over a sample."""
+    linear = Actuator(creep=plant.creep, vibration=plant.vibration)
+    delay = 0.0 if plant.sensor is None else plant.sensor.delay
+    systems = [
+        to_control(Actuator(creep=linear.creep, vibration=linear.vibration, sensor=sensor), sample_time)
+        for sensor in (None, Sensor(delay=delay))
+    ]
+    A = block_diag(*(system.A for system in systems))
+    B = np.concatenate([system.B[:, 0] for system in systems])
+    n = len(systems[0].A)
+    C, M = np.zeros((2, B.size))
+    C[:n], M[n:] = systems[0].C[0], systems[1].C[0]
+    return A, B, C, M
+
+
+def _observer(A: FloatArray, B: FloatArray, M: FloatArray, model_error: float, drift: float) -> FloatArray:
+    """Gains of the stationary Kalman filter for the states and for a disturbance of the output."""
+    n = B.size
+    F, H = block_diag(A, 1.0), np.append(M, 1.0)
+    G = np.append(B, 0.0)
+    Q = model_error**2 * np.outer(G, G) + 1e-12 * np.eye(n + 1)
+    Q[n, n] = drift**2
+    P = solve_discrete_are(F.T, H[:, np.newaxis], Q, np.eye(1))
+    return np.asarray(P @ H / (H @ P @ H + 1.0))
+
+
+def plant_gain(plant: Actuator) -> float:
+    """Displacement at rest for each unit of the law's output."""
+    return Actuator(creep=plant.creep, vibration=plant.vibration).dc_gain
+
+
+def _mean_slope(law: Any, low: float, high: float) -> float:
+    """Mean slope of a law between two inputs, or around its first one."""
+    low, high = (low, high) if math.isfinite(high - low) else (0.0, 1.0)
+    y = law_at(law, math.inf).response(np.linspace(low, high, _PROBED))
+    return float(y[-1] - y[0]) / (high - low)
