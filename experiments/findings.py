@@ -84,6 +84,12 @@ def nanometres(value: float) -> str:
     return f"{1e3 * value:.1f}"
 
 
+def at_rounding(value: float) -> str:
+    """An error that is one of rounding; `ValueError` if it is not."""
+    require(value < 1e-14, f"an error of {value:g} is one of rounding")
+    return error_of(value)
+
+
 def listed(parts: Sequence[str]) -> str:
     """Words joined by commas and an "and"."""
     return parts[0] if len(parts) == 1 else f"{', '.join(parts[:-1])} and {parts[-1]}"
@@ -101,6 +107,19 @@ def by_row(rows: Iterable[Row], *columns: tuple[str, str, Callable[[Any], str]])
     return tabled(heads, *([each(row[name]) for name, each in zip(names, formats, strict=True)] for row in rows))
 
 
+def crossed(
+    title: str, rows: Iterable[Row], line: str, across: str, value: str, write: Callable[[Any], str] = percent
+) -> str:
+    """A table of Markdown with a line for each value of the column `line`, and a column for each one of `across`."""
+    lines, heads = (dict.fromkeys(row[name] for row in rows) for name in (line, across))
+    cells = {name: [write(the(rows, **{line: name, across: head})[value]) for head in heads] for name in lines}
+    return tabled([title, *map(_head, heads)], *([_head(name), *each] for name, each in cells.items()))
+
+
+def _head(value: float | str) -> str:
+    return value if isinstance(value, str) else f"{value:g}"
+
+
 # Evaluation and speed ------------------------------------------------------------------------------------------------
 
 
@@ -114,7 +133,7 @@ def exact_step(result: Result) -> list[str]:
     cells = [[m, *(span(column(where(rows, method=m), key), digits) for key, digits in columns)] for m in methods]
     exponents = listed([format(n, "g") for n in column(own, "n")])
     return [
-        f"The law is exact to rounding: its error is at most {error_of(max(column(own, 'error')))} of the memory's "
+        f"The law is exact to rounding: its error is at most {at_rounding(max(column(own, 'error')))} of the memory's "
         "range. No integrator in Python is faster or more exact.",
         tabled((f"{count(result['samples'])} samples, n = {exponents}", "time, hysim = 1", "error"), *cells),
         f"LSODA's error is not reproducible: from {near[0]['starts']} almost equal starts it is "
@@ -134,7 +153,7 @@ def work_precision(result: Result) -> list[str]:
     missed = [row for row in result["ratios"] if row.get("reached") is False]
     require(all("at_least" in row for row in missed), "hysim is fast enough compared with C and np.exp")
     return [
-        f"At n = 1 the law is exact to rounding: its error is {error_of(own['error'])} of the range. The fastest "
+        f"At n = 1 the law is exact to rounding: its error is {at_rounding(own['error'])} of the range. The fastest "
         f"package with an error of at most 1e-3 takes {number(fastest['times_hysim'])} times as long.",
         tabled(
             ("time, hysim = 1", "driven law, errors up to 1e-3", "oscillator, errors up to 1e-6"),
@@ -187,7 +206,7 @@ def more_samples(result: Result) -> list[str]:
     rows, ends = result["rows"], ("escaped", "undecided", "refused", "partly_refused")
 
     def left_out(row: Row) -> float:
-        return 100.0 * sum(row[end] for end in ends) / float(row["cases"])
+        return float(100.0 * sum(row[end] for end in ends) / row["cases"])
 
     worst, families = max(rows, key=left_out), {row["family"] for row in rows}
     return [
@@ -500,7 +519,8 @@ def sindy_lag_trap(result: Result) -> list[str]:
     require(double["published lag"] == "linear lag", "two rates show the lag")
     widths = {"published sparse model": result["published_widths"], "a pole and a zero": result["lag_widths"]}
     return [
-        "Not always: a published sparse model of a piezo loop is a linear lag, whose loop a pole and a zero have, too.",
+        "Not always: a published sparse model of a piezo loop is a linear lag. A pole and a zero have its loop at 0.1 "
+        "and 1 Hz.",
         tabled(
             ("width of the loop, of the stroke", "0.1 Hz", "1 Hz", "10 Hz"),
             *((name, *(percent(100 * width) for width in each)) for name, each in widths.items()),
@@ -635,20 +655,13 @@ def pixel_sensor(result: Result) -> list[str]:
 def rate_sweep(result: Result) -> list[str]:
     """Up to which rate compensation holds."""
     rows, key = result["rows"], "hysteresis_reduction_percent"
-    rates = (1.0, 10.0, 100.0)
-
-    def at(name: str) -> list[str]:
-        return [name, *(percent(the(rows, controller=name, frequency_hz=rate)[key]) for rate in rates)]
-
-    follow = where(rows, controller="model-following")
-    worst = min(follow, key=lambda row: row[key])
+    controllers = "model-following", "inverse + creep inverse", "PID"
+    some = [row for row in rows if row["controller"] in controllers and row["frequency_hz"] in (1.0, 10.0, 100.0)]
+    worst = min(where(rows, controller="model-following"), key=lambda row: row[key])
     return [
-        f"Model-following holds at all rates tried: it reduces the loop's width least at {worst['frequency_hz']:g} Hz, "
-        f"by {percent(worst[key])}.",
-        tabled(
-            ("reduction of the loop's width", *(f"{rate:g} Hz" for rate in rates)),
-            *map(at, ("model-following", "inverse + creep inverse", "PID")),
-        ),
+        f"Model-following removes {percent(worst[key])} of the loop's width or more at every rate, and least at "
+        f"{worst['frequency_hz']:g} Hz.",
+        crossed("reduction of the loop's width at [Hz]", some, "controller", "frequency_hz", key),
         "Every controller knows the actuator exactly; experiment 15 says what becomes of that when it does not.",
     ]
 
@@ -657,14 +670,14 @@ def pid_hysteresis(result: Result) -> list[str]:
     """What a PID leaves."""
     rows, key = where(result["rows"], plant="law, creep, mode"), "hysteresis_reduction_percent"
     bounds = 2.0, min(column(rows, "max_sensitivity"))
+    both = [row for row in rows if row["max_sensitivity"] in bounds]
     usual = where(rows, max_sensitivity=2.0)
-    cells = [[f"{bound:g}", *map(percent, column(where(rows, max_sensitivity=bound), key))] for bound in bounds]
     ended = column(result["rows"], "search_finished")
     least = min(column(where(result["rows"], max_sensitivity=2.0), "lag_share_percent"))
     return [
-        "A PID removes much at a low rate only. At a maximum sensitivity of 2, at least "
-        f"{percent(least, 0)} of the width that is left is lag, and would be there without hysteresis.",
-        tabled(("reduction by maximum sensitivity", *(f"{row['frequency_hz']:g} Hz" for row in usual)), *cells),
+        f"A PID removes {span(column(usual, key), 3)} % of the width at a maximum sensitivity of 2, less at higher "
+        f"rates. At least {percent(least, 0)} of the width that is left is lag, and would be there without hysteresis.",
+        crossed("reduction by maximum sensitivity at [Hz]", both, "max_sensitivity", "frequency_hz", key),
         "The plant is law, creep and mode; a negative reduction is a wider loop. With one more sample of delay the "
         f"sensitivity rises from 2 to {number(max(column(usual, _DELAYED)))}. A pixel of the paper's camera would move "
         f"the command by {number(max(column(usual, 'volts_per_pixel')))} V. The search for the gains ended by its "
@@ -676,17 +689,14 @@ def vibration(result: Result) -> list[str]:
     """Vibration after a step, by its size."""
     key, rows = "residual_rms_reduction_percent", result["rows"]
     names = "overshoot_reduction_percent", key, "settling_time_reduction_percent"
-    stages = {name: where(rows, plant="Table 1", controller=name) for name in ("model-following", "robust, EI")}
-    follow = stages["model-following"]
+    stages = [row for row in where(rows, plant="Table 1") if row["controller"] in ("model-following", "robust, EI")]
+    follow = where(stages, controller="model-following")
     limited = [f"{row['step_um']:g} um" for row in follow if row["limited_samples"]]
     plants = {name: where(rows, plant=name, controller="PID") for name in ("(4)", "(6)")}
     return [
         f"On Table 1's actuator, known exactly, model-following removes at least {percent(min(column(follow, key)))} "
         f"of the residual vibration. The voltage is limited in steps of {listed(limited)}.",
-        tabled(
-            ("residual vibration removed", *(f"step of {row['step_um']:g} um" for row in follow)),
-            *([name, *map(percent, column(each, key))] for name, each in stages.items()),
-        ),
+        crossed("residual vibration removed after a step of [um]", stages, "controller", "step_um", key),
         "The robust controller is that of experiment 15. The paper's plants are known exactly, too, without noise.",
         tabled(
             ("reduced by PID on the paper's plant", "overshoot", "residual vibration", "settling time"),
@@ -717,6 +727,9 @@ def closed_loop_speed(result: Result) -> list[str]:
 def extended_plays(result: Result) -> list[str]:
     """What extensions do to a Prandtl-Ishlinskii loop."""
     rows = [{**row, "uneven": 100.0 * row["odd_within"]} for row in result["rows"]]
+    plain, dead, _, two, *fast = rows
+    require(min(dead["uneven"], two["uneven"]) > 1.0, "dead zones and two envelopes make the loop uneven")
+    require(min(column([two, *fast], "mid_width")) > plain["mid_width"], "envelopes and speed make it wider")
     return [
         "Dead zones and two envelopes make the loop uneven; two envelopes and thresholds that grow with the speed make "
         "it wider.",
@@ -755,16 +768,13 @@ def preisach(result: Result) -> list[str]:
 
 def dashpot(result: Result) -> list[str]:
     """A damper with and without its dashpot."""
-    names, rates = dict.fromkeys(row["model"] for row in result["rows"]), span(column(result["rows"], "rate_hz"))
-    worst = {name: max(column(where(result["rows"], model=name), "error_percent")) for name in names}
-    require(worst["law, dashpot and spring"] == min(worst.values()), "the whole model is the best")
+    rows, key = result["rows"], "error_percent"
+    without = max(column(where(rows, model="the law alone"), key))
+    require(max(column(where(rows, model="law, dashpot and spring"), key)) < without, "the dashpot matters")
     return [
-        f"Without its dashpot the model is up to {number(worst['the law alone'], 2)} % of the range off at other "
+        f"Without its dashpot the model is up to {number(without, 2)} % of the range off at other "
         f"rates. It was identified at {result['fitted_at_hz']:g} Hz with {100 * result['noise']:g} % of noise.",
-        tabled(
-            ("model", f"largest error at {rates} Hz"),
-            *((name, f"{number(value, 2)} %") for name, value in worst.items()),
-        ),
+        crossed("error of the model [%] at a rate of [Hz]", rows, "model", "rate_hz", key, error_of),
         "The last one has the form of the truth, which is told.",
     ]
 
@@ -781,8 +791,8 @@ def friction(result: Result) -> list[str]:
     theirs = [row for row in mass if row["method"] != "hysim" and row["setting"] == finest]
     return [
         "Along a given motion the law is exact to rounding: hysim's force is within "
-        f"{error_of(max(column(own, 'error')))} of the breakaway force of the closed form, up to the largest stiffness "
-        f"of {number(max(column(own, 'sigma0')), 1)} N/m. It does not chatter, and takes "
+        f"{at_rounding(max(column(own, 'error')))} of the breakaway force of the closed form, up to the largest "
+        f"stiffness of {number(max(column(own, 'sigma0')), 1)} N/m. It does not chatter, and takes "
         f"{number(result['ns_per_sample_of_long_records'], 2)} ns a sample of a long record.",
         f"SciPy's solvers at {result['tolerance']:g} are within {error_of(max(column(solvers, 'error')))}. On a record "
         f"of {result['n_samples']} samples, where calling costs hysim the most, they take "
@@ -805,17 +815,14 @@ def friction(result: Result) -> list[str]:
 
 def sweep_study(result: Result) -> list[str]:
     """On which parameter a loop depends most."""
+    rows, key = result["rows"], "rank_correlation"
     width, area = (
-        {row["parameter"]: row["rank_correlation"] for row in where(result["rows"], measure=measure)}
-        for measure in ("width", "area")
+        max(where(rows, measure=measure), key=lambda row: abs(row[key]))["parameter"] for measure in ("width", "area")
     )
-    names = sorted(width, key=lambda name: -abs(width[name]))
+    title = f"rank correlation over {count(result['n_tasks'])} laws"
     return [
-        f"The width depends most on {names[0]}, the area on {max(area, key=lambda name: abs(area[name]))}.",
-        tabled(
-            (f"rank correlation over {count(result['n_tasks'])} laws", "width", "area"),
-            *((name, f"{width[name]:.2f}", f"{area[name]:.2f}") for name in names),
-        ),
+        f"The width depends most on {width}, the area on {area}.",
+        crossed(title, rows, "parameter", "measure", key, "{:.2f}".format),
     ]
 
 
@@ -835,17 +842,15 @@ def kill_and_resume(result: Result) -> list[str]:
 def scaling(result: Result) -> list[str]:
     """What a sweep costs in addition to its tasks."""
     rows = where(result["rows"], workers=2)
-    names = list(dict.fromkeys(row["executor"] for row in where(rows, kind="fit")))
-    shared = [
-        [kind, *(percent(the(rows, kind=kind, executor=name)["efficiency_percent"], 0) for name in names)]
-        for kind in ("10 ms in a kernel", "10 ms with arrays", "fit")
-    ]
+    shared = [row for row in rows if row["kind"] in ("10 ms in a kernel", "10 ms with arrays", "fit")]
     short = the(rows, kind="microsecond", executor="threads", tasks=100_000)
     one, other = (the(rows, kind=f"laws on Table 1, n = {n}")["seconds"] for n in ("1", "1.5"))
     few, many = (number(result["workers_at_saturation"][f"{task} s"], 2) for task in ("0.01", "1"))
     return [
         f"A task of less than a microsecond costs {number(short['overhead_microseconds'], 2)} us on threads.",
-        tabled(("efficiency of two workers, by task", *names), *shared),
+        crossed(
+            "efficiency of two workers [%], by task", shared, "kind", "executor", "efficiency_percent", "{:.0f}".format
+        ),
         f"A million laws on the paper's points take {number(one, 2)} s with n = 1. With n = 1.5 they take "
         f"{number(other, 2)} s.",
         "A model that is fitted to these rows lets a dask cluster saturate at "
@@ -872,7 +877,6 @@ def fuzz(result: Result) -> list[str]:
 def registration(result: Result) -> list[str]:
     """Displacement from frames, compared with scikit-image."""
     rows = result["rows"]
-    pictures = len({row["picture"] for row in rows})
 
     def at(method: str, snr: int, name: str = "rms_px") -> list[float]:
         return column(where(rows, method=method, snr_db=snr), name)
@@ -889,14 +893,14 @@ def registration(result: Result) -> list[str]:
     honest = column(where(rows, method="hysim"), "error_over_standard_error")
     speed = result["speed_and_memory"]
     return [
-        f"A displacement is at most {number(max(at('hysim', 20)), 2)} pixels off at 20 dB in the rms. The error is "
+        f"A displacement is at most {number(max(at('hysim', 20)), 2)} pixels off in the rms at 20 dB. The error is "
         f"{span(honest, 2)} times its standard error. Whole pixels are {number(max(at('whole pixels', 30)), 2)} pixels "
         "off.",
         tabled(("rms error [pixels]: median (worst)", *(f"{snr} dB" for snr in levels)), *map(ends, ("hysim", peer))),
-        f"The {pictures} kinds of picture were not used while developing, and scikit-image has its better setting. The "
-        f"bias is at most {number(bias, 2)} pixels at 20 dB and better. One core registers "
-        f"{min(column(speed, 'frames_per_second')):.0f} frames of 512 x 512 pixels a second. The memory does not grow "
-        f"with the record: it is {number(max(column(speed, 'peak_mib')))} MiB for {speed[-1]['frames']} frames.",
+        f"The {len({row['picture'] for row in rows})} kinds of picture were not used while developing, and "
+        f"scikit-image has its better setting. The bias is at most {number(bias, 2)} pixels at 20 dB and better. One "
+        f"core registers {min(column(speed, 'frames_per_second')):.0f} frames of 512 x 512 pixels a second. It needs "
+        f"at most {number(max(column(speed, 'peak_mib')))} MiB for up to {speed[-1]['frames']} frames.",
     ]
 
 
@@ -914,6 +918,7 @@ def virtual_rig(result: Result) -> list[str]:
         for name, line in lines.items()
     ]
     fine, shaken = (lines[name][key]["least"] for name in ("parts of a pixel", "whole pixels, shaken"))
+    require(shaken < 0.0, "shaking makes the loop wider at worst")
     return [
         f"With displacements to parts of a pixel the inverse of the identified law removes {percent(fine)} of the true "
         f"hysteresis at worst. The inverse of the true law removes {percent(result['true_law_reduction_percent'])}.",
@@ -967,7 +972,7 @@ def controllers_in_c(result: Result) -> list[str]:
     equal = sum(row["worst_difference"] == 0.0 for row in result["rows"])
     most = max(column(result["rows"], "at_limits_percent"))
     return [
-        f"Yes: of {count(result['laws'])} controllers, each with the inverse of another law, {count(equal)} have the "
+        f"Of {count(result['laws'])} controllers, each with the inverse of another law, {count(equal)} have the "
         f"bits of Python in C, and the worst differs by {number(result['worst_difference'])} of the range. They are "
         f"run in C on the {count(result['samples'])} measurements of their own loops, at the voltage limits in "
         f"{result['least_at_limits_percent']:.2g} to {most:.0f} % of the samples.",
@@ -1208,7 +1213,7 @@ def jiles_atherton(result: Result) -> list[str]:
         for each in [where(rows, method=method, steps=steps)]
     ]
     return [
-        f"The law is exact to rounding: {count(digits['laws'])} laws are at most {error_of(digits['worst'])} of the "
+        f"The law is exact to rounding: {count(digits['laws'])} laws are at most {at_rounding(digits['worst'])} of the "
         f"range off dM/dH integrated with 30 digits. Driven by B, {count(trip['laws'])} laws return it to "
         f"{error_of(trip['worst'])} of the range at worst.",
         tabled(
@@ -1219,8 +1224,8 @@ def jiles_atherton(result: Result) -> list[str]:
         f"More samples on a branch change no output of {count(there['cases'])} hostile laws and as many inverses by "
         f"more than is allowed; the largest change is {number(max(there['worst_share'], back['worst_share']), 2)} of "
         f"that. {count(there['jumping'])} of these laws jump, in one step and in many.",
-        f"The equations of {listed(list(others))} differ from hysim's law by {span(others.values(), 2)} of the range, "
-        f"each with its own constants and {count(result['spellings']['steps'])} Runge-Kutta steps a stroke.",
+        f"Other spellings of the equations ({'; '.join(others)}) differ from hysim's law by {span(others.values(), 2)} "
+        f"of the range, each with its constants and {count(result['spellings']['steps'])} Runge-Kutta steps a stroke.",
     ]
 
 
@@ -1292,12 +1297,18 @@ def mirror(result: Result) -> list[str]:
         if not model.startswith("lines")
     ]
     low, between, high = zip(*ratios, strict=True)
+    require(min(*low, *between, *high) > 0.9, "laws explain little of what lines leave")
+    alone = [errors[output, "lines at 300 mV"][2] / errors[output, "lines"][2] for output in outputs]
+    require(max(alone) < 0.5, "lines for one level alone are much better")
     shifts = []
     for output in outputs:
         first, last = (result["frequencies_hz"][f"{output}, lines at {level} mV"][:4] for level in (100, 300))
         shifts += [100.0 * (1.0 - b / a) for a, b in zip(first, last, strict=True)]
     cells = {", ".join(name): values for name, values in errors.items()}
-    cells |= {f"published, {kind} model": values for kind, values in result["published_percent"].items()}
+    cells |= {
+        f"published, {kind} model, mean of three displacements": values
+        for kind, values in result["published_percent"].items()
+    }
     return [
         f"Hardly: with laws before the modes the error is {span([*low, *high], 3)} times that of lines at the levels "
         f"that were identified. At the level between it is {span(between, 3)} times that of lines.",
