@@ -187,8 +187,8 @@ myst_substitutions = {
     "ratios": ratios(),
     "benchmark": benchmark(),
     "benchmark_errors": benchmark_errors(),
-    "found_in_lag_of_equation_1": " ".join(stored(lag_of_equation_1)),
-    "found_in_preisach": " ".join(stored(preisach)),
+    "found_in_lag_of_equation_1": "\n".join(stored(lag_of_equation_1)),
+    "found_in_preisach": "\n".join(stored(preisach)),
     "benchmark_figure": shown(
         {
             "benchmark_bouc_wen": "Root mean square error on the clean test data "

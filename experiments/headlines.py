@@ -4,16 +4,13 @@ Each function has the name of a folder of `experiments/results`, takes the conte
 question and three cells: hysim, what stands beside it, and where hysim is not good.
 """
 
-from findings import Result, count, error_of, number, percent, span, the, where
+from findings import Result, count, driven_alone, error_of, held, number, percent, span, structures, the, where
 
 Cells = tuple[str, str, str, str]
 
 
 def work_precision(result: Result) -> Cells:
-    driven = where(result["rows"], problem="driven, n = 1")
-    own = the(driven, method="hysim memory")
-    packages = [row for row in driven if row["tool"] not in ("hysim", "C", "C, Runge-Kutta 4") and row["error"] <= 1e-3]
-    fastest = min(packages, key=lambda row: row["times_hysim"])
+    own, fastest = driven_alone(result)
     lsoda = {
         n: the(result["ratios"], what=f"driven, n = {n}: solve_ivp LSODA, compiled, rtol 1e-06 over hysim")
         for n in ("1", "1.5")
@@ -64,25 +61,16 @@ def benchmark_bouc_wen(result: Result) -> Cells:
 
 
 def recovery(result: Result) -> Cells:
-    rows = where(result["rows"], records=400)
-
-    def held(kind: str, noisy: bool) -> str:
-        cells = [row for row in where(rows, kind=kind) if (row["noise_in_quanta"] > 0.0) == noisy]
-        return span([row["coverage_percent"] for row in cells], 3, " %")
-
     return (
         "Do 95 % intervals contain the true parameters?",
-        f"in {held('profile', True)} of noisy records",
-        f"linear intervals of least squares: {held('linear', True)}",
-        f"too wide where rounding is the only error: {held('profile', False)}",
+        f"in {held(result, 'profile', True)} of noisy records",
+        f"linear intervals of least squares: {held(result, 'linear', True)}",
+        f"too wide where rounding is the only error: {held(result, 'profile', False)}",
     )
 
 
 def sindy_recovery(result: Result) -> Cells:
-    own, peer = (
-        {row["condition"]: row for row in where(result["rows"], method=method)} for method in ("hysim", "PySINDy")
-    )
-    short = [name for name in own if ", noise" in name and not name.endswith("noise 0%")]
+    own, peer, short = structures(result)
     exact, theirs = (sum(rows[name]["exact"] for name in short) for rows in (own, peer))
     (worst,) = (name for name in own if own[name]["exact"] < peer[name]["exact"])
     return (

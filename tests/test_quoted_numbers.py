@@ -60,8 +60,11 @@ def test_every_quoted_number_agrees_with_its_result():
 def test_a_finding_is_a_few_sentences_that_follow_the_numbers(finding):
     result = result_of(finding.__name__)
     sentences = finding(result)
-    assert len([each for each in sentences if not each.startswith("\n|")]) <= 3  # and tables
-    assert sentences
+    paragraphs = [each for each in sentences if not each.startswith("\n|")]
+    assert 1 <= len(paragraphs) <= 3  # and tables
+    number = r"(?<!\w)\d+(?: \d{3})*(?:\.\d+)?(?:e-?\d+)?"
+    said = re.split(r"(?<=[.?])\s", " ".join(paragraphs))
+    assert [each for each in said if len(re.findall(number, each)) > 3] == []
     kinds = {int} if finding.__name__ in ("fuzz", "kill_and_resume") else {float}  # these two count
     if finding.__name__ in (
         "exact_step",
