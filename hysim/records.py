@@ -15,10 +15,9 @@ from hysim._basics.frozen import FloatArray, checked, wrong_axes
 from hysim._basics.prefixes import power_of_ten
 from hysim._basics.printing import extent, listed, printed, quantity, summary_text
 from hysim._columns.channels import Channels, along, checked_channels, taken, value_in
-from hysim._columns.drift import drift
 from hysim._columns.excursions import full_amplitude, protocol
 from hysim._columns.resolution import output_quantum
-from hysim._columns.turning import TOLERANCE, complete_cycles, turns
+from hysim._columns.turning import TOLERANCE, complete_cycles, drift, turns
 from hysim.interop import channels_of, frame, table_in, told_by
 
 T = TypeVar("T", float, FloatArray)

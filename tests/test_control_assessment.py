@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 import hysim as hs
 from hysim.control import assess_hysteresis, assess_square_wave, assess_step
-from hysim.control._open_loop import secant_gain, slopes, steady_cycle, without_memory
+from hysim.control._loop import secant_gain, slopes, steady_cycle, without_memory
 from hysim.metrics import vibration_reduction
 
 LAG = hs.TransferFunction(num=(1.0,), den=(1.0, 1.0))

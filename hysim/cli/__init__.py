@@ -27,7 +27,7 @@ GROUPS: Mapping[str, Mapping[str, str]] = {
     "take a model elsewhere": dict.fromkeys(("c", "fmu"), "use"),
     "many simulations": {"sweep": "sweep"},
     "camera frames": {"measure": "look"},
-    "learn and set up": {**dict.fromkeys(("explore", "reproduce", "completion"), "learn"), "warm-up": "warm_up"},
+    "learn and set up": dict.fromkeys(("explore", "reproduce", "completion", "warm-up"), "learn"),
 }
 """Module of every command, in groups as the help shows them; it is loaded when the command runs, or for the help."""
 

@@ -29,8 +29,11 @@ from hysim.control._loop import ClosedLoop as ClosedLoop
 from hysim.control._loop import RestingPlant as RestingPlant
 from hysim.control._loop import as_actuator as as_actuator
 from hysim.control._loop import close_loop as close_loop
-from hysim.control._open_loop import secant_gain as secant_gain
-from hysim.control._open_loop import slopes as slopes
+from hysim.control._loop import secant_gain as secant_gain
+from hysim.control._loop import slopes as slopes
+from hysim.control._loop_shaping import LinearController as LinearController
+from hysim.control._loop_shaping import LoopShaping as LoopShaping
+from hysim.control._loop_shaping import loop_shaping as loop_shaping
 from hysim.control._predictive import PredictiveControl as PredictiveControl
 from hysim.control._stability import LinearLoop as LinearLoop
 from hysim.control._stability import bandwidth as bandwidth

@@ -15,8 +15,7 @@ from hysim import signals
 from hysim._basics.frozen import FloatArray, frozen, read_only
 from hysim._basics.printing import extent, printed, quantity, summary_text
 from hysim.control._controller import Controller, preview
-from hysim.control._loop import ClosedLoop, RestingPlant, around, as_actuator, sampled
-from hysim.control._open_loop import secant_gain, without_memory
+from hysim.control._loop import ClosedLoop, RestingPlant, around, as_actuator, sampled, secant_gain, without_memory
 from hysim.control._stability import judge
 from hysim.control._tracking import is_fed_back
 from hysim.metrics import LoopMetrics, VibrationReduction, loop_metrics, reduction_percent, rmse, vibration_reduction

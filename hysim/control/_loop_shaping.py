@@ -20,8 +20,7 @@ from scipy.signal import cont2discrete
 
 from hysim._basics.frozen import FloatArray, Interval, read_only
 from hysim.control._controller import Feedback, SampledController
-from hysim.control._loop import as_actuator
-from hysim.control._open_loop import secant_gain, slopes
+from hysim.control._loop import as_actuator, secant_gain, slopes
 from hysim.control._stability import LinearLoop
 from hysim.kernels import controllers as kernels
 from hysim.models.model import family

@@ -47,8 +47,7 @@ import numpy.typing as npt
 
 from hysim._basics.frozen import FloatArray, check_positive
 from hysim.control._controller import Controller, Feedback, SampledController, limits_of
-from hysim.control._loop import RestingPlant, as_actuator
-from hysim.control._open_loop import secant_gain, slopes
+from hysim.control._loop import RestingPlant, as_actuator, secant_gain, slopes
 from hysim.control._to_control import to_control
 from hysim.errors import SimulationError
 from hysim.plants.actuator import Actuator

@@ -29,8 +29,7 @@ from scipy.optimize import minimize
 from hysim._basics.frozen import FloatArray, check_choice, check_positive, frozen
 from hysim._basics.printing import printed, summary_text
 from hysim.control._controller import PID, SampledController, limits_of
-from hysim.control._loop import RestingPlant, as_actuator, sampled
-from hysim.control._open_loop import secant_gain, slopes
+from hysim.control._loop import RestingPlant, as_actuator, sampled, secant_gain, slopes
 from hysim.control._stability import LinearLoop, limit_cycle, slowest_decay
 from hysim.control._tracking import TrackingController
 from hysim.models.model import in_brief

@@ -1,7 +1,7 @@
 """Predictive control around the inverse of a law, one sample at a time.
 
 The law's output w drives the linear stage x' = A x + B w, whose displacement is y = C x and whose measurement is
-m = M x. What the measurement has beyond M x is a disturbance d, which a low pass estimates and which stays. At each
+m = M x + d with a disturbance d that stays. A stationary Kalman filter corrects x and d by the measurement. At each
 sample the outputs v_0 ... v_(p-1) of the law for the next p samples minimise
 
     sum (r_i - y_i - d)^2 + effort sum (v_i - v_(i-1))^2 + softness sum (distance of y_i + d from its limits)^2
@@ -15,8 +15,9 @@ multipliers, as OSQP does (B. Stellato et al., Math. Prog. Comp. 12 (2020) 637),
 
     z = K^-1 (sigma z - q + A'(rho s - l)),     s = bounded(a + l / rho),     l += rho (a - s)
 
-with a = 1.6 A z - 0.6 s. The number of iterations is fixed. v_0 goes through the inverse of the law, whose limits are those of the command and
-of its change since the last one, so that these hold exactly. The linear stage then takes what the law has given.
+with a = 1.6 A z - 0.6 s. The number of iterations is fixed. v_0 goes through the inverse of the law, whose limits are
+those of the command and of its change since the last one, so that these hold exactly. The linear stage then takes what
+the law has given.
 """
 
 import math

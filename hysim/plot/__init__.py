@@ -9,12 +9,11 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from hysim.plot._comparisons import comparison, identification, loops, residuals, widths
-from hysim.plot._files import FORMATS, save_svg, to_bytes, to_svg
 from hysim.plot._loops import animate, cycles, minor_loops, width
 from hysim.plot._outcomes import describing_function, displacement, fragility, parameter, selection, track, trade_off
 from hysim.plot._posterior import corner, evidence, prediction
 from hysim.plot._records import element_loops, history, loop, response, signals, traces
-from hysim.plot._style import DIVERGING, SEQUENTIAL, figure, house_style, panels
+from hysim.plot._style import DIVERGING, FORMATS, SEQUENTIAL, figure, house_style, panels, save_svg, to_bytes, to_svg
 from hysim.plot._sweeps import forc, heat_map, ida, parallel_coordinates, quantile_bands, residual_map, sensitivities
 
 __all__ = [

@@ -5,9 +5,18 @@ value (a sine at its mean), and all cycles of one amplitude have the same bits. 
 `sample_times` computes them.
 """
 
-from hysim.signals._cycles import sawtooth, sine, square, staircase, triangle
+from hysim.signals._cycles import (
+    decaying_sine,
+    extremes,
+    growing_sine,
+    reversal_curves,
+    sawtooth,
+    sine,
+    square,
+    staircase,
+    triangle,
+)
 from hysim.signals._ground_motion import ground_motion
-from hysim.signals._nested import decaying_sine, extremes, growing_sine, reversal_curves
 from hysim.signals._spectra import multisine, sample_times, sweep
 
 __all__ = [

@@ -1,10 +1,12 @@
-"""Periodic signals; every cycle has the same bits."""
+"""Periodic signals, whose cycles have the same bits, and signals with nested loops."""
 
 import math
+from collections.abc import Sequence
 
 import numpy as np
+import numpy.typing as npt
 
-from hysim._basics.frozen import FloatArray
+from hysim._basics.frozen import FloatArray, read_only
 from hysim.signals._parts import checked_count, checked_span, unit_sine
 
 
@@ -109,3 +111,161 @@ def square(low: float, high: float, *, cycles: int, samples_per_half: int) -> Fl
     return np.tile(
         np.repeat([low, high], checked_count("samples_per_half", samples_per_half)), checked_count("cycles", cycles)
     )
+
+
+_MOST_SAMPLES = 100_000_000  # of lines between extremes: 0.8 GB
+_ROUNDING = 1e-12  # of a number of steps
+
+
+def reversal_curves(low: float, high: float, *, curves: int, samples_per_step: int = 1) -> FloatArray:
+    """First-order reversal curves: from low up to one level after the other, and back each time.
+
+    `low` and `high` are both hit exactly [unit of u]. The levels above low divide the span evenly into N = `curves`
+    parts, and the highest one is last. With m = `samples_per_step` from one level to the next, curve k = 1 ... N takes
+    2 k m samples. The result has shape (N (N + 1) m + 1,), starts and ends at low [unit of u]. A ValueError is raised
+    if high is not above low, or a count is below 1.
+
+    Examples
+    --------
+    >>> import hysim as hs
+    >>> hs.signals.reversal_curves(0.0, 1.0, curves=2).tolist()
+    [0.0, 0.5, 0.0, 0.5, 1.0, 0.5, 0.0]
+    """
+    checked_span(low, high)
+    m = checked_count("samples_per_step", samples_per_step)
+    up = np.linspace(low, high, checked_count("curves", curves) * m + 1)
+    ways = [np.append(up[: k * m], up[k * m : 0 : -1]) for k in range(1, curves + 1)]
+    return np.append(np.concatenate(ways), low)
+
+
+def decaying_sine(
+    amplitude: float, *, mean: float = 0.0, cycles: int, samples_per_cycle: int, ratio: float | None = None
+) -> FloatArray:
+    """Cycles of a sine, each smaller than the one before: nested loops, which also erase a memory.
+
+    Cycle k = 0 ... N - 1 is mean + a_k sin(2 pi j / samples_per_cycle). The amplitude changes where the sine crosses
+    its mean, and with it the slope there, but not the value.
+
+    Parameters
+    ----------
+    amplitude : float
+        Amplitude a_0 of the first cycle [unit of u].
+    mean : float
+        Value in the middle of the cycles [unit of u].
+    cycles : int
+        Number N of cycles.
+    samples_per_cycle : int
+        Samples of a cycle; with a multiple of 4 both extremes of every cycle are hit exactly.
+    ratio : float, optional
+        a_k / a_(k-1), above 0 and at most 1. By default the amplitudes fall evenly, a_k = a_0 (N - k) / N.
+
+    Returns
+    -------
+    array, shape (cycles * samples_per_cycle + 1,) [unit of u]
+        Starts and ends at the mean.
+
+    Raises
+    ------
+    ValueError
+        If the amplitude is not positive, the ratio is not in its range, or a count is below 1.
+
+    Examples
+    --------
+    >>> import hysim as hs
+    >>> hs.signals.decaying_sine(2.0, cycles=2, samples_per_cycle=4).tolist()
+    [0.0, 2.0, 0.0, -2.0, 0.0, 1.0, 0.0, -1.0, 0.0]
+    """
+    return _swings(_amplitudes(amplitude, cycles, ratio), mean, samples_per_cycle)
+
+
+def growing_sine(
+    amplitude: float, *, mean: float = 0.0, cycles: int, samples_per_cycle: int, ratio: float | None = None
+) -> FloatArray:
+    """Cycles of a sine, each larger than the one before: the amplitudes of `decaying_sine` in reverse order.
+
+    The arguments and errors are those of `decaying_sine`, with the `amplitude` of the last cycle; `ratio` is the
+    amplitude of a cycle over that of the next one. The result has the same shape.
+
+    Examples
+    --------
+    >>> import hysim as hs
+    >>> hs.signals.growing_sine(2.0, cycles=2, samples_per_cycle=4, ratio=0.25).tolist()
+    [0.0, 0.5, 0.0, -0.5, 0.0, 2.0, 0.0, -2.0, 0.0]
+    """
+    return _swings(_amplitudes(amplitude, cycles, ratio)[::-1], mean, samples_per_cycle)
+
+
+def extremes(
+    levels: npt.ArrayLike, *, samples_per_line: int | Sequence[int] | None = None, max_step: float | None = None
+) -> FloatArray:
+    """Any turning points, joined by straight lines that are sampled evenly.
+
+    Parameters
+    ----------
+    levels : array, shape (n_levels,)
+        Turning points in the order of time, each hit exactly [unit of u]. Two equal ones are a rest.
+    samples_per_line : int or sequence of int, length n_levels - 1, optional
+        Samples from a level to the next, the same for all lines or for each.
+    max_step : float, optional
+        Instead of it, the largest step from sample to sample [unit of u]: a rate times the sample time. A line has as
+        many even steps as it needs, a rest has one.
+
+    Returns
+    -------
+    array, shape (1 + sum of the samples of all lines,) [unit of u]
+        Starts at the first level and ends at the last.
+
+    Raises
+    ------
+    ValueError
+        If there are fewer than two levels, one is not finite, not exactly one of `samples_per_line` and `max_step` is
+        given, a count is below 1, the step is not positive, or more than 1e8 samples would result.
+
+    Examples
+    --------
+    >>> import hysim as hs
+    >>> hs.signals.extremes([0.0, 1.0, 0.5], samples_per_line=2).tolist()
+    [0.0, 0.5, 1.0, 0.75, 0.5]
+    """
+    turns = read_only(levels, "levels", ndim=1)
+    if turns.size < 2:
+        raise ValueError(f"a line needs two levels, got {turns.size}")
+    counts = _samples_of_lines(turns, samples_per_line, max_step)
+    lines = [np.linspace(a, b, m + 1)[1:] for a, b, m in zip(turns[:-1], turns[1:], counts, strict=True)]
+    return np.concatenate([turns[:1], *lines])
+
+
+def _amplitudes(largest: float, cycles: int, ratio: float | None) -> FloatArray:
+    if not (math.isfinite(largest) and largest > 0):
+        raise ValueError(f"amplitude must be positive and finite, got {largest}")
+    k = np.arange(checked_count("cycles", cycles))
+    if ratio is None:
+        return largest * ((cycles - k) / cycles)
+    if not 0.0 < ratio <= 1.0:
+        raise ValueError(f"ratio must be above 0 and at most 1, got {ratio}")
+    return np.asarray(largest * ratio**k)
+
+
+def _swings(amplitudes: FloatArray, mean: float, samples_per_cycle: int) -> FloatArray:
+    if not math.isfinite(mean):
+        raise ValueError(f"mean must be finite, got {mean}")
+    period = unit_sine(checked_count("samples_per_cycle", samples_per_cycle))
+    return np.append(mean + np.outer(amplitudes, period).ravel(), mean)
+
+
+def _samples_of_lines(turns: FloatArray, samples: int | Sequence[int] | None, max_step: float | None) -> list[int]:
+    if max_step is not None and samples is None:
+        if not (math.isfinite(max_step) and max_step > 0):
+            raise ValueError(f"max_step must be positive and finite, got {max_step}")
+        lengths = [abs(float(rise)) / max_step for rise in np.diff(turns)]
+        if sum(lengths) > _MOST_SAMPLES:
+            raise ValueError(
+                f"the lines would take {sum(lengths):.3g} steps, more than {_MOST_SAMPLES:.0e}: enlarge max_step"
+            )
+        return [max(1, math.ceil(length * (1 - _ROUNDING))) for length in lengths]
+    if max_step is not None or samples is None:
+        raise ValueError("give either samples_per_line or max_step")
+    counts = list(samples) if isinstance(samples, Sequence) else [samples] * (turns.size - 1)
+    if len(counts) != turns.size - 1:
+        raise ValueError(f"samples_per_line must be one for each of {turns.size - 1} lines, got {len(counts)}")
+    return [checked_count("samples_per_line", m) for m in counts]
