@@ -75,7 +75,6 @@ DEVICES = {
 
 _SCRIPTS = {"bash": BashComplete, "zsh": ZshComplete, "fish": FishComplete}
 Kind = Annotated[str, options.one_of({name: device.what for name, device in DEVICES.items()})]
-Example = Annotated[str, options.file("FILE")]
 
 
 def _notebook(path: Path) -> str:
@@ -89,7 +88,7 @@ def _notebook(path: Path) -> str:
     return source.read_text(encoding="utf-8")
 
 
-def example(path: Example | None = None, *, device: Kind = "piezo") -> None:
+def example(path: Annotated[str, options.file("FILE")] | None = None, *, device: Kind = "piezo") -> None:
     """Write a file to try the other commands on, or a notebook.
 
     Write a record as a file like one of your own, or a notebook of Jupyter.

@@ -60,7 +60,6 @@ def _short(families: Iterable[str]) -> list[str]:
 
 
 def _hyphenated(name: str) -> str:
-    """``bouc-wen`` of ``BoucWen``."""
     return re.sub(r"(?<=[a-z])(?=[A-Z])", "-", name).lower()
 
 

@@ -1,15 +1,10 @@
 """Control that learns from repetition: of trials from rest, or of a periodic reference.
 
-The reference r of a controller is replaced by r + c. With the linear response T from c to the measurement the error
-becomes e - T (change of c), and the correction of `hysim.kernels.learning` leaves at each frequency
-
-    rate = |q - l T|        l = gain q / T of the model
-
-of the error from one repetition to the next. Where it is below one for all T, the errors shrink. T is taken of plants
-whose natural frequencies and whose slope of the law are wrong by the `uncertainty`, and for the least and the largest
-slope of the model's law against the inverse in the controller along the stroke. Slopes that change along the stroke
-are frozen in that theory. q stops where it would not learn: near a resonance that may lie 10 % off the error of the
-model is larger than the model.
+A controller follows r + c. With the linear response T from c to the measurement a repetition leaves |q - l T| of the
+error at each frequency (`hysim.kernels.learning`), with l = gain q / T of the model. Where this is below one for all T
+the errors shrink: of plants whose natural frequencies and slopes are wrong by the `uncertainty`, and for the least and
+the largest slope of the model's law against the controller's along the stroke, each frozen. q ends where it would not
+learn: near a resonance that may lie 10 % off the error of the model is larger than the model.
 
 Sources: S. Arimoto et al., J. Robotic Systems 1 (1984) 123; D. A. Bristow et al., IEEE Control Systems 26(3) (2006) 96;
 S. Hara et al., IEEE Trans. Automatic Control 33 (1988) 659.
@@ -168,15 +163,11 @@ class RepetitiveControl(_Learning):
 
     Raises
     ------
-    TypeError
-        If the controller or the model is none.
-    ValueError
-        If a number is outside its range.
+    TypeError, ValueError
+        If the controller is of another kind, or a number is outside its range.
 
     Examples
     --------
-    A line stands for the law in the controller.
-
     >>> import numpy as np, hysim as hs
     >>> law = hs.BoucWen(beta=0.02, gamma=0.01, feedthrough=0.03, gain=-0.01)
     >>> line = hs.InverseFeedforward(law=hs.Line(slope=0.025))
@@ -185,7 +176,7 @@ class RepetitiveControl(_Learning):
     True
     >>> r = hs.signals.triangle(0.0, 2.0, cycles=10, samples_per_cycle=100)
     >>> error = r - hs.close_loop(law, learner, 1e-3 * np.arange(r.size), r).y
-    >>> bool(np.std(error[-100:]) < 0.02 * np.std(error[:100]))
+    >>> bool(np.std(error[-100:]) < 0.03 * np.std(error[:100]))
     True
     """
 
@@ -209,8 +200,8 @@ class RepetitiveControl(_Learning):
 class IterativeLearning(_Learning):
     """Learning from trials: after each, the reference of a controller is corrected by the errors of the whole trial.
 
-    `learn` runs trials on a plant or on a stage of your own. With a `duration` it is a controller, too, in loops and in
-    C: each time so many samples have passed it updates the corrections and begins again from rest.
+    `learn` runs the trials. With a `duration` it is a controller too, in loops and in C: after so many samples it
+    updates the corrections, and begins again from rest.
 
     Parameters
     ----------
@@ -218,11 +209,6 @@ class IterativeLearning(_Learning):
         As of `RepetitiveControl`.
     duration : float, optional
         Of a trial [s], where the device itself counts samples.
-
-    Raises
-    ------
-    TypeError, ValueError
-        As of `RepetitiveControl`.
 
     Examples
     --------
@@ -252,8 +238,7 @@ class IterativeLearning(_Learning):
     def following(self, correction: npt.ArrayLike, error: npt.ArrayLike, sample_time: float) -> FloatArray:
         """Correction (n,) for the next trial from that of one and its error (n,) [unit of y].
 
-        The error is the reference, as the sensor would read it, minus the measurement; one that is not finite counts
-        as zero.
+        The error is the reference, as the sensor reads it, minus the measurement; where it is not finite it is zero.
         """
         filters, (c, e) = _filters(self, positive_time(sample_time)), np.broadcast_arrays(correction, error)
         following = np.empty(c.size)
@@ -284,7 +269,7 @@ class IterativeLearning(_Learning):
         """Run trials, and correct the reference after each.
 
         A trial has a lead before the reference and one after it: corrections begin before the reference moves, and the
-        last ones need errors after it. The first lead goes from where the model rests to the first reference.
+        last ones need errors after it.
 
         Parameters
         ----------
@@ -337,7 +322,6 @@ class IterativeLearning(_Learning):
         )
 
     def _measured(self, trial: Any, t: FloatArray, r: FloatArray, u0: float | None, number: int) -> FloatArray:
-        """Measurement of a trial with the corrected reference."""
         if callable(trial):
             fed_back = is_fed_back(self.controller)
             measurement = np.array(trial(r if fed_back else self.commands(r, float(t[1] - t[0]), u0)), dtype=float)
@@ -457,7 +441,8 @@ def _delay(model: Any) -> float:
 
 def _slopes(controller: Any, actuator: Actuator, stroke: Interval) -> tuple[float, tuple[float, float]]:
     """Slope of the controller's law over the stroke, and the least and the largest of the model's against it."""
-    cycle = np.tile(triangle(*stroke, cycles=1, samples_per_cycle=_CYCLE), _STEADY) / _behind(actuator)
+    cycle = np.tile(triangle(*stroke, cycles=1, samples_per_cycle=_CYCLE), _STEADY)
+    cycle /= replace(actuator, amplifier=None).dc_gain
     law = Line(slope=1.0) if actuator.hysteresis is None else law_at(actuator.hysteresis, math.inf)
     forward = controller if isinstance(controller, InverseFeedforward) else controller.feedforward
     if forward is None:
@@ -472,11 +457,6 @@ def _slopes(controller: Any, actuator: Actuator, stroke: Interval) -> tuple[floa
     last = u[-_CYCLE:]
     slope = math.copysign(np.ptp(cycle) / np.ptp(last), float(np.diff(last) @ np.diff(cycle[-_CYCLE:])))
     return slope, (float(ratios.min()), float(ratios.max()))
-
-
-def _behind(actuator: Actuator) -> float:
-    """Displacement at rest for each unit of the law's output."""
-    return replace(actuator, amplifier=None).dc_gain
 
 
 def _response(
@@ -520,7 +500,6 @@ def _unlimited(amplifier: Any, controller: Any) -> Any:
 
 
 def _faster(vibration: Any, speed: float) -> Any:
-    """A linear stage whose natural frequencies are `speed` times as high."""
     import control
 
     if speed == 1.0:

@@ -1,12 +1,8 @@
 """Feedback by norms: python-control's H-infinity synthesis for the line that stands for a law, checked on a family.
 
-The sampled plant, hold and delay in it, is taken to the plane of w = 2 (z - 1) / (h (z + 1)), which keeps norms. There
-the controller K minimises the norm from the reference r and a disturbance d of the command to
-
-    W e,        effort u,          e = r - G (u + share d),        W = (w / M + b) / (w + b / 1000)
-
-with the bandwidth b, and returns to z the same way. Without the disturbance K would cancel the plant's resonance, and
-would depend on where it lies. Source: K. Zhou and J. C. Doyle, Essentials of Robust Control (1998), chapters 9 and 14.
+In the plane of w = 2 (z - 1) / (h (z + 1)), which keeps norms, the controller minimises that from the reference r and
+a disturbance d of the command to W e and effort u, with e = r - G (u + d) and W = (w / M + b) / (w + b / 1000). Without
+d it would cancel the resonance. Source: K. Zhou and J. C. Doyle, Essentials of Robust Control (1998), chapter 9.
 """
 
 import itertools
@@ -16,6 +12,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
+from scipy.linalg import schur
 from scipy.signal import cont2discrete
 
 from hysim._basics.frozen import FloatArray, Interval, read_only
@@ -28,27 +25,21 @@ from hysim.models.protocols import CompiledController, positive_time
 from hysim.plants.state_space import StateSpace
 from hysim.signals import triangle
 
+_FAST = 50.0  # of 1 / sample_time: poles of the controller beyond have settled
 _SLOW = 1e-3  # error at rest, in units of the reference
 _CYCLE = 2000  # samples of the stroke along which slopes are taken
 
 
 @family
 class LinearController(SampledController):
-    """Linear controller of the error, such as of a synthesis by python-control, sampled by the bilinear transform.
-
-    A command at a limit does not stop its states.
+    """Linear controller of the error, sampled by the bilinear transform; a limit does not stop its states.
 
     Parameters
     ----------
     system : StateSpace
-        From the error to the command, continuous and without dead time.
+        From the error to the command, continuous; ValueError if it has a dead time.
     limits : (float, float), optional
         Lowest and highest command; None for none [unit of u].
-
-    Raises
-    ------
-    ValueError
-        If the system has a dead time.
 
     Examples
     --------
@@ -104,12 +95,12 @@ def loop_shaping(
     *,
     bandwidth: float,
     max_sensitivity: float = 2.0,
-    effort: float = 0.1,
+    effort: float = 0.05,
     disturbance: float = 1.0,
     variations: Sequence[Any] = (),
     limits: tuple[float, float] | None = None,
 ) -> LoopShaping:
-    """Design a feedback by python-control's `hinfsyn`, for the law's mean slope along a stroke.
+    """Design a feedback by python-control's `hinfsyn`, for a law's mean slope; ImportError without slycot.
 
     Parameters
     ----------
@@ -135,17 +126,11 @@ def loop_shaping(
     -------
     LoopShaping
         Its largest sensitivity is infinite where a slope or a plant is unstable: ask for less bandwidth.
-
-    Raises
-    ------
-    ImportError
-        Without slycot, which python-control needs for it.
     """
-    try:
-        import slycot  # noqa: F401
-    except ImportError:
-        raise ImportError("loop_shaping needs slycot: pip install 'hysim[synthesis]'") from None
     import control
+
+    if not control.slycot_check():
+        raise ImportError("loop_shaping needs slycot: pip install 'hysim[synthesis]'")
 
     cycle, actuator = triangle(*stroke, cycles=1, samples_per_cycle=_CYCLE), as_actuator(plant)
     gain = secant_gain(actuator, cycle)
@@ -154,22 +139,27 @@ def loop_shaping(
     loops = [LinearLoop(each, positive_time(sample_time)) for each in (plant, *variations)]
     A, B, C, D = _in_w(loops[0].system, slope, sample_time)
     n, b = B.size, bandwidth
-    # w: reference and disturbance, then the command; z: weighted error and effort, then the error
-    states = np.block([[A, np.zeros((n, 1))], [-C[np.newaxis], np.full((1, 1), -b * _SLOW)]])
-    inputs = np.block(
-        [[np.zeros(n)[:, None], disturbance / slope * B[:, None], B[:, None]], [1.0, -disturbance / slope * D, -D]]
-    )
-    error = np.append(-C, 0.0)
+    # inputs are the reference, the disturbance and the command; outputs the weighted error, the effort and the error
     through = np.array([1.0, -disturbance / slope * D, -D])
-    weighted = error / max_sensitivity
-    weighted[n] = b - b * _SLOW / max_sensitivity
+    inputs = np.vstack([np.outer(B, [0.0, disturbance / slope, 1.0]), through])
+    error, lag = np.append(-C, 0.0), b * _SLOW * np.eye(1, n + 1, n)
+    states = np.vstack([np.pad(A, ((0, 0), (0, 1))), error - lag])
+    weighted = error / max_sensitivity + (b - b * _SLOW / max_sensitivity) * np.eye(1, n + 1, n)[0]
     outputs = np.stack([weighted, np.zeros(n + 1), error])
     direct = np.stack([through / max_sensitivity, [0.0, 0.0, effort * slope], through])
     K, _, norm, _ = control.hinfsyn(control.ss(states, inputs, outputs, direct), 1, 1)
-    system = StateSpace(A=K.A, B=K.B[:, 0], C=K.C[0], D=float(K.D[0, 0]))
-    controller = LinearController(system=system, limits=limits)
+    controller = LinearController(system=_without_fast_states(K, _FAST / sample_time), limits=limits)
     worst = max(loop.max_sensitivity(controller, each) for loop, each in itertools.product(loops, along))
     return LoopShaping(controller, float(norm), worst)
+
+
+def _without_fast_states(system: Any, fastest: float) -> StateSpace:
+    """A system whose poles beyond a rate have settled: the synthesis has such near its best norm."""
+    A, basis, n = schur(system.A, sort=lambda re, im: math.hypot(re, im) < fastest)
+    B, C = basis.T @ system.B[:, 0], system.C[0] @ basis
+    settled = -np.linalg.solve(A[n:, n:], B[n:])
+    D = float(system.D[0, 0] + C[n:] @ settled)
+    return StateSpace(A=A[:n, :n], B=B[:n] + A[:n, n:] @ settled, C=C[:n], D=D)
 
 
 def _in_w(system: Any, slope: float, sample_time: float) -> tuple[FloatArray, FloatArray, FloatArray, float]:

@@ -37,8 +37,7 @@ _FORGETTING = 1e-12  # noise of each state: else a stage at rest, such as a dela
 class PredictiveControl(SteppedController):
     """Controller that minimises the predicted error over a horizon, within limits of the command and of its rate.
 
-    The linear stages are predicted, and the inverse of the law, creep apart, makes commands of what they need. Limits
-    of the command and of its rate hold exactly; in the prediction they are those of the law's least slope.
+    The limits hold exactly; in the prediction they are those of the law's least slope.
 
     Parameters
     ----------
@@ -136,7 +135,8 @@ class PredictiveControl(SteppedController):
         parameters: list[Any] = [head, A.ravel(), B, M, gains[:-1], free.ravel(), pulse, K.ravel(), inverse.parameters]
         state: list[Any] = [
             [u0, y0 - level * M @ rest], level * rest, np.zeros(B.size), np.full(p, y0), np.full(p, level), np.zeros(p),
-            np.full(p, level), np.zeros(2 * p), np.zeros(3 * p), np.zeros(p), inverse.parameters, inverse.state,
+            np.full(p, level), level * np.eye(1, p)[0], level * np.cumsum(pulse), np.zeros(4 * p), inverse.parameters,
+            inverse.state,
         ]  # fmt: skip
         return CompiledController(
             _with_inverse(kernels.predict, inverse.step),

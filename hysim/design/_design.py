@@ -234,7 +234,7 @@ def design_input(
     subject = _subject(plant, bounds, free, values, noise, criterion)
     rng, in_time = np.random.default_rng(seed), isinstance(plant, ActuatorStructure)
     if in_time:
-        inputs = shapes.usual_of_many_speeds(bounds, _highest(highest_frequency, values or {}, bounds), rng)
+        inputs = shapes.usual_of_many_speeds(bounds, _highest_frequency(highest_frequency, values or {}, bounds), rng)
     else:
         inputs = shapes.usual(bounds)
     drawn = [*shapes.triangles(bounds), *shapes.triangles(bounds, fading=True)] if in_time else []
@@ -300,8 +300,7 @@ def _weak(subject: Subject, covariance: FloatArray) -> list[str]:
     ]
 
 
-def _highest(requested: float | None, values: Mapping[str, float], limits: InputLimits) -> float:
-    """Highest frequency of a multisine [Hz]."""
+def _highest_frequency(requested: float | None, values: Mapping[str, float], limits: InputLimits) -> float:
     nyquist = 0.5 / limits.sample_time
     if requested is not None:
         if not 0.0 < requested <= nyquist:

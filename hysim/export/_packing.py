@@ -171,7 +171,9 @@ class Tape:
             template = OPERATIONS[operation].text
             written[place] = template.format(*map(text, operands))
             if uses[place] > 1 or any(template.count(f"{{{k}}}") > 1 for k in range(len(operands))):
-                declarations.append(f"    const {OPERATIONS[operation].c_type} t{place} = {_bare(written[place])};")
+                declarations.append(
+                    f"    const {OPERATIONS[operation].c_type} t{place} = {_without_outer_parentheses(written[place])};"
+                )
                 written[place] = f"t{place}"
         return declarations, [text(number) for number in numbers]
 
@@ -261,15 +263,16 @@ def _assignments(target: str, texts: list[str]) -> list[str]:
     for text, run in itertools.groupby(texts):
         count = len(list(run))
         if count < _MANY:
-            lines += [f"    {target}[{i}] = {_bare(text)};" for i in range(k, k + count)]
+            lines += [f"    {target}[{i}] = {_without_outer_parentheses(text)};" for i in range(k, k + count)]
         else:
-            lines.append(f"    for (int k = {k}; k < {k + count}; k++) {target}[k] = {_bare(text)};")
+            lines.append(
+                f"    for (int k = {k}; k < {k + count}; k++) {target}[k] = {_without_outer_parentheses(text)};"
+            )
         k += count
     return lines
 
 
-def _bare(text: str) -> str:
-    """A text without the parentheses around the whole of it."""
+def _without_outer_parentheses(text: str) -> str:
     depths = list(itertools.accumulate((character == "(") - (character == ")") for character in text))
     return text[1:-1] if text.endswith(")") and all(depth > 0 for depth in depths[:-1]) else text
 

@@ -143,7 +143,7 @@ def page_text(models: Mapping[str, Shown], record: Record | None = None, *, titl
         style=folder.joinpath("page.css").read_text(encoding="utf-8").strip(),
         script="\n".join(folder.joinpath(f"{name}.js").read_text(encoding="utf-8").strip() for name in _PARTS),
         packs=",\n".join(_expression(pack, k) for k, pack in enumerate(packs)),
-        data=_for_script(json.dumps(data, separators=(",", ":"), ensure_ascii=False)),
+        data=_json_for_script(json.dumps(data, separators=(",", ":"), ensure_ascii=False)),
     )
 
 
@@ -252,6 +252,5 @@ def _expression(function: str, place: int) -> str:
     return f"(() => {{\n{function.strip()}\nreturn pack{place};\n}})()"
 
 
-def _for_script(text: str) -> str:
-    """JSON that no HTML parser takes for the end of its script."""
+def _json_for_script(text: str) -> str:
     return text.replace("&", "\\u0026").replace("<", "\\u003c").replace(">", "\\u003e")

@@ -47,10 +47,9 @@ def learn(
 ) -> float:
     """The command of a controller whose reference is corrected.
 
-    `parameters` are a head (samples of a repetition, m, whole samples and the rest of a sample by which the sensor is
-    late, whether trials begin from rest, length of the controller's state), q, l, the controller's state at rest, and
-    its parameters. `state` is (last command, sample of the repetition, ring of references, corrections, errors, room
-    for the next corrections of a trial, the controller's state).
+    `parameters` are a head (samples of a repetition, m, whole samples and part of one by which the sensor is late,
+    whether trials begin from rest, length of the inner state), q, l, the inner state at rest, and the inner parameters.
+    `state` is (command, sample, ring of references, corrections, errors, next corrections of a trial, inner state).
     """
     parameters, state = borrowed(parameters), borrowed(state)
     period, reach, late = int(parameters[0]), int(parameters[1]), int(parameters[2])

@@ -23,19 +23,13 @@ the law has given.
 import math
 
 from hysim._basics.frozen import FloatArray
-from hysim.kernels._compile import borrowed, inlined, kernel
+from hysim.kernels._compile import borrowed, kernel
 from hysim.kernels.stepping import Step
 from hysim.kernels.tracking import dot, push
 
 N_HEAD = 18
 RELAXED = 1.6  # of a step of the solver, as in OSQP
 N_PLACES = 2  # of the state before its arrays: command and disturbance
-
-
-@inlined
-def bounded(value: float, low: float, high: float, hardness: float) -> float:
-    """The value, moved to the nearest bound where it is beyond; `hardness` is the part of the way that it moves."""
-    return value + hardness * (min(max(value, low), high) - value)
 
 
 @kernel
@@ -119,7 +113,8 @@ def predict(inverse: Step, parameters: FloatArray, state: FloatArray, reference:
                 for j in range(i + 1):
                     given += pulse[i - j] * z[j]
                 wanted = RELAXED * given + (1.0 - RELAXED) * slack[2 * p + i] + multiplier[2 * p + i] / rho
-                slack[2 * p + i] = bounded(wanted, low - base[i], high - base[i], hardness)
+                inside = min(max(wanted, low - base[i]), high - base[i])
+                slack[2 * p + i] = wanted + hardness * (inside - wanted)
                 multiplier[2 * p + i] = rho * (wanted - slack[2 * p + i])
 
     for i in range(own.size):

@@ -46,7 +46,6 @@ class LoopRows:
 
 
 def _interpolated(grid: FloatArray, x: FloatArray, y: FloatArray) -> FloatArray:
-    """`numpy.interp` for each row."""
     below = np.clip(np.searchsorted(x, grid, side="right") - 1, 0, x.size - 1)
     above = np.minimum(below + 1, x.size - 1)
     spans = np.where(above > below, x[above] - x[below], 1.0)

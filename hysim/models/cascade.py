@@ -303,15 +303,14 @@ class Cascade(Composite):
 
     @property
     def known_slopes(self) -> tuple[float, float]:
-        return reduce(_products, known_slopes(self.stages))
+        return reduce(_bounds_of_products, known_slopes(self.stages))
 
     def as_structure(self) -> CascadeStructure:
         """The structure of the same members, those that can be identified as starts."""
         return CascadeStructure(stages=self.stages)
 
 
-def _products(first: tuple[float, float], second: tuple[float, float]) -> tuple[float, float]:
-    """Bounds of the products of numbers between bounds."""
+def _bounds_of_products(first: tuple[float, float], second: tuple[float, float]) -> tuple[float, float]:
     if not all(map(math.isfinite, (*first, *second))):
         return -math.inf, math.inf
     products = [a * b for a in first for b in second]

@@ -97,7 +97,6 @@ def _is_model(value: Any) -> bool:
 
 
 def _models_in(name: str, value: Any) -> dict[str, Any]:
-    """The models that a parameter holds, by their places."""
     members = {f"{name}[{k}]": each for k, each in enumerate(value)} if isinstance(value, tuple) else {name: value}
     return {place: each for place, each in members.items() if _is_model(each)}
 

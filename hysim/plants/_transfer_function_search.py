@@ -208,7 +208,7 @@ class UnitGain:
             columns=tuple(name for name in own.columns if name not in numerator),
             linear=tuple(name for name in own.linear if name not in numerator),
             parameters=parameters,
-            drawn=_near(starts, lower, upper) if len(starts) else None,
+            drawn=_box_about_starts(starts, lower, upper) if len(starts) else None,
         )
 
     def filtered_sets(self, parameters: Parameters, signals: FloatArray, sample_time: float) -> FloatArray:
@@ -253,8 +253,7 @@ class UnitGain:
         return np.asarray(np.clip(np.arcsinh(ratios), -_WIDEST, _WIDEST))
 
 
-def _near(starts: FloatArray, lower: FloatArray, upper: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """The part of the box about the starts."""
+def _box_about_starts(starts: FloatArray, lower: FloatArray, upper: FloatArray) -> tuple[FloatArray, FloatArray]:
     reach = _NEAR * (upper - lower)
     return np.maximum(starts.min(axis=0) - reach, lower), np.minimum(starts.max(axis=0) + reach, upper)
 

@@ -121,7 +121,6 @@ def _newton(
 
 
 def _moves(multipliers: FloatArray) -> np.ndarray:
-    """Which multipliers do not belong to a conserved quantity."""
     return np.abs(multipliers - 1.0) > MARGIN
 
 

@@ -92,7 +92,7 @@ class Proposal:
         places = (v @ inverse - offset).reshape(len(v), n_v, n_parts)
         places *= places
         squares = places.sum(axis=1)
-        return _power(1.0 / (1.0 + squares / self.freedom), (self.freedom + n_v) // 2) * scale, squares
+        return _whole_power(1.0 / (1.0 + squares / self.freedom), (self.freedom + n_v) // 2) * scale, squares
 
     def beside(self, other: "Proposal", share_of_other: float) -> "Proposal":
         share = np.concatenate([(1.0 - share_of_other) * self.share, share_of_other * other.share])
@@ -111,11 +111,10 @@ class Proposal:
         return columns, np.einsum("pij,pj->ip", inverse, self.centres).ravel(), scale
 
 
-def _power(base: FloatArray, exponent: int) -> FloatArray:
-    """A whole power, by squares: faster than a general one."""
+def _whole_power(base: FloatArray, exponent: int) -> FloatArray:
     if exponent == 1:
         return base
-    root = _power(base, exponent // 2)
+    root = _whole_power(base, exponent // 2)
     return root * root * base if exponent % 2 else root * root
 
 
@@ -302,7 +301,7 @@ def proposal_for(
     for _ in range(_ROUNDS + 1):
         q = proposal.draw(_IMPROVING * len(population[0]), rng)
         log_weight = target.log_posterior(q) - proposal.log_density(q)
-        share = _even(log_weight)
+        share = _effective_share(log_weight)
         if share > best_share:
             best, best_share = proposal, share
         if share > _EVEN_ENOUGH:
@@ -328,8 +327,7 @@ def _fewest(target: Target) -> int:
     return FEWEST_EACH * (target.n_x + 2)
 
 
-def _even(log_weight: FloatArray) -> float:
-    """Effective share of weights: one where all are equal."""
+def _effective_share(log_weight: FloatArray) -> float:
     weight = np.exp(log_weight - log_weight.max())
     return float(weight.sum() ** 2 / (weight**2).sum() / weight.size)
 
@@ -368,17 +366,16 @@ def _settled(
 def _next_power(value: FloatArray, most: float) -> float:
     """Step of the power that leaves half the particles effective, by bisection."""
 
-    if _even(most * value) >= _HALF:
+    if _effective_share(most * value) >= _HALF:
         return most
     low, high = 0.0, most
     for _ in range(60):
         middle = 0.5 * (low + high)
-        low, high = (middle, high) if _even(middle * value) >= _HALF else (low, middle)
+        low, high = (middle, high) if _effective_share(middle * value) >= _HALF else (low, middle)
     return max(high, 1e-12)
 
 
 def _resampled(weight: FloatArray, rng: np.random.Generator, n: int) -> npt.NDArray[np.intp]:
-    """Places of `n` draws with these weights, whose sum is one."""
     places = (np.arange(n) + rng.random()) / n
     return np.minimum(np.searchsorted(np.cumsum(weight), places), weight.size - 1)
 

@@ -147,7 +147,6 @@ def _n_samples(duration: float, sample_time: float) -> int:
 
 
 def _envelope(name: str, time: FloatArray, rise: float, plateau: float, end: float) -> FloatArray:
-    """The envelope at times as shares of the duration."""
     check_choice("envelope", name, ENVELOPES)
     check_not_negative(plateau=plateau)
     for word, value in {"rise": rise, "end": end}.items():

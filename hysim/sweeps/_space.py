@@ -94,14 +94,13 @@ class Sample:
     def draw(self) -> dict[str, FloatArray]:
         """The values of each parameter, shape (n_tasks,); ValueError if a distribution gives one that is not finite."""
         drawn = {}
-        for (name, distribution), fractions in zip(self.distributions.items(), self._fractions().T, strict=True):
+        for (name, distribution), fractions in zip(self.distributions.items(), self._unit_cube().T, strict=True):
             drawn[name] = np.asarray(_quantiles(name, distribution)(fractions), dtype=float)
             if not np.isfinite(drawn[name]).all():
                 raise ValueError(f"the distribution of {name} gave a value that is not finite")
         return drawn
 
-    def _fractions(self) -> FloatArray:
-        """Points of the unit cube, shape (n_tasks, d)."""
+    def _unit_cube(self) -> FloatArray:
         from scipy.stats import qmc
 
         rng, d = np.random.default_rng(self.seed), len(self.distributions)

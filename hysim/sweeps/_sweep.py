@@ -288,7 +288,7 @@ class _Run:
         self.progress(*self._done())
         try:
             while self.sent < self.remaining.places.size or self.running:
-                self._send()
+                self._fill_queues()
                 self._wait()
                 self._settle()
         except BaseException as error:
@@ -303,8 +303,7 @@ class _Run:
     def _done(self) -> tuple[int, int]:
         return int(self.table.done.sum()), self.table.done.size
 
-    def _send(self) -> None:
-        """Fill the workers' queues."""
+    def _fill_queues(self) -> None:
         total, number = self.remaining.places.size, self.workers.number()
         while self.sent < total and len(self.running) < 2 * number + 1:
             stop = self.sent + self._size(total - self.sent, number)

@@ -182,7 +182,7 @@ def _filtered(
     """The belief after the sample `k`, the output that was predicted, and the standard deviation expected of it."""
     count, covariance = step.size, last.covariance.copy()
     covariance[range(count), range(count)] += step**2
-    points = last.mean + _roots(covariance)
+    points = last.mean + _sigma_points(covariance)
     memory = np.column_stack([np.full(len(points), last.before), points[:, count:]])
     outputs = copies.moved(points[:, :count], memory, last.before, u)
     points[:, count:] = memory[:, 1:]
@@ -198,8 +198,7 @@ def _filtered(
     return Belief(mean + gain * (y - predicted), after, u), predicted, float(np.sqrt(variance))
 
 
-def _roots(covariance: FloatArray) -> FloatArray:
-    """Points (2 n, n) about zero with this covariance."""
+def _sigma_points(covariance: FloatArray) -> FloatArray:
     size = covariance.diagonal().copy()
     scale = np.sqrt(np.where(size > 0.0, size, 1.0))
     values, vectors = np.linalg.eigh(covariance / np.outer(scale, scale))

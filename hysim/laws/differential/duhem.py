@@ -150,7 +150,6 @@ class DuhemStructure(Subject, Composable):
             return float(np.sum((record.y - y) ** 2))
 
     def _regression(self, record: Record, degree: float) -> dict[str, float]:
-        """The coefficients of the terms up to this degree."""
         terms = [term for term in self.terms if term.degree <= degree]
         du = np.diff(record.u)
         columns = []

@@ -135,10 +135,10 @@ class BankStructure(SignedStructure):
     def search_space(self, record: Record, freedom: Freedom = ALL_FREE) -> SearchSpace:
         """Thresholds and memory as coordinates where they are free, weights before dead zones; the rest is linear."""
         if self.zones is None:
-            return self._space_of_plays(record, freedom)
+            return self._space_without_dead_zones(record, freedom)
         if not freedom.starts_at_rest("rest"):
             raise ValueError('the memory of plays before dead zones is not searched: use initial="rest" or "periodic"')
-        own = self._space_of_plays(record, Freedom(initial=freedom.initial))
+        own = self._space_without_dead_zones(record, Freedom(initial=freedom.initial))
         weights, (start, x) = own.columns[:-1], self._plain(own, record)
         zones = np.array(self.dead_zones)
         if not zones.size:  # zero and even steps inside the range of x
@@ -158,8 +158,7 @@ class BankStructure(SignedStructure):
         held = {**own.held, **named("dead_zones", zones.tolist()), **held}
         return space_of(box, columns, defaults, held, limits, starts, state=own.state, screened=0)
 
-    def _space_of_plays(self, record: Record, freedom: Freedom) -> SearchSpace:
-        """The space without dead zones."""
+    def _space_without_dead_zones(self, record: Record, freedom: Freedom) -> SearchSpace:
         half, first, turns = spans(record)["h"], float(record.u[0]), self._turns
         places = self._thresholds(half)
         thresholds, axes = named(self.law.thresholds_name, places.tolist()), self._axes(record)

@@ -132,7 +132,7 @@ class EnergyPlays(Bank, Law):
     @classmethod
     def outputs_of_one(cls, z: FloatArray, parameters: Parameters, record: Record) -> FloatArray:
         """The curve at the positions (n_sets, n_samples, n_plays)."""
-        return _anhysteretic(z / np.reshape(parameters["field"], (-1, 1, 1)))
+        return _langevin(z / np.reshape(parameters["field"], (-1, 1, 1)))
 
     @property
     def saturation(self) -> float:
@@ -172,13 +172,12 @@ class EnergyPlays(Bank, Law):
         >>> core.dissipated([0.0, 100.0, -100.0]).round(3).tolist()
         [0.0, 16.251, 48.753]
         """
-        curves = _anhysteretic(self.remembered(u) / self.field)
+        curves = _langevin(self.remembered(u) / self.field)
         displacement = np.abs(np.diff(curves, axis=0, prepend=curves[:1]))
         return np.asarray(np.cumsum(displacement, axis=0) @ (np.array(self.thresholds) * self.weights))
 
 
-def _anhysteretic(x: FloatArray) -> FloatArray:
-    """Langevin's function of numbers of any shape."""
+def _langevin(x: FloatArray) -> FloatArray:
     flat = read_only(x).ravel()
     values = np.empty_like(flat)
     kernels.anhysteretic(flat, values)

@@ -173,7 +173,6 @@ def _between_the_ends(bend: FloatArray, phase: FloatArray, record: Record) -> li
 
 
 def _check_envelopes(left: FloatArray, right: FloatArray) -> None:
-    """Refuse envelopes (n_sets, 5) that do not increase."""
     for name, side in {"left": left, "right": right if right.shape[1] else left}.items():
         if side.shape[1] != len(IDENTITY):
             raise ValueError(f"{name} must hold 5 coefficients, got {side.shape[1]}")

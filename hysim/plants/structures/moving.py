@@ -167,7 +167,6 @@ class MovingStructure(AssembledStructure):
         return {each: np.ascontiguousarray(values) for each, values in arrays.items()}
 
     def _energies(self, x: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Kinetic and elastic energy of states (k, m), shape (k,) each."""
         n = self.n_nodes
         kinetic = 0.5 * np.einsum("ki,ij,kj->k", x[:, n:], self.mass_matrix, x[:, n:])
         elastic = 0.5 * np.einsum("ki,ij,kj->k", x[:, :n], self.stiffness_matrix, x[:, :n])

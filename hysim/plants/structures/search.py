@@ -255,13 +255,12 @@ class SearchedStructure(MovingStructure, Subject):
             return free_coordinate(name, *map(float, freedom.bounds[name]))
         if start == 0.0:
             raise ValueError(f"{name!r} is free and begins at zero: give bounds={{{name!r}: (lower, upper)}}")
-        if start > 0.0 and not self._may_be(name, -start, strokes):
+        if start > 0.0 and not self._may_be_negative(name, -start, strokes):
             return Coordinate(name, start / _DECADE, start * _DECADE, start, log=True)
         size = abs(start)
         return Coordinate(name, -_DECADE * size, _DECADE * size, size)
 
-    def _may_be(self, name: str, value: float, strokes: FloatArray | None) -> bool:
-        """Whether a negative number makes sense."""
+    def _may_be_negative(self, name: str, value: float, strokes: FloatArray | None) -> bool:
         if name.partition("[")[0].partition(".")[0] in ("mass", "stiffness", "damping"):
             return False
         try:
