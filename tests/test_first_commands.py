@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 import hysim as hs
-from hysim.cli import COMMANDS, GROUPS, HYSIM, Command, main, warm_up
+from hysim.cli import COMMANDS, GROUPS, HYSIM, Command, learn, main
 from hysim.cli.learn import DEVICES
 from hysim.files import FileColumn
 
@@ -141,10 +141,10 @@ def test_a_script_for_each_shell_is_printed(run, shell):
 
 
 def test_warm_up_makes_every_call(run, monkeypatch):
-    every = warm_up.calls()
+    every = learn.calls()
     assert {*hs.families(), "responses", "frame", "closed loop"} <= every.keys()
     few = ("Play", "Dashpot", "PolynomialBoucWen", "oscillator, split", "identify Line")
-    monkeypatch.setattr(warm_up, "calls", lambda: {name: every[name] for name in few})
+    monkeypatch.setattr(learn, "calls", lambda: {name: every[name] for name in few})
     assert run("warm-up") == (0, "5 calls have been compiled\n", "")
 
 

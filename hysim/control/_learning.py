@@ -24,7 +24,7 @@ from scipy.signal import firwin, kaiser_beta, kaiserord
 from hysim._basics.frozen import FloatArray, Interval, NotNegative, Positive, frozen, read_only, vectors
 from hysim._basics.printing import printed, quantity, summary_text
 from hysim._basics.results import model_of
-from hysim.control._controller import SteppedController, begun, preview
+from hysim.control._controller import SteppedController, begun, limits_of, preview
 from hysim.control._loop import RestingPlant, close_loop, sampled, secant_gain
 from hysim.control._to_control import to_control
 from hysim.control._tracking import InverseFeedforward, TrackingController, is_fed_back
@@ -110,7 +110,7 @@ class _Learning(SteppedController):
     @property
     def limits(self) -> tuple[float, ...] | None:
         """Lowest and highest command of the controller [unit of u]."""
-        return getattr(self.controller, "limits", None)
+        return limits_of(self.controller)
 
     def ahead(self, sample_time: float) -> int:
         """Samples by which the reference must be known ahead, as of the controller."""
