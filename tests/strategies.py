@@ -36,14 +36,19 @@ def assert_cut_and_continued_gives_the_same_bits(law, u, cut, **time) -> None:
     assert end == whole_end
 
 
-def refused(*cases):
-    """Make a test of calls with their messages, and with their errors before these if they are no ValueError."""
+def refused(*cases, call=lambda make: make(), error=ValueError):
+    """Make a test of calls that are refused, each with its message.
+
+    A case holds the arguments of `call`, an error where it is another one than `error`, and a message.
+    """
 
     @pytest.mark.parametrize("case", cases, ids=[case[-1] for case in cases])
     def test(case):
-        call, *errors, message = case
-        with pytest.raises(*errors or [ValueError], match=message):
-            call()
+        *arguments, message = case
+        other = isinstance(arguments[-1], type) and issubclass(arguments[-1], Exception)
+        expected = arguments.pop() if other else error
+        with pytest.raises(expected, match=message):
+            call(*arguments)
 
     return test
 

@@ -9,6 +9,7 @@ import sys
 
 import numpy as np
 import pytest
+from strategies import refused
 from test_inverse_of_every_law import LAWS
 
 import hysim as hs
@@ -251,25 +252,20 @@ def test_the_state_of_a_lean_law_is_small():
     assert hs.to_c(hs.PrandtlIshlinskii(thresholds=(0.0, 1.0, 2.0), weights=(1.0, 1.0, 1.0))).state_size == 4
 
 
-@pytest.mark.parametrize(
-    ("thing", "arguments", "error", "message"),
-    [
-        (PID, {"sample_time": H, "name": "2axes"}, ValueError, "name must be letters"),
-        (PID, {"sample_time": H, "name": ""}, ValueError, "it has another character"),
-        (PID, {"sample_time": H, "name": "double"}, ValueError, "got 'double': it is a word of the language C"),
-        (PID, {"sample_time": H, "name": "sin"}, ValueError, "got 'sin': it is a function of the C library"),
-        (PID, {"sample_time": H, "name": "Math"}, ValueError, "got 'Math': Math.h is a header of the C library"),
-        (PID, {"sample_time": H, "u0": math.nan}, ValueError, "u0 must be finite, got nan"),
-        (PID, {}, ValueError, "give sample_time"),
-        (PID, {"sample_time": 0.0}, ValueError, "sample_time must be positive"),
-        (hs.TransferFunction(num=(1.0,), den=(1.0, 1.0)), {}, ValueError, "give sample_time"),
-        (hs.BoucWen, {}, TypeError, "got the class BoucWen: give it its parameters"),
-        ("law.json", {}, TypeError, "can be stepped is expected, got str"),
-    ],
+test_a_thing_without_a_program_is_refused = refused(
+    (PID, {"sample_time": H, "name": "2axes"}, "name must be letters"),
+    (PID, {"sample_time": H, "name": ""}, "it has another character"),
+    (PID, {"sample_time": H, "name": "double"}, "got 'double': it is a word of the language C"),
+    (PID, {"sample_time": H, "name": "sin"}, "got 'sin': it is a function of the C library"),
+    (PID, {"sample_time": H, "name": "Math"}, "got 'Math': Math.h is a header of the C library"),
+    (PID, {"sample_time": H, "u0": math.nan}, "u0 must be finite, got nan"),
+    (PID, {}, "give sample_time"),
+    (PID, {"sample_time": 0.0}, "sample_time must be positive"),
+    (hs.TransferFunction(num=(1.0,), den=(1.0, 1.0)), {}, "give sample_time"),
+    (hs.BoucWen, {}, TypeError, "got the class BoucWen: give it its parameters"),
+    ("law.json", {}, TypeError, "can be stepped is expected, got str"),
+    call=lambda thing, arguments: hs.to_c(thing, **arguments),
 )
-def test_a_thing_without_a_program_is_refused(thing, arguments, error, message):
-    with pytest.raises(error, match=message):
-        hs.to_c(thing, **arguments)
 
 
 @needs_compiler

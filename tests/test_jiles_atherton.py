@@ -18,6 +18,7 @@ from hysim.models.search_space import Freedom
 sys.path.insert(0, str(Path(__file__).parent.parent / "experiments"))
 from magnetic_evolution import loop_of, steady_cycle
 from magnetic_reference import Core, Exact, runge_kutta, strokes
+from strategies import refused
 
 MU0 = 4e-7 * math.pi
 SLOW = numba.config.DISABLE_JIT
@@ -197,20 +198,15 @@ def test_whether_it_jumps_does_not_depend_on_the_samples():
             assert rows[0][-1] == pytest.approx(rows[1][-1], abs=1.6e6 * 1e-11)
 
 
-@pytest.mark.parametrize(
-    ("name", "value", "message"),
-    [
-        ("Ms", 0.0, "Ms must be positive"),
-        ("a", -1.0, "a must be positive"),
-        ("k", 0.0, "k must be positive"),
-        ("c", 1.1, "c must be between 0 and 1"),
-        ("reversible_feedback", -0.1, "reversible_feedback must be between 0 and 1"),
-        ("alpha", 0.02, "not unique"),
-    ],
+test_constants_of_no_material_are_refused = refused(
+    ("Ms", 0.0, "Ms must be positive"),
+    ("a", -1.0, "a must be positive"),
+    ("k", 0.0, "k must be positive"),
+    ("c", 1.1, "c must be between 0 and 1"),
+    ("reversible_feedback", -0.1, "reversible_feedback must be between 0 and 1"),
+    ("alpha", 0.02, "not unique"),
+    call=lambda name, value: hs.JilesAtherton(**{name: value}),
 )
-def test_constants_of_no_material_are_refused(name, value, message):
-    with pytest.raises(ValueError, match=message):
-        hs.JilesAtherton(**{name: value})
 
 
 # ---------------------------------------------------------------------------------- other spellings
@@ -329,10 +325,8 @@ def test_coordinates_lead_to_the_parameters_and_back(freedom):
     assert set(space.linear) <= {"gain", "feedthrough", "offset"}
 
 
-@pytest.mark.parametrize(
-    ("bounds", "message"),
-    [({"k": (0.0, 1.0)}, "'k' must be positive and finite"), ({"alpha": (0.0, np.inf)}, "'alpha' must be finite")],
+test_bounds_that_make_no_box_are_refused = refused(
+    ({"k": (0.0, 1.0)}, "'k' must be positive and finite"),
+    ({"alpha": (0.0, np.inf)}, "'alpha' must be finite"),
+    call=lambda bounds: box(Freedom(bounds=bounds)),
 )
-def test_bounds_that_make_no_box_are_refused(bounds, message):
-    with pytest.raises(ValueError, match=message):
-        box(Freedom(bounds=bounds))
