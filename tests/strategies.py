@@ -1,11 +1,18 @@
-"""What several tests share: random laws and inputs for the invariants, and tests of what is refused."""
+"""What several tests share: conditions, random laws and inputs for the invariants, and tests of what is refused."""
 
+import shutil
+
+import numba
 import numpy as np
 import pytest
 from hypothesis import strategies as st
 
 import hysim as hs
 
+COMPILED = not numba.config.DISABLE_JIT
+COMPILER = shutil.which("gcc") or shutil.which("clang") or shutil.which("cc")
+needs_compiled = pytest.mark.skipif(not COMPILED, reason="takes minutes without compiled code")
+needs_compiler = pytest.mark.skipif(COMPILER is None, reason="there is no C compiler here")
 EXPONENTS = st.sampled_from([0.5, 0.8, 1.0, 1.3, 1.5, 2.0, 2.7, 5.0, 12.0])
 
 

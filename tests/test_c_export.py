@@ -1,15 +1,13 @@
 """Laws, plants and controllers in C do what they do in Python; controllers on a long replay of measurements."""
 
 import math
-import os
 import re
-import shutil
 import subprocess
 import sys
 
 import numpy as np
 import pytest
-from strategies import refused
+from strategies import COMPILED, COMPILER, needs_compiler, refused
 from test_inverse_of_every_law import LAWS
 
 import hysim as hs
@@ -18,7 +16,6 @@ from hysim.cli import main
 from hysim.kernels.controllers import replay
 
 H = 5e-5  # s
-COMPILED = os.environ.get("NUMBA_DISABLE_JIT", "0") == "0"
 N = 20_000 if COMPILED else 200
 MODE = {"natural_frequency": 2.0 * math.pi * 500.0, "damping_ratio": 0.01}
 CREEP = hs.Creep.per_decade(1.5)
@@ -115,8 +112,6 @@ int main(void)
     return 0;
 }}
 """
-compiler = shutil.which("gcc") or shutil.which("cc")
-needs_compiler = pytest.mark.skipif(compiler is None, reason="there is no C compiler here")
 
 
 def compiled(source, folder, *options):
@@ -124,7 +119,7 @@ def compiled(source, folder, *options):
     source.write(folder)
     measurement = ", record[1]" if "measurement)" in source.header else ""
     (folder / "driver.c").write_text(DRIVER.format(name=source.name, measurement=measurement))
-    command = [compiler, *STRICT, *options, "driver.c", f"{source.name}.c", "-o", "driver", "-lm"]
+    command = [COMPILER, *STRICT, *options, "driver.c", f"{source.name}.c", "-o", "driver", "-lm"]
     subprocess.run(command, cwd=folder, check=True, capture_output=True, text=True)
     return folder / "driver"
 
@@ -211,7 +206,7 @@ def test_the_worked_main_prints_the_response(name, tmp_path):
     timed = name in ("plant", "law_and_mode", "actuator")
     source = hs.to_c(model, H if timed else None, name=name)
     source.write(tmp_path)
-    command = [compiler, *STRICT, f"{name}_main.c", f"{name}.c", "-o", "main", "-lm"]
+    command = [COMPILER, *STRICT, f"{name}_main.c", f"{name}.c", "-o", "main", "-lm"]
     subprocess.run(command, cwd=tmp_path, check=True)
     lines = "\n".join(map(repr, u.tolist()))
     out = subprocess.run([tmp_path / "main"], input=lines, capture_output=True, text=True, check=True).stdout
@@ -228,14 +223,14 @@ def test_the_user_s_name_meets_none_of_ours(law, tmp_path):
     assert not [each for each in ours if each.endswith(("_init", "_step", "_state", "_held"))]
     *_, name = type(law).__name__.lower(), *(each[: -len("_step_")] for each in ours if each.endswith("_step_"))
     hs.to_c(law, H, name=name).write(tmp_path)
-    subprocess.run([compiler, *STRICT, "-fsyntax-only", f"{name}.c"], cwd=tmp_path, check=True)
+    subprocess.run([COMPILER, *STRICT, "-fsyntax-only", f"{name}.c"], cwd=tmp_path, check=True)
 
 
 @needs_compiler
 @pytest.mark.parametrize(("law", "name"), [(hs.BoucWen(n=1.5), "boucwen"), (PLAYS, "clamps"), (hs.Play(), "play")])
 def test_a_law_of_its_natural_name_is_built(law, name, tmp_path):
     hs.to_c(law, name=name).write(tmp_path)
-    subprocess.run([compiler, *STRICT, f"{name}.c", f"{name}_main.c", "-o", "a", "-lm"], cwd=tmp_path, check=True)
+    subprocess.run([COMPILER, *STRICT, f"{name}.c", f"{name}_main.c", "-o", "a", "-lm"], cwd=tmp_path, check=True)
     out = subprocess.run([tmp_path / "a"], input="0.5\n-0.2\n", capture_output=True, text=True, check=True).stdout
     assert np.array(out.split(), dtype=float) == pytest.approx(law.response([0.5, -0.2]), abs=1e-14)
 
@@ -280,7 +275,7 @@ def test_an_inverse_from_a_file_by_the_command_line_alone(tmp_path):
     for command in (
         [*hysim, "identify", "loop.csv", *columns, "--out", "law.json"],
         [*hysim, "c", "law.json", "--inverse", "--out", "inverse.c"],
-        [compiler, *STRICT, "inverse.c", "inverse_main.c", "-o", "inverse", "-lm"],
+        [COMPILER, *STRICT, "inverse.c", "inverse_main.c", "-o", "inverse", "-lm"],
     ):
         subprocess.run(command, cwd=tmp_path, check=True, capture_output=True)
     law, wanted = hs.load_model(tmp_path / "law.json"), 2.5 + 2.4 * np.sin(0.1 * np.arange(300))

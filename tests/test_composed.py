@@ -1,20 +1,16 @@
 """Sums and cascades are models like any other: they respond, continue, invert, are stored and identified."""
 
 import inspect
-import os
 
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from strategies import bounded_laws, refused, short_inputs
+from strategies import bounded_laws, needs_compiled, refused, short_inputs
 
 import hysim as hs
 from hysim.models.model import every_family
 
-needs_compiled = pytest.mark.skipif(
-    os.environ.get("NUMBA_DISABLE_JIT", "0") != "0", reason="thousands of runs, which only compiled code does in time"
-)
 TIME = 0.05
 PLANT = hs.TransferFunction(num=(2.0, 30.0), den=(1.0, 2.0, 30.0), delay=0.07)
 

@@ -4,16 +4,14 @@ from dataclasses import replace
 from itertools import pairwise
 
 import mpmath
-import numba
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
-from strategies import refused
+from strategies import COMPILED, needs_compiled, refused
 
 import hysim as hs
 
-COMPILED = not numba.config.DISABLE_JIT
 COILS = [
     hs.Chan(saturation=2.0, coercivity=0.4, squareness=0.3, feedthrough=0.1, offset=0.2, z0=-0.4),
     hs.Chan(saturation=2.0, coercivity=0.4, squareness=0.9, gap=0.5, z0=1.0),
@@ -310,7 +308,7 @@ def noisy(law, seed=8):
     return hs.Record(u=LOOPS, y=y + 1e-3 * np.ptp(y) * np.random.default_rng(seed).normal(size=y.size))
 
 
-@pytest.mark.skipif(not COMPILED, reason="a search takes long without numba")
+@needs_compiled
 @pytest.mark.parametrize(
     "law",
     [
@@ -328,7 +326,7 @@ def test_the_core_is_found_within_its_intervals(law):
         assert fit.stderr[name] < 0.2 * max(abs(getattr(law, name)), 0.1), name
 
 
-@pytest.mark.skipif(not COMPILED, reason="a search takes long without numba")
+@needs_compiled
 def test_cells_are_found_with_their_field():
     true = hs.EnergyPlays(thresholds=(0.0, 0.1, 0.3), weights=(0.2, 1.0, 0.4), field=0.15)
     fit = hs.identify(hs.EnergyPlays.structure(thresholds=true.thresholds), noisy(true), initial="rest")

@@ -1,6 +1,5 @@
 """A hidden memory's law is found from an oscillator's input and output, and none is found where there is none."""
 
-import os
 import warnings
 from dataclasses import replace
 
@@ -8,7 +7,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from strategies import refused
+from strategies import needs_compiled, refused
 
 import hysim as hs
 from hysim.discovery import _oscillator
@@ -16,9 +15,6 @@ from hysim.discovery._hidden_memory import HiddenMemory, cases, diverges
 from hysim.discovery._oscillator import recorded
 from hysim.identification import identify
 from hysim.laws.differential.terms import RELAXATION, Term, bouc_wen_terms, memory_terms
-
-COMPILED = os.environ.get("NUMBA_DISABLE_JIT", "0") == "0"
-needs_compiled = pytest.mark.skipif(not COMPILED, reason="millions of steps, which only compiled code does in time")
 
 STEP = 1.0 / 750.0
 TRUTH = {"u'": 5e4, "|u'| z": -800.0, "u' |z|": 300.0}

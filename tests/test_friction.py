@@ -2,7 +2,6 @@
 
 import ctypes
 import math
-import shutil
 import subprocess
 from dataclasses import replace
 
@@ -10,13 +9,11 @@ import numpy as np
 import pytest
 from friction_laws import FAMILIES, backlash, decades, drawn, lugre, maxwell, walk
 from scipy.integrate import solve_ivp
-from strategies import refused
+from strategies import COMPILER, needs_compiler, refused
 
 import hysim as hs
 from hysim.models.model import candidates
 
-compiler = shutil.which("gcc") or shutil.which("clang")
-needs_compiler = pytest.mark.skipif(compiler is None, reason="there is no C compiler here")
 every_family = pytest.mark.parametrize("family", FAMILIES, ids=lambda family: family.__name__)
 N_LAWS = 12
 PASSIVE = hs.LuGre(sigma0=40.0, sigma1=0.4, sigma2=0.3, coulomb=1.0, breakaway=1.6, stribeck_velocity=0.1)
@@ -321,7 +318,7 @@ def test_c_computes_the_same(tmp_path):
         (tmp_path / f"{number}.c").write_text(program.source)
         library = tmp_path / f"{number}.so"
         subprocess.run(
-            [compiler, "-std=c99", "-ffp-contract=off", "-Wall", "-Wextra", "-Werror", "-O2", "-shared", "-fPIC", "-o",
+            [COMPILER, "-std=c99", "-ffp-contract=off", "-Wall", "-Wextra", "-Werror", "-O2", "-shared", "-fPIC", "-o",
              str(library), f"{number}.c", "-lm"], cwd=tmp_path, check=True,
         )  # fmt: skip
         c = ctypes.CDLL(str(library))

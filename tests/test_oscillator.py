@@ -1,18 +1,16 @@
 """The oscillator against closed forms, converged references and its own energy."""
 
-import os
 from dataclasses import replace
 
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
-from strategies import refused
+from strategies import COMPILED, refused
 
 import hysim as hs
 from hysim.kernels import oscillator as kernels
 from hysim.plants import oscillator as module
 
-COMPILED = os.environ.get("NUMBA_DISABLE_JIT", "0") == "0"
 LAWS = {
     "benchmark": hs.BoucWen(A=5e4, beta=800.0, gamma=-1100.0),
     "n = 0.6": hs.BoucWen(A=5e4, beta=60.0, gamma=40.0, n=0.6),

@@ -1,18 +1,14 @@
 """The oscillator's parameters come back from its input and output alone."""
 
-import os
 from dataclasses import replace
 
 import numpy as np
 import pytest
-from strategies import refused
+from strategies import COMPILED, needs_compiled, refused
 
 import hysim as hs
 from hysim.models.search_space import Freedom
 from hysim.plants.equation_of_motion import decimated, interpolated, interpolated_record
-
-COMPILED = os.environ.get("NUMBA_DISABLE_JIT", "0") == "0"
-needs_compiled = pytest.mark.skipif(not COMPILED, reason="millions of steps, which only compiled code does in time")
 
 TRUTH = {"mass": 2.0, "damping": 10.0, "stiffness": 5e4, "A": 5e4, "beta": 800.0, "gamma": -300.0, "n": 1.0}
 STEP = 1.0 / 750.0

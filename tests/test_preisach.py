@@ -3,12 +3,11 @@
 import dataclasses
 import pickle
 
-import numba
 import numpy as np
 import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
-from strategies import assert_cut_and_continued_gives_the_same_bits, refused, short_inputs
+from strategies import COMPILED, assert_cut_and_continued_gives_the_same_bits, refused, short_inputs
 
 import hysim as hs
 from hysim.kernels.stepping import drive
@@ -305,7 +304,7 @@ def test_the_inverse_continues_from_a_state(law, past, u):
 
 def test_a_long_record_of_plateaus_and_small_steps_both_ways():
     rng = np.random.default_rng(1)
-    n = 100 if numba.config.DISABLE_JIT else 10_000
+    n = 10_000 if COMPILED else 100
     steps = rng.normal(size=n) * rng.choice([0.0, 1e-9, 1e-3, 0.1, 1.0], size=n)
     u = np.clip(np.sin(np.cumsum(steps)), -0.999, 0.999)
     law = a_law(hs.Preisach)

@@ -1,6 +1,5 @@
 """Invariants of structures: the same tests for every family that an element takes."""
 
-import os
 import pickle
 from dataclasses import replace
 
@@ -8,14 +7,13 @@ import numpy as np
 import pytest
 from frame_laws import FAMILIES, JUMPING, LAWS, SMOOTH, bouc_wen
 from scipy.linalg import eigvals, expm
-from strategies import refused
+from strategies import COMPILED, refused
 
 import hysim as hs
 from hysim.laws.friction.rated_law import RatedLaw
 from hysim.models.model import every_family
 from hysim.models.protocols import Stepwise, needs_time
 
-COMPILED = os.environ.get("NUMBA_DISABLE_JIT", "0") == "0"
 H = 0.02
 T = H * np.arange(401 if COMPILED else 41)
 QUAKE = hs.signals.ground_motion(6.0, duration=8.0, sample_time=H, seed=3)[: T.size]

@@ -1,11 +1,9 @@
 """Slow motions of structures: every equilibrium is one, along each family's own force."""
 
-import os
-
 import numpy as np
 import pytest
 from frame_laws import JUMPING, LAWS, bouc_wen
-from strategies import refused
+from strategies import needs_compiled, refused
 
 import hysim as hs
 
@@ -73,7 +71,7 @@ def test_stiff_slips_and_mechanisms_are_in_balance(law):
     assert test.residual.max() <= 1e-9  # a displacement of 0.1 m rounds to 1.4e-17 m, which is 1.4e-10 N on 1e7 N/m
 
 
-@pytest.mark.skipif(os.environ.get("NUMBA_DISABLE_JIT", "0") != "0", reason="20 000 samples take minutes uncompiled")
+@needs_compiled
 def test_a_slow_motion_of_masses_comes_close():
     frame = hs.shear_frame([1.0, 0.8], laws=bouc_wen(), damping=2.0, excitation="force", output="displacement.2")
     slow = frame.cyclic([0.1, -0.05], [0.0, 1.0], steps=20)
