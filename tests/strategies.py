@@ -1,5 +1,6 @@
 """What several tests share: conditions, random laws and inputs for the invariants, and tests of what is refused."""
 
+import re
 import shutil
 
 import numba
@@ -56,6 +57,19 @@ def refused(*cases, call=lambda make: make(), error=ValueError):
         expected = arguments.pop() if other else error
         with pytest.raises(expected, match=message):
             call(*arguments)
+
+    return test
+
+
+def refused_in_one_line(*cases, call=lambda run, words: run(*words)):
+    """Make a test of command lines that end with one line, which holds their message; `run` is a fixture."""
+
+    @pytest.mark.parametrize(("words", "message"), cases)
+    def test(run, words, message):
+        code, out, err = call(run, words)
+        assert (code, out, err.count("\n")) == (2, "", 1)
+        assert re.match(r"hysim( \w+)?: error: ", err)
+        assert message in err
 
     return test
 

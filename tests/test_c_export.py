@@ -101,31 +101,31 @@ DRIVER = """
 int main(void)
 {{
     static {name}_state state;
-    double record[2], command[2];
+    double record[2], out[2];
 
     {name}_init(&state);
     while (fread(record, sizeof record, 1, stdin) == 1) {{
-        command[1] = {name}_step(&state, record[0]{measurement});
-        command[0] = state.x[0];
-        fwrite(command, sizeof command, 1, stdout);
+        out[1] = {name}_step(&state, record[0]{measurement});
+        out[0] = {other};
+        fwrite(out, sizeof out, 1, stdout);
     }}
     return 0;
 }}
 """
 
 
-def compiled(source, folder, *options):
-    """A program that reads pairs of reference and measurement and writes pairs of command and drive."""
+def compiled(source, folder, other="state.x[0]"):
+    """A program that reads pairs of reference and measurement and writes pairs of another number and the drive."""
     source.write(folder)
     measurement = ", record[1]" if "measurement)" in source.header else ""
-    (folder / "driver.c").write_text(DRIVER.format(name=source.name, measurement=measurement))
-    command = [COMPILER, *STRICT, *options, "driver.c", f"{source.name}.c", "-o", "driver", "-lm"]
+    (folder / "driver.c").write_text(DRIVER.format(name=source.name, measurement=measurement, other=other))
+    command = [COMPILER, *STRICT, "driver.c", f"{source.name}.c", "-o", "driver", "-lm"]
     subprocess.run(command, cwd=folder, check=True, capture_output=True, text=True)
     return folder / "driver"
 
 
 def replayed(program, reference, measurement):
-    """Commands and drives in C."""
+    """Commands, or another number, and drives in C."""
     record = np.stack([reference, measurement], axis=1).tobytes()
     out = subprocess.run([program], input=record, capture_output=True, check=True).stdout
     return np.frombuffer(out).reshape(-1, 2).T

@@ -44,6 +44,7 @@ class Slider(hs.Law):
 U = hs.signals.triangle(-1.0, 1.0, cycles=1, samples_per_cycle=40) * 1.0
 SUPPLIES = (1.0, 2.0, 4.0)
 DEPENDS = {"threshold": ("T", 1), "gain": ("T", 2)}
+PLAYS = hs.PrandtlIshlinskii(thresholds=(0.0, 0.3), weights=(1.0, 0.5))
 
 
 def play(T):
@@ -309,21 +310,11 @@ test_a_dependence_that_cannot_be_identified_is_refused = refused(
     ({"gain": ("T", -1)}, "degree must be a whole number"),
     ({"z0": ("T", 1)}, "state at the first sample"),
     ({}, "names no parameter"),
-    call=lambda depends: hs.identify(hs.Play, records(), depends=depends),
+    ({"gain": ("T", 1)}, hs.Play, {"gain": 1.0}, "'gain' is fixed and depends on 'T'"),
+    ({"gain": ("T", 1)}, hs.SingleValued, TypeError, "depends is for laws"),
+    ({"thresholds[1]": ("T", 1)}, PLAYS, r"'thresholds\[1\]' is not searched by itself: give bounds="),
+    call=lambda depends, law=hs.Play, fixed=None: hs.identify(law, records(), depends=depends, fixed=fixed),
 )
-
-
-def test_a_parameter_is_not_fixed_and_dependent():
-    with pytest.raises(ValueError, match="'gain' is fixed and depends on 'T'"):
-        hs.identify(hs.Play, records(), depends={"gain": ("T", 1)}, fixed={"gain": 1.0})
-    with pytest.raises(TypeError, match="depends is for laws"):
-        hs.identify(hs.SingleValued, records(), depends={"gain": ("T", 1)})
-
-
-def test_a_parameter_without_a_box_needs_bounds():
-    law = hs.PrandtlIshlinskii(thresholds=(0.0, 0.3), weights=(1.0, 0.5))
-    with pytest.raises(ValueError, match=r"'thresholds\[1\]' is not searched by itself: give bounds="):
-        hs.identify(law, records(), depends={"thresholds[1]": ("T", 1)})
 
 
 def test_a_search_with_few_evaluations_is_partial():

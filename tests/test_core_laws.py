@@ -277,6 +277,7 @@ test_what_is_no_core_is_refused = refused(
     (lambda: hs.Chan(squareness=1.0), "squareness, remanence over saturation, must be between 0 and 1, got 1.0"),
     (lambda: hs.Tellinen(z0=-1.5), "z0 must be from -1"),
     (lambda: hs.Chan(gap=-0.1), "gap must not be negative"),
+    (lambda: hs.identify(hs.Chan, noisy(CORES[0]), bounds={"gap": (0.0, 1.0)}), "gap of a Chan cannot be searched"),
     (lambda: hs.Chan(gap=0.1, saturation=-1.0), "saturation must not be negative with a gap"),
     (lambda: hs.Chan.from_ltspice(Hc=1.0, Bs=0.4, Br=0.1, A=0.0), "A must be positive"),
     (lambda: hs.Chan(feedthrough=1.0).to_ltspice(), "slope of vacuum at saturation"),
@@ -334,8 +335,3 @@ def test_cells_are_found_with_their_field():
     np.testing.assert_allclose(fit.model.weights, true.weights, atol=0.05)
     again = hs.identify(fit.model, noisy(true), initial="rest")
     assert again.rmse == pytest.approx(fit.rmse, rel=1e-3)
-
-
-def test_the_gap_is_not_searched():
-    with pytest.raises(ValueError, match="gap of a Chan cannot be searched"):
-        hs.identify(hs.Chan, noisy(CORES[0]), bounds={"gap": (0.0, 1.0)})

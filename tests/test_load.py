@@ -87,11 +87,6 @@ def test_a_file_without_a_header_has_columns_by_number():
 GAPS = "u,y\n0,0\n1,1\n2,\n3,3\n4,nan\n5,5\n6,6\nNA,7\n"
 
 
-def test_a_missing_value_is_an_error_with_its_line_and_column():
-    with pytest.raises(ValueError, match=r"line 4, column 'y': the value is missing; on_missing=\"drop\""):
-        load(GAPS)
-
-
 def test_samples_with_missing_values_can_be_dropped():
     rec = load(GAPS, on_missing="drop")
     assert (rec.u.tolist(), rec.y.tolist()) == ([0, 1, 3, 5, 6], [0, 1, 3, 5, 6])
@@ -175,6 +170,7 @@ test_what_is_no_record_is_refused = refused(
     ("u,y\n0,1\n2\n", "line 3: expected 2 cells, got 1"),
     ("u,y\n0,1\n", "at least 2 samples, there are 1"),
     ("u,y\n0\0,1\n", "not a text file"),
+    (GAPS, r"line 4, column 'y': the value is missing; on_missing=\"drop\""),
     call=load,
 )
 

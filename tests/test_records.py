@@ -85,6 +85,8 @@ def test_the_sample_time_is_that_of_an_even_record():
 test_what_is_no_record_is_refused_with_its_place = refused(
     ({"u": [0, 1, math.nan, 1]}, "u must be finite, got nan at index 2"),
     ({"y": [0, 1, 2, math.inf]}, "y must be finite, got inf at index 3"),
+    ({"u": [0, 1, math.inf, 1]}, "u must be finite, got inf at index 2"),
+    ({"y": [0, math.nan, 2, 1]}, "y must be finite, got nan at index 1"),
     ({"y": [0, 1, 2]}, "u and y must have equal lengths, got 4 and 3"),
     ({"t": [0, 1, 2]}, "u and t must have equal lengths, got 4 and 3"),
     ({"t": [0, 1, 1, 2]}, "got 1.0 after 1.0 at sample 2"),

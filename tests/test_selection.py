@@ -1,7 +1,6 @@
 """`select` finds the order behind the noise, and ranks by what it is asked."""
 
 import numpy as np
-import pytest
 from strategies import refused
 
 import hysim as hs
@@ -51,13 +50,9 @@ test_what_cannot_be_ranked_is_refused = refused(
     ([hs.Line, hs.Line], {}, "one name"),
     ([hs.Line], {"criterion": "r2"}, "criterion must be"),
     ([hs.Line], {"criterion": "cv_rmse"}, "needs a cross-validation"),
+    (hs.Line, {}, TypeError, "use identify"),
     call=lambda candidates, options: hs.select(candidates, hs.datasets.table1(), **options),
 )
-
-
-def test_one_candidate_is_no_selection():
-    with pytest.raises(TypeError, match="use identify"):
-        hs.select(hs.Line, hs.datasets.table1())
 
 
 def test_what_candidates_have_in_common_is_searched_once_and_is_what_each_finds_alone(monkeypatch):

@@ -158,17 +158,13 @@ test_wrong_arguments_are_named = refused(
 )
 
 
-@pytest.mark.parametrize(
-    "arguments", [{"poles": 0, "zeros": 0}, {"poles": 2, "zeros": 3}, {"poles": 2, "zeros": 1, "initial": "warm"}]
+test_wrong_structures_are_refused = refused(
+    ({"poles": 0, "zeros": 0}, "pole|initial"),
+    ({"poles": 2, "zeros": 3}, "pole|initial"),
+    ({"poles": 2, "zeros": 1, "initial": "warm"}, "pole|initial"),
+    ({"poles": 2.5, "zeros": 1}, TypeError, "int"),
+    call=lambda arguments: hs.TransferFunction.structure(**arguments),
 )
-def test_wrong_structures_are_refused(arguments):
-    with pytest.raises(ValueError, match=r"pole|initial"):
-        hs.TransferFunction.structure(**arguments)
-
-
-def test_numbers_of_poles_are_whole():
-    with pytest.raises(TypeError, match="int"):
-        hs.TransferFunction.structure(poles=2.5, zeros=1)
 
 
 @pytest.mark.parametrize("poles", [1, 2, 5])
@@ -228,13 +224,10 @@ def test_the_unit_of_time_does_not_matter():
     assert minute.model.dc_gain == pytest.approx(second.model.dc_gain, rel=1e-3)  # its error is the cost's root
 
 
-def test_a_denominator_cannot_be_fixed():
+@pytest.mark.parametrize("options", [{"fixed": {"den[1]": 1.0}}, {"bounds": {"den[2]": (0.0, 1.0)}}])
+def test_a_denominator_cannot_be_fixed(options):
     with pytest.raises(ValueError, match="sections"):
-        hs.identify(hs.TransferFunction.structure(poles=2, zeros=0), hs.datasets.table1(), fixed={"den[1]": 1.0})
-    with pytest.raises(ValueError, match="sections"):
-        hs.identify(
-            hs.TransferFunction.structure(poles=2, zeros=0), hs.datasets.table1(), bounds={"den[2]": (0.0, 1.0)}
-        )
+        hs.identify(hs.TransferFunction.structure(poles=2, zeros=0), hs.datasets.table1(), **options)
 
 
 def rao_garnier(snr, seed):

@@ -346,20 +346,10 @@ test_wrong_arguments_are_named = refused(
     ((MODE, T_STEP, STEP * np.inf), {}, "reference must be finite, got inf"),
     ((hs.BoucWen(gain=0.0), T_STEP, STEP), {}, "gain is 0.0"),
     ((hs.TransferFunction(num=(1.0,), den=(1.0, 0.0)), T_STEP, STEP), {}, "gain is inf"),
+    ((MODE, T_STEP, STEP), {"transient": -1.0}, "transient"),
+    ((MODE, T_STEP, STEP), {"transient": 100.0}, "transient"),
+    (("plant", T_STEP, STEP), {}, TypeError, "got str"),
+    ((MODE, T_STEP, STEP), {"variations": ["plant"]}, TypeError, "got str"),
+    ((MODE, T_STEP, STEP), {"controller": hs.BoucWen()}, TypeError, "PID or a TrackingController, got BoucWen"),
     call=lambda arguments, options: hs.tune(*arguments, **options),
 )
-
-
-def test_what_is_no_plant_is_refused():
-    with pytest.raises(TypeError, match="got str"):
-        hs.tune("plant", T_STEP, STEP)
-    with pytest.raises(TypeError, match="got str"):
-        hs.tune(MODE, T_STEP, STEP, variations=["plant"])
-    with pytest.raises(TypeError, match="PID or a TrackingController, got BoucWen"):
-        hs.tune(MODE, T_STEP, STEP, controller=hs.BoucWen())
-
-
-@pytest.mark.parametrize("transient", [-1.0, 100.0])
-def test_a_transient_outside_the_record_is_named(transient):
-    with pytest.raises(ValueError, match="transient"):
-        hs.tune(MODE, T_STEP, STEP, transient=transient)
