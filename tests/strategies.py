@@ -44,6 +44,15 @@ def assert_cut_and_continued_gives_the_same_bits(law, u, cut, **time) -> None:
     assert end == whole_end
 
 
+def outputs_of_compiled_steps(law, u, **time):
+    """Outputs of the compiled step, one sample at a time, and the state at the end."""
+    from hysim.kernels.stepping import drive
+
+    compiled, y = law.compiled(u0=u[0], **time), np.empty(u.size)
+    assert drive(compiled.step, compiled.parameters, compiled.state, u, y) == -1
+    return y, compiled.state
+
+
 def refused(*cases, call=lambda make: make(), error=ValueError):
     """Make a test of calls that are refused, each with its message.
 

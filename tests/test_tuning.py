@@ -128,6 +128,11 @@ def test_a_sampled_loop_has_a_finite_gain_margin():
     assert found.gain_margin == pytest.approx(factor, rel=0.03)
 
 
+def objectives_of(error):
+    weights = np.linspace(0.0, 1.0, error.size)
+    return {"itae": np.mean(weights * np.abs(error)), "rms": np.sqrt(np.mean(error**2))}
+
+
 @pytest.mark.parametrize("name", TASKS)
 def test_it_follows_better_than_the_open_loop(name):
     plant, _, reference, objective = TASKS[name]
@@ -139,9 +144,7 @@ def test_it_follows_better_than_the_open_loop(name):
         error = reference - y * (y @ reference) / (y @ y)
     else:
         error = reference - plant.response(reference / dc_gain, H)
-    weights = np.linspace(0.0, 1.0, reference.size)
-    values = {"itae": np.mean(weights * np.abs(error)), "rms": np.sqrt(np.mean(error**2))}
-    assert found.objective < 0.5 * values[objective]
+    assert found.objective < 0.5 * objectives_of(error)[objective]
 
 
 @pytest.mark.parametrize("name", TASKS)
@@ -149,9 +152,7 @@ def test_the_objective_is_that_of_the_loop_it_returns(name):
     plant, t, reference, objective = TASKS[name]
     found = tuned(name)
     error = hs.close_loop(plant, found.controller, t, reference).error
-    weights = np.linspace(0.0, 1.0, reference.size)
-    values = {"itae": np.mean(weights * np.abs(error)), "rms": np.sqrt(np.mean(error**2))}
-    assert found.objective == pytest.approx(values[objective], rel=1e-9)
+    assert found.objective == pytest.approx(objectives_of(error)[objective], rel=1e-9)
 
 
 def test_the_search_is_deterministic():
