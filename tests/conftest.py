@@ -48,6 +48,7 @@ for name, usual in {"SIGINT": signal.default_int_handler, "SIGHUP": signal.SIG_D
 import hypothesis  # noqa: E402  numba must not be imported before the cache folder is set
 import pytest  # noqa: E402
 
+pytest.register_assert_rewrite("strategies")
 collect_ignore = ["data", "strangers"]  # scripts, which a search for doctests would run
 if sys.platform == "win32":
     collect_ignore += ["test_ending_early.py", "test_kernel_cache.py"]  # signals and limits that Windows lacks

@@ -1,11 +1,19 @@
-"""What several tests share: random laws and inputs for the invariants, and tests of what is refused."""
+"""What several tests share: conditions, random laws and inputs for the invariants, and tests of what is refused."""
 
+import re
+import shutil
+
+import numba
 import numpy as np
 import pytest
 from hypothesis import strategies as st
 
 import hysim as hs
 
+COMPILED = not numba.config.DISABLE_JIT
+COMPILER = shutil.which("gcc") or shutil.which("clang") or shutil.which("cc")
+needs_compiled = pytest.mark.skipif(not COMPILED, reason="takes minutes without compiled code")
+needs_compiler = pytest.mark.skipif(COMPILER is None, reason="there is no C compiler here")
 EXPONENTS = st.sampled_from([0.5, 0.8, 1.0, 1.3, 1.5, 2.0, 2.7, 5.0, 12.0])
 
 
@@ -36,14 +44,41 @@ def assert_cut_and_continued_gives_the_same_bits(law, u, cut, **time) -> None:
     assert end == whole_end
 
 
-def refused(*cases):
-    """Make a test of calls with their messages, and with their errors before these if they are no ValueError."""
+def outputs_of_compiled_steps(law, u, **time):
+    """Outputs of the compiled step, one sample at a time, and the state at the end."""
+    from hysim.kernels.stepping import drive
+
+    compiled, y = law.compiled(u0=u[0], **time), np.empty(u.size)
+    assert drive(compiled.step, compiled.parameters, compiled.state, u, y) == -1
+    return y, compiled.state
+
+
+def refused(*cases, call=lambda make: make(), error=ValueError):
+    """Make a test of calls that are refused, each with its message.
+
+    A case holds the arguments of `call`, an error where it is another one than `error`, and a message.
+    """
 
     @pytest.mark.parametrize("case", cases, ids=[case[-1] for case in cases])
     def test(case):
-        call, *errors, message = case
-        with pytest.raises(*errors or [ValueError], match=message):
-            call()
+        *arguments, message = case
+        other = isinstance(arguments[-1], type) and issubclass(arguments[-1], Exception)
+        expected = arguments.pop() if other else error
+        with pytest.raises(expected, match=message):
+            call(*arguments)
+
+    return test
+
+
+def refused_in_one_line(*cases, call=lambda run, words: run(*words)):
+    """Make a test of command lines that end with one line, which holds their message; `run` is a fixture."""
+
+    @pytest.mark.parametrize(("words", "message"), cases)
+    def test(run, words, message):
+        code, out, err = call(run, words)
+        assert (code, out, err.count("\n")) == (2, "", 1)
+        assert re.match(r"hysim( \w+)?: error: ", err)
+        assert message in err
 
     return test
 

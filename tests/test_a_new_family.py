@@ -5,7 +5,6 @@ They are `tests/square_dahl.py` and `tests/fading_dahl.py`.
 
 import itertools
 import os
-import shutil
 import subprocess
 import sys
 
@@ -14,6 +13,7 @@ import pytest
 from fading_dahl import FadingDahl
 from scipy.integrate import solve_ivp
 from square_dahl import SquareDahl
+from strategies import COMPILER, needs_compiler
 
 import hysim as hs
 
@@ -23,7 +23,6 @@ LAWS = {
 }
 U = hs.signals.triangle(-1.0, 1.0, cycles=3, samples_per_cycle=40)
 T = np.arange(0.0, 4.0, 0.01)
-compiler = shutil.which("gcc") or shutil.which("cc")
 
 
 @pytest.fixture(params=LAWS)
@@ -135,10 +134,10 @@ def test_a_study_varies_it():
     assert (np.diff(study["height"]) > 0.0).all()
 
 
-@pytest.mark.skipif(compiler is None, reason="there is no C compiler here")
+@needs_compiler
 def test_its_c_has_its_numbers(law, tmp_path):
     hs.to_c(law, name="mine").write(tmp_path)
-    command = [compiler, "-std=c99", "-O2", "-ffp-contract=off", "mine_main.c", "mine.c", "-o", "main", "-lm"]
+    command = [COMPILER, "-std=c99", "-O2", "-ffp-contract=off", "mine_main.c", "mine.c", "-o", "main", "-lm"]
     subprocess.run(command, cwd=tmp_path, check=True)
     lines = "\n".join(map(repr, U.tolist())) + "\n"
     out = subprocess.run([tmp_path / "main"], input=lines, capture_output=True, text=True, check=True).stdout

@@ -1,6 +1,5 @@
 """The whole chain: exact where the voltage is held, second order behind an amplifier that takes time."""
 
-import os
 from dataclasses import replace
 
 import control
@@ -9,10 +8,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.linalg import expm
+from strategies import COMPILED
 
 import hysim as hs
 
-COMPILED = os.environ.get("NUMBA_DISABLE_JIT", "0") == "0"
 FINEST, ROUGH = (2048, 0.02) if COMPILED else (64, 0.1)  # sub-steps of the reference, and what it leaves of the order
 EXACT = 1e-12  # expm against expm, and a few hundred steps of signals of order one
 H = 5e-5  # of a controller at 20 kHz [s]

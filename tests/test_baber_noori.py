@@ -2,13 +2,12 @@
 
 import itertools
 
-import numba
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
-from strategies import bounded_laws, refused, short_inputs
+from strategies import COMPILED, bounded_laws, needs_compiled, refused, short_inputs
 
 import hysim as hs
 from hysim.errors import SimulationError
@@ -19,7 +18,7 @@ COMMON = {"A": 1.1, "beta": 0.7, "gamma": 0.25, "gain": -0.5, "offset": 0.2, "z0
 WEAR = {"delta_a": 0.05, "delta_nu": 0.3, "delta_eta": 0.2}
 PINCHING = {"zeta_s": 0.9, "q": 0.1, "p": 1.2, "psi": 0.15, "delta_psi": 0.05, "lambda_": 0.4}
 OWN = {"wear": WEAR, "pinching": PINCHING, "both": WEAR | PINCHING}
-FEW = settings(max_examples=2 if numba.config.DISABLE_JIT else 20)
+FEW = settings(max_examples=20 if COMPILED else 2)
 
 
 def law(own, n=1.0, **others):
@@ -158,7 +157,7 @@ def test_what_does_not_stay_finite_is_named():
     assert np.isfinite(rows[1]).all()
 
 
-@pytest.mark.skipif(bool(numba.config.DISABLE_JIT), reason="a search takes a million steps")
+@needs_compiled
 def test_identify_finds_wear_and_holds_what_the_record_cannot_tell():
     u = hs.signals.triangle(-2.0, 2.0, cycles=4, samples_per_cycle=24)
     truth = hs.BoucWenBaberNoori(beta=0.7, gamma=0.2, delta_nu=0.15, delta_eta=0.08, gain=3.0)
@@ -198,7 +197,7 @@ def test_the_materials_of_opensees_are_their_equations_in_small_steps(name):
     """Their backward Euler step, written out for steps so short that an explicit one is as good."""
     p = THEIRS[name]
     model = getattr(hs.BoucWenBaberNoori, f"from_{name}")(**p)
-    n_steps = 100 if numba.config.DISABLE_JIT else 20_000
+    n_steps = 20_000 if COMPILED else 100
     u = np.concatenate([np.linspace(a, b, n_steps)[1:] for a, b in itertools.pairwise([0.0, 2.0, -1.0, 0.5])])
     stress, z, e, last = [], 0.0, 0.0, 0.0
     for strain in u.tolist():

@@ -1,16 +1,11 @@
 """The generated benchmark is the published one."""
 
-import os
-
 import numpy as np
 import pytest
-from strategies import refused
+from strategies import needs_compiled, refused
 
 import hysim as hs
 from hysim.plants.equation_of_motion import decimated
-
-COMPILED = os.environ.get("NUMBA_DISABLE_JIT", "0") == "0"
-needs_compiled = pytest.mark.skipif(not COMPILED, reason="millions of steps, which only compiled code does in time")
 
 # Eight of the 153 000 samples of the published, noise-free sine-sweep output (Noel and Schoukens 2016,
 # doi 10.4121/12967592, file yval_sinesweep), read from the published pair and printed with 17 digits.

@@ -7,6 +7,7 @@ import warnings
 import numpy as np
 import pytest
 from square_dahl import SquareDahl
+from strategies import refused
 
 import hysim as hs
 
@@ -43,6 +44,7 @@ class Slider(hs.Law):
 U = hs.signals.triangle(-1.0, 1.0, cycles=1, samples_per_cycle=40) * 1.0
 SUPPLIES = (1.0, 2.0, 4.0)
 DEPENDS = {"threshold": ("T", 1), "gain": ("T", 2)}
+PLAYS = hs.PrandtlIshlinskii(thresholds=(0.0, 0.3), weights=(1.0, 0.5))
 
 
 def play(T):
@@ -263,38 +265,27 @@ def test_outside_the_identified_range_is_warned_of(fit):
         fit.model.response(U, channels={"T": np.linspace(0.0, 4.0, U.size)})
 
 
-@pytest.mark.parametrize(
-    ("arguments", "error", "message"),
-    [
-        ({"law": hs.Play}, TypeError, "law must be a model"),
-        (
-            {"polynomials": (polynomial("beta", 1.0, 2.0),)},
-            ValueError,
-            "no parameter 'beta'; its parameters are thre",
-        ),
-        ({"polynomials": (polynomial("threshold", 1.0, -2.0),)}, ValueError, "threshold"),
-        ({"polynomials": (polynomial("gain", 1.0, 2.0),) * 2}, ValueError, "two polynomials"),
-        ({"polynomials": ("gain",)}, TypeError, "must hold ChannelPolynomial"),
-    ],
+test_what_is_no_dependent_law_is_refused = refused(
+    ({"law": hs.Play}, TypeError, "law must be a model"),
+    ({"polynomials": (polynomial("beta", 1.0, 2.0),)}, "no parameter 'beta'; its parameters are thre"),
+    ({"polynomials": (polynomial("threshold", 1.0, -2.0),)}, "threshold"),
+    ({"polynomials": (polynomial("gain", 1.0, 2.0),) * 2}, "two polynomials"),
+    ({"polynomials": ("gain",)}, TypeError, "must hold ChannelPolynomial"),
+    call=lambda arguments: hs.Dependent(
+        **{"law": hs.Play(), "polynomials": (polynomial("gain", 1.0, 2.0),)} | arguments
+    ),
 )
-def test_what_is_no_dependent_law_is_refused(arguments, error, message):
-    with pytest.raises(error, match=message):
-        hs.Dependent(**{"law": hs.Play(), "polynomials": (polynomial("gain", 1.0, 2.0),)} | arguments)
 
 
-@pytest.mark.parametrize(
-    ("arguments", "message"),
-    [
-        ({"at": ()}, "increasing places"),
-        ({"at": (2.0, 1.0)}, "increasing places"),
-        ({"values": (1.0,)}, "one number for"),
-        ({"span": (3.0, 1.0)}, "lowest and the highest"),
-    ],
+test_what_is_no_polynomial_is_refused = refused(
+    ({"at": ()}, "increasing places"),
+    ({"at": (2.0, 1.0)}, "increasing places"),
+    ({"values": (1.0,)}, "one number for"),
+    ({"span": (3.0, 1.0)}, "lowest and the highest"),
+    call=lambda arguments: hs.ChannelPolynomial(
+        **{"parameter": "gain", "channel": "T", "at": (1.0, 2.0), "values": (1.0, 2.0)} | arguments
+    ),
 )
-def test_what_is_no_polynomial_is_refused(arguments, message):
-    known = {"parameter": "gain", "channel": "T", "at": (1.0, 2.0), "values": (1.0, 2.0)}
-    with pytest.raises(ValueError, match=message):
-        hs.ChannelPolynomial(**known | arguments)
 
 
 def test_a_model_without_its_channels_says_what_to_give(fit):
@@ -307,34 +298,19 @@ def test_a_model_without_its_channels_says_what_to_give(fit):
 # ---------------------------------------------------------------------------------- what identify refuses
 
 
-@pytest.mark.parametrize(
-    ("depends", "error", "message"),
-    [
-        ({"gain": ("I", 1)}, ValueError, "record 0 has no channel 'I'; it has 'T'"),
-        ({"beta": ("T", 1)}, ValueError, "depends names 'beta'; the parameters are threshold"),
-        ({"gain": ("T", 3)}, ValueError, "needs 4 different values of the channel, the records have 3"),
-        ({"gain": "T"}, TypeError, r"must hold \(channel, degree\)"),
-        ({"gain": ("T", -1)}, ValueError, "degree must be a whole number"),
-        ({"z0": ("T", 1)}, ValueError, "state at the first sample"),
-        ({}, ValueError, "names no parameter"),
-    ],
+test_a_dependence_that_cannot_be_identified_is_refused = refused(
+    ({"gain": ("I", 1)}, "record 0 has no channel 'I'; it has 'T'"),
+    ({"beta": ("T", 1)}, "depends names 'beta'; the parameters are threshold"),
+    ({"gain": ("T", 3)}, "needs 4 different values of the channel, the records have 3"),
+    ({"gain": "T"}, TypeError, r"must hold \(channel, degree\)"),
+    ({"gain": ("T", -1)}, "degree must be a whole number"),
+    ({"z0": ("T", 1)}, "state at the first sample"),
+    ({}, "names no parameter"),
+    ({"gain": ("T", 1)}, hs.Play, {"gain": 1.0}, "'gain' is fixed and depends on 'T'"),
+    ({"gain": ("T", 1)}, hs.SingleValued, TypeError, "depends is for laws"),
+    ({"thresholds[1]": ("T", 1)}, PLAYS, r"'thresholds\[1\]' is not searched by itself: give bounds="),
+    call=lambda depends, law=hs.Play, fixed=None: hs.identify(law, records(), depends=depends, fixed=fixed),
 )
-def test_a_dependence_that_cannot_be_identified_is_refused(depends, error, message):
-    with pytest.raises(error, match=message):
-        hs.identify(hs.Play, records(), depends=depends)
-
-
-def test_a_parameter_is_not_fixed_and_dependent():
-    with pytest.raises(ValueError, match="'gain' is fixed and depends on 'T'"):
-        hs.identify(hs.Play, records(), depends={"gain": ("T", 1)}, fixed={"gain": 1.0})
-    with pytest.raises(TypeError, match="depends is for laws"):
-        hs.identify(hs.SingleValued, records(), depends={"gain": ("T", 1)})
-
-
-def test_a_parameter_without_a_box_needs_bounds():
-    law = hs.PrandtlIshlinskii(thresholds=(0.0, 0.3), weights=(1.0, 0.5))
-    with pytest.raises(ValueError, match=r"'thresholds\[1\]' is not searched by itself: give bounds="):
-        hs.identify(law, records(), depends={"thresholds[1]": ("T", 1)})
 
 
 def test_a_search_with_few_evaluations_is_partial():
@@ -439,21 +415,16 @@ def test_channels_are_cut_interpolated_converted_and_printed_with_their_record()
         MEASURED.channel("I")
 
 
-@pytest.mark.parametrize(
-    ("channels", "error", "message"),
-    [
-        ({"u": 1.0}, ValueError, "a name other than"),
-        ({"": 1.0}, ValueError, "a name other than"),
-        ({"T": [1.0, 2.0]}, ValueError, r"one number, or 3 as u has, got shape \(2,\)"),
-        ({"T": np.nan}, ValueError, "'T' must be finite, got nan"),
-        ({"T": [1.0, np.inf, 2.0]}, ValueError, "'T' must be finite, got inf at index 1"),
-        ({"T": "hot"}, TypeError, "must be numbers"),
-        ([1.0], TypeError, "must be a mapping"),
-    ],
+test_what_is_no_channel_is_refused = refused(
+    ({"u": 1.0}, "a name other than"),
+    ({"": 1.0}, "a name other than"),
+    ({"T": [1.0, 2.0]}, r"one number, or 3 as u has, got shape \(2,\)"),
+    ({"T": np.nan}, "'T' must be finite, got nan"),
+    ({"T": [1.0, np.inf, 2.0]}, "'T' must be finite, got inf at index 1"),
+    ({"T": "hot"}, TypeError, "must be numbers"),
+    ([1.0], TypeError, "must be a mapping"),
+    call=lambda channels: hs.Record(u=[0.0, 1.0, 2.0], y=[0.0, 1.0, 2.0], channels=channels),
 )
-def test_what_is_no_channel_is_refused(channels, error, message):
-    with pytest.raises(error, match=message):
-        hs.Record(u=[0.0, 1.0, 2.0], y=[0.0, 1.0, 2.0], channels=channels)
 
 
 @pytest.mark.parametrize("ending", [".csv", ".tsv", ".npz", ".mat", ".h5"])

@@ -7,10 +7,9 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from strategies import assert_cut_and_continued_gives_the_same_bits, refused, short_inputs
+from strategies import assert_cut_and_continued_gives_the_same_bits, outputs_of_compiled_steps, refused, short_inputs
 
 import hysim as hs
-from hysim.kernels.stepping import drive
 from hysim.models.search_space import Freedom
 
 # Al Janaideh 2022, example 1.
@@ -184,9 +183,7 @@ def test_cut_and_continue_gives_the_same_bits(law, u, data):
 @pytest.mark.parametrize("law", LAWS, ids=family)
 def test_stepping_one_sample_at_a_time_gives_the_same_bits(law):
     u = np.sin(np.linspace(0.0, 9.0, 50)) + 0.3
-    compiled, y = law.compiled(u0=u[0]), np.empty(u.size)
-    assert drive(compiled.step, compiled.parameters, compiled.state, u, y) == -1
-    assert np.array_equal(y, law.response(u))
+    assert np.array_equal(outputs_of_compiled_steps(law, u)[0], law.response(u))
 
 
 @given(short_inputs(1.0), st.integers(0, 1000), st.booleans())
@@ -297,22 +294,14 @@ def test_an_input_that_stands_still_does_so_behind_the_inverse():
     assert np.array_equal(*EXAMPLE.inverse_response(EXAMPLE.response(u)).reshape(4, 3)[:, :2].T)
 
 
-@pytest.mark.parametrize(
-    ("law", "message"),
-    [
-        (hs.PrandtlIshlinskii(thresholds=(0.1,), weights=(1.0,)), "threshold zero"),
-        (hs.PrandtlIshlinskii(), "threshold zero"),
-        (hs.PrandtlIshlinskii(thresholds=(0.0, 0.1, 0.2), weights=(1.0, -2.0, 3.0)), r"come to -1 for i = 1"),
-        (hs.PrandtlIshlinskii(thresholds=(0.0, 0.1), weights=(0.0, 1.0)), "come to 0 for i = 0"),
-        (
-            hs.PrandtlIshlinskii(thresholds=(0.0, 0.1, 0.2), weights=(1.0, 1.0, 1.0), z0=(0.0, 0.5, 0.0)),
-            "plays 1 and 2",
-        ),
-    ],
+test_a_law_without_an_inverse_is_refused = refused(
+    (hs.PrandtlIshlinskii(thresholds=(0.1,), weights=(1.0,)), "threshold zero"),
+    (hs.PrandtlIshlinskii(), "threshold zero"),
+    (hs.PrandtlIshlinskii(thresholds=(0.0, 0.1, 0.2), weights=(1.0, -2.0, 3.0)), r"come to -1 for i = 1"),
+    (hs.PrandtlIshlinskii(thresholds=(0.0, 0.1), weights=(0.0, 1.0)), "come to 0 for i = 0"),
+    (hs.PrandtlIshlinskii(thresholds=(0.0, 0.1, 0.2), weights=(1.0, 1.0, 1.0), z0=(0.0, 0.5, 0.0)), "plays 1 and 2"),
+    call=lambda law: law.inverse(),
 )
-def test_a_law_without_an_inverse_is_refused(law, message):
-    with pytest.raises(ValueError, match=message):
-        law.inverse()
 
 
 # ---------------------------------------------------------------------------------- identification

@@ -14,10 +14,11 @@ from typing import Annotated, Literal
 import click
 import numpy as np
 import pytest
+from strategies import refused_in_one_line
 
 import hysim as hs
 from hysim._basics.atomic import write_all
-from hysim.cli import COMMANDS, Command, designs, main, models, options, outputs
+from hysim.cli import COMMANDS, Command, designs, models, options, outputs
 from hysim.cli.look import KINDS
 
 LAW = hs.BoucWen(beta=0.03, gamma=0.02, gain=-0.01, feedthrough=0.03)
@@ -43,14 +44,10 @@ def folder(tmp_path_factory):
 
 
 @pytest.fixture
-def run(folder, monkeypatch, capsys):
+def run(folder, monkeypatch, shell):
     """Run a command in that folder: exit code, standard output, standard error."""
     monkeypatch.chdir(folder)
-
-    def command(*arguments):
-        return main([*map(str, arguments)]), *capsys.readouterr()
-
-    return command
+    return shell
 
 
 def test_the_commands_are_those_of_the_design():
@@ -255,18 +252,12 @@ def test_every_kind_of_picture_is_drawn_from_files(run, tmp_path, kind):
     assert all((f">{name}<" in text) == (kind == "history") for name in ("law", "other"))
 
 
-@pytest.mark.parametrize(
-    ("arguments", "message"),
-    [
-        (("--kind", "residual-map"), "--kind residual-map takes 1 --model, got 0"),
-        (("--kind", "describing-function"), "takes at least 1 --model, got 0"),
-        (("loop.csv", "--kind", "forc"), "--kind forc takes 1 file, got 2"),
-    ],
+test_a_picture_needs_its_files_and_models = refused_in_one_line(
+    (("--kind", "residual-map"), "--kind residual-map takes 1 --model, got 0"),
+    (("--kind", "describing-function"), "takes at least 1 --model, got 0"),
+    (("loop.csv", "--kind", "forc"), "--kind forc takes 1 file, got 2"),
+    call=lambda run, words: run("plot", "loop.csv", *words, *COLUMNS, "--out", "x.svg"),
 )
-def test_a_picture_needs_its_files_and_models(run, arguments, message):
-    code, out, err = run("plot", "loop.csv", *arguments, *COLUMNS, "--out", "x.svg")
-    assert (code, out, err.count("\n")) == (2, "", 1)
-    assert message in err
 
 
 @pytest.mark.parametrize(("form", "begin"), [("png", b"\x89PNG"), ("pdf", b"%PDF")])
@@ -407,30 +398,24 @@ def test_bounds_that_cannot_be_kept_exit_with_1(run):
     assert "NOT within its bounds" in out
 
 
-@pytest.mark.parametrize(
-    ("arguments", "message"),
-    [
-        (("law.json", "--sample-time", "0.01"), "give --range LOW,HIGH, or --limits LOW,HIGH, or --record FILE"),
-        (("law.json", *DESIGN, "--sample-time", "0"), "'--sample-time': expected a positive number"),
-        (("law.json", *DESIGN, "--frequency", "-1"), "'--frequency': expected a positive number"),
-        (("law.json", *DESIGN, "--duration", "nan"), "'--duration': expected a positive number"),
-        (("law.json", *DESIGN, "--step", "0"), "--step must be a number that is not zero"),
-        (("law.json", *DESIGN, "--range", "2,1"), "LOW below HIGH, got '2,1'"),
-        (("law.json", "--sample-time", "1", "--limits", "1,0"), "'--limits': expected LOW,HIGH"),
-        (("law.json", *DESIGN, "--limits", "1"), "expected LOW,HIGH with numbers"),
-        (("law.json", *DESIGN, "--controller", "notch"), "needs a plant with one mode, this one has 0"),
-        (("law.json", *DESIGN, "--vary-mode", "10"), "needs a plant with one mode"),
-        (("law.json", *DESIGN, "--mode", "1,0.1", "--vary-mode", "100"), "expected a number above 0 and below 100"),
-        (("law.json", *DESIGN, "--preview"), "--preview is for inverse, tracking, model-following"),
-        (("law.json", *DESIGN, "--c", "x.h"), "call the file .c"),
-        (("lag.json", "--sample-time", "1e-6", "--range", "0,1"), "the plant is too slow for the sample time"),
-        (("loop.csv", *DESIGN), "does not hold a model"),
-    ],
+test_a_design_that_makes_no_sense_is_refused_in_one_line = refused_in_one_line(
+    (("law.json", "--sample-time", "0.01"), "give --range LOW,HIGH, or --limits LOW,HIGH, or --record FILE"),
+    (("law.json", *DESIGN, "--sample-time", "0"), "'--sample-time': expected a positive number"),
+    (("law.json", *DESIGN, "--frequency", "-1"), "'--frequency': expected a positive number"),
+    (("law.json", *DESIGN, "--duration", "nan"), "'--duration': expected a positive number"),
+    (("law.json", *DESIGN, "--step", "0"), "--step must be a number that is not zero"),
+    (("law.json", *DESIGN, "--range", "2,1"), "LOW below HIGH, got '2,1'"),
+    (("law.json", "--sample-time", "1", "--limits", "1,0"), "'--limits': expected LOW,HIGH"),
+    (("law.json", *DESIGN, "--limits", "1"), "expected LOW,HIGH with numbers"),
+    (("law.json", *DESIGN, "--controller", "notch"), "needs a plant with one mode, this one has 0"),
+    (("law.json", *DESIGN, "--vary-mode", "10"), "needs a plant with one mode"),
+    (("law.json", *DESIGN, "--mode", "1,0.1", "--vary-mode", "100"), "expected a number above 0 and below 100"),
+    (("law.json", *DESIGN, "--preview"), "--preview is for inverse, tracking, model-following"),
+    (("law.json", *DESIGN, "--c", "x.h"), "call the file .c"),
+    (("lag.json", "--sample-time", "1e-6", "--range", "0,1"), "the plant is too slow for the sample time"),
+    (("loop.csv", *DESIGN), "does not hold a model"),
+    call=lambda run, words: run("control", *words),
 )
-def test_a_design_that_makes_no_sense_is_refused_in_one_line(run, arguments, message):
-    code, out, err = run("control", *arguments)
-    assert (code, out, err.count("\n")) == (2, "", 1)
-    assert message in err
 
 
 def test_the_kinds_of_controllers_are_the_same_in_help_and_in_designs():

@@ -10,6 +10,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from scipy import signal, stats
+from strategies import refused
 
 import hysim as hs
 from hysim.cli import main
@@ -103,22 +104,16 @@ def test_without_a_resolution_there_are_no_quanta(table1):
     assert "[" not in header.replace("[%]", "")
 
 
-@pytest.mark.parametrize(
-    ("subjects", "record", "error", "message"),
-    [
-        ({}, "table", ValueError, "nothing to compare"),
-        ({"line": hs.Line}, "branch", ValueError, "cycle"),
-        ({"line": hs.Line}, None, TypeError, "takes a Record"),
-        ({"word": "bouc-wn"}, "table", ValueError, "no family 'bouc-wn'"),
-        ({"number": 3}, "table", TypeError, "takes a model"),
-        ({"class": hs.Sensor}, "table", TypeError, "takes a model"),
-        (3, "table", TypeError, "takes a mapping"),
-    ],
+test_wrong_arguments_are_named = refused(
+    ({}, hs.datasets.table1(), "nothing to compare"),
+    ({"line": hs.Line}, hs.datasets.table1()[:26], "cycle"),
+    ({"line": hs.Line}, [1.0, 2.0], TypeError, "takes a Record"),
+    ({"word": "bouc-wn"}, hs.datasets.table1(), "no family 'bouc-wn'"),
+    ({"number": 3}, hs.datasets.table1(), TypeError, "takes a model"),
+    ({"class": hs.Sensor}, hs.datasets.table1(), TypeError, "takes a model"),
+    (3, hs.datasets.table1(), TypeError, "takes a mapping"),
+    call=hs.compare,
 )
-def test_wrong_arguments_are_named(table1, subjects, record, error, message):
-    chosen = {"table": table1, "branch": table1[:26], None: [1.0, 2.0]}[record]
-    with pytest.raises(error, match=message):
-        hs.compare(subjects, chosen)
 
 
 QUICK = ("Line", "SingleValued", "Play", "Dahl")

@@ -4,16 +4,14 @@ from dataclasses import replace
 from itertools import pairwise
 
 import mpmath
-import numba
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
-from strategies import refused
+from strategies import COMPILED, needs_compiled, refused
 
 import hysim as hs
 
-COMPILED = not numba.config.DISABLE_JIT
 COILS = [
     hs.Chan(saturation=2.0, coercivity=0.4, squareness=0.3, feedthrough=0.1, offset=0.2, z0=-0.4),
     hs.Chan(saturation=2.0, coercivity=0.4, squareness=0.9, gap=0.5, z0=1.0),
@@ -279,6 +277,7 @@ test_what_is_no_core_is_refused = refused(
     (lambda: hs.Chan(squareness=1.0), "squareness, remanence over saturation, must be between 0 and 1, got 1.0"),
     (lambda: hs.Tellinen(z0=-1.5), "z0 must be from -1"),
     (lambda: hs.Chan(gap=-0.1), "gap must not be negative"),
+    (lambda: hs.identify(hs.Chan, noisy(CORES[0]), bounds={"gap": (0.0, 1.0)}), "gap of a Chan cannot be searched"),
     (lambda: hs.Chan(gap=0.1, saturation=-1.0), "saturation must not be negative with a gap"),
     (lambda: hs.Chan.from_ltspice(Hc=1.0, Bs=0.4, Br=0.1, A=0.0), "A must be positive"),
     (lambda: hs.Chan(feedthrough=1.0).to_ltspice(), "slope of vacuum at saturation"),
@@ -310,7 +309,7 @@ def noisy(law, seed=8):
     return hs.Record(u=LOOPS, y=y + 1e-3 * np.ptp(y) * np.random.default_rng(seed).normal(size=y.size))
 
 
-@pytest.mark.skipif(not COMPILED, reason="a search takes long without numba")
+@needs_compiled
 @pytest.mark.parametrize(
     "law",
     [
@@ -328,7 +327,7 @@ def test_the_core_is_found_within_its_intervals(law):
         assert fit.stderr[name] < 0.2 * max(abs(getattr(law, name)), 0.1), name
 
 
-@pytest.mark.skipif(not COMPILED, reason="a search takes long without numba")
+@needs_compiled
 def test_cells_are_found_with_their_field():
     true = hs.EnergyPlays(thresholds=(0.0, 0.1, 0.3), weights=(0.2, 1.0, 0.4), field=0.15)
     fit = hs.identify(hs.EnergyPlays.structure(thresholds=true.thresholds), noisy(true), initial="rest")
@@ -336,8 +335,3 @@ def test_cells_are_found_with_their_field():
     np.testing.assert_allclose(fit.model.weights, true.weights, atol=0.05)
     again = hs.identify(fit.model, noisy(true), initial="rest")
     assert again.rmse == pytest.approx(fit.rmse, rel=1e-3)
-
-
-def test_the_gap_is_not_searched():
-    with pytest.raises(ValueError, match="gap of a Chan cannot be searched"):
-        hs.identify(hs.Chan, noisy(CORES[0]), bounds={"gap": (0.0, 1.0)})

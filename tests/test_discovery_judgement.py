@@ -1,6 +1,5 @@
 """`judge`: hysteresis, a lag that looks like it, or nothing that these records could tell."""
 
-import os
 from dataclasses import replace
 
 import numpy as np
@@ -8,6 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.optimize import least_squares
+from strategies import COMPILED, needs_compiled
 
 import hysim as hs
 from hysim.discovery._competitors import steady_width
@@ -77,9 +77,6 @@ def as_line(records, weights):
     u, y = (np.concatenate([getattr(r, name) for r in records]) for name in ("u", "y"))
     slope, level = np.polyfit(u, y, 1, w=np.concatenate(weights))
     return [hs.Duhem.from_terms({"u'": slope}, y0=level + slope * r.u[0]) for r in records]
-
-
-COMPILED = os.environ.get("NUMBA_DISABLE_JIT", "0") == "0"
 
 
 def judged(records, refit):
@@ -292,7 +289,7 @@ def test_linear_creep_is_a_lag():
     assert found.verdict == "linear lag"
 
 
-@pytest.mark.skipif(not COMPILED, reason="identifies on hundreds of samples, which takes minutes uncompiled")
+@needs_compiled
 def test_only_a_law_that_could_change_the_verdict_is_worth_a_search():
     curve = competitors(sines(lambda u, _: MAPS["tanh"](u)))
     assert curve.enough == pytest.approx(BETTER * curve.errors["curve"], rel=1e-3)  # and the floor of the errors
@@ -302,7 +299,7 @@ def test_only_a_law_that_could_change_the_verdict_is_worth_a_search():
     assert competitors([hs.Record(u=TRIANGLE, y=LAW.response(TRIANGLE))]).enough == np.inf
 
 
-@pytest.mark.skipif(not COMPILED, reason="searches laws for hundreds of samples, which takes minutes uncompiled")
+@needs_compiled
 def test_the_search_is_short_where_a_curve_suffices():
     found = hs.discover(sines(lambda u, _: MAPS["relu"](u), (1.0,)))
     assert found.verdict == "no structure found"
@@ -330,7 +327,7 @@ def test_a_law_that_diverges_on_steady_cycles_is_no_structure():
     assert "diverges in free run" in doubts(found)[0]
 
 
-@pytest.mark.skipif(not COMPILED, reason="identifies on hundreds of samples, which takes minutes uncompiled")
+@needs_compiled
 def test_a_fold_that_cannot_be_fitted_counts_as_a_miss():
     records = sines(lag().response)
     laws = as_duhem(records, [np.ones(len(record)) for record in records])
@@ -343,7 +340,7 @@ def test_a_fold_that_cannot_be_fitted_counts_as_a_miss():
     assert found.verdict == "linear lag"
 
 
-@pytest.mark.skipif(not COMPILED, reason="identifies on hundreds of samples, which takes minutes uncompiled")
+@needs_compiled
 def test_a_long_record_is_judged_on_fewer_samples():
     lengths = []
 

@@ -116,6 +116,15 @@ def test_an_infinite_or_flat_direction_stops_nothing():
     assert x == pytest.approx([1.0, 3.0], abs=1e-9)  # the second coordinate has no say, and stays
 
 
+def law_and_free_run(structure, numbers, record):
+    """The law that a candidate of these numbers becomes, and the response of its structure, from y0 = 0.4."""
+    candidate = SimpleNamespace(
+        structure=structure, unknowns=np.append(numbers, 0.4), covariance=np.eye(numbers.size + 1)
+    )
+    found = _result.law_from(candidate, [record], "z")
+    return found, structure.run(record.u, numbers[np.newaxis], np.array([0.4]), 1e6)[0][0]
+
+
 @pytest.mark.parametrize("n", [1, 2, 3, 4])
 @pytest.mark.parametrize("A", [1.0, 0.7, -2.5])
 @pytest.mark.parametrize("offset", [0.0, 3.0])
@@ -126,11 +135,7 @@ def test_the_scale_of_a_memory_is_a_convention(n, A, offset):
     structure = Terms(tuple(sorted(names)), True, bool(offset))
     numbers[:3] = numbers[:3][[names.index(term) for term in structure.terms]]
     record = record_of(lambda u: u)
-    candidate = SimpleNamespace(
-        structure=structure, unknowns=np.append(numbers, 0.4), covariance=np.eye(numbers.size + 1)
-    )
-    found = _result.law_from(candidate, [record], "z")
-    expected = structure.run(record.u, numbers[np.newaxis], np.array([0.4]), 1e6)[0][0]
+    found, expected = law_and_free_run(structure, numbers, record)
     model = found.models[0]
     assert isinstance(model, hs.BoucWen)
     assert (model.A, model.gain, model.n) == (1.0, A, float(n))
@@ -146,11 +151,7 @@ def test_a_law_of_any_exponent_is_the_model_that_it_becomes(n, shifts):
     structure = AnyExponent(*shifts)
     numbers = np.array([-1.5, -0.3, -0.1, n, 5.0, 2.0])[: structure.size]
     record = record_of(lambda u: u)
-    candidate = SimpleNamespace(
-        structure=structure, unknowns=np.append(numbers, 0.4), covariance=np.eye(numbers.size + 1)
-    )
-    found = _result.law_from(candidate, [record], "z")
-    expected = structure.run(record.u, numbers[np.newaxis], np.array([0.4]), 1e6)[0][0]
+    found, expected = law_and_free_run(structure, numbers, record)
     assert found.models[0].response(record.u) == pytest.approx(expected, abs=1e-9 * np.ptp(expected))  # its kernel's
     assert found.models[0].n == n
     assert set(found.stderr) >= {*found.coefficients, "n"}

@@ -7,7 +7,7 @@ import pickle
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
-from strategies import assert_cut_and_continued_gives_the_same_bits
+from strategies import assert_cut_and_continued_gives_the_same_bits, refused
 
 import hysim as hs
 from hysim.errors import SimulationError
@@ -175,21 +175,16 @@ def test_a_structure_of_degree_1_fits_the_measured_loop():
     assert fit.fit_percent == pytest.approx(96.09, abs=0.01)  # as printed
 
 
-@pytest.mark.parametrize(
-    ("arguments", "error", "message"),
-    [
-        ({}, ValueError, "give degree or terms"),
-        ({"degree": 1, "terms": ["u'"]}, ValueError, "give degree or terms"),
-        ({"degree": -1}, ValueError, "must not be negative"),
-        ({"degree": 1.5}, TypeError, "must be a whole number"),
-        ({"terms": []}, ValueError, "at least one term"),
-        ({"terms": ["u' |z|"]}, ValueError, "memory of its own"),
-        ({"terms": ["u"]}, ValueError, "unknown term"),
-    ],
+test_a_structure_is_checked = refused(
+    ({}, "give degree or terms"),
+    ({"degree": 1, "terms": ["u'"]}, "give degree or terms"),
+    ({"degree": -1}, "must not be negative"),
+    ({"degree": 1.5}, TypeError, "must be a whole number"),
+    ({"terms": []}, "at least one term"),
+    ({"terms": ["u' |z|"]}, "memory of its own"),
+    ({"terms": ["u"]}, "unknown term"),
+    call=lambda arguments: hs.Duhem.structure(**arguments),
 )
-def test_a_structure_is_checked(arguments, error, message):
-    with pytest.raises(error, match=message):
-        hs.Duhem.structure(**arguments)
 
 
 @pytest.mark.parametrize(

@@ -23,6 +23,7 @@ BOUC_WEN = {1: ("|u'| z", "u' |z|"), 2: ("|u'| |z| z", "u' z^2"), 3: ("|u'| z^3"
 MIXED = hs.Duhem(
     p=[[0.5, -0.3], [0.9, 0.0]], q=[[0.1, -0.5]], p_abs=[[-0.4], [0.3]], q_abs=[[0.2, -0.3]], feedthrough=1.5, y0=-0.2
 )
+WITH_OFFSET = hs.Duhem.from_terms({"u'": 1.0, "|u'| z": -0.6, "u' |z|": -0.3}, feedthrough=2.0, offset=7.0, y0=7.25)
 PATH = np.array([0.0, 0.3, -1.4, 1.1, 1.1, -0.2, 0.4, -1.0, 1.5, -1.5])
 
 TIGHT = {"method": "DOP853", "rtol": 1e-13, "atol": 1e-15, "max_step": 0.05}  # an event is seen between steps only
@@ -131,14 +132,16 @@ def test_an_odd_law_is_odd_to_the_bit(u):
     assert np.array_equal(mirrored.response(-np.array(u)), -law.response(u))
 
 
+@pytest.mark.parametrize("law", [MIXED, WITH_OFFSET], ids=["mixed", "offset"])
 @pytest.mark.parametrize("cut", range(PATH.size + 1))
-def test_cut_at_a_sample_and_continued_is_the_same_bits(cut):
-    assert_cut_and_continued_gives_the_same_bits(MIXED, PATH, cut)
+def test_cut_at_a_sample_and_continued_is_the_same_bits(law, cut):
+    assert_cut_and_continued_gives_the_same_bits(law, PATH, cut)
 
 
-def test_the_compiled_step_is_the_path_to_the_bit():
-    law = MIXED.compiled(PATH[0])
-    assert np.array_equal([law.step(law.parameters, law.state, u) for u in PATH], MIXED.response(PATH))
+@pytest.mark.parametrize("law", [MIXED, WITH_OFFSET], ids=["mixed", "offset"])
+def test_the_compiled_step_is_the_path_to_the_bit(law):
+    one = law.compiled(PATH[0])
+    assert np.array_equal([one.step(one.parameters, one.state, u) for u in PATH], law.response(PATH))
 
 
 def test_batches_are_the_path_to_the_bit():

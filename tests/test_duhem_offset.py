@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from strategies import assert_cut_and_continued_gives_the_same_bits
 
 import hysim as hs
 from hysim.models.search_space import Freedom
@@ -34,16 +33,6 @@ def test_bouc_wen_with_an_offset_is_a_duhem_law():
     bouc_wen = hs.BoucWen(A=1.0, beta=0.6, gamma=0.3, feedthrough=2.0, offset=7.0, z0=0.25)
     expected = bouc_wen.response(PATH)
     assert np.abs(LAW.response(PATH) - expected).max() < 1e-10 * np.ptp(expected)  # an integrated law's promise
-
-
-@pytest.mark.parametrize("cut", range(PATH.size + 1))
-def test_cut_at_a_sample_and_continued_is_the_same_bits(cut):
-    assert_cut_and_continued_gives_the_same_bits(LAW, PATH, cut)
-
-
-def test_the_compiled_step_is_the_path_to_the_bit():
-    law = LAW.compiled(PATH[0])
-    assert np.array_equal([law.step(law.parameters, law.state, u) for u in PATH], LAW.response(PATH))
 
 
 def test_batches_are_the_path_to_the_bit():

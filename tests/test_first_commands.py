@@ -19,15 +19,10 @@ from hysim.files import FileColumn
 
 
 @pytest.fixture
-def run(tmp_path, monkeypatch, capsys):
+def run(tmp_path, monkeypatch, shell):
     """Run a command in an empty folder: exit code, standard output, standard error."""
     monkeypatch.chdir(tmp_path)
-
-    def command(*arguments):
-        code = main([*arguments])
-        return code, *capsys.readouterr()
-
-    return command
+    return shell
 
 
 @pytest.mark.parametrize("name", ["piezo.csv", "piezo.npz", "piezo.mat"])
@@ -133,11 +128,11 @@ def test_bash_offers_what_its_script_is_told(run, tmp_path):
     assert done.stdout == "profile\n"
 
 
-@pytest.mark.parametrize("shell", ["bash", "zsh", "fish"])
-def test_a_script_for_each_shell_is_printed(run, shell):
-    code, out, err = run("completion", shell)
+@pytest.mark.parametrize("name", ["bash", "zsh", "fish"])
+def test_a_script_for_each_shell_is_printed(run, name):
+    code, out, err = run("completion", name)
     assert (code, err) == (0, "")
-    assert f"_HYSIM_COMPLETE={shell}_complete" in out
+    assert f"_HYSIM_COMPLETE={name}_complete" in out
 
 
 def test_warm_up_makes_every_call(run, monkeypatch):

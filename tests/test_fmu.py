@@ -14,6 +14,7 @@ from xml.etree import ElementTree
 import numpy as np
 import pytest
 from square_dahl import SquareDahl
+from strategies import COMPILER, needs_compiler
 
 import hysim as hs
 from hysim.export import _compilers, _fmu
@@ -74,9 +75,15 @@ INTEGRATOR = Program(
     sample_time=0.01,
 )
 UNITS = {"u": "mm", "y": "N"}
-COMPILER = shutil.which("gcc") or shutil.which("clang")
-needs_compiler = pytest.mark.skipif(COMPILER is None, reason="there is no C compiler here")
 STEP = 0.1  # s
+
+
+def driven_by_fmpy(test):
+    return needs_compiler(pytest.mark.extra("fmpy")(test))
+
+
+def of_each_version(test):
+    return driven_by_fmpy(pytest.mark.parametrize("version", VERSIONS)(test))
 
 
 def unit(folder, program=FRICTION, version="2.0", platforms=(), u0=0.0):
@@ -349,8 +356,7 @@ U = 0.3 + np.sin(0.7 * np.arange(120)) * np.linspace(1.0, 0.3, 120)
 ALLOWED = 1e-12 * np.ptp(LAW.response(U))  # rounding of exp and of other orders of the operations
 
 
-@needs_compiler
-@pytest.mark.extra("fmpy")
+@driven_by_fmpy
 @pytest.mark.parametrize("program", ["law", "controller"])
 @pytest.mark.parametrize("version", VERSIONS)
 def test_fmpy_finds_no_problem(compiled, version, program):
@@ -359,9 +365,7 @@ def test_fmpy_finds_no_problem(compiled, version, program):
     assert validate_fmu(compiled[program, version]) == []
 
 
-@needs_compiler
-@pytest.mark.extra("fmpy")
-@pytest.mark.parametrize("version", VERSIONS)
+@of_each_version
 def test_a_library_exports_the_functions_of_the_standard_and_nothing_else(compiled, tmp_path, version):
     """Those that the standard's header lists; of FMI 2.0 without model exchange."""
     import fmpy
@@ -377,9 +381,7 @@ def test_a_library_exports_the_functions_of_the_standard_and_nothing_else(compil
     assert {line.split()[-1] for line in listed.stdout.splitlines()} == names
 
 
-@needs_compiler
-@pytest.mark.extra("fmpy")
-@pytest.mark.parametrize("version", VERSIONS)
+@of_each_version
 def test_a_simulation_gives_the_response_of_the_law_one_step_late(compiled, version):
     path = compiled["law", version]
     y = driven(path, U, {"u0": U[0]})
@@ -405,8 +407,7 @@ MODELS = {  # functions: a plant compiles its stages, which no collection of tes
 }
 
 
-@needs_compiler
-@pytest.mark.extra("fmpy")
+@driven_by_fmpy
 @pytest.mark.parametrize("name", MODELS)
 def test_units_of_all_kinds_do_what_their_models_do(tmp_path, name):
     """Versions take turns; the simulation begins at the first input."""
@@ -430,8 +431,7 @@ CONTROLLERS = {
 }
 
 
-@needs_compiler
-@pytest.mark.extra("fmpy")
+@driven_by_fmpy
 @pytest.mark.parametrize("name", CONTROLLERS)
 def test_units_of_controllers_do_what_the_controllers_do(tmp_path, name):
     controller = CONTROLLERS[name]()
@@ -449,9 +449,7 @@ def test_units_of_controllers_do_what_the_controllers_do(tmp_path, name):
     ours.unit.freeInstance()
 
 
-@needs_compiler
-@pytest.mark.extra("fmpy")
-@pytest.mark.parametrize("version", VERSIONS)
+@of_each_version
 def test_fmpy_builds_a_unit_from_its_sources(tmp_path, version):
     import fmpy
     from fmpy.build import build_platform_binary
@@ -465,9 +463,7 @@ def test_fmpy_builds_a_unit_from_its_sources(tmp_path, version):
     np.testing.assert_allclose(driven(str(folder), U, {"u0": U[0]})[1:], expected[:-1], rtol=0.0, atol=ALLOWED)
 
 
-@needs_compiler
-@pytest.mark.extra("fmpy")
-@pytest.mark.parametrize("version", VERSIONS)
+@of_each_version
 def test_a_saved_state_continues_with_the_same_bits(slave, version):
     friction = slave(version)
     friction.start(u0=0.2)
@@ -484,9 +480,7 @@ def test_a_saved_state_continues_with_the_same_bits(slave, version):
     assert other.outputs(U[50:], 50).tolist() == rest.tolist()
 
 
-@needs_compiler
-@pytest.mark.extra("fmpy")
-@pytest.mark.parametrize("version", VERSIONS)
+@of_each_version
 def test_a_state_of_another_model_is_refused(slave, version):
     friction, integrator = slave(version), slave(version, "controller")
     friction.start()
@@ -495,9 +489,7 @@ def test_a_state_of_another_model_is_refused(slave, version):
         integrator.from_bytes(data)
 
 
-@needs_compiler
-@pytest.mark.extra("fmpy")
-@pytest.mark.parametrize("version", VERSIONS)
+@of_each_version
 def test_reset_forgets_parameters_and_memory(slave, version):
     friction = slave(version)
     friction.start()
@@ -511,9 +503,7 @@ def test_reset_forgets_parameters_and_memory(slave, version):
     assert friction.outputs(U).tolist() == first.tolist()
 
 
-@needs_compiler
-@pytest.mark.extra("fmpy")
-@pytest.mark.parametrize("version", VERSIONS)
+@of_each_version
 def test_a_parameter_that_is_tuned_in_the_course_of_a_simulation_keeps_the_memory(slave, version):
     friction = slave(version)
     friction.start(u0=U[0])
@@ -528,9 +518,7 @@ def test_a_parameter_that_is_tuned_in_the_course_of_a_simulation_keeps_the_memor
     assert friction.get("coulomb") == 0.5
 
 
-@needs_compiler
-@pytest.mark.extra("fmpy")
-@pytest.mark.parametrize("version", VERSIONS)
+@of_each_version
 @pytest.mark.parametrize("u", [math.nan, math.inf])
 def test_an_input_that_is_not_finite_is_refused_and_changes_nothing(slave, version, u):
     friction = slave(version)
@@ -543,9 +531,7 @@ def test_an_input_that_is_not_finite_is_refused_and_changes_nothing(slave, versi
     assert friction.to_bytes(friction.save()) == before
 
 
-@needs_compiler
-@pytest.mark.extra("fmpy")
-@pytest.mark.parametrize("version", VERSIONS)
+@of_each_version
 @pytest.mark.parametrize(("step", "per_step"), [(0.01, 1), (0.03, 3), (0.0025, 0.25)])
 def test_a_sampled_model_runs_at_its_own_sample_time(slave, version, step, per_step):
     """1 + 0.5 k after k samples of a unit error, whatever the communication step."""
@@ -558,9 +544,7 @@ def test_a_sampled_model_runs_at_its_own_sample_time(slave, version, step, per_s
         assert integrator.get("command") == 1.0 + 0.5 * math.ceil((k + 1) * per_step)
 
 
-@needs_compiler
-@pytest.mark.extra("fmpy")
-@pytest.mark.parametrize("version", VERSIONS)
+@of_each_version
 def test_a_model_that_diverges_ends_the_simulation(tmp_path, version):
     source = "static double grow(const double *p, double *s, double u) { return s[0] = p[0] * s[0] + u; }"
     program = Program(

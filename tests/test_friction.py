@@ -2,7 +2,6 @@
 
 import ctypes
 import math
-import shutil
 import subprocess
 from dataclasses import replace
 
@@ -10,12 +9,11 @@ import numpy as np
 import pytest
 from friction_laws import FAMILIES, backlash, decades, drawn, lugre, maxwell, walk
 from scipy.integrate import solve_ivp
+from strategies import COMPILER, needs_compiler, refused
 
 import hysim as hs
 from hysim.models.model import candidates
 
-compiler = shutil.which("gcc") or shutil.which("clang")
-needs_compiler = pytest.mark.skipif(compiler is None, reason="there is no C compiler here")
 every_family = pytest.mark.parametrize("family", FAMILIES, ids=lambda family: family.__name__)
 N_LAWS = 12
 PASSIVE = hs.LuGre(sigma0=40.0, sigma1=0.4, sigma2=0.3, coulomb=1.0, breakaway=1.6, stribeck_velocity=0.1)
@@ -320,7 +318,7 @@ def test_c_computes_the_same(tmp_path):
         (tmp_path / f"{number}.c").write_text(program.source)
         library = tmp_path / f"{number}.so"
         subprocess.run(
-            [compiler, "-std=c99", "-ffp-contract=off", "-Wall", "-Wextra", "-Werror", "-O2", "-shared", "-fPIC", "-o",
+            [COMPILER, "-std=c99", "-ffp-contract=off", "-Wall", "-Wextra", "-Werror", "-O2", "-shared", "-fPIC", "-o",
              str(library), f"{number}.c", "-lm"], cwd=tmp_path, check=True,
         )  # fmt: skip
         c = ctypes.CDLL(str(library))
@@ -332,24 +330,19 @@ def test_c_computes_the_same(tmp_path):
         np.testing.assert_allclose(y, law.response(u, time), rtol=0, atol=1e-13 * size(y))
 
 
-@pytest.mark.parametrize(
-    ("family", "arguments", "message"),
-    [
-        (hs.LuGre, {"sigma0": 0.0}, "sigma0 must be positive"),
-        (hs.LuGre, {"breakaway": -1.0}, "breakaway must be positive"),
-        (hs.LuGre, {"damping_velocity": -1.0}, "damping_velocity must not be negative"),
-        (hs.StribeckFriction, {"breakaway_velocity": 0.0}, "breakaway_velocity must be positive"),
-        (hs.GeneralizedMaxwellSlip, {"stiffness": (1.0, 2.0)}, "must be equally long"),
-        (hs.GeneralizedMaxwellSlip, {"stiffness": (), "weights": ()}, "not empty"),
-        (hs.GeneralizedMaxwellSlip, {"z0": (0.0, 1.0)}, "z0 must hold one number for each of 1 elements"),
-        (hs.GeneralizedMaxwellSlip, {"attraction": 0.0}, "attraction must be positive"),
-        (hs.ElasticBacklash, {"stiffness": -1.0}, "stiffness must be positive"),
-        (hs.ElasticBacklash, {"half_gap": -1.0}, "half_gap must not be negative"),
-    ],
+test_what_is_no_friction_is_refused = refused(
+    (hs.LuGre, {"sigma0": 0.0}, "sigma0 must be positive"),
+    (hs.LuGre, {"breakaway": -1.0}, "breakaway must be positive"),
+    (hs.LuGre, {"damping_velocity": -1.0}, "damping_velocity must not be negative"),
+    (hs.StribeckFriction, {"breakaway_velocity": 0.0}, "breakaway_velocity must be positive"),
+    (hs.GeneralizedMaxwellSlip, {"stiffness": (1.0, 2.0)}, "must be equally long"),
+    (hs.GeneralizedMaxwellSlip, {"stiffness": (), "weights": ()}, "not empty"),
+    (hs.GeneralizedMaxwellSlip, {"z0": (0.0, 1.0)}, "z0 must hold one number for each of 1 elements"),
+    (hs.GeneralizedMaxwellSlip, {"attraction": 0.0}, "attraction must be positive"),
+    (hs.ElasticBacklash, {"stiffness": -1.0}, "stiffness must be positive"),
+    (hs.ElasticBacklash, {"half_gap": -1.0}, "half_gap must not be negative"),
+    call=lambda family, arguments: family(**arguments),
 )
-def test_what_is_no_friction_is_refused(family, arguments, message):
-    with pytest.raises(ValueError, match=message):
-        family(**arguments)
 
 
 def test_friction_is_compared_by_name_where_the_record_has_time():

@@ -1,6 +1,5 @@
 """Masses on friction: against SciPy's solvers, against the laws that friction contains, and in a control loop."""
 
-import os
 from dataclasses import replace
 from itertools import pairwise
 
@@ -8,10 +7,10 @@ import numpy as np
 import pytest
 from friction_laws import FAMILIES
 from scipy.integrate import solve_ivp
+from strategies import COMPILED, needs_compiled
 
 import hysim as hs
 
-COMPILED = os.environ.get("NUMBA_DISABLE_JIT", "0") == "0"
 H = 0.01
 T = H * np.arange(801 if COMPILED else 41)
 FORCE = 3.0 * np.sin(2.0 * T) * (1.0 + 0.5 * np.sin(0.7 * T)) + 0.3 * np.sin(9.0 * T)
@@ -143,7 +142,7 @@ def test_friction_stands_in_an_element_of_its_own():
         hs.Element(hs.mode(1.0, 0.1), between=(0, 1))
 
 
-@pytest.mark.skipif(not COMPILED, reason="30 000 samples take minutes without compiled code")
+@needs_compiled
 def test_a_controller_with_an_integral_hunts_and_one_without_stops_short():
     """The position loop of Canudas de Wit, Olsson, Astrom and Lischinsky (1995): Kp = 3, Ki = 4, Kd = 6."""
     plant = mass_on(ARTICLE, stiffness=0.0, tolerance=1e-9)

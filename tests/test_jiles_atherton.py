@@ -1,7 +1,6 @@
 """The Jiles-Atherton law against its differential equation in H, and what must hold for every constant."""
 
 import math
-import shutil
 import subprocess
 import sys
 from dataclasses import replace
@@ -18,10 +17,10 @@ from hysim.models.search_space import Freedom
 sys.path.insert(0, str(Path(__file__).parent.parent / "experiments"))
 from magnetic_evolution import loop_of, steady_cycle
 from magnetic_reference import Core, Exact, runge_kutta, strokes
+from strategies import COMPILER, needs_compiler, refused
 
 MU0 = 4e-7 * math.pi
 SLOW = numba.config.DISABLE_JIT
-compiler = shutil.which("gcc") or shutil.which("cc")
 STEEL = Core(Ms=1.6e6, a=1100.0, alpha=1.6e-3, k=400.0, c=0.2)
 ROUNDING = 1e-13  # of the range: some roundings of a dozen strokes, amplified by 1 / (1 - alpha dM_an/dHe)
 
@@ -150,14 +149,14 @@ def test_a_negative_gain_is_inverted_too_and_mixed_signs_by_the_search():
     assert mixed.inverse_response(mixed.response(u), u0=0.0) == pytest.approx(u, abs=1e-6)
 
 
-@pytest.mark.skipif(compiler is None, reason="no C compiler")
+@needs_compiler
 def test_the_inverse_is_the_same_in_c(tmp_path):
     law = hs.JilesAtherton(Ms=1.0, a=0.4, alpha=0.5, k=0.3, gain=1.0, feedthrough=0.2)
     program = hs.to_c(hs.InverseFeedforward(law=law), 1.0, name="inverse")
     (tmp_path / "inverse.c").write_text(program.source)
     (tmp_path / "inverse.h").write_text(program.header)
     strict = ["-std=c99", "-Wall", "-Wextra", "-Werror", "-fsyntax-only"]
-    subprocess.run([compiler, *strict, "inverse.c"], cwd=tmp_path, check=True)
+    subprocess.run([COMPILER, *strict, "inverse.c"], cwd=tmp_path, check=True)
 
 
 def test_an_output_beyond_saturation_has_no_input():
@@ -197,20 +196,15 @@ def test_whether_it_jumps_does_not_depend_on_the_samples():
             assert rows[0][-1] == pytest.approx(rows[1][-1], abs=1.6e6 * 1e-11)
 
 
-@pytest.mark.parametrize(
-    ("name", "value", "message"),
-    [
-        ("Ms", 0.0, "Ms must be positive"),
-        ("a", -1.0, "a must be positive"),
-        ("k", 0.0, "k must be positive"),
-        ("c", 1.1, "c must be between 0 and 1"),
-        ("reversible_feedback", -0.1, "reversible_feedback must be between 0 and 1"),
-        ("alpha", 0.02, "not unique"),
-    ],
+test_constants_of_no_material_are_refused = refused(
+    ("Ms", 0.0, "Ms must be positive"),
+    ("a", -1.0, "a must be positive"),
+    ("k", 0.0, "k must be positive"),
+    ("c", 1.1, "c must be between 0 and 1"),
+    ("reversible_feedback", -0.1, "reversible_feedback must be between 0 and 1"),
+    ("alpha", 0.02, "not unique"),
+    call=lambda name, value: hs.JilesAtherton(**{name: value}),
 )
-def test_constants_of_no_material_are_refused(name, value, message):
-    with pytest.raises(ValueError, match=message):
-        hs.JilesAtherton(**{name: value})
 
 
 # ---------------------------------------------------------------------------------- other spellings
@@ -329,10 +323,8 @@ def test_coordinates_lead_to_the_parameters_and_back(freedom):
     assert set(space.linear) <= {"gain", "feedthrough", "offset"}
 
 
-@pytest.mark.parametrize(
-    ("bounds", "message"),
-    [({"k": (0.0, 1.0)}, "'k' must be positive and finite"), ({"alpha": (0.0, np.inf)}, "'alpha' must be finite")],
+test_bounds_that_make_no_box_are_refused = refused(
+    ({"k": (0.0, 1.0)}, "'k' must be positive and finite"),
+    ({"alpha": (0.0, np.inf)}, "'alpha' must be finite"),
+    call=lambda bounds: box(Freedom(bounds=bounds)),
 )
-def test_bounds_that_make_no_box_are_refused(bounds, message):
-    with pytest.raises(ValueError, match=message):
-        box(Freedom(bounds=bounds))

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from strategies import refused
 
 import hysim as hs
 from hysim._columns.turning import TOLERANCE, complete_cycles
@@ -277,22 +278,17 @@ def test_the_width_error_is_the_rms_difference_of_signed_widths():
         hs.metrics.width_rmse(up, far)
 
 
-@pytest.mark.parametrize(
-    ("u", "y", "message"),
-    [
-        ([0, 1, 0], [0, 1], "equal lengths, got 3 and 2"),
-        ([0, 1], [0, 1], "at least 3 samples, got 2"),
-        ([2, 2, 2], [0, 1, 0], "constant at 2"),
-        ([0, math.nan, 0], [0, 1, 0], "u must be finite, got nan at index 1"),
-        ([0, 1, 0], [0, 1, math.inf], "y must be finite, got inf at index 2"),
-        ([0, 1, 2, 3], [0, 1, 2, 3], "found 0: it turns at 0, 3"),
-        ([0, 1, 0.5], [0, 1, 0], "found 0: it turns at 0, 1, 0.5"),
-        ([0, 3, -3, -1], [0, 1, -1, 0], "a level to one extreme or to both and back to the level, such as 0, max"),
-    ],
+test_what_is_no_loop_is_refused = refused(
+    ([0, 1, 0], [0, 1], "equal lengths, got 3 and 2"),
+    ([0, 1], [0, 1], "at least 3 samples, got 2"),
+    ([2, 2, 2], [0, 1, 0], "constant at 2"),
+    ([0, math.nan, 0], [0, 1, 0], "u must be finite, got nan at index 1"),
+    ([0, 1, 0], [0, 1, math.inf], "y must be finite, got inf at index 2"),
+    ([0, 1, 2, 3], [0, 1, 2, 3], "found 0: it turns at 0, 3"),
+    ([0, 1, 0.5], [0, 1, 0], "found 0: it turns at 0, 1, 0.5"),
+    ([0, 3, -3, -1], [0, 1, -1, 0], "a level to one extreme or to both and back to the level, such as 0, max"),
+    call=hs.loop_metrics,
 )
-def test_what_is_no_loop_is_refused(u, y, message):
-    with pytest.raises(ValueError, match=message):
-        hs.loop_metrics(u, y)
 
 
 @pytest.mark.parametrize("flip", [1.0, -1.0])
@@ -489,19 +485,14 @@ def test_a_memory_that_decays_slowly_is_run_until_it_repeats():
     assert found.imag == pytest.approx(4.0 * beta * a / (3.0 * math.pi), rel=1e-3)  # first order in beta a
 
 
-@pytest.mark.parametrize(
-    ("arguments", "options", "error", "message"),
-    [
-        ((hs.TransferFunction(num=(1.0,), den=(1.0, 1.0)), [1.0]), {}, TypeError, "without time, got TransferFunction"),
-        ((3.0, [1.0]), {}, TypeError, "without time, got float"),
-        ((hs.Play(), [0.0]), {}, ValueError, r"must be positive, and the mean finite, got \[0.0\]"),
-        ((hs.Play(), [1.0]), {"mean": math.inf}, ValueError, "mean finite"),
-        ((hs.Play(), [1.0]), {"samples_per_cycle": 7}, ValueError, "even, and at least 4, got 7"),
-    ],
+test_what_has_no_describing_function_is_refused = refused(
+    ((hs.TransferFunction(num=(1.0,), den=(1.0, 1.0)), [1.0]), {}, TypeError, "without time, got TransferFunction"),
+    ((3.0, [1.0]), {}, TypeError, "without time, got float"),
+    ((hs.Play(), [0.0]), {}, r"must be positive, and the mean finite, got \[0.0\]"),
+    ((hs.Play(), [1.0]), {"mean": math.inf}, "mean finite"),
+    ((hs.Play(), [1.0]), {"samples_per_cycle": 7}, "even, and at least 4, got 7"),
+    call=lambda arguments, options: hs.metrics.describing_function(*arguments, **options),
 )
-def test_what_has_no_describing_function_is_refused(arguments, options, error, message):
-    with pytest.raises(error, match=message):
-        hs.metrics.describing_function(*arguments, **options)
 
 
 class Counting:

@@ -1,11 +1,11 @@
 """A controller without a valid sample holds the last one, counts it, and recovers: in Python, in loops and in C."""
 
 import math
-import subprocess
 
 import numpy as np
 import pytest
-from test_c_export import AMPLIFIED, CONTROLLERS, MODE, STACK, STRICT, compiler, needs_compiler
+from strategies import needs_compiler
+from test_c_export import AMPLIFIED, CONTROLLERS, MODE, STACK, compiled, replayed
 from test_inverse_of_every_law import LAWS, reversing
 
 import hysim as hs
@@ -185,26 +185,6 @@ def test_a_loop_around_a_structure_holds_and_counts():
     assert run_.conditions["held_samples"] == 1
 
 
-DRIVER = """
-#include <stdio.h>
-#include "{name}.h"
-
-int main(void)
-{{
-    static {name}_state state;
-    double record[2], out[2];
-
-    {name}_init(&state);
-    while (fread(record, sizeof record, 1, stdin) == 1) {{
-        out[0] = {name}_step(&state, record[0]{measurement});
-        out[1] = (double){name}_held(&state);
-        fwrite(out, sizeof out, 1, stdout);
-    }}
-    return 0;
-}}
-"""
-
-
 @needs_compiler
 @every_controller
 def test_c_holds_and_counts_as_python(name, tmp_path):
@@ -212,14 +192,8 @@ def test_c_holds_and_counts_as_python(name, tmp_path):
     controller, (r, m) = EVERY[name](), signals()
     r, m = with_gaps(r, shift=1), with_gaps(m)
     source = hs.to_c(controller, H, name=name)
-    source.write(tmp_path)
+    held, u = replayed(compiled(source, tmp_path, other=f"{name}_held(&state)"), r, m)
     takes_both = "double measurement" in source.header
-    (tmp_path / "driver.c").write_text(DRIVER.format(name=name, measurement=", record[1]" if takes_both else ""))
-    command = [compiler, *STRICT, "driver.c", f"{name}.c", "-o", "driver", "-lm"]
-    subprocess.run(command, cwd=tmp_path, check=True, capture_output=True, text=True)
-    record = np.stack([r, m], axis=1).tobytes()
-    out = subprocess.run([tmp_path / "driver"], input=record, capture_output=True, check=True).stdout
-    u, held = np.frombuffer(out).reshape(-1, 2).T
     commands, count = run(controller, r, m if takes_both else np.zeros(m.size))
     assert np.abs(u - commands[:, 1]).max() <= 1e-12 * np.ptp(commands[:, 1])
     assert held[-1] == count

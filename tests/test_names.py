@@ -4,7 +4,6 @@ import pytest
 
 import hysim as hs
 from hysim._names import MODULE_OF, meant, nearest
-from hysim.cli import main
 from hysim.models.model import candidates, candidates_named, every_family, family_named
 
 RECORD = hs.datasets.table1()
@@ -97,14 +96,9 @@ def test_nothing_is_guessed_where_nothing_is_near():
         (("identify", "loop.csv", "--model", "dahl", "--u", "voltag"), "did you mean 'voltage'?"),
     ],
 )
-def test_the_command_line_guesses_too(arguments, said, tmp_path, monkeypatch, capsys):
+def test_the_command_line_guesses_too(arguments, said, tmp_path, monkeypatch, shell):
     monkeypatch.chdir(tmp_path)
     (tmp_path / "loop.csv").write_text("u,y,voltage\n0,0,0\n1,1,1\n0,0.1,0\n1,1,1\n0,0.1,0\n")
-    try:
-        code = main(arguments)
-    except SystemExit as end:
-        code = end.code
-    printed = capsys.readouterr()
-    assert (code, printed.out) == (2, "")
-    assert said in printed.err
-    assert printed.err.count("\n") == 1
+    code, out, err = shell(*arguments)
+    assert (code, out, err.count("\n")) == (2, "", 1)
+    assert said in err

@@ -235,6 +235,10 @@ def test_a_law_of_the_user_has_a_page(tmp_path):
 # ---------------------------------------------------------------------------------- in a browser
 
 
+def in_a_browser(test):
+    return pytest.mark.browser(pytest.mark.extra("websockets")(test))
+
+
 @pytest.fixture(scope="module")
 def browser(tmp_path_factory):
     pytest.importorskip("websockets")
@@ -259,8 +263,7 @@ def assert_as_python(state, record=None):
     return y
 
 
-@pytest.mark.browser
-@pytest.mark.extra("websockets")
+@in_a_browser
 def test_every_model_of_the_explorer_follows_its_sliders_as_python_does(browser, models, tmp_path):
     browser.open(explorer(tmp_path / "explorer.html"))
     for place, name in enumerate(models):
@@ -275,8 +278,7 @@ def test_every_model_of_the_explorer_follows_its_sliders_as_python_does(browser,
     assert len(browser.requests()) == 1  # the page itself
 
 
-@pytest.mark.browser
-@pytest.mark.extra("websockets")
+@in_a_browser
 def test_a_record_is_compared_and_what_a_slider_says_in_a_frame_is_drawn_once(browser, tmp_path):
     record = hs.datasets.table1()
     page = to_page(hs.Dahl(stiffness=0.02, coulomb=5.0) + hs.Line(slope=0.01), tmp_path / "page.html", record)
@@ -298,8 +300,7 @@ def test_a_record_is_compared_and_what_a_slider_says_in_a_frame_is_drawn_once(br
     assert len(browser.value("window.hysim.times")) == 1
 
 
-@pytest.mark.browser
-@pytest.mark.extra("websockets")
+@in_a_browser
 def test_the_address_holds_the_setting_and_reset_takes_it_back(browser, tmp_path):
     page = to_page(hs.BoucWen(), tmp_path / "page.html")
     browser.open(page)
@@ -315,8 +316,7 @@ def test_the_address_holds_the_setting_and_reset_takes_it_back(browser, tmp_path
     assert browser.drawn()["values"] == first["values"]
 
 
-@pytest.mark.browser
-@pytest.mark.extra("websockets")
+@in_a_browser
 def test_axes_stay_while_a_slider_moves_until_they_are_fitted(browser, tmp_path):
     browser.open(to_page(hs.BoucWen(), tmp_path / "page.html"))
     limits = browser.value("window.hysim.limits")
@@ -330,8 +330,7 @@ def test_axes_stay_while_a_slider_moves_until_they_are_fitted(browser, tmp_path)
     assert browser.value("document.getElementById('refit').className") == ""
 
 
-@pytest.mark.browser
-@pytest.mark.extra("websockets")
+@in_a_browser
 def test_a_double_click_fits_the_axes(browser, tmp_path):
     browser.open(to_page(hs.BoucWen(), tmp_path / "page.html"))
     limits = browser.value("window.hysim.limits")
@@ -340,8 +339,7 @@ def test_a_double_click_fits_the_axes(browser, tmp_path):
     assert browser.value("window.hysim.limits") != limits
 
 
-@pytest.mark.browser
-@pytest.mark.extra("websockets")
+@in_a_browser
 def test_the_equation_of_the_output_has_the_numbers_of_the_sliders(browser, tmp_path):
     def shown():
         return browser.value("document.getElementById('output').textContent")
@@ -358,8 +356,7 @@ def test_the_equation_of_the_output_has_the_numbers_of_the_sliders(browser, tmp_
     assert shown().endswith("= (u - z₀) + 3 (u - z₁)")
 
 
-@pytest.mark.browser
-@pytest.mark.extra("websockets")
+@in_a_browser
 def test_the_plays_that_are_drawn_are_those_of_python_at_the_moment(browser, models, tmp_path):
     browser.open(explorer(tmp_path / "explorer.html"))
     drawn = 0
@@ -386,8 +383,7 @@ def test_the_plays_that_are_drawn_are_those_of_python_at_the_moment(browser, mod
     assert drawn == 10
 
 
-@pytest.mark.browser
-@pytest.mark.extra("websockets")
+@in_a_browser
 def test_reversals_of_ones_own_make_the_loop_that_python_makes(browser, tmp_path):
     rng = np.random.default_rng(5)
     page = to_page(hs.BoucWen(feedthrough=0.2), tmp_path / "page.html")
@@ -429,8 +425,7 @@ def test_reversals_of_ones_own_make_the_loop_that_python_makes(browser, tmp_path
     assert browser.value("document.getElementById('reversals').ariaInvalid") == "true"
 
 
-@pytest.mark.browser
-@pytest.mark.extra("websockets")
+@in_a_browser
 def test_a_film_of_the_input_runs_until_it_is_paused_and_its_moment_is_in_the_address(browser, tmp_path):
     page = to_page(hs.Play(), tmp_path / "page.html")
     browser.open(page)
@@ -443,8 +438,7 @@ def test_a_film_of_the_input_runs_until_it_is_paused_and_its_moment_is_in_the_ad
     assert browser.drawn()["moment"] == state["moment"] < len(state["u"]) - 1
 
 
-@pytest.mark.browser
-@pytest.mark.extra("websockets")
+@in_a_browser
 def test_no_model_of_the_explorer_is_wider_than_a_telephone(browser, models, tmp_path):
     browser.size(TELEPHONE)
     browser.open(explorer(tmp_path / "explorer.html"))
@@ -455,8 +449,7 @@ def test_no_model_of_the_explorer_is_wider_than_a_telephone(browser, models, tmp
     browser.size(WIDE)
 
 
-@pytest.mark.browser
-@pytest.mark.extra("websockets")
+@in_a_browser
 @pytest.mark.parametrize("width", [TELEPHONE, WIDE])
 def test_nothing_is_wider_than_the_window(browser, tmp_path, width):
     browser.open(to_page(LAW, tmp_path / "page.html", hs.datasets.table1()))

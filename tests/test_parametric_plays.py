@@ -8,6 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from scipy.integrate import quad
+from strategies import refused
 
 import hysim as hs
 from hysim.laws.operators._bank_search import conditioned, dominant_extremes
@@ -94,21 +95,16 @@ def test_densities_at_the_edge_of_the_numbers_have_shares_that_sum_to_one():
         assert (law.shares >= 0.0).all()
 
 
-@pytest.mark.parametrize(
-    ("arguments", "message"),
-    [
-        ({"exponent": -1.0}, "exponent must be above -1"),
-        ({"decay": 0.0}, "decay must be positive"),
-        ({"weight": 1.0}, "reach must be positive if a weight is not zero"),
-        ({"reach": -1.0}, "reach must be positive if a weight is not zero"),
-        ({"plays": 2.5}, "plays must be whole and positive"),
-        ({"plays": 0.0}, "plays must be whole and positive"),
-        ({"z0": ()}, "z0 must hold at least one input"),
-    ],
+test_what_is_no_density_is_refused = refused(
+    ({"exponent": -1.0}, "exponent must be above -1"),
+    ({"decay": 0.0}, "decay must be positive"),
+    ({"weight": 1.0}, "reach must be positive if a weight is not zero"),
+    ({"reach": -1.0}, "reach must be positive if a weight is not zero"),
+    ({"plays": 2.5}, "plays must be whole and positive"),
+    ({"plays": 0.0}, "plays must be whole and positive"),
+    ({"z0": ()}, "z0 must hold at least one input"),
+    call=lambda arguments: hs.ParametricPrandtlIshlinskii(**arguments),
 )
-def test_what_is_no_density_is_refused(arguments, message):
-    with pytest.raises(ValueError, match=message):
-        hs.ParametricPrandtlIshlinskii(**arguments)
 
 
 # ---------------------------------------------------------------------------------- the past before a record

@@ -3,15 +3,19 @@
 import dataclasses
 import pickle
 
-import numba
 import numpy as np
 import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
-from strategies import assert_cut_and_continued_gives_the_same_bits, refused, short_inputs
+from strategies import (
+    COMPILED,
+    assert_cut_and_continued_gives_the_same_bits,
+    outputs_of_compiled_steps,
+    refused,
+    short_inputs,
+)
 
 import hysim as hs
-from hysim.kernels.stepping import drive
 from hysim.models.search_space import Freedom
 
 FAMILIES = [hs.Preisach, hs.PreisachRelays]
@@ -206,10 +210,9 @@ def test_cut_and_continue_gives_the_same_bits(family, u, data):
 @given(u=short_inputs(1.2))
 def test_stepping_one_sample_at_a_time_gives_the_same_bits(family, u):
     law = a_law(family, z0=(0.8, -0.4))
-    compiled, y = law.compiled(u0=u[0]), np.empty(u.size)
-    assert drive(compiled.step, compiled.parameters, compiled.state, u, y) == -1
+    y, state = outputs_of_compiled_steps(law, u)
     assert np.array_equal(y, law.response(u))
-    assert compiled.state[0] == u[-1]
+    assert state[0] == u[-1]
 
 
 def test_a_compiled_loop_forgets_the_smallest_of_too_many_extremes():
@@ -217,8 +220,7 @@ def test_a_compiled_loop_forgets_the_smallest_of_too_many_extremes():
     law = a_law(hs.Preisach)
     u = np.array([1.0, -1.0] * 750) * np.linspace(0.95, 0.05, 1500)
     u = np.concatenate([u, u[::-1][:1200]])
-    compiled, y = law.compiled(u0=u[0]), np.empty(u.size)
-    assert drive(compiled.step, compiled.parameters, compiled.state, u, y) == -1
+    y, _ = outputs_of_compiled_steps(law, u)
     step = 0.9 / 1499  # of the amplitude from one extreme to the next: two of them and the densest relays bound it
     densest = max(WEIGHTS) / np.diff(LEVELS).min() ** 2
     assert 0.0 < np.abs(y - law.response(u)).max() < 500 * 2.0 * densest * (4.0 * step) ** 2
@@ -231,8 +233,7 @@ def test_the_extremes_that_are_forgotten_close_the_smallest_rectangle():
     falls[400:403] = 1e-7
     u = (0.95 - np.cumsum([0.0, *falls])) * np.resize([1.0, -1.0], 1000)
     u = np.concatenate([u, u[::-1]])
-    compiled, y = law.compiled(u0=u[0]), np.empty(u.size)
-    assert drive(compiled.step, compiled.parameters, compiled.state, u, y) == -1
+    y, _ = outputs_of_compiled_steps(law, u)
     densest = max(WEIGHTS) / np.diff(LEVELS).min() ** 2
     assert np.abs(y - law.response(u)).max() < 2.0 * densest * 2e-7**2 + ROUNDING
 
@@ -305,7 +306,7 @@ def test_the_inverse_continues_from_a_state(law, past, u):
 
 def test_a_long_record_of_plateaus_and_small_steps_both_ways():
     rng = np.random.default_rng(1)
-    n = 100 if numba.config.DISABLE_JIT else 10_000
+    n = 10_000 if COMPILED else 100
     steps = rng.normal(size=n) * rng.choice([0.0, 1e-9, 1e-3, 0.1, 1.0], size=n)
     u = np.clip(np.sin(np.cumsum(steps)), -0.999, 0.999)
     law = a_law(hs.Preisach)

@@ -68,14 +68,13 @@ def work(clock, seconds):
     return measure
 
 
-def test_a_short_call_reports_nothing(stream, clock):
-    work(clock, 0.4)()
-    assert stream.getvalue() == ""
+FEW_LINES = "measure: 1 of 4, 0:00:18 left\nmeasure: 3 of 4, 0:00:06 left\n"
 
 
-def test_a_long_call_writes_few_lines_to_a_file(stream, clock):
-    work(clock, 6.0)()
-    assert stream.getvalue() == "measure: 1 of 4, 0:00:18 left\nmeasure: 3 of 4, 0:00:06 left\n"
+@pytest.mark.parametrize(("seconds", "reported"), [(0.4, ""), (6.0, FEW_LINES)], ids=["short", "long"])
+def test_a_short_call_reports_nothing_and_a_long_one_few_lines_to_a_file(stream, clock, seconds, reported):
+    work(clock, seconds)()
+    assert stream.getvalue() == reported
 
 
 def test_a_long_call_overwrites_its_line_on_a_terminal(stream, clock):

@@ -1,7 +1,7 @@
 """`select` finds the order behind the noise, and ranks by what it is asked."""
 
 import numpy as np
-import pytest
+from strategies import refused
 
 import hysim as hs
 from hysim.identification import _search
@@ -45,23 +45,14 @@ def test_structures_are_all_those_below_the_number_of_poles():
     assert all(structure.sample == "end" and structure.zeros < structure.poles for structure in found.values())
 
 
-@pytest.mark.parametrize(
-    ("candidates", "options", "message"),
-    [
-        ([], {}, "nothing to select"),
-        ([hs.Line, hs.Line], {}, "one name"),
-        ([hs.Line], {"criterion": "r2"}, "criterion must be"),
-        ([hs.Line], {"criterion": "cv_rmse"}, "needs a cross-validation"),
-    ],
+test_what_cannot_be_ranked_is_refused = refused(
+    ([], {}, "nothing to select"),
+    ([hs.Line, hs.Line], {}, "one name"),
+    ([hs.Line], {"criterion": "r2"}, "criterion must be"),
+    ([hs.Line], {"criterion": "cv_rmse"}, "needs a cross-validation"),
+    (hs.Line, {}, TypeError, "use identify"),
+    call=lambda candidates, options: hs.select(candidates, hs.datasets.table1(), **options),
 )
-def test_what_cannot_be_ranked_is_refused(candidates, options, message):
-    with pytest.raises(ValueError, match=message):
-        hs.select(candidates, hs.datasets.table1(), **options)
-
-
-def test_one_candidate_is_no_selection():
-    with pytest.raises(TypeError, match="use identify"):
-        hs.select(hs.Line, hs.datasets.table1())
 
 
 def test_what_candidates_have_in_common_is_searched_once_and_is_what_each_finds_alone(monkeypatch):

@@ -6,9 +6,10 @@ import re
 from pathlib import Path
 
 import pytest
+from strategies import refused_in_one_line
 
 import hysim as hs
-from hysim.cli import COMMANDS, Command, main
+from hysim.cli import COMMANDS, Command
 from hysim.cli.outputs import flags
 from hysim.cli.words import OTHER_NAMES, in_shell_words, suggestion
 
@@ -36,17 +37,15 @@ PYTHON_ONLY = (
 
 
 @pytest.fixture
-def run(tmp_path, monkeypatch, capsys):
-    """Run a command in a folder with a loop: exit code, standard output, standard error."""
+def run(tmp_path, monkeypatch, shell):
+    """Run a command in a folder with two records and a law: exit code, standard output, standard error."""
     monkeypatch.chdir(tmp_path)
     rows = "".join(f"{k},{u},{2 * u}\n" for k, u in enumerate([0, 1, 2, 1, 0]))
     (tmp_path / "loop.csv").write_text(f"t,u,y\n{rows}")
     (tmp_path / "latin.csv").write_bytes("u,y [µm]\n0,1\n1,2\n".encode("latin-1"))
-
-    def command(*arguments):
-        return main([*arguments]), *capsys.readouterr()
-
-    return command
+    (tmp_path / "weg.csv").write_text("Weg,y\n0,1\n1,2\n")
+    hs.save(hs.Line(slope=2.0), "law.json")
+    return shell
 
 
 @pytest.mark.parametrize(
@@ -156,73 +155,50 @@ def test_errors_of_the_library_name_options(run):
     )
 
 
-@pytest.mark.parametrize(
-    ("arguments", "message"),
-    [
-        (("metrics", "--U", "u", "loop.csv"), "there is no option --U: did you mean --u? (see hysim metrics --help)"),
-        (("identify", "loop.csv", "--model", "line", "--fixed", "a=1"), "no option --fixed: did you mean --fix?"),
-        (("identify", "loop.csv", "--model", "line", "--sampletime=1"), "did you mean --sample-time?"),
-        (("metrics", "loop.csv", "loop.csv"), "Got unexpected extra argument (loop.csv) (see hysim metrics --help)"),
-        (("identify", "loop.csv", "--model", "boucwem"), "did you mean bouc-wen? (models of your own: MODEL.json"),
-        (("identify", "loop.csv", "--model", "Oscilator"), "did you mean oscillator?"),
-        (("identify", "loop.csv", "--modle", "line"), "no option --modle: did you mean --model? (see hysim identify"),
-        (("identify", "loop.csv", "--model", "lu-gree"), "did you mean lugre?"),
-        (("identify", "loop.csv", "--model", "structure"), "a structure has no default: give one in a file"),
-        (("identify", "loop.csv", "--model", "line", "--plays", "3"), "but of prandtl-ishlinskii, modified-prandtl-"),
-        (("identify", "loop.csv", "--model", "line", "--bounds", "slope=3:1"), "'--bounds': expected NAME=LOW:HIGH"),
-        (("plot", "loop.csv", "--kind", "lop"), "got 'lop': did you mean loop?"),
-        (("help",), "there is no command 'help': did you mean --help?"),
-        (("--verson",), "there is no option --verson: did you mean --version? (see hysim --help)"),
-        (("metrics", "loop.csv", "--qqq", "1"), "there is no option --qqq (see hysim metrics --help)"),
-    ],
-)  # fmt: skip
-def test_a_typo_is_answered_with_what_was_meant(run, arguments, message):
-    code, out, err = run(*arguments)
-    assert (code, out, err.count("\n")) == (2, "", 1)
-    assert message in err
-
-
-@pytest.mark.parametrize(
-    ("arguments", "message"),
-    [
-        (("metrics", "lopo.csv"), "lopo.csv: No such file or directory: did you mean loop.csv?"),
-        (("metrics", "none/loop.csv"), "none/loop.csv: No such file or directory\n"),
-        (
-            ("metrics", "weg.csv", "--u", "weg", "--y", "y"),
-            "no column 'weg', the columns are: Weg, y; did you mean 'Weg'?",
-        ),
-        (
-            ("metrics", "loop.csv", "--u", "y"),
-            "the input and the output are both the column y: name them by --u and --y",
-        ),
-        (("simulate", "loop.csv", "law.json"), "the model stands before the record: hysim simulate law.json loop.csv"),
-        (("simulate", "law.json", "weg.csv"), "no column is called u, the columns are: Weg, y; name it by --u"),
-        (("identify", "law.json", "--model", "line"), "law.json is a model, which hysim simulate, control, page and"),
-        (("columns", "law.json"), "and c take, and hysim compare --model"),
-        (
-            ("c", "loop.csv", "--out", "a.c"),
-            "not hold a model of hysim: Expecting value: line 1 column 1 (char 0); hysim identify --out makes",
-        ),
-        (("simulate", "line", "loop.csv"), "write a model of it by hysim identify --out line.json"),
-        (("identify", "loop.csv", "--model", "weg.csv"), "the file weg.csv is no model: give the name of a family"),
-        (("identify", "loop.csv", "--model", "line", "--out", "law"), "models are JSON: call the file .json, got law"),
-        (("identify", "loop.csv", "--model", "line", "--sample-time", "1ms"), "number without a unit, got '1ms'"),
-        (("identify", "loop.csv", "--model", "line", "--seed", "1.5"), "expected a whole number, got '1.5'"),
-        (("plot", "loop.csv", "--kind", "forc", "--out", "f.svg"), "at least 3 reversal curves from different levels"),
-        (("sweep", "study.toml"), "the rows are kept in a database: give --out study.sqlite"),
-        (("example", "loop.csv"), "loop.csv is there already: give another name, as in hysim example mine.csv"),
-    ],
+test_a_typo_is_answered_with_what_was_meant = refused_in_one_line(
+    (("metrics", "--U", "u", "loop.csv"), "there is no option --U: did you mean --u? (see hysim metrics --help)"),
+    (("identify", "loop.csv", "--model", "line", "--fixed", "a=1"), "no option --fixed: did you mean --fix?"),
+    (("identify", "loop.csv", "--model", "line", "--sampletime=1"), "did you mean --sample-time?"),
+    (("metrics", "loop.csv", "loop.csv"), "Got unexpected extra argument (loop.csv) (see hysim metrics --help)"),
+    (("identify", "loop.csv", "--model", "boucwem"), "did you mean bouc-wen? (models of your own: MODEL.json"),
+    (("identify", "loop.csv", "--model", "Oscilator"), "did you mean oscillator?"),
+    (("identify", "loop.csv", "--modle", "line"), "no option --modle: did you mean --model? (see hysim identify"),
+    (("identify", "loop.csv", "--model", "lu-gree"), "did you mean lugre?"),
+    (("identify", "loop.csv", "--model", "structure"), "a structure has no default: give one in a file"),
+    (("identify", "loop.csv", "--model", "line", "--plays", "3"), "but of prandtl-ishlinskii, modified-prandtl-"),
+    (("identify", "loop.csv", "--model", "line", "--bounds", "slope=3:1"), "'--bounds': expected NAME=LOW:HIGH"),
+    (("plot", "loop.csv", "--kind", "lop"), "got 'lop': did you mean loop?"),
+    (("help",), "there is no command 'help': did you mean --help?"),
+    (("--verson",), "there is no option --verson: did you mean --version? (see hysim --help)"),
+    (("metrics", "loop.csv", "--qqq", "1"), "there is no option --qqq (see hysim metrics --help)"),
 )
-def test_a_wrong_step_is_answered_with_the_right_one(run, tmp_path, arguments, message):
-    (tmp_path / "weg.csv").write_text("Weg,y\n0,1\n1,2\n")
-    hs.save(hs.Line(slope=2.0), "law.json")
-    code, out, err = run(*arguments)
-    assert (code, out, err.count("\n")) == (2, "", 1)
-    assert message in err
+
+
+test_a_wrong_step_is_answered_with_the_right_one = refused_in_one_line(
+    (("metrics", "lopo.csv"), "lopo.csv: No such file or directory: did you mean loop.csv?"),
+    (("metrics", "none/loop.csv"), "none/loop.csv: No such file or directory\n"),
+    (("metrics", "weg.csv", "--u", "weg", "--y", "y"), "no column 'weg', the columns are: Weg, y; did you mean 'Weg'?"),
+    (("metrics", "loop.csv", "--u", "y"), "the input and the output are both the column y: name them by --u and --y"),
+    (("simulate", "loop.csv", "law.json"), "the model stands before the record: hysim simulate law.json loop.csv"),
+    (("simulate", "law.json", "weg.csv"), "no column is called u, the columns are: Weg, y; name it by --u"),
+    (("identify", "law.json", "--model", "line"), "law.json is a model, which hysim simulate, control, page and"),
+    (("columns", "law.json"), "and c take, and hysim compare --model"),
+    (
+        ("c", "loop.csv", "--out", "a.c"),
+        "not hold a model of hysim: Expecting value: line 1 column 1 (char 0); hysim identify --out makes",
+    ),
+    (("simulate", "line", "loop.csv"), "write a model of it by hysim identify --out line.json"),
+    (("identify", "loop.csv", "--model", "weg.csv"), "the file weg.csv is no model: give the name of a family"),
+    (("identify", "loop.csv", "--model", "line", "--out", "law"), "models are JSON: call the file .json, got law"),
+    (("identify", "loop.csv", "--model", "line", "--sample-time", "1ms"), "number without a unit, got '1ms'"),
+    (("identify", "loop.csv", "--model", "line", "--seed", "1.5"), "expected a whole number, got '1.5'"),
+    (("plot", "loop.csv", "--kind", "forc", "--out", "f.svg"), "at least 3 reversal curves from different levels"),
+    (("sweep", "study.toml"), "the rows are kept in a database: give --out study.sqlite"),
+    (("example", "loop.csv"), "loop.csv is there already: give another name, as in hysim example mine.csv"),
+)
 
 
 def test_the_only_column_of_a_file_is_the_input_of_a_simulation(run, tmp_path):
-    hs.save(hs.Line(slope=2.0), "law.json")
     (tmp_path / "inputs.txt").write_text("1\n3\n")
     assert run("simulate", "law.json", "inputs.txt") == (0, "u,y\n1.0,2.0\n3.0,6.0\n", "")
     assert run("simulate", "law.json", "inputs.txt", "--out", "-") == (0, "u,y\n1.0,2.0\n3.0,6.0\n", "")

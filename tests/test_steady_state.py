@@ -1,12 +1,12 @@
 """Lightly damped oscillators settle in few periods, and undamped and unstable ones are refused as quickly."""
 
-import os
 import subprocess
 import sys
 from dataclasses import replace
 
 import numpy as np
 import pytest
+from strategies import needs_compiled
 
 import hysim as hs
 from hysim.discovery._hidden_memory import Oscillator, Response
@@ -14,8 +14,6 @@ from hysim.kernels import memory_terms
 from hysim.laws.differential.terms import bouc_wen_terms
 from hysim.plants.oscillator import attracting_state
 
-COMPILED = os.environ.get("NUMBA_DISABLE_JIT", "0") == "0"
-needs_compiled = pytest.mark.skipif(not COMPILED, reason="hundreds of periods, which only compiled code does in time")
 STEP, OMEGA = 0.01, 12.0
 U = 20.0 * np.sin(2.0 * np.pi * np.arange(100) / 100) + 3.0
 MOST = 300  # periods: the last attempt begins after 256

@@ -1,20 +1,17 @@
 """A structure in a closed loop: its own motion under forces that are held, and an earthquake beside them."""
 
-import os
 from dataclasses import replace
 
 import numpy as np
 import pytest
 from frame_laws import bouc_wen
 from scipy.linalg import expm
+from strategies import needs_compiled
 
 import hysim as hs
 from hysim.kernels.structure_path import follow
 
-pytestmark = pytest.mark.skipif(
-    os.environ.get("NUMBA_DISABLE_JIT", "0") != "0",
-    reason="loops of hundreds of samples, which take minutes uncompiled",
-)
+pytestmark = needs_compiled
 H = 0.01
 T = H * np.arange(500)
 STEP = np.where(T > 0.1, 1.0, 0.0)

@@ -10,6 +10,7 @@ import sweep_tasks
 from hypothesis import given
 from hypothesis import strategies as st
 from scipy import stats
+from strategies import refused
 
 import hysim as hs
 from hysim.sweeps import _sweep
@@ -215,69 +216,49 @@ def test_a_sample_follows_its_distributions_and_its_seed(method):
     assert not np.isin(again.draw()["a"], result["a"]).any()
 
 
-@pytest.mark.parametrize(
-    ("space", "error", "words"),
-    [
-        ({}, ValueError, "at least one parameter"),
-        ({"a": [], "b": [1]}, ValueError, "no value of a"),
-        ({"a": [math.nan], "b": [1]}, ValueError, "got nan"),
-        ({"a": [1, "x"], "b": [1]}, TypeError, "all numbers, all strings"),
-        ({"a": 1.0, "b": [1]}, TypeError, "must be a sequence"),
-        ({"a": [1]}, TypeError, "does not take the parameters a"),
-        ({"a": [1], "seed": [1]}, ValueError, "cannot be called 'seed'"),
-        ([], ValueError, "no task"),
-        ([{"a": 1, "b": 2}, {"a": 1}], ValueError, "task 1 of the list has a, the first has a, b"),
-        ("ab", TypeError, "a space is"),
-    ],
+test_a_wrong_space_is_refused = refused(
+    ({}, "at least one parameter"),
+    ({"a": [], "b": [1]}, "no value of a"),
+    ({"a": [math.nan], "b": [1]}, "got nan"),
+    ({"a": [1, "x"], "b": [1]}, TypeError, "all numbers, all strings"),
+    ({"a": 1.0, "b": [1]}, TypeError, "must be a sequence"),
+    ({"a": [1]}, TypeError, "does not take the parameters a"),
+    ({"a": [1], "seed": [1]}, "cannot be called 'seed'"),
+    ([], "no task"),
+    ([{"a": 1, "b": 2}, {"a": 1}], "task 1 of the list has a, the first has a, b"),
+    ("ab", TypeError, "a space is"),
+    call=lambda space: hs.sweep(sweep_tasks.product, space),
 )
-def test_a_wrong_space_is_refused(space, error, words):
-    with pytest.raises(error, match=words):
-        hs.sweep(sweep_tasks.product, space)
 
 
-@pytest.mark.parametrize(
-    ("options", "error", "words"),
-    [
-        ({"executor": "dusk"}, ValueError, "executor must be"),
-        ({"executor": 3}, TypeError, "method submit"),
-        ({"workers": 0}, ValueError, "workers must be"),
-        ({"seed": -1}, ValueError, "not be negative"),
-        ({"seed": 1.5}, TypeError, "a whole number"),
-        ({"on_change": "ask"}, ValueError, "on_change must be"),
-    ],
+test_a_wrong_option_is_refused = refused(
+    ({"executor": "dusk"}, "executor must be"),
+    ({"executor": 3}, TypeError, "method submit"),
+    ({"workers": 0}, "workers must be"),
+    ({"seed": -1}, "not be negative"),
+    ({"seed": 1.5}, TypeError, "a whole number"),
+    ({"on_change": "ask"}, "on_change must be"),
+    call=lambda options: hs.sweep(sweep_tasks.product, {"a": [1], "b": [1]}, **options),
 )
-def test_a_wrong_option_is_refused(options, error, words):
-    with pytest.raises(error, match=words):
-        hs.sweep(sweep_tasks.product, {"a": [1], "b": [1]}, **options)
 
 
-@pytest.mark.parametrize(
-    ("arguments", "words"),
-    [
-        ({"n": 100}, "take 64 or 128"),
-        ({"n": 0, "method": "latin_hypercube"}, "at least 1"),
-        ({"n": 4, "method": "random"}, "one of sobol"),
-        ({"n": 4, "distributions": {"a": (1.0, 0.0)}}, "in order"),
-        ({"n": 4, "distributions": {}}, "at least one"),
-    ],
+test_a_wrong_sample_is_refused = refused(
+    ({"n": 100}, "take 64 or 128"),
+    ({"n": 0, "method": "latin_hypercube"}, "at least 1"),
+    ({"n": 4, "method": "random"}, "one of sobol"),
+    ({"n": 4, "distributions": {"a": (1.0, 0.0)}}, "in order"),
+    ({"n": 4, "distributions": {}}, "at least one"),
+    call=lambda arguments: hs.Sample(**{"distributions": {"a": (0.0, 1.0)}, **arguments}),
 )
-def test_a_wrong_sample_is_refused(arguments, words):
-    with pytest.raises(ValueError, match=words):
-        hs.Sample(**{"distributions": {"a": (0.0, 1.0)}, **arguments})
 
 
-@pytest.mark.parametrize(
-    ("law", "arguments", "error", "words"),
-    [
-        (hs.BoucWen, {"measure": "rmse"}, ValueError, "y is needed"),
-        (hs.BoucWen, {"measure": "width"}, ValueError, "one of rmse"),
-        (hs.BoucWen, {"y": [1.0]}, ValueError, "equal lengths"),
-        (hs.SingleValued, {"y": [1.0, 2.0]}, TypeError, "SingleValued cannot compute many laws"),
-    ],
+test_a_wrong_response_task_is_refused = refused(
+    (hs.BoucWen, {"measure": "rmse"}, "y is needed"),
+    (hs.BoucWen, {"measure": "width"}, "one of rmse"),
+    (hs.BoucWen, {"y": [1.0]}, "equal lengths"),
+    (hs.SingleValued, {"y": [1.0, 2.0]}, TypeError, "SingleValued cannot compute many laws"),
+    call=lambda law, arguments: hs.response_task(law, [0.0, 1.0], **arguments),
 )
-def test_a_wrong_response_task_is_refused(law, arguments, error, words):
-    with pytest.raises(error, match=words):
-        hs.response_task(law, [0.0, 1.0], **arguments)
 
 
 def test_an_output_cannot_have_the_name_of_a_parameter():

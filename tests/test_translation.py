@@ -2,12 +2,12 @@
 
 import ctypes
 import math
-import shutil
 import subprocess
 
 import numpy as np
 import pytest
 from square_dahl import SquareDahl
+from strategies import COMPILER, needs_compiler
 
 import hysim as hs
 from hysim.export._c import HELPERS, Scalar, UntranslatableError, Vector
@@ -16,8 +16,6 @@ from hysim.kernels.stepping import complete
 from hysim.models.compiled_step import startable
 from hysim.models.model import every_family
 
-compiler = shutil.which("gcc") or shutil.which("clang")
-needs_compiler = pytest.mark.skipif(compiler is None, reason="there is no C compiler here")
 of_another = "no function"
 STRICT = ["-std=c99", "-ffp-contract=off", "-Wall", "-Wextra", "-Wpedantic", "-Werror"]
 TABLE = np.array([1.0, -2.5, 1e-300, 0.1])
@@ -170,7 +168,7 @@ def library(functions, folder, *options):
         head = f"double {function.__name__}(double *p, double *x, double u)"
         wrapped.append(f"{head};\n{head} {{{unused} return {c.name}({', '.join(given)}); }}\n")
     (folder / "all.c").write_text("#include <math.h>\n" + translation.text() + "\n".join(wrapped))
-    command = [compiler, *STRICT, *options, "-shared", "-fPIC", "all.c", "-o", "all.so", "-lm"]
+    command = [COMPILER, *STRICT, *options, "-shared", "-fPIC", "all.c", "-o", "all.so", "-lm"]
     subprocess.run(command, cwd=folder, check=True)
     return ctypes.CDLL(str(folder / "all.so"))
 
@@ -309,7 +307,7 @@ def test_the_steps_of_all_families_compile_without_a_warning(tmp_path):
         (tmp_path / f"f{number}.c").write_text(f"#include <math.h>\n{text}\n{use}\n")
     sources = sorted(path.name for path in tmp_path.glob("f*.c"))
     assert len(sources) >= 15
-    subprocess.run([compiler, *STRICT, "-fsyntax-only", *sources], cwd=tmp_path, check=True)
+    subprocess.run([COMPILER, *STRICT, "-fsyntax-only", *sources], cwd=tmp_path, check=True)
 
 
 def test_a_law_of_ones_own_is_translated():
