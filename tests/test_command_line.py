@@ -156,6 +156,8 @@ def test_summary_of_the_camera(summary):
     assert all(keys <= row.keys() for row in rows)
     assert {row["frame_rate_hz"] for row in rows} == {10.0, 30.0, 100.0, 1000.0}
     assert {row["delay_frames"] for row in rows} == {1}
+    learned = [row for row in rows if row["trials"]]
+    rows = [row for row in rows if not row["trials"]]
     assert all(1.0 <= row["max_sensitivity"] <= 2.002 for row in rows)  # to which it is known
     of_law = [row for row in rows if row["plant"] == "bouc-wen+eq7"]
     best = {(row["quantum_um"], row["shake_px"]): row["true_reduction_percent"] for row in of_law}  # of 1000 Hz
@@ -163,6 +165,11 @@ def test_summary_of_the_camera(summary):
     own = [row for row in of_law if row["quantum_um"] == 0.0763 and row["shake_px"] == 0.31]
     assert all(row["true_reduction_percent"] < 80.0 for row in own)
     assert any(row["true_reduction_percent"] >= 89.5 for row in of_law if 0.0 < row["quantum_um"] < 0.0763)
+    assert {(row["quantum_um"], row["shake_px"], row["max_sensitivity"]) for row in learned} == {(0.0763, 0.31, None)}
+    reduced = {(row["plant"], row["frame_rate_hz"]): row["true_reduction_percent"] for row in learned}
+    assert all(reduced[row["plant"], row["frame_rate_hz"]] > row["true_reduction_percent"] for row in own[:3])
+    assert reduced["bouc-wen+eq7", 100.0] > 89.5
+    assert reduced["eq4", 100.0] > 95.0
 
 
 def test_summary_of_the_dwell(summary):

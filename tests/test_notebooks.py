@@ -69,6 +69,4 @@ def test_every_notebook_is_listed_written_by_the_command_without_outputs_and_com
 
 def test_a_notebook_of_another_name_is_refused_with_the_names(capsys):
     assert main(["example", "mine.ipynb"]) == 2
-    assert (
-        "the notebooks are compensate.ipynb, discover.ipynb, first_fit.ipynb and study.ipynb" in capsys.readouterr().err
-    )
+    assert "the notebooks are compensate.ipynb, discover.ipynb, first_fit.ipynb, study.ipynb" in capsys.readouterr().err

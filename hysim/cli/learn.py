@@ -13,7 +13,6 @@ import click
 from click.shell_completion import BashComplete, FishComplete, ZshComplete
 
 import hysim as hs
-from hysim._basics.printing import listed
 from hysim._basics.progress import Progress, announced_by, reports
 from hysim.cli import options, outputs
 from hysim.cli.records import STANDARD
@@ -84,7 +83,9 @@ def _notebook(path: Path) -> str:
         each for each in (package / "data" / "notebooks", package.parent / "docs" / "notebooks") if each.is_dir()
     )
     if not (source := folder / path.name).is_file():
-        raise ValueError(f"the notebooks are {listed(sorted(each.name for each in folder.iterdir()))}, got {path.name}")
+        raise ValueError(
+            f"the notebooks are {', '.join(sorted(each.name for each in folder.iterdir()))}, got {path.name}"
+        )
     return source.read_text(encoding="utf-8")
 
 

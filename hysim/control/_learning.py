@@ -44,8 +44,9 @@ _LENGTH = 2**15  # samples of an impulse response: 0.6 Hz between frequencies at
 _CYCLE = 2000  # samples of the stroke along which slopes are taken
 _STEADY = 3  # cycles, the last of which counts
 _MOVES = 1e-6  # of the largest change of the inverse's output: smaller ones have no slope
-_TRUSTED = 0.8  # rate of an ideal filter above which the automatic low pass stops
-_CONVERGES = 0.95  # rate that the automatic low pass must reach
+_TRUSTED = 0.8  # rate of an ideal filter of gain one above which the automatic low pass stops
+_LEARNS = 0.05  # of the gain: part of the error that the automatic low pass must take away
+_LOWEST = 1e-3  # of pi / sample_time: its taps still fit into an impulse response
 _HIGHEST = 0.5  # of pi / sample_time: highest automatic cutoff
 _NARROWER, _TRIES = 0.85, 20
 _RIPPLE = 60.0  # dB: an error of 0.1 % in the pass band is learned no further
@@ -391,12 +392,12 @@ def _filters(learner: _Learning, sample_time: float) -> _Filters:
     late = math.ceil(_delay(learner.model) / sample_time)
     if learner.cutoff is not None:
         return _with_cutoff(learner.cutoff, inverse, plants, late, sample_time, slopes)
-    doubtful = np.flatnonzero(np.abs(1.0 - inverse * plants).max(axis=0) > _TRUSTED)
+    doubtful = np.flatnonzero(np.abs(1.0 - inverse / learner.gain * plants).max(axis=0) > _TRUSTED)
     edge = doubtful[0] / nominal.size if doubtful.size else 1.0
     cutoff = min(edge / (1.0 + 0.5 * _TRANSITION), _HIGHEST) * math.pi / sample_time
     for _ in range(_TRIES):
         filters = _with_cutoff(cutoff, inverse, plants, late, sample_time, slopes)
-        if filters.condition.rate < _CONVERGES:
+        if filters.condition.rate < 1.0 - _LEARNS * learner.gain:
             break
         cutoff *= _NARROWER
     return filters
@@ -412,10 +413,13 @@ def _with_cutoff(
 ) -> _Filters:
     """Taps of a low pass, and of it times the inverse, and what they leave of the error."""
     corner = cutoff * sample_time / math.pi
-    if not corner < 1.0:
-        raise ValueError(f"cutoff must be below pi / sample_time, {math.pi / sample_time:.4g} rad/s, got {cutoff:.4g}")
+    if not _LOWEST < corner < 1.0:
+        low, high = (part * math.pi / sample_time for part in (_LOWEST, 1.0))
+        raise ValueError(
+            f"cutoff must lie between {low:.4g} and {high:.4g} rad/s at this sample time, got {cutoff:.4g}"
+        )
     half = kaiserord(_RIPPLE, min(_TRANSITION * corner, 1.0 - corner))[0] // 2
-    reach = min(half + max(half // 2, 16) + late, _LENGTH // 2 - 1)
+    reach = half + max(half // 2, 16) + late
     taps = np.pad(firwin(2 * half + 1, corner, window=("kaiser", kaiser_beta(_RIPPLE))), reach - half)
     low_pass = _spectrum(taps)
     learns = np.fft.irfft(low_pass * inverse, _LENGTH)[-np.arange(-reach, reach + 1)]

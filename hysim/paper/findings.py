@@ -5,7 +5,7 @@ from typing import Any
 
 from hysim._basics.frozen import frozen
 from hysim._basics.parallel import awaited, second_process
-from hysim.paper.camera import CameraLoop, hysteresis_cameras, period_rows, vibration_cameras
+from hysim.paper.camera import CameraLoop, hysteresis_cameras, learned_cameras, period_rows, vibration_cameras
 from hysim.paper.claims import Claim, claims, evidence
 from hysim.paper.equations import Approximation, Characteristics, printed_characteristics
 from hysim.paper.loops import Case, Loops, control_measures, law_plant, on_equations, with_law
@@ -26,8 +26,8 @@ class Findings:
         Equations (1) and (4) identified anew.
     loops : Loops
         The closed loops.
-    cameras : tuple of CameraLoop
-        Those that a camera closes.
+    cameras, learned : tuple of CameraLoop
+        Those that a camera closes, and those whose reference is learned from its readings.
     periods : list of dict
         Reduction of the hysteresis against the period of the triangle.
     dwell : list of dict
@@ -44,6 +44,7 @@ class Findings:
     reidentification: Reidentification
     loops: Loops
     cameras: tuple[CameraLoop, ...]
+    learned: tuple[CameraLoop, ...]
     periods: list[dict[str, float]]
     dwell: list[dict[str, float]]
     claims: tuple[Claim, ...]
@@ -54,7 +55,7 @@ class Findings:
     def searches(self) -> list[Found]:
         """The search of every controller; some controllers run in several loops."""
         cases: tuple[Case[Any], ...] = (*self.loops.hysteresis, *self.loops.steps, *self.loops.squares)
-        return [*(case.found for case in cases), *(camera.found for camera in self.cameras)]
+        return [*(case.found for case in cases), *(camera.found for camera in self.cameras if camera.found)]
 
 
 def find(*, quick: bool = False, thorough: bool = False, progress: Progress | None = None) -> Findings:
@@ -84,9 +85,10 @@ def find(*, quick: bool = False, thorough: bool = False, progress: Progress | No
         again = beside.submit(reidentify, models.fits["tf-identified"])
         say(last - 1, last, "closed loops")
         asymmetric_model = models.fits["bouc-wen-asymmetric"].model
+        learned = beside.submit(learned_cameras, asymmetric_model)
         cameras = (*hysteresis_cameras(asymmetric_model, starts), *on_vibration)
         closed = with_law(awaited(equations), asymmetric_model, starts)
-        reidentification = awaited(again)
+        reidentification, learned_rows = awaited(again), awaited(learned)
     say(last, last, "claims")
     law, of = models.fits["bouc-wen"].model, evidence(models, reidentification, control_measures(closed))
     return Findings(
@@ -94,6 +96,7 @@ def find(*, quick: bool = False, thorough: bool = False, progress: Progress | No
         reidentification=reidentification,
         loops=closed,
         cameras=cameras,
+        learned=tuple(learned_rows),
         periods=period_rows(asymmetric_model, closed.hysteresis[0], cameras),
         dwell=dwell_rows(law, law_plant(law)),
         claims=claims(of),

@@ -17,7 +17,7 @@ from typing import Any
 from hysim.datasets import PIXEL
 from hysim.identification import Identification
 from hysim.metrics import loop_metrics
-from hysim.paper.camera import PERIODS, TARGETS, CameraLoop, needed, with_own_camera
+from hysim.paper.camera import PERIODS, TARGETS, TRIALS, CameraLoop, needed, with_own_camera
 from hysim.paper.claims import RULES, VERDICTS, Claim, as_text
 from hysim.paper.equations import EQUATION_1, EQUATION_4, EQUATION_6, EQUATION_7, Characteristics
 from hysim.paper.findings import Findings
@@ -67,6 +67,8 @@ def report_page(findings: Findings, summary: Mapping[str, Any], drawn: Mapping[s
         "claimed": {claim.id: {"here": claim.recomputed, "badge": _badge(claim.verdict)} for claim in findings.claims},
         "with_camera": {plant: _with_camera(plant, findings.cameras) for plant in TARGETS},
         "verdicts": {name: _badge(name, f"{numbers[name]} {_PLURAL.get(name, name)}") for name in VERDICTS},
+        "learned": {plant: _with_camera(plant, findings.learned) for plant in TARGETS},
+        "n_trials": TRIALS,
         "needed": {plant: needed(plant, findings.cameras) for plant in TARGETS},
         "lag_loop": next(row for row in summary["control"]["hysteresis"] if row["plant"] == "eq1"),
         "periods": PERIODS,

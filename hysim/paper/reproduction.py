@@ -179,7 +179,7 @@ def _summary(computed: Findings) -> dict[str, Any]:
         },
         "models": model_measures(computed.study),
         "claims": [dict(vars(claim)) for claim in computed.claims],
-        "control": {**control_measures(computed.loops), "camera": camera_rows(computed.cameras)},
+        "control": {**control_measures(computed.loops), "camera": camera_rows([*computed.cameras, *computed.learned])},
         "dwell": computed.dwell,
         "evidence": preference_measures(),
     }
