@@ -633,6 +633,50 @@ def robustness(result: Result) -> list[str]:
     ]
 
 
+def learning(result: Result) -> list[str]:
+    """Repetition and prediction on actuators that are not quite the model."""
+    rows, spread = result["rows"], result["spread_percent"]
+    learned = where(rows, kind="iterative learning")
+    slow = the(learned, reference="triangle of 1 Hz")
+    require(slow["trials_to_noise"] <= 8, "eight trials reach the sensor's noise at 1 Hz")
+    require(not sum(column(learned, "worse_than_first")), "no draw is worse after the last trial than in the first")
+    first, last = "median_um_1", "median_um_10"
+    steps = [row for row in rows if row["reference"].startswith("step")]
+    milliseconds = lambda value: "not within 90 ms" if value is None else f"{1e3 * value:.1f} ms"  # noqa: E731
+    return [
+        f"With law, creep and mode each up to {spread:g} % off, {slow['trials_to_noise']} trials take the error of a "
+        f"triangle of 1 Hz to the sensor's noise of {1e3 * result['noise_um']:g} nm in the median. No draw diverges.",
+        by_row(
+            learned,
+            ("learned from trials, median rms in nm", "reference", str),
+            ("first", first, nanometres),
+            ("second", "median_um_2", nanometres),
+            ("fourth", "median_um_4", nanometres),
+            ("tenth", last, nanometres),
+            ("largest of all draws", "largest_um", nanometres),
+        ),
+        "What a reference asks for above the low pass is not learned: the corners of 100 Hz excite a mode whose frequency "
+        "is not known well.",
+        by_row(
+            [row for row in rows if "margin" in row and row["margin"] is not None],
+            ("in a loop, rms in nm", "reference", str),
+            ("controller", "kind", str),
+            ("median", "median_um", nanometres),
+            ("largest", "largest_um", nanometres),
+        ),
+        "Prediction brakes in time where the voltage has a limit.",
+        by_row(
+            steps,
+            ("step within 0 to 70 V", "kind", str),
+            ("overshoot, exact model", "overshoot_percent", percent),
+            ("settled", "settling_time_s", milliseconds),
+            ("overshoot, median of the draws", "median_overshoot_percent", percent),
+            ("settled, median", "median_settling_time_s", milliseconds),
+            ("overshoot, largest", "largest_overshoot_percent", percent),
+        ),
+    ]
+
+
 def pixel_sensor(result: Result) -> list[str]:
     """Control through whole pixels."""
     rows = {row["controller"]: row for row in result["rows"]}
@@ -1359,6 +1403,7 @@ GROUPS: dict[str, tuple[Finding, ...]] = {
         lag_of_equation_1,
         compensation_matrix,
         robustness,
+        learning,
         pixel_sensor,
         rate_sweep,
         pid_hysteresis,

@@ -15,6 +15,7 @@ DOCS = Path(__file__).parent.parent / "docs"
 PAGES = sorted([*DOCS.glob("*.md"), *DOCS.glob("teaching/*.md")])
 NEEDS = {
     "camera": pytest.mark.extra("skimage"),
+    "control": pytest.mark.extra("slycot"),
     "dataframes": pytest.mark.extra("pandas", "xarray"),
     "posterior": pytest.mark.extra("emcee"),
 }

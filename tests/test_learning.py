@@ -109,7 +109,7 @@ def test_a_device_that_counts_trials_learns_as_learn_does():
         errors[min(k, samples - 1)] = 0.0 - noise if k < samples else errors[-1]
         _, state = device.step(state, 0.0, noise)
     low_pass = _filters(device, H).low_pass
-    stored = state.state[2 + device.ahead(H) + 1 + 2 :][:samples]
+    stored = state.state[3 + device.ahead(H) + 1 + 2 :][:samples]
     assert low_pass.size < samples
     assert np.allclose(stored, device.following(np.zeros(samples), errors, H), rtol=0.0, atol=1e-12)
 
@@ -214,7 +214,7 @@ def test_a_horizon_and_an_amplifier_that_do_not_fit_are_refused():
     slow = replace(STAGE, amplifier=hs.Amplifier(slew_rate=100.0))
     with pytest.raises(ValueError, match=r"the amplifier must act at once"):
         hs.PredictiveControl(model=slow, horizon=0.02)
-    with pytest.raises(TypeError, match=r"controller must be an InverseFeedforward or a TrackingController, got PID"):
+    with pytest.raises(TypeError, match=r"controller must be an InverseFeedforward, or a TrackingController with one"):
         hs.RepetitiveControl(controller=hs.PID(ki=1.0), model=STAGE, stroke=STROKE, period=0.1)
     with pytest.raises(ValueError, match=r"needs their duration="):
         learner().compiled(H)

@@ -25,7 +25,7 @@ from hysim._basics.frozen import FloatArray, Interval, NotNegative, Positive, fr
 from hysim._basics.printing import printed, quantity, summary_text
 from hysim._basics.results import model_of
 from hysim.control._controller import SteppedController, begun, limits_of, preview
-from hysim.control._loop import RestingPlant, close_loop, sampled, secant_gain
+from hysim.control._loop import RestingPlant, close_loop, sampled
 from hysim.control._to_control import to_control
 from hysim.control._tracking import InverseFeedforward, TrackingController, is_fed_back
 from hysim.errors import HysimWarning
@@ -57,8 +57,7 @@ _DAMPED = 1e-2  # of the response at rest: smaller responses are not inverted
 class LearningCondition(NamedTuple):
     """What a repetition leaves of the error, at worst over frequencies, slopes of the law and uncertain plants.
 
-    `rate` is that part, `frequency` where it is reached and `cutoff` the corner of the low pass [rad/s], and `slopes`
-    the least and the largest slope of the law against the controller's inverse.
+    `rate` is that part, `frequency` its place, `cutoff` the corner of the low pass [rad/s]; `slopes` are the law's.
     """
 
     rate: float
@@ -73,9 +72,8 @@ class LearningCondition(NamedTuple):
 
     def __str__(self) -> str:
         hertz, corner = self.frequency / (2.0 * math.pi), self.cutoff / (2.0 * math.pi)
-        verdict = "converges" if self.converges else "MAY DIVERGE"
         left = f"a repetition leaves at most {100.0 * self.rate:.3g} % of the error, at {hertz:.4g} Hz"
-        return f"{verdict}: {left}; learns up to {corner:.4g} Hz"
+        return f"{'converges' if self.converges else 'MAY DIVERGE'}: {left}; learns up to {corner:.4g} Hz"
 
 
 class _Filters(NamedTuple):
@@ -95,9 +93,8 @@ class _Learning(SteppedController):
     uncertainty: NotNegative
 
     def __post_init__(self) -> None:
-        if not isinstance(self.controller, InverseFeedforward | TrackingController):
-            kind = type(self.controller).__name__
-            raise TypeError(f"controller must be an InverseFeedforward or a TrackingController, got {kind}")
+        if not isinstance(self.controller, InverseFeedforward | TrackingController) or self.controller.plant is None:
+            raise TypeError("controller must be an InverseFeedforward, or a TrackingController with one")
         if not self.uncertainty < 1.0:
             raise ValueError(f"uncertainty must be below 1, got {self.uncertainty:g}")
         as_actuator(self.model)
@@ -135,7 +132,7 @@ class _Learning(SteppedController):
         room = (3 if is_trial else 2) * (samples if is_trial else samples + reach + 1)
         head = [samples, reach, whole, max(late - whole, 0.0), float(is_trial), inner.state.size]
         parameters = [np.array(head), filters.low_pass, filters.inverse, inner.state, inner.parameters]
-        state = [np.array([u0, 0.0]), np.full(whole + 2, y0), np.zeros(room), inner.state]
+        state = [np.array([u0, 0.0, 0.0]), np.full(whole + 2, y0), np.zeros(room), inner.state]
         step = _bound(inner.step)
         return CompiledController(step, read_only(np.concatenate(parameters), finite=False), np.concatenate(state))
 
@@ -247,15 +244,14 @@ class IterativeLearning(_Learning):
         learning.renew(filters.low_pass, filters.inverse, np.array(c, dtype=float), errors, following)
         return following
 
-    def commands(self, reference: npt.ArrayLike, sample_time: float, u0: float | None = None) -> FloatArray:
-        """Commands (n,) of a controller without feedback for a reference (n,), from rest at `u0` [unit of u]."""
-        r = read_only(reference, "reference", ndim=1)
+    def _replayed(self, r: FloatArray, sample_time: float, u0: float | None) -> FloatArray:
+        """Commands of a controller without feedback, before and after the limits, shape (2, n)."""
         samples = min(preview(self.controller, sample_time), r.size)
         ahead = read_only(np.append(r[samples:], np.full(samples, r[-1])))
         compiled = begun(self.controller, sample_time, (self.u0 or 0.0) if u0 is None else u0, float(r[0]))
-        command, u = np.empty((2, r.size))
-        controllers.replay(compiled.step, compiled.parameters, compiled.state, ahead, ahead, command, u)
-        return u
+        commands = np.empty((2, r.size))
+        controllers.replay(compiled.step, compiled.parameters, compiled.state, ahead, ahead, *commands)
+        return np.asarray(commands)
 
     def learn(
         self,
@@ -304,35 +300,41 @@ class IterativeLearning(_Learning):
         r = np.concatenate([rest + rising * (r[0] - rest), r, np.full(2 * lead, r[-1])])
         c = np.zeros(r.size) if correction is None else vectors(correction=correction, t=times)[0]
         read = np.interp(times - _delay(self.model), times, r)
-        corrections, measurements = np.empty((2, trials, r.size))
+        corrections, measurements, commands = np.empty((3, trials, r.size))
+        shown = np.ones(2 + math.ceil(_delay(self.model) / h))  # samples in which the sensor may show a limit
         for k in range(trials):
             corrections[k] = c
             with warnings.catch_warnings():
                 if k < trials - 1:
                     warnings.simplefilter("ignore", HysimWarning)
-                measurements[k] = self._measured(trial, times, r + c, u0, k)
-            c = self.following(c, read - measurements[k], h)
-        errors = (read - measurements)[:, lead : -2 * lead]
+                measurements[k], wanted, commands[k] = self._measured(trial, times, r + c, u0, k)
+            limited = np.convolve(wanted != commands[k], shown)[: r.size] > 0.0
+            c = self.following(c, np.where(limited, 0.0, read - measurements[k]), h)
         return LearnedTrials(
             t=times,
             reference=r,
             corrections=corrections,
             measurements=measurements,
-            rms=np.sqrt(np.nanmean(errors**2, axis=1)),
+            commands=commands,
+            rms=np.sqrt(np.nanmean((read - measurements)[:, lead : -2 * lead] ** 2, axis=1)),
             condition=self.condition(h),
         )
 
-    def _measured(self, trial: Any, t: FloatArray, r: FloatArray, u0: float | None, number: int) -> FloatArray:
+    def _measured(
+        self, trial: Any, t: FloatArray, r: FloatArray, u0: float | None, number: int
+    ) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Measurement of a trial, and its commands before and after the limits."""
         if callable(trial):
-            fed_back = is_fed_back(self.controller)
-            measurement = np.array(trial(r if fed_back else self.commands(r, float(t[1] - t[0]), u0)), dtype=float)
+            before, after = (r, r) if is_fed_back(self.controller) else self._replayed(r, float(t[1] - t[0]), u0)
+            measurement = np.array(trial(after), dtype=float)
             if measurement.shape != r.shape:
                 raise ValueError(f"trial must return a measurement of shape {r.shape}, got {measurement.shape}")
-            return measurement
+            return measurement, before, after
         plant = model_of(trial)
         if not isinstance(plant, Structure) and (sensor := as_actuator(plant).sensor) is not None:
             plant = replace(as_actuator(plant), sensor=replace(sensor, seed=sensor.seed + number))
-        return close_loop(plant, self.controller, t, r, u0=u0).measurement
+        run = close_loop(plant, self.controller, t, r, u0=u0)
+        return run.measurement, run.command, run.drive
 
 
 @printed
@@ -344,8 +346,9 @@ class LearnedTrials:
     ----------
     t, reference : array, shape (n_samples,)
         Times [s] and reference, with the rest before and after it [unit of y].
-    corrections, measurements : array, shape (n_trials, n_samples)
-        Corrections of the reference, and what the sensor read [unit of y].
+    corrections, measurements, commands : array, shape (n_trials, n_samples)
+        Corrections of the reference, what the sensor read [unit of y], and commands within the limits [unit of u]; the
+        references where a controller with feedback runs on a stage of your own.
     rms : array, shape (n_trials,)
         Rms of the error of each trial, without the rest but with the sensor's noise in it [unit of y].
     condition : LearningCondition
@@ -356,6 +359,7 @@ class LearnedTrials:
     reference: FloatArray
     corrections: FloatArray
     measurements: FloatArray
+    commands: FloatArray
     rms: FloatArray
     condition: LearningCondition
 
@@ -427,7 +431,7 @@ def _with_cutoff(
     worst = int(np.argmax(rates))
     frequency = 2.0 * math.pi * worst / (_LENGTH * sample_time)
     return _Filters(
-        taps, np.ascontiguousarray(learns), LearningCondition(float(rates[worst]), frequency, cutoff, slopes)
+        taps, np.ascontiguousarray(learns), LearningCondition(float(rates[worst]), frequency, float(cutoff), slopes)
     )
 
 
@@ -448,12 +452,8 @@ def _slopes(controller: Any, actuator: Actuator, stroke: Interval) -> tuple[floa
     cycle = np.tile(triangle(*stroke, cycles=1, samples_per_cycle=_CYCLE), _STEADY)
     cycle /= replace(actuator, amplifier=None).dc_gain
     law = Line(slope=1.0) if actuator.hysteresis is None else law_at(actuator.hysteresis, math.inf)
-    forward = controller if isinstance(controller, InverseFeedforward) else controller.feedforward
-    if forward is None:
-        gain = secant_gain(Actuator(hysteresis=law), cycle[:_CYCLE])
-        inverted: Any = Line(slope=gain)
-    else:
-        inverted = Line(slope=1.0) if forward.law is None else law_at(forward.law, math.inf)
+    inverse = controller if isinstance(controller, InverseFeedforward) else controller.feedforward
+    inverted = Line(slope=1.0) if inverse.law is None else law_at(inverse.law, math.inf)
     u = inverted.inverse_response(cycle)
     level, v = np.diff(law.response(u))[-_CYCLE:], np.diff(inverted.response(u))[-_CYCLE:]
     moves = np.abs(v) > _MOVES * np.abs(v).max()
@@ -470,21 +470,23 @@ def _response(
 
     The plant's line has `ratio` times the controller's `slope`; its natural frequencies are `speed` times as high.
     """
-    line, delay = Line(slope=slope), Sensor(delay=_delay(actuator))
+    line, amplifier = Line(slope=slope), actuator.amplifier
+    if amplifier == controller.plant.amplifier:  # which the controller inverts
+        amplifier = None
     plant = replace(
         actuator,
-        amplifier=_unlimited(actuator.amplifier, controller),
+        amplifier=amplifier and replace(amplifier, offset=0.0, limits=None, slew_rate=None),
         hysteresis=Line(slope=slope * ratio),
         vibration=None if actuator.vibration is None else _faster(actuator.vibration, speed),
-        sensor=delay,
+        sensor=Sensor(delay=_delay(actuator)),
     )
     if isinstance(controller, InverseFeedforward):
         linear: Any = replace(controller, law=line, amplifier=None)
     else:
-        forward, model = controller.feedforward, controller.model
+        model = controller.model
         linear = replace(
             controller,
-            feedforward=None if forward is None else replace(forward, law=line, amplifier=None),
+            feedforward=replace(controller.feedforward, law=line, amplifier=None),
             model=None if model is None else replace(model, hysteresis=line, amplifier=None),
             limits=None,
         )
@@ -493,14 +495,6 @@ def _response(
     impulse[at] = 1.0
     measured = RestingPlant(plant, sample_time, 0.0).run(linear, impulse).measurement
     return np.fft.rfft(np.roll(measured, -at))
-
-
-def _unlimited(amplifier: Any, controller: Any) -> Any:
-    """The amplifier of a plant, without what the controller inverts and without limits."""
-    plant = controller.plant
-    if amplifier is None or (plant is not None and plant.amplifier == amplifier):
-        return None
-    return replace(amplifier, offset=0.0, limits=None, slew_rate=None)
 
 
 def _faster(vibration: Any, speed: float) -> Any:

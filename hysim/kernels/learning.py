@@ -8,11 +8,11 @@ with the error e, the reference as the sensor would read it minus the measuremen
 the same low pass times the inverse of the model from c to the measurement. Both look m samples ahead, which the
 repetition before allows.
 
-Of trials, each from rest, corrections and errors are zero before the trial. The corrections fade in along the first m
-samples; they fade out before the last m, which get none, since the errors that they need come after the trial. A
-weight of at most one enlarges nothing, so they shrink where they do on a line without ends. In a loop whose reference
-has a period of N samples j is the period before, and the errors of the last N samples and the corrections of the last
-N + m are kept in rings.
+Where a command is at a limit, and as long as the sensor may show that, errors count as zero: corrections that cannot
+act would grow without end. Before a trial, which begins at rest, corrections and errors are zero. Corrections fade in
+along its first m samples and out before its last m, which would need errors after it; a weight of at most one enlarges
+nothing, so they shrink where they do on a line without ends. In a loop whose reference has a period of N samples j is
+the period before, and rings keep the errors of the last N samples and the corrections of the last N + m.
 """
 
 from numba import float64, void
@@ -24,7 +24,7 @@ from hysim.kernels.stepping import CONSTANTS, VECTOR
 from hysim.kernels.tracking import push
 
 N_HEAD = 6
-N_PLACES = 2  # of the state before the ring of references
+N_PLACES = 3  # of the state before the ring of references
 
 
 @signed_kernel(void(CONSTANTS, CONSTANTS, CONSTANTS, CONSTANTS, VECTOR))
@@ -49,7 +49,8 @@ def learn(
 
     `parameters` are a head (samples of a repetition, m, whole samples and part of one by which the sensor is late,
     whether trials begin from rest, length of the inner state), q, l, the inner state at rest, and the inner parameters.
-    `state` is (command, sample, ring of references, corrections, errors, next corrections of a trial, inner state).
+    `state` is (command, sample, samples for which a limit counts, ring of references, corrections, errors, next
+    corrections of a trial, inner state).
     """
     parameters, state = borrowed(parameters), borrowed(state)
     period, reach, late = int(parameters[0]), int(parameters[1]), int(parameters[2])
@@ -87,10 +88,11 @@ def learn(
                 at -= room
             total += low_pass[i] * corrections[at] + inverse[i] * errors[at]
         corrections[k] = total
-    errors[k] = (1.0 - part) * past[late] + part * past[late + 1] - measurement
-    state[1] = float(k + 1)
+    error = (1.0 - part) * past[late] + part * past[late + 1] - measurement
+    errors[k] = 0.0 if state[2] > 0.0 else error
     u = inner(parameters[p:], own, reference + corrections[k], measurement)
-    state[0] = own[0]
+    state[0], state[1] = own[0], float(k + 1)
+    state[2] = state[2] - 1.0 if u == own[0] else float(late + 2)
     return float(u)
 
 
