@@ -19,7 +19,6 @@ first call that compiles; for the Jiles-Atherton law also those of the clock on 
 goes on with the evolution that is stored, up to so many seconds for each set.
 """
 
-import json
 import sys
 import time
 from collections.abc import Mapping
@@ -33,7 +32,7 @@ from hysim.plot import Figure, figure
 
 sys.path.insert(0, str(Path(__file__).parent))
 from magnetic_evolution import Core, errors, evolve_until, loop_of
-from results_folder import write_results
+from results_folder import append_lines, stored_result, write_results
 
 RESULTS = Path(__file__).parent / "results" / "magnetic_loops"
 STORED = RESULTS / "evolution.jsonl"
@@ -234,12 +233,10 @@ def main(smoke: bool = False, folder: Path | None = None, seconds: float = SECON
 
 def restored() -> None:
     """Write the runs of the evolution that the last result has to the file of the present ones."""
-    result = RESULTS / "result.json"
     RESULTS.mkdir(parents=True, exist_ok=True)
-    if not STORED.exists() and result.exists():
-        sets = json.loads(result.read_text(encoding="utf-8"))["sets"]
-        runs = [json.dumps({"set": name, **run}) for name, each in sets.items() for run in each["runs"]]
-        STORED.write_text("".join(f"{run}\n" for run in runs), encoding="utf-8")
+    if not STORED.exists():
+        sets = stored_result(RESULTS).get("sets", {})
+        append_lines(STORED, *({"set": name, **run} for name, each in sets.items() for run in each["runs"]))
 
 
 def line_of(row: Row) -> str:

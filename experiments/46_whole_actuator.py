@@ -14,7 +14,6 @@ two poles and a delay behind it, identified on the steps, the one record that sh
     python experiments/46_whole_actuator.py [CASES.jsonl]    with a file, its cases are kept and others are added to it
 """
 
-import json
 import sys
 import time
 from dataclasses import replace
@@ -27,7 +26,7 @@ import hysim as hs
 from hysim.plot import Figure, figure
 
 sys.path.insert(0, str(Path(__file__).parent))
-from results_folder import write_results
+from results_folder import append_lines, median_and_worst, stored_lines, write_results
 
 RESULTS = Path(__file__).parent / "results" / "whole_actuator"
 N_DRAWS, N_PLAYS = 50, 10
@@ -155,23 +154,15 @@ def case(draw: int, model: str) -> Row:
     }  # fmt: skip
 
 
-def stored(file: Path | None) -> dict[tuple[int, str], Row]:
-    """Cases that were computed before."""
-    lines = file.read_text(encoding="utf-8").splitlines() if file is not None and file.exists() else []
-    return {(row["draw"], row["model"]): row for row in map(json.loads, lines)}
-
-
 def computed(file: Path | None) -> list[Row]:
     """All cases, each stored in the file as soon as it is known; all whole actuators first."""
-    known = stored(file)
+    known = {(row["draw"], row["model"]): row for row in stored_lines(file)}
     for model, n in ((WHOLE, N_DRAWS), (ALONE, N_OF_ALONE), (CASCADE, N_OF_CASCADE)):
         for draw in range(n):
             if (draw, model) not in known:
                 known[draw, model] = case(draw, model)
                 print(draw, model, known[draw, model]["error_in_noise"], flush=True)
-                if file is not None:
-                    with file.open("a", encoding="utf-8") as lines:
-                        lines.write(json.dumps(known[draw, model], allow_nan=False) + "\n")
+                append_lines(file, known[draw, model])
     return [known[key] for key in sorted(known)]
 
 
@@ -181,15 +172,11 @@ def computed(file: Path | None) -> list[Row]:
 def summary(cases: list[Row], model: str) -> Row:
     """One row of the table."""
     own = [each for each in cases if each["model"] == model]
-    errors = [each["error_in_noise"] for each in own]
-    cpu = [each["cpu_seconds"] for each in own]
     return {
         "model": model,
         "draws": len(own),
-        "median_error_in_noise": float(np.median(errors)),
-        "worst_error_in_noise": max(errors),
-        "median_cpu_seconds": float(np.median(cpu)),
-        "worst_cpu_seconds": max(cpu),
+        **median_and_worst("error_in_noise", (each["error_in_noise"] for each in own)),
+        **median_and_worst("cpu_seconds", (each["cpu_seconds"] for each in own)),
         "worst_wall_seconds": max(each["wall_seconds"] for each in own),
         "converged": sum(each["success"] for each in own),
     }

@@ -17,7 +17,6 @@ predicted: a sine of 17 Hz, then steps held for 0.1 s; its error is in units of 
     python experiments/51_design.py [CASES.jsonl]    with a file, its cases are kept and others are added to it
 """
 
-import json
 import sys
 import time
 from dataclasses import replace
@@ -31,7 +30,7 @@ import hysim as hs
 from hysim.plot import Figure, figure
 
 sys.path.insert(0, str(Path(__file__).parent))
-from results_folder import write_results
+from results_folder import append_lines, median_and_worst, stored_lines, write_results
 
 RESULTS = Path(__file__).parent / "results" / "design"
 N_DRAWS = 5
@@ -204,16 +203,13 @@ def cases(draw: int, inputs: dict[str, np.ndarray], design_seconds: float) -> li
 
 def computed(file: Path | None) -> list[Row]:
     """All cases, those of a draw stored in the file as soon as they are known."""
-    lines = file.read_text(encoding="utf-8").splitlines() if file is not None and file.exists() else []
-    known = [json.loads(line) for line in lines]
+    known = stored_lines(file)
     for draw in range(N_DRAWS):
         if all(row["draw"] != draw for row in known):
             found = cases(draw, *designs(draw))
             known += found
             print(draw, {row["input"]: round(row["error_in_noise"], 3) for row in found}, flush=True)
-            if file is not None:
-                with file.open("a", encoding="utf-8") as stored:
-                    stored.writelines(json.dumps(row, allow_nan=False) + "\n" for row in found)
+            append_lines(file, *found)
     return known
 
 
@@ -223,7 +219,7 @@ def computed(file: Path | None) -> list[Row]:
 def summary(rows: list[Row], name: str) -> Row:
     """One row of the table."""
     own = [row for row in rows if row["input"] == name]
-    pooled = {unit: [value for row in own for value in row[unit].values()] for unit in ("in_designed", "in_own")}
+    errors = {unit: [value for row in own for value in row[unit].values()] for unit in ("in_designed", "in_own")}
     parts = {}
     for part in ("hysteresis", "creep", "vibration"):
         ratios = [value for row in own for each, value in row["expected_ratio"].items() if each.startswith(part)]
@@ -231,14 +227,11 @@ def summary(rows: list[Row], name: str) -> Row:
     return {
         "input": name,
         "draws": len(own),
-        "median_error_in_expected_of_designed": float(np.median(pooled["in_designed"])),
-        "worst_error_in_expected_of_designed": max(pooled["in_designed"]),
-        "median_error_in_own_expected": float(np.median(pooled["in_own"])),
-        "worst_error_in_own_expected": max(pooled["in_own"]),
+        **median_and_worst("error_in_expected_of_designed", errors["in_designed"]),
+        **median_and_worst("error_in_own_expected", errors["in_own"]),
         **parts,
         "not_determined": sum(len(row["not_determined"]) for row in own),
-        "median_prediction_in_noise": float(np.median([row["error_in_noise"] for row in own])),
-        "worst_prediction_in_noise": max(row["error_in_noise"] for row in own),
+        **median_and_worst("prediction_in_noise", (row["error_in_noise"] for row in own)),
         "converged": sum(row["success"] for row in own),
         "median_fit_cpu_seconds": float(np.median([row["fit_cpu_seconds"] for row in own])),
     }
