@@ -23,7 +23,7 @@ from hysim.plot import Figure, figure
 
 sys.path.insert(0, str(Path(__file__).parent))
 from peers import driven, oscillator
-from peers.contest import Contestant, Run, in_turns, quartiles
+from peers.contest import Contestant, Run, in_turns, spread
 from results_folder import write_results
 
 RESULTS = Path(__file__).parent / "results" / "work_precision"
@@ -43,12 +43,6 @@ def measured(problem: str, contestant: Contestant, own: Run, exact: np.ndarray, 
     row |= {"setting": contestant.setting, "error": error}
     row |= spread("ns_per_sample", 1e9 * turns[:, 0] / exact.size)
     return row | spread("times_hysim", turns[:, 0] / turns[:, 1]) | {"repeats": len(turns)}
-
-
-def spread(name: str, values: np.ndarray) -> dict[str, float]:
-    """Median under `name`, and the quartiles beside it."""
-    low, median, high = quartiles(values)
-    return {name: median, f"{name}_q1": low, f"{name}_q3": high}
 
 
 def drive(n: float, most: int, folder: Path, smoke: bool) -> tuple[list[Row], Ratio, float | None]:

@@ -29,7 +29,7 @@ from hysim.plot import Figure, figure
 sys.path.insert(0, str(Path(__file__).parent))
 import structure_cases as cases
 from peers import structures as peers
-from peers.contest import peer, quartiles
+from peers.contest import peer, spread
 from results_folder import write_results
 
 RESULTS = Path(__file__).parent / "results" / "structures_work_precision"
@@ -60,12 +60,6 @@ def measured(case: cases.Case, entry: peers.Entry, own: peers.Entry, exact: Any,
     row |= {"error": error, "peak_error": None, "imbalance": None}
     row |= spread("ns_per_term", 1e9 * turns[:, 0] / case.n_terms)
     return row | spread("times_hysim", turns[:, 0] / turns[:, 1]) | {"repeats": len(turns)}
-
-
-def spread(name: str, values: Array) -> dict[str, float]:
-    """Median under `name`, and the quartiles beside it."""
-    low, median, high = quartiles(values)
-    return {name: median, f"{name}_q1": low, f"{name}_q3": high}
 
 
 def contest(case: cases.Case, entries: list[peers.Entry], most: int) -> tuple[list[Row], dict[str, float]]:

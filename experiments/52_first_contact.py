@@ -15,7 +15,6 @@ best filter, and each true parameter is looked for in its interval at 95 %.
 """
 
 import shutil
-import subprocess
 import sys
 import tempfile
 import warnings
@@ -31,6 +30,7 @@ from hysim.plot import Figure, figure
 sys.path.insert(0, str(Path(__file__).parent))
 from every_verb import largest_difference, numbers_of_every_verb
 from results_folder import write_results
+from step_runners import program_output
 
 RESULTS = Path(__file__).parent / "results" / "first_contact"
 NOISES = (0.0, 0.01, 0.03, 0.1, 0.3, 1.0)  # % of the span of the input
@@ -51,13 +51,7 @@ LAWS: dict[str, hs.Law] = {
     "Dahl": hs.Dahl(stiffness=1.0, coulomb=20.0),
     "plays": hs.PrandtlIshlinskii(thresholds=(0.0, 5.0, 15.0, 30.0), weights=(1.0, 0.3, 0.2, 0.1)),
 }
-FAMILIES: dict[str, Any] = {
-    "Bouc-Wen": hs.BoucWen,
-    "polynomial Bouc-Wen": hs.PolynomialBoucWen,
-    "Zhu-Wang": hs.ZhuWangBoucWen,
-    "Dahl": hs.Dahl,
-    "plays": hs.PrandtlIshlinskii,
-}
+FAMILIES: dict[str, Any] = {name: type(law) for name, law in LAWS.items()}
 OTHERS: dict[str, Any] = {
     "generalised Bouc-Wen": hs.GeneralizedBoucWen,
     "Baber-Noori": hs.BoucWenBaberNoori,
@@ -249,14 +243,7 @@ def _of_c(feedforward: Any, wanted: np.ndarray, folder: Path) -> float | None:
     """Largest difference between the commands of the exported C and of Python, in spans of these."""
     if (compiler := shutil.which("cc")) is None:
         return None
-    code = hs.to_c(feedforward, name="inverse")
-    code.write(folder)
-    program = folder / "inverse"
-    sources = [str(folder / "inverse.c"), str(folder / "inverse_main.c")]
-    subprocess.run([compiler, "-std=c99", "-O2", "-ffp-contract=off", *sources, "-lm", "-o", str(program)], check=True)
-    lines = "\n".join(repr(each) for each in wanted.tolist()) + "\n"
-    text = subprocess.run([str(program)], input=lines, capture_output=True, text=True, check=True).stdout
-    commands = np.array([float(line.split()[-1]) for line in text.split("\n") if line.strip()])
+    commands = program_output(compiler, hs.to_c(feedforward, name="inverse"), wanted[np.newaxis], folder)
     step, parameters, state = feedforward.compiled(1.0, feedforward.u0 or 0.0)
     ours = np.array([step(parameters, state, each, 0.0) for each in wanted.tolist()])
     known = ~(np.isnan(commands) & np.isnan(ours))  # where no input has the wanted output
@@ -279,25 +266,20 @@ def main(smoke: bool = False, folder: Path | None = None) -> list[Row]:
                 print(line_of(rows[-1]), flush=True)
     if smoke:
         return rows
-    numbers = summary(rows)
-    write_results(RESULTS, rows, draw, numbers)
+    write_results(RESULTS, rows, draw, summary(rows))
     return rows
 
 
 def line_of(row: Row) -> str:
     """A row in words."""
-    floor = (
-        ""
-        if row["over_floor"] is None
-        else f", {row['over_floor']:.2f} of the floor, {row['held']}/{row['parameters']}"
-    )
-    flow = (
-        "" if row["flow"] is None else f", flow {row['flow']} [{row['lowest']}, {row['highest']}], C {row['c_apart']}"
-    )
-    return (
+    line = (
         f"{row['record']}: {row['model']}, {row['fit_percent']:.3f} %, verbs within {row['largest_difference']:.1e} %"
-        f"{floor}{flow}"
     )
+    if row["over_floor"] is not None:
+        line += f", {row['over_floor']:.2f} of the floor, {row['held']}/{row['parameters']}"
+    if row["flow"] is not None:
+        line += f", flow {row['flow']} [{row['lowest']}, {row['highest']}], C {row['c_apart']}"
+    return line
 
 
 def summary(rows: list[Row]) -> Row:

@@ -17,7 +17,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
-from magnetic_reference import Core, susceptibility
+from magnetic_reference import Core, runge_kutta_step, susceptibility
 from numba import njit
 from results_folder import append_lines, stored_lines
 from scipy.optimize import OptimizeResult, differential_evolution
@@ -52,14 +52,8 @@ def moved(core: Core, start: float, end: float, M: float, steps: int) -> float:
     if end == start:
         return M
     h = (end - start) / steps
-    delta = 1.0 if h > 0.0 else -1.0
     for k in range(steps):
-        H = start + k * h
-        first = susceptibility(core, H, M, delta)
-        second = susceptibility(core, H + 0.5 * h, M + 0.5 * h * first, delta)
-        third = susceptibility(core, H + 0.5 * h, M + 0.5 * h * second, delta)
-        fourth = susceptibility(core, H + h, M + h * third, delta)
-        M += h / 6.0 * (first + 2.0 * second + 2.0 * third + fourth)
+        M = runge_kutta_step(susceptibility, core, start + k * h, M, h)
     return M
 
 

@@ -51,9 +51,10 @@ def in_turns(run: Run, own: Run, least: int = 3, most: int = 21) -> np.ndarray:
     return np.array(turns)
 
 
-def quartiles(values: np.ndarray) -> list[float]:
-    """First quartile, median, third quartile."""
-    return [float(value) for value in np.quantile(values, [0.25, 0.5, 0.75])]
+def spread(name: str, values: np.ndarray) -> dict[str, float]:
+    """Median under `name`, and the quartiles beside it."""
+    low, median, high = np.quantile(values, [0.25, 0.5, 0.75]).tolist()
+    return {name: median, f"{name}_q1": low, f"{name}_q3": high}
 
 
 @cache
