@@ -139,10 +139,9 @@ def draw(rows: list[Row]) -> Figure:
         shown = [(float(line[kind]), place) for place, line in enumerate(lines) if kind in line]
         ax.plot(*zip(*shown, strict=True), marker, fillstyle="full" if kind == "multisine" else "none", label=kind)
     ax.axvline(ASKED_RMSE, ls=":", lw=0.8, color="#777777", label="asked")
-    ax.set_xscale("log")
     ax.set_yticks(range(len(lines)), [str(line["method"]) for line in lines])
     ax.invert_yaxis()
-    ax.set(xlabel="Root mean square error on the test [m]", title="Bouc-Wen benchmark: clean test data")
+    ax.set(xscale="log", xlabel="Root mean square error on the test [m]", title="Bouc-Wen benchmark: clean test data")
     ax.legend(loc="lower right")
     return canvas
 

@@ -218,9 +218,8 @@ def draw(rows: list[Row]) -> Figure:
     before = [row["worst_percent_before_refinement"] for row in own]
     ax.plot([row["seed"] for row in own], before, "o", fillstyle="none", label="hysim, before refinement")
     ax.axhline(ASKED_PERCENT, ls=":", lw=0.8, color="#777777", label="asked")
-    ax.set_yscale("log")
     ax.set_xticks(list(SEEDS))
-    ax.set(xlabel="Seed", ylabel="Largest error [%]", title="Law of the benchmark, 39 dB")
+    ax.set(yscale="log", xlabel="Seed", ylabel="Largest error [%]", title="Law of the benchmark, 39 dB")
     canvas.legend(loc="outside lower center", ncols=2)
     return canvas
 

@@ -63,6 +63,31 @@ def median_and_worst(name: str, values: Iterable[float]) -> dict[str, float]:
     return {f"median_{name}": float(np.median(collected)), f"worst_{name}": float(collected.max())}
 
 
+def label_grid(canvas: Figure, axes: np.ndarray, xlabel: str, ylabel: str, names: Iterable[str]) -> None:
+    """Label a grid of panels at its lower and left side, with one legend of these names, where they are drawn."""
+    for ax in axes[-1]:
+        ax.set_xlabel(xlabel)
+    for ax in axes[:, 0]:
+        ax.set_ylabel(ylabel)
+    handles = {label: handle for ax in axes.flat for handle, label in zip(*ax.get_legend_handles_labels(), strict=True)}
+    shown = [name for name in names if name in handles]
+    canvas.legend([handles[name] for name in shown], shown, loc="outside lower center", ncols=3)
+
+
+def draw_models(
+    canvas: Figure, rows: list[Row], filled: list[bool], panels: Iterable[tuple[str, float, str]]
+) -> np.ndarray:
+    """A dot for each model and panel, filled or not; a panel is a column, its scale and its label."""
+    axes = canvas.subplots(1, 2, sharey=True)
+    for ax, (column, scale, label) in zip(axes, panels, strict=True):
+        for place, (row, full) in enumerate(zip(rows, filled, strict=True)):
+            ax.plot(scale * row[column], place, "o", color="#0072B2", markerfacecolor="#0072B2" if full else "white")
+        ax.set_xlabel(label)
+    axes[0].set_yticks(range(len(rows)), [row["model"] for row in rows])
+    axes[0].invert_yaxis()
+    return axes
+
+
 def loop_columns(loop: hs.control.LoopAssessment) -> dict[str, float | bool | None]:
     """What stands beside a reduction in the table of every control experiment; a pixel is the paper's camera's."""
     columns = loop.row(PIXEL)
