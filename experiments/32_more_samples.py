@@ -17,7 +17,7 @@ import argparse
 import json
 import sys
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from concurrent.futures import ProcessPoolExecutor
 from functools import cache, partial
 from pathlib import Path
@@ -27,7 +27,7 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parent))
 from hostile_laws import DRAWS
-from more_samples import BITS, Verdict, compiled_run, draw_case, judged, judged_beside, response_run, runs, spread
+from more_samples import BITS, Case, Verdict, compiled_run, draw_case, judged, judged_beside, response_run, runs, spread
 from more_samples_batch import (
     ODD,
     batch_runs,
@@ -59,7 +59,7 @@ def forward_verdicts(family: str, seeds: range) -> Found:
         rng = generator(family, seed)
         case = draw_case(family, rng)
         cases.append(case)
-        errors.append(None if family in BITS else cache(partial(spread, case)))
+        errors.append(None if family in BITS else remembered(case))
         paths.append(runs(case, response_run))
         yield "response", judged(case, paths[-1], errors[-1]), seed
         if family not in NOT_STEPPED:
@@ -89,6 +89,11 @@ def inverse_verdicts(family: str, seeds: range) -> Found:
 def generator(family: str, seed: int) -> np.random.Generator:
     """The generator of a case."""
     return np.random.default_rng([seed, *family.encode()])
+
+
+def remembered(case: Case) -> Callable[[], Any]:
+    """The spread of a case, worked out once."""
+    return cache(partial(spread, case))
 
 
 def to_the_bit(same: bool) -> Verdict:

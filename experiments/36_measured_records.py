@@ -33,6 +33,7 @@ from hysim.plot import Figure
 
 sys.path.insert(0, str(Path(__file__).parent))
 import random_starts as starts
+from measured_cores import AMPLITUDES, column, core_loops
 from random_starts import Box
 from results_folder import append_lines, median_and_worst, stored_lines, stored_result, write_results
 
@@ -74,30 +75,22 @@ class Measured(NamedTuple):
 
 def measured(folder: Path) -> Iterator[Measured]:
     """The records of a folder, those of few samples first."""
-    for material, amplitudes in (("MnZn_ferrite", 3), ("M130_27s", 3), ("amorf", 1)):
-        for k in range(amplitudes):
-            place = f"[{k}]" if amplitudes > 1 else ""
-            field, flux = (
-                _column(folder / "magnetic_jamodel" / f"{x}_{material}.mat", f"{x}measT{place}") for x in "HB"
-            )
-            yield Measured("magnet", hs.Record(u=field, y=flux, name=f"{material} {k + 1}"), MAGNET)
+    for material in AMPLITUDES:
+        for loop in core_loops(folder, material):
+            yield Measured("magnet", loop, MAGNET)
     for k in (1, 2, 3):
         path = folder / "steel_resspylab" / f"example_{k}.csv"
         record = hs.load(path, u="e_true", y="Sigma_true", name=f"coupon {k}")
         yield Measured("steel", record, STEEL)
     for k in (1, 2, 4):
         path = folder / "mr_damper_labcontrol" / f"data_simulation_4.{k}_MRdamper.mat"
-        motion, velocity, force = (_column(path, f"x_F[{place}]") for place in range(3))
+        motion, velocity, force = (column(path, f"x_F[{place}]") for place in range(3))
         yield Measured("damper", hs.Record(u=motion, y=force, name=f"4.{k} over displacement"), DAMPER)
         yield Measured("damper", hs.Record(u=velocity, y=force, name=f"4.{k} over velocity"), ("Bouc-Wen",))
     for level in (100, 300):
         path, place = folder / "fsm_cubespec" / "fsm_subset.npz", f"{level}mV_train[0,0,0]"
         record = hs.load(path, u=f"u_{place}", y=f"y_{place}", t=False, name=f"{level} mV")
         yield Measured("mirror", record, MIRROR)
-
-
-def _column(path: Path, name: str) -> Any:
-    return hs.load(path, u=name, y=name, t=False).u
 
 
 def stand_in() -> Measured:

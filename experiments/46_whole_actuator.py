@@ -27,13 +27,13 @@ from hysim.plot import Figure, figure
 
 sys.path.insert(0, str(Path(__file__).parent))
 from results_folder import append_lines, median_and_worst, stored_lines, write_results
+from simulated_stages import RANGE, STRUCTURE, drawn_law, noise_of, record
 
 RESULTS = Path(__file__).parent / "results" / "whole_actuator"
 N_DRAWS, N_PLAYS = 50, 10
 N_OF_ALONE, N_OF_CASCADE = 25, 5
 FAST, MEDIUM, SLOW = 1.0 / 20e3, 1e-3, 0.02  # sample times [s]
 HIGHEST = 125.0  # V
-RANGE = 3.0  # um, of the sensor of 12 bits
 WHOLE, CASCADE, ALONE = "whole actuator", "law >> transfer function", "law alone"
 Row = dict[str, Any]
 
@@ -65,14 +65,7 @@ def law_of(draw: int, rng: np.random.Generator) -> tuple[Any, Any]:
         weights[0] = 6.0
         law = hs.PrandtlIshlinskii(thresholds=tuple(thresholds), weights=tuple(0.02 * weights / weights.sum()))
         return law, hs.PrandtlIshlinskii.structure(plays=N_PLAYS)
-    structure = hs.PolynomialBoucWen(input_coefficients=(1.0, 0.1))
-    law = hs.identify(structure, hs.datasets.table1(), fixed={"n": 1.0}).model
-    return replace(
-        law,
-        beta=law.beta * rng.uniform(0.7, 1.4),
-        gamma=law.beta * rng.uniform(-0.5, 0.5),
-        gain=law.gain * rng.uniform(0.6, 1.4),
-    ), structure
+    return drawn_law(rng), STRUCTURE
 
 
 def stage(draw: int) -> tuple[hs.Actuator, Any, list[hs.Record], dict[str, float]]:
@@ -94,8 +87,7 @@ def stage(draw: int) -> tuple[hs.Actuator, Any, list[hs.Record], dict[str, float
     records = []
     for k, (u, step) in enumerate(commands(rng, 2 + draw // 4 % 2)):
         read = replace(truth, sensor=replace(sensor, seed=10 * draw + k))
-        units = {"t": "s", "u": "V", "y": "um"}
-        records.append(hs.Record(u=u, y=read.measured(u, step), t=step * np.arange(u.size), units=units))
+        records.append(record(read, u, step))
     values = {f"hysteresis.{name}": value for name, value in law.scalars.items() if not name.startswith("z0")}
     values |= {
         "creep.percent": percent,
@@ -104,11 +96,6 @@ def stage(draw: int) -> tuple[hs.Actuator, Any, list[hs.Record], dict[str, float
         "vibration.delay": delay,
     }
     return truth, structure, records, {name: float(value) for name, value in values.items()}
-
-
-def noise_of(sensor: hs.Sensor) -> float:
-    """Its rms value with that of the rounding [um]."""
-    return float(np.hypot(sensor.noise, sensor.quantum / np.sqrt(12.0)))
 
 
 # ---------------------------------------------------------------------------------- one case

@@ -29,6 +29,7 @@ from hysim.plot import Figure, figure
 
 sys.path.insert(0, str(Path(__file__).parent))
 from every_verb import largest_difference, numbers_of_every_verb
+from measured_cores import core_loops
 from results_folder import write_results
 from step_runners import program_output
 
@@ -138,21 +139,14 @@ def others() -> Iterator[Case]:
 def measured(folder: Path) -> Iterator[Case]:
     """The records of a folder: mirror, damper, magnets, steel."""
     every = tuple(FAMILIES)
-    for level in (300,):
-        path, place = folder / "fsm_cubespec" / "fsm_subset.npz", f"{level}mV_train[0,0,0]"
-        record = hs.load(path, u=f"u_{place}", y=f"y_{place}", t=False, name=f"mirror {level} mV")
-        yield from _each(record[:MIRROR], every)
+    path, place = folder / "fsm_cubespec" / "fsm_subset.npz", "300mV_train[0,0,0]"
+    record = hs.load(path, u=f"u_{place}", y=f"y_{place}", t=False, name="mirror 300 mV")
+    yield from _each(record[:MIRROR], every)
     path = folder / "mr_damper_labcontrol" / "data_simulation_4.2_MRdamper.mat"
     yield from _each(hs.load(path, u="x_F[0]", y="x_F[2]", t=False, name="damper 4.2"), every)
-    for material, amplitudes in (("MnZn_ferrite", 3), ("amorf", 1)):
-        for k in range(amplitudes):
-            place = f"[{k}]" if amplitudes > 1 else ""
-            columns = [
-                hs.load(folder / "magnetic_jamodel" / f"{x}_{material}.mat", u=f"{x}measT{place}", y=f"{x}measT{place}",
-                        t=False).u
-                for x in "HB"
-            ]  # fmt: skip
-            yield from _each(hs.Record(u=columns[0], y=columns[1], name=f"{material} {k + 1}"), every)
+    for material in ("MnZn_ferrite", "amorf"):
+        for loop in core_loops(folder, material):
+            yield from _each(loop, every)
     for k in (1, 2, 3):
         path = folder / "steel_resspylab" / f"example_{k}.csv"
         yield from _each(hs.load(path, u="e_true", y="Sigma_true", name=f"coupon {k}"), (*every, "Baber-Noori"))
