@@ -14,18 +14,16 @@ import time
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
-import mpmath
 import numpy as np
 from scipy.integrate import solve_ivp
 
-import hysim as hs
 from hysim.plot import Figure, figure
 
 sys.path.insert(0, str(Path(__file__).parent))
+from peers.driven import BETA, EXPONENTS, GAMMA, law, reference
 from results_folder import write_results
 
 RESULTS = Path(__file__).parent / "results" / "exact_step"
-BETA, GAMMA = 0.6, 0.3
 STARTS = tuple(k * 1e-13 for k in range(-12, 13))  # of the memory, whose range is about 1
 
 
@@ -33,41 +31,6 @@ def two_tone(n_samples: int) -> np.ndarray:
     """Two sines of incommensurate frequencies, so that minor loops of every size occur."""
     t = np.linspace(0.0, 20.0, n_samples)
     return np.sin(2.1 * t) + 0.6 * np.sin(7.3 * t)
-
-
-def reference(u: np.ndarray, n: float) -> np.ndarray:
-    """Memory by the closed form of each branch, solved by Newton's method with 30 digits."""
-    z = [mpmath.mpf(0)]
-    with mpmath.workdps(30):
-        for du in np.diff(u):
-            z.append(_step(z[-1], mpmath.mpf(float(du)), mpmath.mpf(n)))
-    return np.array([float(value) for value in z])
-
-
-def _step(z: mpmath.mpf, du: mpmath.mpf, n: mpmath.mpf) -> mpmath.mpf:
-    """One monotone stretch: T_c(w) is the length from 0 to w on dw/dL = 1 - c w^n."""
-
-    def length_to(w: mpmath.mpf, c: mpmath.mpf) -> mpmath.mpf:
-        return w * mpmath.hyp2f1(1, 1 / n, 1 + 1 / n, c * w**n)
-
-    s, d = mpmath.mpf(BETA + GAMMA), mpmath.mpf(GAMMA - BETA)
-    direction, left = mpmath.sign(du), abs(du)
-    along = direction * z
-    if along < 0:
-        to_zero = length_to(-along, d)
-        if left <= to_zero:
-            return -direction * _inverse(lambda w: length_to(w, d), d, n, to_zero - left, -along)
-        along, left = mpmath.mpf(0), left - to_zero
-    return direction * _inverse(lambda w: length_to(w, s), s, n, length_to(along, s) + left, along)
-
-
-def _inverse(length_to: Callable, c: mpmath.mpf, n: mpmath.mpf, length: mpmath.mpf, w: mpmath.mpf) -> mpmath.mpf:
-    for _ in range(60):
-        change = (length_to(w) - length) * (1 - c * w**n)
-        w = abs(w - change)
-        if abs(change) < mpmath.mpf(10) ** -28:
-            break
-    return w
 
 
 def slope(z: float, du: float, n: float) -> float:
@@ -108,7 +71,7 @@ def adaptive(u: np.ndarray, n: float, method: str, rtol: float, z0: float = 0.0)
 
 
 METHODS: dict[str, Callable[[np.ndarray, float], np.ndarray]] = {
-    "hysim": lambda u, n: hs.BoucWen(beta=BETA, gamma=GAMMA, n=n).memory(u),
+    "hysim": lambda u, n: law(n).memory(u),
     "forward Euler": euler,
     "Runge-Kutta 4": runge_kutta,
     "solve_ivp RK45, 1e-3": lambda u, n: adaptive(u, n, "RK45", 1e-3),
@@ -133,7 +96,7 @@ def main(smoke: bool = False) -> list[dict[str, float | str]]:
     u = two_tone(n_samples)
     rows: list[dict[str, float | str]] = []
     lsoda: list[dict[str, float]] = []
-    for n in (1.0, 1.5, 2.0):
+    for n in EXPONENTS:
         exact = reference(u, n)
         for name, method in METHODS.items():
             z, seconds = timed(lambda method=method, n=n: method(u, n), repeats)

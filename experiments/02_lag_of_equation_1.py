@@ -8,8 +8,6 @@ unstable ones among them, are left out: between the limits of the voltage some o
 limit cycle, 89 % narrower. The last of ten cycles is measured.
 """
 
-import csv
-import json
 import sys
 from pathlib import Path
 from typing import Any
@@ -18,10 +16,10 @@ import hysim as hs
 from hysim.paper.equations import EQUATION_1
 from hysim.paper.loops import HIGH, PERIOD, SAMPLE_TIME, SUPPLY
 from hysim.paper.search import search, triangle_task
-from hysim.plot import Figure, figure, house_style, save_svg
+from hysim.plot import Figure, figure
 
 sys.path.insert(0, str(Path(__file__).parent))
-from results_folder import loop_columns
+from results_folder import loop_columns, write_results
 
 RESULTS = Path(__file__).parent / "results" / "lag_of_equation_1"
 SEEDS = (1, 2, 3)
@@ -70,11 +68,10 @@ def main(smoke: bool = False) -> list[dict[str, Any]]:
             f"Td {line['Td']:.3g}, filter {line['derivative_filter']:.2g})"
         )
     if not smoke:
-        write(rows)
+        write_results(RESULTS, rows, draw, {})
     return rows
 
 
-@house_style()
 def draw(rows: list[dict[str, Any]]) -> Figure:
     """Reduction against the bound."""
     canvas = figure(height=3.6)
@@ -89,17 +86,6 @@ def draw(rows: list[dict[str, Any]]) -> Figure:
     ax.set_xticks([1, 2, 5, 10, 20, 50], ["1", "2", "5", "10", "20", "50"])
     ax.minorticks_off()
     return canvas
-
-
-def write(rows: list[dict[str, Any]]) -> None:
-    """The table, the figure and the numbers into the results' folder."""
-    RESULTS.mkdir(parents=True, exist_ok=True)
-    with (RESULTS / "table.csv").open("w", newline="", encoding="utf-8") as file:
-        table = csv.DictWriter(file, rows[0], lineterminator="\n")
-        table.writeheader()
-        table.writerows(rows)
-    save_svg(draw(rows), RESULTS / "figure.svg", name="lag_of_equation_1")
-    (RESULTS / "result.json").write_text(json.dumps({"rows": rows}, indent=2) + "\n", encoding="utf-8")
 
 
 if __name__ == "__main__":

@@ -15,6 +15,7 @@ import json
 import sys
 import tempfile
 from collections.abc import Iterator
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -23,8 +24,8 @@ from hysim.plot import Figure, figure
 
 sys.path.insert(0, str(Path(__file__).parent))
 from peers import driven, oscillator
-from peers.contest import Contestant, Run, in_turns, quartiles
-from results_folder import write_results
+from peers.contest import Contestant, Run, clock, in_turns, spread
+from results_folder import label_grid, write_results
 
 RESULTS = Path(__file__).parent / "results" / "work_precision"
 ENOUGH = 1e-6  # the oscillator's error at which methods are compared
@@ -38,17 +39,11 @@ Ratio = dict[str, float | str | bool]
 def measured(problem: str, contestant: Contestant, own: Run, exact: np.ndarray, unit: float, most: int) -> Row:
     """Error of one method at one setting, its time, and that in times of hysim's."""
     error = float(np.abs(contestant.run() - exact).max() / unit)
-    turns = in_turns(contestant.run, own, min(3, most), most)
+    turns = in_turns(partial(clock, contestant.run), partial(clock, own), min(3, most), most)
     row: Row = {"problem": problem, "tool": contestant.tool, "method": contestant.method}
     row |= {"setting": contestant.setting, "error": error}
     row |= spread("ns_per_sample", 1e9 * turns[:, 0] / exact.size)
     return row | spread("times_hysim", turns[:, 0] / turns[:, 1]) | {"repeats": len(turns)}
-
-
-def spread(name: str, values: np.ndarray) -> dict[str, float]:
-    """Median under `name`, and the quartiles beside it."""
-    low, median, high = quartiles(values)
-    return {name: median, f"{name}_q1": low, f"{name}_q3": high}
 
 
 def drive(n: float, most: int, folder: Path, smoke: bool) -> tuple[list[Row], Ratio, float | None]:
@@ -67,7 +62,7 @@ def drive(n: float, most: int, folder: Path, smoke: bool) -> tuple[list[Row], Ra
     for contestant in driven.contestants(t, n, folder, smoke):
         target = smooth if contestant.smooth else exact
         rows.append(measured(problem, contestant, own, target, float(np.ptp(exact)), most))
-    turns = in_turns(own, lambda: np.exp(u), most, 5 * most)
+    turns = in_turns(partial(clock, own), partial(clock, lambda: np.exp(u)), most, 5 * most)
     asked = {"at_most": 25.0} if n in (1.0, 2.0) else {}
     return rows, {"what": f"{problem}: hysim over np.exp", **asked, **spread("median", turns[:, 0] / turns[:, 1])}, sure
 
@@ -201,13 +196,7 @@ def draw(rows: list[Row]) -> Figure:
         unit = "rms of y" if problem == "oscillator" else "range of z"
         ax.set_title(f"{str(problem).capitalize()} [{unit}]")
     axes[0, 0].set_ylim(1e-17, 10.0)
-    for ax in axes[-1]:
-        ax.set_xlabel("Time a sample [ns]")
-    for ax in axes[:, 0]:
-        ax.set_ylabel("Largest error")
-    handles = {label: handle for ax in axes.flat for handle, label in zip(*ax.get_legend_handles_labels(), strict=True)}
-    shown = [tool for tool in LOOKS if tool in handles]
-    canvas.legend([handles[tool] for tool in shown], shown, loc="outside lower center", ncols=3)
+    label_grid(canvas, axes, "Time a sample [ns]", "Largest error", LOOKS)
     return canvas
 
 

@@ -144,12 +144,9 @@ def draw(rows: list[Row]) -> Figure:
 
 
 if __name__ == "__main__":
-    lines = main()
-    for line in lines:
+    for line in main():
         print(
             f"{line['kind']:8} n = {line['n']:10} {line['sets']:>8} sets x {line['samples']:>8} samples"
             f" {line['million_samples_per_second']:8.1f} million samples a second"
             f" +- {100 * float(line['spread']) / float(line['seconds']):.0f} %, {line['times_exp']:.1f} times np.exp"
         )
-    for name, slope in slopes(lines).items():
-        print(f"slope of log time over log size, {name}: {slope:.2f}")

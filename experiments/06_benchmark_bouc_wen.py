@@ -11,15 +11,18 @@ errors asked for stands the chance that such a method has of reaching them all. 
 processors together. Of the published results the white-box one fitted the same equation, the others are black boxes.
 """
 
-import csv
-import json
+import sys
 import time
 from pathlib import Path
 
 import numpy as np
 
 import hysim as hs
-from hysim.plot import Figure, figure, house_style, save_svg
+from hysim.plot import Figure, figure
+
+sys.path.insert(0, str(Path(__file__).parent))
+from benchmark_records import NOISE, PERIOD, TEST_SEED, errors_on_tests, recipe, sweep
+from results_folder import write_results
 
 RESULTS = Path(__file__).parent / "results" / "benchmark_bouc_wen"
 Row = dict[str, float | str | bool]
@@ -27,8 +30,6 @@ Row = dict[str, float | str | bool]
 TRUTH = {"mass": 2.0, "damping": 10.0, "stiffness": 5e4, "A": 5e4, "beta": 800.0, "gamma": -1100.0, "n": 1.0}
 ASKED = {name: 0.5 if name == "damping" else 0.1 for name in TRUTH if name != "n"}  # percent
 ASKED_RMSE, ASKED_SECONDS = 1.5e-7, 20.0  # [m], [s]
-NOISE = 8e-6
-TEST_SEED = 1000
 PUBLISHED: list[Row] = [
     {"method": "Best linear model", "multisine": 1.65e-4},
     {"method": "NFIR, 2017", "multisine": 1.63e-4},
@@ -46,20 +47,6 @@ WHITE_BOX = {
 }
 
 
-def recipe(period: int, told: bool) -> object:
-    """How the benchmark's multisine records are made; if that is not told, only that their input is a multisine."""
-    if not told:
-        return hs.BoucWenOscillator.structure(initial="periodic", period=period, hold="band-limited")
-    return hs.BoucWenOscillator.structure(
-        method="newmark",
-        oversampling=20,
-        decimation=(2, 2, 5),
-        initial="periodic",
-        period=period,
-        hold="band-limited",
-    )
-
-
 def trained(seed: int, smoke: bool) -> hs.Record:
     """Four periods of noisy data; in a smoke run two of a short sum of sines."""
     if not smoke:
@@ -71,23 +58,11 @@ def trained(seed: int, smoke: bool) -> hs.Record:
     return hs.Record(u=np.tile(u, 2), y=y, t=np.arange(y.size) / 750.0)
 
 
-def sweep(n_samples: int) -> np.ndarray:
-    """Begin of the benchmark's sweep at 750 Hz."""
-    t = np.arange(n_samples) / 750.0
-    return 40.0 * np.sin(2.0 * np.pi * (18.0 * t + t**2 / 12.0))
-
-
 def tested(plant: hs.BoucWenOscillator, smoke: bool) -> dict[str, float]:
     """Root mean square error of a plant on both tests [m]."""
-    inputs = {
-        "multisine": trained(TEST_SEED, smoke).u[: 256 if smoke else 8192],
-        "sweep": sweep(100 if smoke else hs.benchmarks.SWEEP_LENGTH),
-    }
-    official = hs.benchmarks.simulate_official
-    return {
-        kind: float(np.sqrt(np.mean((official(u, kind=kind, plant=plant) - official(u, kind=kind)) ** 2)))
-        for kind, u in inputs.items()
-    }
+    multisine = trained(TEST_SEED, smoke).u[: 256 if smoke else PERIOD]
+    times = np.arange(100 if smoke else hs.benchmarks.SWEEP_LENGTH) / 750.0
+    return errors_on_tests(plant, multisine, sweep(times))
 
 
 def chance(fit: hs.Identification) -> float:
@@ -102,7 +77,7 @@ def chance(fit: hs.Identification) -> float:
 def run(seed: int, known: bool, smoke: bool, told: bool = True) -> Row:
     """One identification, its errors and its tests."""
     record = trained(seed, smoke)
-    structure = recipe(256 if smoke else 8192, told)
+    structure = recipe(256 if smoke else PERIOD, told)
     begin, begin_on_processors = time.perf_counter(), time.process_time()
     fit = hs.identify(structure, record, fixed={"n": 1.0} if known else {})
     seconds, on_processors = time.perf_counter() - begin, time.process_time() - begin_on_processors
@@ -128,7 +103,9 @@ def main(smoke: bool = False) -> list[Row]:
         return [warm]
     cases = (True, True), (False, True), (True, False)  # n known, recipe told
     rows = [run(seed, known, False, told) for known, told in cases for seed in range(1, 6)]
-    write(rows)
+    asked = {"error_percent": ASKED, "rmse": ASKED_RMSE, "seconds": ASKED_SECONDS}
+    numbers = {"asked": asked, "summary": summary(rows), "published": PUBLISHED, "white_box": WHITE_BOX}
+    write_results(RESULTS, rows, draw, numbers)
     return rows
 
 
@@ -153,21 +130,6 @@ def summary(rows: list[Row]) -> list[Row]:
     return lines
 
 
-def write(rows: list[Row]) -> None:
-    """Table, figure and JSON."""
-    RESULTS.mkdir(parents=True, exist_ok=True)
-    names = list(dict.fromkeys(name for row in reversed(rows) for name in row))
-    with (RESULTS / "table.csv").open("w", newline="") as file:
-        writer = csv.DictWriter(file, names, lineterminator="\n")
-        writer.writeheader()
-        writer.writerows(rows)
-    asked = {"error_percent": ASKED, "rmse": ASKED_RMSE, "seconds": ASKED_SECONDS}
-    result = {"asked": asked, "summary": summary(rows), "published": PUBLISHED, "white_box": WHITE_BOX, "rows": rows}
-    (RESULTS / "result.json").write_text(json.dumps(result, indent=2, allow_nan=False) + "\n")
-    with house_style():
-        save_svg(draw(rows), RESULTS / "figure.svg", name="benchmark_bouc_wen")
-
-
 def draw(rows: list[Row]) -> Figure:
     """Test errors of the published methods and of hysim, on a log scale."""
     lines = PUBLISHED + summary(rows)
@@ -177,10 +139,9 @@ def draw(rows: list[Row]) -> Figure:
         shown = [(float(line[kind]), place) for place, line in enumerate(lines) if kind in line]
         ax.plot(*zip(*shown, strict=True), marker, fillstyle="full" if kind == "multisine" else "none", label=kind)
     ax.axvline(ASKED_RMSE, ls=":", lw=0.8, color="#777777", label="asked")
-    ax.set_xscale("log")
     ax.set_yticks(range(len(lines)), [str(line["method"]) for line in lines])
     ax.invert_yaxis()
-    ax.set(xlabel="Root mean square error on the test [m]", title="Bouc-Wen benchmark: clean test data")
+    ax.set(xscale="log", xlabel="Root mean square error on the test [m]", title="Bouc-Wen benchmark: clean test data")
     ax.legend(loc="lower right")
     return canvas
 

@@ -20,7 +20,7 @@ import hysim as hs
 from hysim.plot import Figure, figure
 
 sys.path.insert(0, str(Path(__file__).parent))
-from results_folder import write_results
+from results_folder import draw_models, write_results
 
 RESULTS = Path(__file__).parent / "results" / "table1_models"
 RECORD = hs.datasets.table1(dwell=1.0)
@@ -39,14 +39,11 @@ def variants() -> Iterator[tuple[str, Any, dict[str, float]]]:
         fixed = {} if n is None else {"n": n}
         of_n = "n free" if n is None else f"n = {n:g}"
         for degree in (2, 3):
-            start = hs.PolynomialBoucWen(input_coefficients=COEFFICIENTS[degree])
+            start: Any = hs.PolynomialBoucWen(input_coefficients=COEFFICIENTS[degree])
             yield f"polynomial of degree {degree}, {of_n}", start, fixed
         for degree in (1, 2):
-            yield (
-                f"zhu-wang, degree {degree}, {of_n}",
-                hs.ZhuWangBoucWen(input_coefficients=COEFFICIENTS[degree]),
-                fixed,
-            )
+            start = hs.ZhuWangBoucWen(input_coefficients=COEFFICIENTS[degree])
+            yield f"zhu-wang, degree {degree}, {of_n}", start, fixed
     for degree in (1, 2):
         start = hs.GeneralizedBoucWen(input_coefficients=COEFFICIENTS[degree])
         yield f"generalized, degree {degree}, n = 1", start, {"n": 1.0}
@@ -160,15 +157,8 @@ def draw(rows: list[Row]) -> Figure:
     """BIC and leave-one-out rmse of each variant."""
     shown = [line for line in rows if line["bic"] < rows[0]["bic"] + 40.0 and line["loo_rmse"] is not None]
     canvas = figure(height=0.32 * len(shown) + 1.2)
-    left, right = canvas.subplots(1, 2, sharey=True)
-    places = range(len(shown))
-    for ax, key, scale, name in ((left, "bic", 1.0, "BIC"), (right, "loo_rmse", 1e3, "Leave-one-out rmse [nm]")):
-        for place, line in zip(places, shown, strict=True):
-            face = "#0072B2" if line["as_asked"] else "white"
-            ax.plot(scale * line[key], place, "o", color="#0072B2", markerfacecolor=face)
-        ax.set_xlabel(name)
-    left.set_yticks(list(places), [line["model"] for line in shown])
-    left.invert_yaxis()
+    panels = ("bic", 1.0, "BIC"), ("loo_rmse", 1e3, "Leave-one-out rmse [nm]")
+    left, _ = draw_models(canvas, shown, [line["as_asked"] for line in shown], panels)
     left.axvspan(rows[0]["bic"] - 0.5, rows[0]["bic"] + CLOSE, color="#e8f0f6")
     return canvas
 

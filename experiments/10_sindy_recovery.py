@@ -16,7 +16,6 @@ any choice that only the records decide. `discover` takes the fewest numbers of 
 `python experiments/10_sindy_recovery.py resume` measures the conditions that are not stored yet.
 """
 
-import json
 import sys
 import time
 import warnings
@@ -33,7 +32,7 @@ import hysim as hs
 from hysim.plot import Figure, figure
 
 sys.path.insert(0, str(Path(__file__).parent))
-from results_folder import write_results
+from results_folder import stored_result, write_results
 
 RESULTS = Path(__file__).parent / "results" / "sindy_recovery"
 SEEDS = 20
@@ -197,9 +196,8 @@ def main(smoke: bool = False, resume: bool = False) -> list[Row]:
     """Measure, print and write table, figure and result."""
     if smoke:
         return [row for condition in SMOKE for row in both_rows(condition, [one(condition, 0)])]
-    stored = RESULTS / "result.json"
-    rows: list[Row] = json.loads(stored.read_text())["rows"] if resume else []
-    rows = [{"as_likely": None} | row for row in rows]
+    stored: list[Row] = stored_result(RESULTS).get("rows", []) if resume else []
+    rows = [{"as_likely": None} | row for row in stored]
     for condition in (*CONDITIONS, *SHORT):
         if any(row["condition"] == condition.name for row in rows):
             continue

@@ -101,14 +101,11 @@ def draw(rows: list[Row]) -> Figure:
             values = [row[prefix + measure] for row in rows]
             remains = [math.nan if value is None else 100.0 - float(value) for value in values]
             ax.plot(remains, places, "o", color="#0072B2", markersize=5, fillstyle=style, label=name)
-        ax.set_xscale("log")
-        ax.set_xlim(1.0, 200.0)
-        ax.set_xlabel(label)
+        ax.set(xscale="log", xlim=(1.0, 200.0), xlabel=label)
         ax.tick_params(axis="x", which="minor", labelbottom=False)
     left.set_yticks(places, [str(row["controller"]) for row in rows])
     left.invert_yaxis()
-    handles, names = right.get_legend_handles_labels()
-    canvas.legend(handles, names, loc="outside lower center", ncols=2)
+    canvas.legend(*right.get_legend_handles_labels(), loc="outside lower center", ncols=2)
     return canvas
 
 

@@ -90,13 +90,9 @@ def draw(rows: list[Row]) -> Figure:
             known = [math.nan if each[key] is None else float(each[key]) for each in line]
             values = [100.0 - value if "percent" in key else value for value in known]
             ax.plot([each["frequency_hz"] for each in line], values, "o-", markersize=3, label=name)
-        ax.set_xscale("log")
-        ax.set_ylabel(label)
-        if key != "peak_voltage":
-            ax.set_yscale("log")
+        ax.set(xscale="log", yscale="linear" if key == "peak_voltage" else "log", ylabel=label)
     ax.set_xlabel("Frequency of the reference [Hz]")
-    handles, names = ax.get_legend_handles_labels()
-    canvas.legend(handles, names, loc="outside lower center", ncols=2)
+    canvas.legend(*ax.get_legend_handles_labels(), loc="outside lower center", ncols=2)
     return canvas
 
 

@@ -87,14 +87,13 @@ def main(smoke: bool = False) -> list[Row]:
             for rate in rates:
                 wave = {"low": LOW, "high": HIGH, "period": 1.0 / rate, "sample_time": H, "cycles": cycles}
                 loops = hs.control.assess_hysteresis(plant, pid, **wave)
+                reduction = loops.hysteresis_reduction_percent if loops.loop.stable else None
                 rows.append(
                     {
                         "plant": name,
                         "max_sensitivity": bound,
                         "frequency_hz": rate,
-                        "hysteresis_reduction_percent": loops.hysteresis_reduction_percent
-                        if loops.loop.stable
-                        else None,
+                        "hysteresis_reduction_percent": reduction,
                         "lag_share_percent": 100.0 * loops.lag_width / loops.closed_width,
                         "open_width_um": loops.open_width,
                         "closed_width_um": loops.closed_width,
@@ -129,12 +128,9 @@ def draw(rows: list[Row]) -> Figure:
             lag = [value * float(row["lag_share_percent"]) / 100.0 for value, row in zip(left, line, strict=True)]
             ax.plot(bounds, left, "o-", color=f"C{k}", markersize=4, label=f"{rate:g} Hz")
             ax.plot(bounds, lag, ":", color=f"C{k}", label="of it lag" if k == 0 else None)
-        ax.set_yscale("log")
-        ax.set_title(name)
-        ax.set_xlabel("Maximum sensitivity")
+        ax.set(yscale="log", title=name, xlabel="Maximum sensitivity")
     canvas.axes[0].set_ylabel("Width left [%]")
-    handles, labels = ax.get_legend_handles_labels()
-    canvas.legend(handles, labels, loc="outside lower center", ncols=4)
+    canvas.legend(*ax.get_legend_handles_labels(), loc="outside lower center", ncols=4)
     return canvas
 
 

@@ -106,9 +106,7 @@ def draw(rows: list[Row]) -> Figure:
             left = [math.nan if each[STEP[1]] is None else 100.0 - float(each[STEP[1]]) for each in line]
             sizes = [abs(float(each["step_um"])) for each in line]
             (shown[label],) = ax.plot(sizes, left, "o-", color=colours[label], markersize=4)
-        ax.set_yscale("log")
-        ax.set_title(name)
-        ax.set_xlabel("Step [um]")
+        ax.set(yscale="log", title=name, xlabel="Step [um]")
     canvas.axes[0].set_ylabel("Residual vibration left [%]")
     canvas.legend(list(shown.values()), list(shown), loc="outside lower center", ncols=2)
     return canvas

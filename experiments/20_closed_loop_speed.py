@@ -11,15 +11,12 @@ sample, medians of repeats in turns, and the outputs are compared. Beside them s
 controllers of the matrix and its noisy sensor, as a user calls it: every loop is run twice, for what the noise does.
 """
 
-import importlib.util
 import math
-import statistics
 import sys
 import time
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
-from types import ModuleType
 
 import control
 import numba
@@ -29,10 +26,11 @@ import hysim as hs
 from hysim.plot import Figure, figure
 
 sys.path.insert(0, str(Path(__file__).parent))
+from peers.contest import spread
 from results_folder import write_results
+from table1_actuator import H, controllers, reference_plant, resting_voltage
 
 RESULTS = Path(__file__).parent / "results" / "closed_loop_speed"
-H = 1.0 / 20e3  # s
 PI = hs.PID(kp=0.3, ki=1000.0)
 PEERS = (
     "python-control, plant by to_control",
@@ -43,15 +41,6 @@ PEERS = (
 )
 
 Row = dict[str, float | str | None]
-
-
-def matrix() -> ModuleType:
-    """The experiment whose plant and controllers are run here."""
-    path = Path(__file__).parent / "14_compensation_matrix.py"
-    spec = importlib.util.spec_from_file_location(path.stem, path)
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
 
 
 @numba.extending.register_jitable  # a plain function in Python, inlined where numba compiles its caller
@@ -207,11 +196,10 @@ def loops(plant: hs.Actuator, samples: int, fewer: int, repeats: int) -> list[Ro
 
 def ten_seconds(plant: hs.Actuator, samples: int, repeats: int) -> list[Row]:
     """`close_loop` with each controller of the matrix, noise included, as a user calls it."""
-    experiment = matrix()
     r, t = hs.signals.triangle(0.1, 2.5, cycles=10, samples_per_cycle=samples // 10)[:samples], H * np.arange(samples)
-    u0 = experiment.resting_voltage(plant, 0.1)
+    u0 = resting_voltage(plant, 0.1)
     rows = []
-    for name, controller in experiment.controllers(plant).items():
+    for name, controller in controllers(plant).items():
         times = in_turns([lambda each=controller: hs.close_loop(plant, each, t, r, u0=u0)], repeats)[:, 0]
         rows.append(
             {
@@ -225,15 +213,9 @@ def ten_seconds(plant: hs.Actuator, samples: int, repeats: int) -> list[Row]:
     return rows
 
 
-def spread(name: str, values: np.ndarray) -> dict[str, float]:
-    """Median and quartiles."""
-    low, middle, high = statistics.quantiles(values.tolist(), n=4, method="inclusive")
-    return {name: middle, f"{name}_q1": low, f"{name}_q3": high}
-
-
 def main(smoke: bool = False) -> list[Row]:
     """Measure, print, and unless it is a smoke run write table, figure and result."""
-    plant = matrix().reference_plant()
+    plant = reference_plant()
     quiet = replace(plant, sensor=replace(plant.sensor, noise=0.0))
     rows = loops(quiet, 400, 40, 2) if smoke else loops(quiet, 200_000, 1000, 9)
     rows += ten_seconds(plant, 400, 2) if smoke else ten_seconds(plant, 200_000, 5)
@@ -262,8 +244,7 @@ def draw(rows: list[Row]) -> Figure:
         places = np.arange(len(part))
         ax.errorbar(middle, places, xerr=[middle - low, high - middle], fmt="o", markersize=5)
         ax.set_yticks(places, [str(row["name"]) for row in part])
-        ax.set_ylim(len(part) - 0.5, -0.5)
-        ax.set_xlabel(label)
+        ax.set(ylim=(len(part) - 0.5, -0.5), xlabel=label)
     axes[0].set_xscale("log")
     axes[1].set_xlim(left=0.0)
     return canvas

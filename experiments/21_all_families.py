@@ -15,7 +15,7 @@ import hysim as hs
 from hysim.plot import Figure, figure
 
 sys.path.insert(0, str(Path(__file__).parent))
-from results_folder import write_results
+from results_folder import draw_models, write_results
 
 RESULTS = Path(__file__).parent / "results" / "all_families"
 RECORD = hs.datasets.table1(dwell=1.0)
@@ -70,22 +70,13 @@ def main(smoke: bool = False) -> list[Row]:
 def draw(rows: list[Row]) -> Figure:
     """Leave-one-out rmse and width error of each family; filled where it is not told from the winner."""
     canvas = figure(height=0.32 * len(rows) + 1.2)
-    left, right = canvas.subplots(1, 2, sharey=True)
-    panels = (
-        (left, "loo_rmse", 1e3, "Leave-one-out rmse [nm]"),
-        (right, "width_error_percent", 1.0, "Width error [%]"),
-    )
-    for ax, key, scale, name in panels:
-        for place, line in enumerate(rows):
-            near = line["probability"] is None or line["probability"] >= 0.05
-            ax.plot(scale * line[key], place, "o", color="#0072B2", markerfacecolor="#0072B2" if near else "white")
-        ax.set_xlabel(name)
+    near = [line["probability"] is None or line["probability"] >= 0.05 for line in rows]
+    panels = ("loo_rmse", 1e3, "Leave-one-out rmse [nm]"), ("width_error_percent", 1.0, "Width error [%]")
+    left, right = draw_models(canvas, rows, near, panels)
     left.set_xscale("log")
     left.set_xticks([30, 100, 300], ["30", "100", "300"])
     left.minorticks_off()
     right.axvline(0.0, color="#777777", linewidth=0.8)
-    left.set_yticks(range(len(rows)), [line["model"] for line in rows])
-    left.invert_yaxis()
     return canvas
 
 

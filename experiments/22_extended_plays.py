@@ -96,8 +96,7 @@ def draw(loops: dict[str, tuple[list[float], list[float]]]) -> Figure:
         for name, color, dash in zip(names, ("#0072B2", "#D55E00"), ("solid", (0, (4, 1.5))), strict=False):
             ax.plot(*loops[name], color=color, linestyle=dash, label=name)
         ax.plot(*loops["plain"], color="0.6", linestyle="solid", label="plain")
-        ax.set_title(title)
-        ax.set_xlabel("u")
+        ax.set(title=title, xlabel="u")
         ax.legend(loc="upper center", bbox_to_anchor=(0.5, -0.2))
     panels[0].set_ylabel("y")
     return canvas

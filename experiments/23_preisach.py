@@ -75,11 +75,8 @@ def row(curves: int, seeds: int) -> Row:
 def smoothness(seed: int, strengths: NDArray[np.float64] = STRENGTHS) -> Row:
     """Error with the smoothness that the default chooses over that with the best one, for one random density."""
     rng = np.random.default_rng([23, seed])
-    width, place, flat = (
-        10.0 ** rng.uniform(np.log10(0.05), np.log10(0.8)),
-        rng.uniform(0.0, 0.8),
-        rng.uniform(0.0, 0.3),
-    )
+    width = 10.0 ** rng.uniform(np.log10(0.05), np.log10(0.8))
+    place, flat = rng.uniform(0.0, 0.8), rng.uniform(0.0, 0.3)
     noise = NOISES[seed % len(NOISES)]
 
     def ridge(a: NDArray[np.float64], b: NDArray[np.float64]) -> NDArray[np.float64]:

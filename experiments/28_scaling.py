@@ -222,9 +222,9 @@ def draw(rows: list[Row]) -> Figure:
     """Overhead against the number of tasks, efficiency of the longer ones, and the model beyond two workers."""
     canvas = figure(height=8.4)
     above, middle, below = canvas.subplots(3)
+    short = [line for line in rows if line["kind"] == "microsecond" and line["workers"] == 2]
     for name, style in {"threads": "o-", "processes": "s--", "dask": "^:"}.items():
-        chosen = [line for line in rows if line["kind"] == "microsecond" and line["executor"] == name]
-        chosen = [line for line in chosen if line["workers"] == 2]
+        chosen = [line for line in short if line["executor"] == name]
         costs = [line["overhead_microseconds"] for line in chosen]
         above.loglog([line["tasks"] for line in chosen], costs, style, label=name)
     above.set(xlabel="Tasks of less than a microsecond", ylabel="Overhead [µs a task]")
@@ -245,12 +245,9 @@ def draw(rows: list[Row]) -> Figure:
 
 
 if __name__ == "__main__":
-    lines = main()
-    for line in lines:
+    for line in main():
         print(
             f"{line['kind']:24} {line['workers']} {line['executor']:10} {line['tasks']:>8} tasks"
             f" {line['seconds']:7.3f} s, efficiency {line['efficiency_percent']:4.0f} %,"
             f" overhead {line['overhead_microseconds']:8.1f} us a task"
         )
-    for key, value in models_of(lines).items():
-        print(key, value)

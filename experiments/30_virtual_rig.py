@@ -161,8 +161,7 @@ def draw(rows: list[Row], true_width: float, best: float) -> Figure:
     widths.set(title="Identified loop, with its interval", ylabel="Largest width [um]", xticks=[])
     left.axhline(100.0 - best, color="black", linewidth=0.8)
     left.set(title="Left by the law's inverse", ylabel="Hysteresis left [%]", xticks=[], yscale="log")
-    handles, labels = widths.get_legend_handles_labels()
-    canvas.legend(handles, labels, loc="outside lower center", ncols=3)
+    canvas.legend(*widths.get_legend_handles_labels(), loc="outside lower center", ncols=3)
     return canvas
 
 

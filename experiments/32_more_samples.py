@@ -19,6 +19,7 @@ import sys
 from collections import Counter
 from collections.abc import Callable, Iterator
 from concurrent.futures import ProcessPoolExecutor
+from functools import cache, partial
 from pathlib import Path
 from typing import Any
 
@@ -92,14 +93,7 @@ def generator(family: str, seed: int) -> np.random.Generator:
 
 def remembered(case: Case) -> Callable[[], Any]:
     """The spread of a case, worked out once."""
-    known: list[Any] = []
-
-    def ask() -> Any:
-        if not known:
-            known.append(spread(case))
-        return known[0]
-
-    return ask
+    return cache(partial(spread, case))
 
 
 def to_the_bit(same: bool) -> Verdict:
@@ -193,10 +187,8 @@ def draw(rows: list[Row]) -> Figure:
         worst = [min(max(float(row["worst"]), 1e-4), 1e2) for row in own]
         ax.plot(worst, [families.index(str(row["family"])) for row in own], marker, label=path, fillstyle="none")
     ax.axvline(1.0, color="#888888", linewidth=0.8)
-    ax.set_xlim(5e-5, 2e2)
-    ax.set_xscale("log")
+    ax.set(xlim=(5e-5, 2e2), xscale="log", xlabel="Difference / allowed (drawn from 1e-4 to 100)")
     ax.set_yticks(range(len(families)), families)
-    ax.set_xlabel("Difference / allowed (drawn from 1e-4 to 100)")
     ax.legend(ncols=3, loc="lower center", bbox_to_anchor=(0.3, 1.0))
     return canvas
 

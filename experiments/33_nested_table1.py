@@ -18,7 +18,6 @@ quotes; `python experiments/33_nested_table1.py resume` goes on after those that
 """
 
 import csv
-import json
 import sys
 import time
 from collections.abc import Callable
@@ -32,7 +31,7 @@ import hysim as hs
 from hysim.plot import Figure, figure
 
 sys.path.insert(0, str(Path(__file__).parent))
-from results_folder import write_results
+from results_folder import stored_result, write_results
 
 RESULTS = Path(__file__).parent / "results" / "nested_table1"
 STORED = Path(hs.__file__).parent / "data" / "table1_nested.csv"
@@ -165,8 +164,7 @@ def main(smoke: bool = False, resume: bool = False) -> list[Row]:
 
 
 def _stored() -> list[Row]:
-    stored = RESULTS / "result.json"
-    before = json.loads(stored.read_text()) if stored.exists() else {"rows": [], "errors_um": []}
+    before = {"rows": [], "errors_um": []} | stored_result(RESULTS)
     return [row | {"errors_um": errors} for row, errors in zip(before["rows"], before["errors_um"], strict=True)]
 
 

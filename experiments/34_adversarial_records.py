@@ -205,14 +205,6 @@ HYSTERETIC = {
 PLANTS = {kind: _curve(function) for kind, function in CURVES.items()} | LINEAR | HYSTERETIC
 
 
-def _triangle(rng: np.random.Generator, samples: int) -> Array:
-    return hs.signals.triangle(-1.0, 1.0, cycles=CYCLES, samples_per_cycle=samples)
-
-
-def _sine(rng: np.random.Generator, samples: int) -> Array:
-    return hs.signals.sine(1.0, cycles=CYCLES, samples_per_cycle=samples)
-
-
 def _sum_of_sines(rng: np.random.Generator, samples: int) -> Array:
     phase = 2.0 * np.pi * np.arange(CYCLES * samples + 1) / samples
     parts = [
@@ -222,21 +214,17 @@ def _sum_of_sines(rng: np.random.Generator, samples: int) -> Array:
     return u / np.abs(u).max()
 
 
-def _fading(rng: np.random.Generator, samples: int) -> Array:
-    return hs.signals.decaying_sine(1.0, cycles=CYCLES + 2, samples_per_cycle=samples)
-
-
 def _fading_triangle(rng: np.random.Generator, samples: int) -> Array:
     """A triangle of falling amplitude at one rate."""
     levels = [1.0, -0.9, 0.8, -0.7, 0.6, -0.5, 0.4]
     return hs.signals.extremes([0.0, *levels], max_step=4.0 / samples)
 
 
-WAVEFORMS = {
-    "triangle": _triangle,
-    "sine": _sine,
+WAVEFORMS: dict[str, Callable[[np.random.Generator, int], Array]] = {
+    "triangle": lambda rng, n: hs.signals.triangle(-1.0, 1.0, cycles=CYCLES, samples_per_cycle=n),
+    "sine": lambda rng, n: hs.signals.sine(1.0, cycles=CYCLES, samples_per_cycle=n),
     "sum of sines": _sum_of_sines,
-    "fading sine": _fading,
+    "fading sine": lambda rng, n: hs.signals.decaying_sine(1.0, cycles=CYCLES + 2, samples_per_cycle=n),
     "fading triangle": _fading_triangle,
 }
 PLANS = {  # waveform, number of rates and noise of the records of each kind

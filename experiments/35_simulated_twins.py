@@ -16,7 +16,6 @@ parameters and a BIC that is no higher: a default call may leave out what the re
 as it is done, and `python experiments/35_simulated_twins.py resume` goes on after those that are stored.
 """
 
-import json
 import sys
 import time
 from collections.abc import Callable
@@ -27,26 +26,12 @@ import numpy as np
 import numpy.typing as npt
 
 import hysim as hs
-from hysim.plot import Figure, figure
+from hysim.plot import Figure
 
 sys.path.insert(0, str(Path(__file__).parent))
-from random_starts import (
-    COLEMAN_HODGDON,
-    DAHL,
-    MEMORY,
-    OFFSET,
-    OUTPUT,
-    PATIENCE,
-    PINCH,
-    PLAYS_WITH_DENSITY,
-    RATES,
-    REACHED,
-    Box,
-    Peer,
-    coefficients,
-    reaches,
-)
-from results_folder import write_results
+import random_starts as starts
+from random_starts import Box
+from results_folder import append_lines, median_and_worst, stored_lines, write_results
 
 RESULTS = Path(__file__).parent / "results" / "simulated_twins"
 N_SEEDS = 19
@@ -100,7 +85,7 @@ def piezo(rng: np.random.Generator) -> Twin:
     return Twin(
         hs.BoucWen(**{**law.scalars, "z0": z0}),
         u,
-        MEMORY | OUTPUT | {"feedthrough": (-5.0, 5.0)},
+        starts.MEMORY | starts.OUTPUT | {"feedthrough": (-5.0, 5.0)},
         0.01 * stroke * np.log10(1.0 + 100.0 * t),
     )
 
@@ -111,7 +96,7 @@ def skewed_stack(rng: np.random.Generator) -> Twin:
         **yielding(rng), gain=-rng.uniform(0.3, 0.9), input_coefficients=(rng.uniform(1.0, 2.0), rng.uniform(-0.3, 0.3))
     )
     u = stairs(1500, 5, growing=False)
-    return Twin(law, u, MEMORY | OUTPUT | coefficients(2), np.zeros(u.size))
+    return Twin(law, u, starts.MEMORY | starts.OUTPUT | starts.coefficients(2), np.zeros(u.size))
 
 
 def skewed_damper(rng: np.random.Generator) -> Twin:
@@ -122,7 +107,7 @@ def skewed_damper(rng: np.random.Generator) -> Twin:
     )
     u = stairs(800, 4)
     sectors: Box = dict.fromkeys(others, (-0.5, 0.5))
-    return Twin(law, u, MEMORY | OUTPUT | sectors | coefficients(1), np.zeros(u.size))
+    return Twin(law, u, starts.MEMORY | starts.OUTPUT | sectors | starts.coefficients(1), np.zeros(u.size))
 
 
 def ferroelectric(rng: np.random.Generator) -> Twin:
@@ -134,7 +119,8 @@ def ferroelectric(rng: np.random.Generator) -> Twin:
         input_coefficients=(rng.uniform(1.0, 2.0),),
     )
     u = stairs(600, 3)
-    return Twin(law, u, MEMORY | OUTPUT | coefficients(1) | {"delta": (-2.0, 2.0)}, np.zeros(u.size))
+    box = starts.MEMORY | starts.OUTPUT | starts.coefficients(1) | {"delta": (-2.0, 2.0)}
+    return Twin(law, u, box, np.zeros(u.size))
 
 
 def steel_sheet(rng: np.random.Generator) -> Twin:
@@ -142,14 +128,14 @@ def steel_sheet(rng: np.random.Generator) -> Twin:
     law = hs.ColemanHodgdon(alpha=rng.uniform(0.5, 20.0), c=rng.uniform(0.5, 2.0), B=rng.uniform(0.0, 0.4))
     u = sines(rng, 2000, rng.uniform(3.0, 8.0))
     law = hs.ColemanHodgdon(**{**law.scalars, "z0": float(law.memory(u[::-1])[-1])})
-    return Twin(law, u, COLEMAN_HODGDON, np.zeros(u.size))
+    return Twin(law, u, starts.COLEMAN_HODGDON, np.zeros(u.size))
 
 
 def bearing(rng: np.random.Generator) -> Twin:
     """Friction of Dahl's law under a motion in sines."""
     law = hs.Dahl(stiffness=float(10.0 ** rng.uniform(0.0, 2.0)), coulomb=rng.uniform(0.5, 2.0))
     u = sines(rng, 2000, rng.uniform(3.0, 8.0))
-    return Twin(law, u, DAHL, np.zeros(u.size))
+    return Twin(law, u, starts.DAHL, np.zeros(u.size))
 
 
 def stack_of_plays(rng: np.random.Generator) -> Twin:
@@ -172,7 +158,7 @@ def _plays(rng: np.random.Generator, weights: FloatArray) -> Twin:
     z0 = law.memory(u[::-1])[-1]
     box: Box = {f"weights[{k}]": (-5.0, 5.0) for k in range(20)}
     law = hs.PrandtlIshlinskii(thresholds=tuple(thresholds), weights=tuple(weights), z0=tuple(z0))
-    return Twin(law, u, box | OFFSET, np.zeros(u.size), hs.PrandtlIshlinskii.structure(plays=20))
+    return Twin(law, u, box | starts.OFFSET, np.zeros(u.size), hs.PrandtlIshlinskii.structure(plays=20))
 
 
 def shape_memory(rng: np.random.Generator) -> Twin:
@@ -182,7 +168,7 @@ def shape_memory(rng: np.random.Generator) -> Twin:
     law = hs.Preisach(levels=tuple(levels), weights=tuple(weights), z0=(-1.0,))
     u = hs.signals.reversal_curves(-1.0, 1.0, curves=10, samples_per_step=20)
     box: Box = {f"weights[{k}]": (0.0, 1.0) for k in range(weights.size)}
-    return Twin(law, u, box | OFFSET, np.zeros(u.size), hs.Preisach.structure(intervals=INTERVALS))
+    return Twin(law, u, box | starts.OFFSET, np.zeros(u.size), hs.Preisach.structure(intervals=INTERVALS))
 
 
 def pinching_column(rng: np.random.Generator) -> Twin:
@@ -200,7 +186,7 @@ def pinching_column(rng: np.random.Generator) -> Twin:
         input_coefficients=(rng.uniform(0.0, 0.2),),
     )
     u = stairs(1000, 5)
-    return Twin(law, u, MEMORY | OUTPUT | RATES | PINCH, np.zeros(u.size))
+    return Twin(law, u, starts.MEMORY | starts.OUTPUT | starts.RATES | starts.PINCH, np.zeros(u.size))
 
 
 def worn_damper(rng: np.random.Generator) -> Twin:
@@ -213,7 +199,7 @@ def worn_damper(rng: np.random.Generator) -> Twin:
         input_coefficients=(rng.uniform(0.0, 0.2),),
     )
     u = stairs(600, 4)
-    return Twin(law, u, MEMORY | OUTPUT | RATES, np.zeros(u.size))
+    return Twin(law, u, starts.MEMORY | starts.OUTPUT | starts.RATES, np.zeros(u.size))
 
 
 def magnet(rng: np.random.Generator) -> Twin:
@@ -228,7 +214,7 @@ def magnet(rng: np.random.Generator) -> Twin:
         z0=(1.0, -1.0),
     )
     u = np.concatenate([np.linspace(-1.0, 1.0, 60), np.linspace(1.0, -1.0, 60)[1:], -stairs(200, 5, growing=False)])
-    return Twin(law, u, PLAYS_WITH_DENSITY, np.zeros(u.size))
+    return Twin(law, u, starts.PLAYS_WITH_DENSITY, np.zeros(u.size))
 
 
 DEVICES: dict[str, Callable[[np.random.Generator], Twin]] = {
@@ -258,8 +244,8 @@ def case(device: str, seed: int) -> Row:
     seconds = time.perf_counter() - begin
     cost = float(np.sum((fit.residual / unit_y) ** 2))
 
-    peer = Peer(twin.law, twin.box, twin.u, measured)
-    truth, scipy = peer.from_law(), peer.from_random_starts(rng, PATIENCE * seconds)
+    peer = starts.Peer(twin.law, twin.box, twin.u, measured)
+    truth, scipy = peer.from_law(), peer.from_random_starts(rng, starts.PATIENCE * seconds)
     least = min(truth, scipy.cost)
     return {
         "device": device,
@@ -275,8 +261,8 @@ def case(device: str, seed: int) -> Row:
         "over_scipy": cost / scipy.cost if np.isfinite(scipy.cost) else None,
         "scipy_starts": scipy.n,
         "scipy_seconds": scipy.seconds,
-        "reached": reaches(fit, cost, least, len(twin.box)),
-        "beaten_by_scipy": not reaches(fit, cost, scipy.cost, len(twin.box)),
+        "reached": starts.reaches(fit, cost, least, len(twin.box)),
+        "beaten_by_scipy": not starts.reaches(fit, cost, scipy.cost, len(twin.box)),
     }
 
 
@@ -285,21 +271,19 @@ def main(smoke: bool = False, resume: bool = False) -> list[Row]:
     if smoke:
         return [case("bearing", 0)]
     stored = RESULTS / "cases.jsonl"
-    rows: list[Row] = []
-    if resume and stored.exists():
-        rows = [json.loads(line) for line in stored.read_text(encoding="utf-8").splitlines()]
+    rows = stored_lines(stored) if resume else []
     RESULTS.mkdir(parents=True, exist_ok=True)
+    if not rows:
+        stored.unlink(missing_ok=True)
     done = {(row["device"], row["seed"]) for row in rows}
     for device, seed in ((device, seed) for seed in range(N_SEEDS) for device in DEVICES):
         if (device, seed) in done:
             continue
         rows.append(case(device, seed))
         print(line_of(rows[-1]), flush=True)
-        with stored.open("w" if len(rows) == 1 else "a", encoding="utf-8") as file:
-            file.write(json.dumps(rows[-1]) + "\n")
+        append_lines(stored, rows[-1])
     rows.sort(key=lambda row: (row["seed"], list(DEVICES).index(row["device"])))
-    numbers = summary(rows)
-    write_results(RESULTS, rows, draw, numbers)
+    write_results(RESULTS, rows, draw, summary(rows))
     stored.unlink()
     return rows
 
@@ -316,43 +300,30 @@ def line_of(row: Row) -> str:
 
 def summary(rows: list[Row]) -> dict[str, Any]:
     """The numbers that are quoted."""
-    seconds = np.array([row["seconds"] for row in rows])
-    over = np.array([row["over_best_known"] for row in rows])
+    devices = {name: [row for row in rows if row["device"] == name] for name in DEVICES}
     return {
         "cases": len(rows),
-        "reached_percent": 100.0 * float(np.mean([row["reached"] for row in rows])),
-        "beaten_by_scipy_percent": 100.0 * float(np.mean([row["beaten_by_scipy"] for row in rows])),
-        "worst_over_best_known": float(over.max()),
-        "median_seconds": float(np.median(seconds)),
-        "worst_seconds": float(seconds.max()),
+        "reached_percent": starts.share_percent(rows, "reached"),
+        "beaten_by_scipy_percent": starts.share_percent(rows, "beaten_by_scipy"),
+        "worst_over_best_known": max(row["over_best_known"] for row in rows),
+        **median_and_worst("seconds", (row["seconds"] for row in rows)),
         "total_seconds": float(sum(row["seconds"] + row["scipy_seconds"] for row in rows)),
         "devices": {
-            device: {
-                "reached_percent": 100.0 * float(np.mean([row["reached"] for row in rows if row["device"] == device])),
-                "worst_over_best_known": max(row["over_best_known"] for row in rows if row["device"] == device),
-                "median_seconds": float(np.median([row["seconds"] for row in rows if row["device"] == device])),
-                "worst_seconds": max(row["seconds"] for row in rows if row["device"] == device),
+            name: {
+                "reached_percent": starts.share_percent(own, "reached"),
+                "worst_over_best_known": max(row["over_best_known"] for row in own),
+                **median_and_worst("seconds", (row["seconds"] for row in own)),
             }
-            for device in dict.fromkeys(row["device"] for row in rows)
+            for name, own in devices.items()
         },
     }
 
 
 def draw(rows: list[Row]) -> Figure:
     """Cost over the best known, and seconds, by device."""
-    canvas = figure(height=5.6)
     names = list(dict.fromkeys(row["device"] for row in rows))
-    above, below = canvas.subplots(2, 1, sharex=True)
-    for row in rows:
-        x = names.index(row["device"]) + 0.5 * (row["seed"] / N_SEEDS - 0.5)
-        mark = {"marker": "o", "markersize": 3.5, "color": "#0072B2" if row["reached"] else "#D55E00"}
-        above.plot(x, max(row["over_best_known"] - 1.0, 1e-12), **mark)
-        below.plot(x, row["seconds"], **mark)
-    above.axhline(REACHED - 1.0, color="#999999", linewidth=0.8)
-    above.set(yscale="log", ylabel="Sum of squares over\nthe best known, less 1")
-    below.set(yscale="log", ylabel="Default call [s]")
-    below.set_xticks(range(len(names)), names, rotation=20, ha="right")
-    return canvas
+    places = [names.index(row["device"]) + 0.5 * (row["seed"] / N_SEEDS - 0.5) for row in rows]
+    return starts.draw_cases(rows, places, names, "s")
 
 
 if __name__ == "__main__":

@@ -20,7 +20,6 @@ of the processor. Each case is stored as it is done, and `resume` adds those tha
     python experiments/36_measured_records.py FOLDER [resume | report]
 """
 
-import json
 import sys
 import time
 from collections.abc import Iterator
@@ -30,41 +29,29 @@ from typing import Any, NamedTuple
 import numpy as np
 
 import hysim as hs
-from hysim.plot import Figure, figure
+from hysim.plot import Figure
 
 sys.path.insert(0, str(Path(__file__).parent))
-from random_starts import (
-    COLEMAN_HODGDON,
-    DAHL,
-    MEMORY,
-    OUTPUT,
-    PATIENCE,
-    PINCH,
-    PLAYS_WITH_DENSITY,
-    RATES,
-    REACHED,
-    Box,
-    Peer,
-    coefficients,
-    reaches,
-)
-from results_folder import write_results
+import random_starts as starts
+from measured_cores import AMPLITUDES, column, core_loops
+from random_starts import Box
+from results_folder import append_lines, median_and_worst, stored_lines, stored_result, write_results
 
 RESULTS = Path(__file__).parent / "results" / "measured_records"
 LONGEST = 10.0  # seconds of the random starts of a case
 SHORTEST = 0.5
 PLAYS = 10
 LIMITS: Box = {"n": (0.5, 10.0), "exponent": (-0.95, 4.0)}  # of hysim's searches: beyond is another problem
-WIDE: Box = MEMORY | OUTPUT | {"gain": (-20.0, 20.0), "feedthrough": (-5.0, 5.0)} | coefficients(5)
+WIDE: Box = starts.MEMORY | starts.OUTPUT | {"gain": (-20.0, 20.0), "feedthrough": (-5.0, 5.0)} | starts.coefficients(5)
 FAMILIES: dict[str, tuple[Any, Box]] = {
     "Bouc-Wen": (hs.BoucWen, WIDE),
     "polynomial Bouc-Wen": (hs.PolynomialBoucWen, WIDE),
     "Zhu-Wang": (hs.ZhuWangBoucWen, WIDE | {"delta": (-2.0, 2.0)}),
     "generalised Bouc-Wen": (hs.GeneralizedBoucWen, WIDE | {f"b{k}": (-0.5, 0.5) for k in range(2, 7)}),
-    "Baber-Noori": (hs.BoucWenBaberNoori, WIDE | RATES | PINCH),
-    "Dahl": (hs.Dahl, DAHL | {"feedthrough": (-5.0, 5.0)}),
-    "Coleman-Hodgdon": (hs.ColemanHodgdon, COLEMAN_HODGDON),
-    "parametric plays": (hs.ParametricPrandtlIshlinskii, PLAYS_WITH_DENSITY),
+    "Baber-Noori": (hs.BoucWenBaberNoori, WIDE | starts.RATES | starts.PINCH),
+    "Dahl": (hs.Dahl, starts.DAHL | {"feedthrough": (-5.0, 5.0)}),
+    "Coleman-Hodgdon": (hs.ColemanHodgdon, starts.COLEMAN_HODGDON),
+    "parametric plays": (hs.ParametricPrandtlIshlinskii, starts.PLAYS_WITH_DENSITY),
     "ten plays": (
         hs.PrandtlIshlinskii.structure(plays=PLAYS),
         {f"weights[{k}]": (-5.0, 5.0) for k in range(PLAYS)} | {"offset": (-3.0, 3.0)},
@@ -88,30 +75,22 @@ class Measured(NamedTuple):
 
 def measured(folder: Path) -> Iterator[Measured]:
     """The records of a folder, those of few samples first."""
-    for material, amplitudes in (("MnZn_ferrite", 3), ("M130_27s", 3), ("amorf", 1)):
-        for k in range(amplitudes):
-            place = f"[{k}]" if amplitudes > 1 else ""
-            field, flux = (
-                _column(folder / "magnetic_jamodel" / f"{x}_{material}.mat", f"{x}measT{place}") for x in "HB"
-            )
-            yield Measured("magnet", hs.Record(u=field, y=flux, name=f"{material} {k + 1}"), MAGNET)
+    for material in AMPLITUDES:
+        for loop in core_loops(folder, material):
+            yield Measured("magnet", loop, MAGNET)
     for k in (1, 2, 3):
         path = folder / "steel_resspylab" / f"example_{k}.csv"
         record = hs.load(path, u="e_true", y="Sigma_true", name=f"coupon {k}")
         yield Measured("steel", record, STEEL)
     for k in (1, 2, 4):
         path = folder / "mr_damper_labcontrol" / f"data_simulation_4.{k}_MRdamper.mat"
-        motion, velocity, force = (_column(path, f"x_F[{place}]") for place in range(3))
+        motion, velocity, force = (column(path, f"x_F[{place}]") for place in range(3))
         yield Measured("damper", hs.Record(u=motion, y=force, name=f"4.{k} over displacement"), DAMPER)
         yield Measured("damper", hs.Record(u=velocity, y=force, name=f"4.{k} over velocity"), ("Bouc-Wen",))
     for level in (100, 300):
         path, place = folder / "fsm_cubespec" / "fsm_subset.npz", f"{level}mV_train[0,0,0]"
         record = hs.load(path, u=f"u_{place}", y=f"y_{place}", t=False, name=f"{level} mV")
         yield Measured("mirror", record, MIRROR)
-
-
-def _column(path: Path, name: str) -> Any:
-    return hs.load(path, u=name, y=name, t=False).u
 
 
 def stand_in() -> Measured:
@@ -135,8 +114,8 @@ def case(device: str, record: hs.Record, family: str, seed: int = 0) -> Row:
     scaled = hs.Record(u=record.u / np.abs(record.u).max(), y=record.y / unit)
     again = hs.identify(subject, scaled, admissible=False, seed=seed + 1)
     box = {name: pair for name, pair in ranges.items() if name in again.model.scalars}
-    patience = max(SHORTEST, PATIENCE * seconds)
-    peer = Peer(again.model, box, scaled.u, scaled.y, LIMITS)
+    patience = max(SHORTEST, starts.PATIENCE * seconds)
+    peer = starts.Peer(again.model, box, scaled.u, scaled.y, LIMITS)
     second = float(np.sum(again.residual**2))
     start = min(second, peer.from_law(min(patience, LONGEST)))
     scipy = peer.from_random_starts(np.random.default_rng(seed), min(patience, LONGEST))
@@ -159,8 +138,8 @@ def case(device: str, record: hs.Record, family: str, seed: int = 0) -> Row:
         "scipy_starts": scipy.n,
         "scipy_seconds": scipy.seconds,
         "scipy_is_shortened": patience > LONGEST and scipy.seconds >= LONGEST,
-        "reached": reaches(fit, cost, least, len(box)),
-        "beaten_by_scipy": not reaches(fit, cost, scipy.cost, len(box)),
+        "reached": starts.reaches(fit, cost, least, len(box)),
+        "beaten_by_scipy": not starts.reaches(fit, cost, scipy.cost, len(box)),
     }
 
 
@@ -173,8 +152,7 @@ def main(smoke: bool = False, folder: Path | None = None, resume: bool = False, 
     rows = stored_rows(stored) if resume or only_report else []
     stored.unlink(missing_ok=True)
     RESULTS.mkdir(parents=True, exist_ok=True)
-    for row in rows:
-        append(stored, row)
+    append_lines(stored, *rows)
     done = {(row["device"], row["record"], row["family"]) for row in rows}
     cases = [(device, record, family) for device, record, families in measured(folder) for family in families]
     missing = [
@@ -184,7 +162,7 @@ def main(smoke: bool = False, folder: Path | None = None, resume: bool = False, 
         begin = time.process_time()
         rows.append({**case(device, record, family), "total_seconds": time.process_time() - begin})
         print(line_of(rows[-1]), flush=True)
-        append(stored, rows[-1])
+        append_lines(stored, rows[-1])
     left_out = dict.fromkeys(f"{device} {record.name}" for device, record, _ in missing) if only_report else {}
     numbers = {**summary(rows), "cases_left_out": len(cases) - len(rows), "records_left_out": list(left_out)}
     write_results(RESULTS, rows, draw, numbers)
@@ -194,16 +172,7 @@ def main(smoke: bool = False, folder: Path | None = None, resume: bool = False, 
 
 def stored_rows(stored: Path) -> list[Row]:
     """Cases of a run that was stopped, or else of the last one that ended."""
-    if stored.exists():
-        return [json.loads(line) for line in stored.read_text(encoding="utf-8").splitlines()]
-    result = RESULTS / "result.json"
-    return list(json.loads(result.read_text(encoding="utf-8"))["rows"]) if result.exists() else []
-
-
-def append(stored: Path, row: Row) -> None:
-    """Store one case."""
-    with stored.open("a", encoding="utf-8") as file:
-        file.write(json.dumps(row) + "\n")
+    return stored_lines(stored) if stored.exists() else stored_result(RESULTS).get("rows", [])
 
 
 def line_of(row: Row) -> str:
@@ -221,14 +190,14 @@ def summary(rows: list[Row]) -> dict[str, Any]:
     return {
         "cases": len(rows),
         "records": len({(row["device"], row["record"]) for row in rows}),
-        "reached_percent": _share(rows, "reached"),
-        "beaten_by_scipy_percent": _share(rows, "beaten_by_scipy"),
-        "shortened_scipy_percent": _share(rows, "scipy_is_shortened"),
+        "reached_percent": starts.share_percent(rows, "reached"),
+        "beaten_by_scipy_percent": starts.share_percent(rows, "beaten_by_scipy"),
+        "shortened_scipy_percent": starts.share_percent(rows, "scipy_is_shortened"),
         "longest_scipy_seconds": LONGEST,
         "not_converged": sum(not row["success"] for row in rows),
         "worst_over_best_known": max(row["over_best_known"] for row in rows),
         "total_seconds": sum(row["total_seconds"] for row in rows),
-        **_seconds(rows),
+        **median_and_worst("seconds", (row["seconds"] for row in rows)),
         "lost": [
             {name: row[name] for name in ("device", "record", "family", "over_best_known", "over_scipy", "at_bound")}
             for row in rows
@@ -237,42 +206,26 @@ def summary(rows: list[Row]) -> dict[str, Any]:
         "families": {
             family: {
                 "cases": len(own),
-                "reached_percent": _share(own, "reached"),
+                "reached_percent": starts.share_percent(own, "reached"),
                 "worst_over_best_known": max(row["over_best_known"] for row in own),
-                **_seconds(own),
+                **median_and_worst("seconds", (row["seconds"] for row in own)),
             }
-            for family in FAMILIES
-            if (own := [row for row in rows if row["family"] == family])
+            for family, own in _by_family(rows).items()
         },
     }
 
 
-def _share(rows: list[Row], name: str) -> float:
-    return 100.0 * float(np.mean([row[name] for row in rows]))
-
-
-def _seconds(rows: list[Row]) -> dict[str, float]:
-    seconds = [row["seconds"] for row in rows]
-    return {"median_seconds": float(np.median(seconds)), "worst_seconds": max(seconds)}
+def _by_family(rows: list[Row]) -> dict[str, list[Row]]:
+    groups = {family: [row for row in rows if row["family"] == family] for family in FAMILIES}
+    return {family: own for family, own in groups.items() if own}
 
 
 def draw(rows: list[Row]) -> Figure:
     """Cost over the best known, and seconds, by family."""
-    canvas = figure(height=5.6)
-    names = [family for family in FAMILIES if any(row["family"] == family for row in rows)]
-    above, below = canvas.subplots(2, 1, sharex=True)
-    for x, name in enumerate(names):
-        own = [row for row in rows if row["family"] == name]
-        for k, row in enumerate(own):
-            place = x + 0.6 * ((k + 0.5) / len(own) - 0.5)
-            mark = {"marker": "o", "markersize": 3.5, "color": "#0072B2" if row["reached"] else "#D55E00"}
-            above.plot(place, max(row["over_best_known"] - 1.0, 1e-12), **mark)
-            below.plot(place, row["seconds"], **mark)
-    above.axhline(REACHED - 1.0, color="#999999", linewidth=0.8)
-    above.set(yscale="log", ylabel="Sum of squares over\nthe best known, less 1")
-    below.set(yscale="log", ylabel="Default call [CPU s]")
-    below.set_xticks(range(len(names)), names, rotation=20, ha="right")
-    return canvas
+    groups = _by_family(rows)
+    ordered = [row for own in groups.values() for row in own]
+    places = [x + 0.6 * ((k + 0.5) / len(own) - 0.5) for x, own in enumerate(groups.values()) for k in range(len(own))]
+    return starts.draw_cases(ordered, places, list(groups), "CPU s")
 
 
 if __name__ == "__main__":

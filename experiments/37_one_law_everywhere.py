@@ -31,23 +31,9 @@ from hysim.kernels.stepping import drive
 from hysim.plot import Figure, figure
 
 sys.path.insert(0, str(Path(__file__).parent))
+import step_runners as runners
 from exported_steps import SAMPLE_TIME, THINGS, Array, Case, cases
 from results_folder import write_results
-from step_runners import (
-    STRICT,
-    Library,
-    Module,
-    Unit,
-    checked,
-    code_bytes,
-    fields_of,
-    fixed_of,
-    has_fmpy,
-    has_wasm,
-    least_seconds,
-    program_output,
-    text,
-)
 
 RESULTS = Path(__file__).parent / "results" / "one_law_everywhere"
 PROMISED = 1e-12
@@ -65,9 +51,9 @@ def peers() -> tuple[str, ...]:
     there = {
         "gcc": shutil.which("gcc"),
         "clang": shutil.which("clang"),
-        "wasm": has_wasm(),
-        "FMI 2.0": has_fmpy(),
-        "FMI 3.0": has_fmpy(),
+        "wasm": runners.has_wasm(),
+        "FMI 2.0": runners.has_fmpy(),
+        "FMI 3.0": runners.has_fmpy(),
     }
     return tuple(name for name in PEERS if there[name])
 
@@ -105,35 +91,37 @@ def row(family: str, run: Sequence[str], folder: Path, n_laws: int = 20, n_hosti
     own = list(cases(family, 37, n_laws, n_hostile))
     programs: dict[str, list[Case]] = defaultdict(list)
     for each in own:
-        programs[text(each)].append(each)
+        programs[runners.text(each)].append(each)
     found: dict[str, list[float]] = {name: [] for name in run}
     seconds: list[tuple[float, float]] = []
     for k, group in enumerate(programs.values()):
         place = folder / f"{''.join(filter(str.isalpha, family))}{k}"
         for compiler in (name for name in ("gcc", "clang") if name in run):
-            library = Library(compiler, group[0], place.with_name(f"{place.name}_{compiler}"))
+            library = runners.Library(compiler, group[0], place.with_name(f"{place.name}_{compiler}"))
             for each in group:
                 y, taken = library.outputs(each)
                 found[compiler].append(difference(y, each))
                 if each.kind == "random" and compiler == "gcc" and np.isfinite(each.y).all():
                     seconds.append((taken / y.size, in_python(each) / y.size))
-        for each, y in zip(group, checked("gcc", group, place), strict=True):
+        for each, y in zip(group, runners.checked("gcc", group, place), strict=True):
             found["gcc"].append(difference(y, each))
         if "wasm" in run:
-            module = Module(group[0], place)
+            module = runners.Module(group[0], place)
             found["wasm"] += [difference(module.outputs(each), each) for each in group]
         for version in (name for name in run if name.startswith("FMI")):
             found[version] += in_units(group, version.partition(" ")[2], place)
     first = [group[0] for group in programs.values()]
     sources = [hs.to_c(each.thing, SAMPLE_TIME, name="law") for each in first]
     for each, source in zip(first, sources, strict=True):
-        found["gcc"].append(difference(program_output(source, each, folder), each))
+        found["gcc"].append(difference(runners.program_output("gcc", source, runners.inputs_of(each), folder), each))
     return {
         "family": family,
         "programs": len(programs),
         "cases": len(own),
         "lines": max(source.source.count("\n") for source in sources),
-        "code_bytes": max(code_bytes(["gcc"], source, folder / "law", *STRICT, *NO_UNWINDING) for source in sources),
+        "code_bytes": max(
+            runners.code_bytes(["gcc"], source, folder / "law", *runners.STRICT, *NO_UNWINDING) for source in sources
+        ),
         "ram_bytes": max(8 * (each.parameters.size + each.state.size) for each in own),
         "ns_c": 1e9 * float(np.median([a for a, _ in seconds])),
         "ns_c_most": 1e9 * max(a for a, _ in seconds),
@@ -148,17 +136,17 @@ def row(family: str, run: Sequence[str], folder: Path, n_laws: int = 20, n_hosti
 
 def in_units(group: Sequence[Case], version: str, place: Path) -> list[float]:
     """Differences of the cases of a program in units: of a law, in one unit for each number of parameters."""
-    units: dict[Any, Unit] = {}
+    units: dict[Any, runners.Unit] = {}
     found = []
     for each in group:
         is_law = isinstance(each.thing, hs.Law)
         sizes = each.parameters.size, each.state.size
-        key = (tuple(fields_of(each)), fixed_of(each), sizes) if is_law else id(each.thing)
+        key = (tuple(runners.fields_of(each)), runners.fixed_of(each), sizes) if is_law else id(each.thing)
         if key not in units:
             most = UNITS_OF_A_FAMILY if is_law else UNITS_OF_ONE_THING
             if len(units) == most or (not is_law and units and each.kind == "random"):  # the second one: hostile inputs
                 continue
-            units[key] = Unit(each, version, place.with_name(f"{place.name}_{version[0]}_{len(units)}"))
+            units[key] = runners.Unit(each, version, place.with_name(f"{place.name}_{version[0]}_{len(units)}"))
         found.append(ended(units[key].outputs(each), each))
     return found
 
@@ -168,19 +156,19 @@ def in_python(case: Case) -> float:
     if len(case.inputs) == 2:
         command, u = np.empty(case.y.size), np.empty(case.y.size)
         step, parameters, state = case.thing.initial(SAMPLE_TIME)
-        return least_seconds(lambda: replay(step, parameters, state.copy(), *case.inputs, command, u))
+        return runners.least_seconds(lambda: replay(step, parameters, state.copy(), *case.inputs, command, u))
     law, y = case.thing.startable(SAMPLE_TIME).started(float(case.inputs[0, 0])), np.empty(case.y.size)
-    return least_seconds(lambda: drive(law.step, law.parameters, law.state.copy(), case.inputs[0], y))
+    return runners.least_seconds(lambda: drive(law.step, law.parameters, law.state.copy(), case.inputs[0], y))
 
 
 def on_a_board(folder: Path) -> int | None:
     """Bytes of a Bouc-Wen law with n = 1 on a Cortex-M7, without the C library; None without zig."""
-    if not has_wasm():
+    if not runners.has_wasm():
         return None
     law = hs.to_c(hs.BoucWen(beta=0.4, gamma=0.2), name="law")
     zig = [sys.executable, "-m", "ziglang", "cc", "-target", "thumb-linux-musleabihf", "-mcpu=cortex_m7"]
     options = ("-std=c99", "-Os", "-ffp-contract=off", "-fno-sanitize=all", *NO_UNWINDING)
-    return code_bytes(zig, law, folder / "law", *options)
+    return runners.code_bytes(zig, law, folder / "law", *options)
 
 
 def main(smoke: bool = False) -> list[Row]:

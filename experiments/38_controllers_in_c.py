@@ -7,7 +7,6 @@ writes it, compiled by the C compiler. The commands are compared in parts of the
 """
 
 import shutil
-import subprocess
 import sys
 import tempfile
 from pathlib import Path
@@ -21,12 +20,12 @@ from hysim.plot import Figure, figure
 
 sys.path.insert(0, str(Path(__file__).parent))
 from results_folder import write_results
+from step_runners import program_output
 
 RESULTS = Path(__file__).parent / "results" / "controllers_in_c"
 SAMPLES = 20_000
 H = 1e-3  # s
 LIMITS = (-0.8, 0.8)
-OPTIONS = ("-std=c99", "-O2", "-ffp-contract=off", "-Wall", "-Wextra", "-Wpedantic", "-Werror")
 PLAYS = hs.PrandtlIshlinskii(thresholds=(0.0, 0.2, 0.5), weights=(1.0, 0.5, 0.3), offset=0.1)
 LAWS: dict[str, Any] = {
     "Bouc-Wen, n = 1": hs.BoucWen(beta=0.6, gamma=0.3, feedthrough=1.0, gain=0.4, offset=-0.1, z0=0.2),
@@ -90,12 +89,7 @@ def row(name: str, law: Any, samples: int, compiler: str, folder: Path) -> Row:
     )
     run = hs.close_loop(stage, controller, H * np.arange(samples), wanted)
     code = hs.to_c(controller, H, name="controller", y0=float(run.y[0]))
-    code.write(folder)
-    program = [compiler, *OPTIONS, "controller.c", "controller_main.c", "-o", "controller", "-lm"]
-    subprocess.run(program, cwd=folder, check=True)
-    lines = "\n".join(f"{r!r} {m!r}" for r, m in zip(wanted.tolist(), run.measurement.tolist(), strict=True))
-    out = subprocess.run([folder / "controller"], input=lines, capture_output=True, text=True, check=True).stdout
-    given = np.array(out.split(), dtype=float)
+    given = program_output(compiler, code, np.stack([wanted, run.measurement]), folder)
     difference = np.abs(given - run.drive)
     return {
         "law": name,
@@ -131,22 +125,20 @@ def main(smoke: bool = False) -> list[Row]:
             "median_difference": float(np.median(differences)),
             "least_at_limits_percent": min(each["at_limits_percent"] for each in rows),
         }
-        write_results(RESULTS, rows, picture, numbers)
+        write_results(RESULTS, rows, draw, numbers)
     return rows
 
 
-def picture(rows: list[Row]) -> Figure:
+def draw(rows: list[Row]) -> Figure:
     """Worst difference of each law."""
-    fig = figure(height=0.22 * len(rows) + 0.8)
-    ax = fig.add_subplot()
+    canvas = figure(height=0.22 * len(rows) + 0.8)
+    ax = canvas.add_subplot()
     places = np.arange(len(rows))[::-1]
     ax.plot([max(each["worst_difference"], 1e-17) for each in rows], places, "o")
     ax.axvline(1e-12, color="black", linestyle=":")
-    ax.set_xscale("log")
-    ax.set_xlim(4e-18, 1e-11)
+    ax.set(xscale="log", xlim=(4e-18, 1e-11), xlabel="worst difference / range (1e-17: equal bits)")
     ax.set_yticks(places, [each["law"] for each in rows])
-    ax.set_xlabel("worst difference / range (1e-17: equal bits)")
-    return fig
+    return canvas
 
 
 if __name__ == "__main__":

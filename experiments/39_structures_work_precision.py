@@ -17,7 +17,7 @@ imported are left out.
 
 import json
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -29,8 +29,8 @@ from hysim.plot import Figure, figure
 sys.path.insert(0, str(Path(__file__).parent))
 import structure_cases as cases
 from peers import structures as peers
-from peers.contest import peer, quartiles
-from results_folder import write_results
+from peers.contest import in_turns, peer, spread
+from results_folder import label_grid, write_results
 
 RESULTS = Path(__file__).parent / "results" / "structures_work_precision"
 PEAK = 1e-6  # of a peak drift: what the default is asked to reach
@@ -44,28 +44,14 @@ ALONE = (cases.pinching, cases.isolated_tower)
 # ---------------------------------------------------------------------------------- measuring
 
 
-def in_turns(run: Callable[[], float], own: Callable[[], float], most: int) -> Array:
-    """Seconds of both, shape (repeats, 2), until `most` repeats or, after 3, 2 s; no call is the first."""
-    turns: list[tuple[float, float]] = []
-    while not turns or (len(turns) < most and (len(turns) < min(3, most) or sum(map(sum, turns)) < 2.0)):
-        turns.append((run(), own()))
-    return np.array(turns)
-
-
 def measured(case: cases.Case, entry: peers.Entry, own: peers.Entry, exact: Any, most: int) -> Row:
     """Error of one method at one setting, its time, and that in times of hysim's default."""
     error = float(np.abs(entry.drift() - exact.drift).max() / exact.peak_drift.max())
-    turns = in_turns(entry.seconds, own.seconds, most)
+    turns = in_turns(entry.seconds, own.seconds, min(3, most), most, 2.0)
     row: Row = {"problem": case.name, "tool": entry.tool, "method": entry.method, "setting": entry.setting}
     row |= {"error": error, "peak_error": None, "imbalance": None}
     row |= spread("ns_per_term", 1e9 * turns[:, 0] / case.n_terms)
     return row | spread("times_hysim", turns[:, 0] / turns[:, 1]) | {"repeats": len(turns)}
-
-
-def spread(name: str, values: Array) -> dict[str, float]:
-    """Median under `name`, and the quartiles beside it."""
-    low, median, high = quartiles(values)
-    return {name: median, f"{name}_q1": low, f"{name}_q3": high}
 
 
 def contest(case: cases.Case, entries: list[peers.Entry], most: int) -> tuple[list[Row], dict[str, float]]:
@@ -240,13 +226,8 @@ def draw(rows: list[Row]) -> Figure:
                 points = sorted((r["ns_per_term"], r["error"]) for r in own)
                 ax.loglog(*zip(*points, strict=True), ls=dashes, lw=1.1, mew=0.8, label=label, **look)
         ax.set_title(f"{str(problem).capitalize()}")
-    for ax in axes[-1]:
-        ax.set_xlabel("Time a sample and element [ns]")
-    for ax in axes[:, 0]:
-        ax.set_ylabel("Error of the drifts [largest drift]")
-    handles = {label: handle for ax in axes.flat for handle, label in zip(*ax.get_legend_handles_labels(), strict=True)}
-    shown = [label for label, *_ in LOOKS.values() if label in handles]
-    canvas.legend([handles[label] for label in shown], shown, loc="outside lower center", ncols=3)
+    labels = [label for label, *_ in LOOKS.values()]
+    label_grid(canvas, axes, "Time a sample and element [ns]", "Error of the drifts [largest drift]", labels)
     return canvas
 
 

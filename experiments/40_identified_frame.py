@@ -23,7 +23,7 @@ import hysim as hs
 from hysim.plot import Figure, figure
 
 sys.path.insert(0, str(Path(__file__).parent))
-from results_folder import write_results
+from results_folder import median_and_worst, write_results
 
 RESULTS = Path(__file__).parent / "results" / "identified_frame"
 N_SEEDS = 20
@@ -126,8 +126,7 @@ def main(smoke: bool = False) -> list[Row]:
     for seed in range(N_SEEDS):
         rows.append(case(seed))
         print(line_of(rows[-1]), flush=True)
-    numbers = summary(rows)
-    write_results(RESULTS, rows, draw, numbers)
+    write_results(RESULTS, rows, draw, summary(rows))
     return rows
 
 
@@ -159,24 +158,15 @@ def summary(rows: list[Row]) -> dict[str, Any]:
         "median_of_worst_storey_percent": float(np.median(drifts.max(axis=1))),
         "worst_peak_drift_error_percent": float(drifts.max()),
         "median_peak_drift_error_of_start_percent": float(np.median(values("peak_drift_error_of_start_percent"))),
-        "median_damping_error_percent": float(np.median(np.abs(values(f"{DAMPING}_error_percent")))),
-        "worst_damping_error_percent": float(np.abs(values(f"{DAMPING}_error_percent")).max()),
-        "median_damping_stderr_percent": float(np.median(values("damping_stderr_percent"))),
-        "worst_damping_stderr_percent": float(values("damping_stderr_percent").max()),
-        "median_law_error_percent": float(np.median(law)),
-        "worst_law_error_percent": float(law.max()),
+        **median_and_worst("damping_error_percent", np.abs(values(f"{DAMPING}_error_percent"))),
+        **median_and_worst("damping_stderr_percent", values("damping_stderr_percent")),
+        **median_and_worst("law_error_percent", law.flat),
         "worst_law_parameter": off[int(law.max(axis=1).argmax())],
-        "median_correlation_of_damping": float(np.median(values("largest_correlation_of_damping"))),
-        "worst_correlation_of_damping": float(values("largest_correlation_of_damping").max()),
+        **median_and_worst("correlation_of_damping", values("largest_correlation_of_damping")),
         "rms_error_in_stderr": float(np.sqrt(np.mean(values("rms_error_in_stderr") ** 2))),
-        "median_seconds": float(np.median(values("seconds"))),
-        "worst_seconds": float(values("seconds").max()),
+        **median_and_worst("seconds", values("seconds")),
         "parameters": {
-            name: {
-                "median_error_percent": float(np.median(np.abs(values(f"{name}_error_percent")))),
-                "worst_error_percent": float(np.abs(values(f"{name}_error_percent")).max()),
-            }
-            for name in FREE
+            name: median_and_worst("error_percent", np.abs(values(f"{name}_error_percent"))) for name in FREE
         },
     }
 

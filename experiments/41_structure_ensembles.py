@@ -12,6 +12,7 @@ import resource
 import sys
 import time
 from concurrent.futures import ThreadPoolExecutor
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -147,17 +148,14 @@ def measure(n_sets: int, n_samples: int, n_checked: int, repeats: int) -> list[R
     a, sets = ground_motion(n_samples), oscillators(n_sets)
     few = {name: values[:n_checked] for name, values in sets.items()}
     truth = peaks(few, a, 1e-11)
+    methods = {f"hysim, tolerance {each:g}": partial(peaks, tolerance=each) for each in TOLERANCES}
+    methods |= {f"Newmark, {count} steps a sample": partial(newmark_peaks, substeps=count) for count in (1, 8)}
     rows = []
-    for tolerance in TOLERANCES:
-        peaks(few, a[:100], tolerance)
-        seconds, cpu, found = timed(lambda tolerance=tolerance: peaks(sets, a, tolerance), repeats)
+    for method, run in methods.items():
+        run(few, a[:100])
+        seconds, cpu, found = timed(partial(run, sets, a), repeats)
         errors = np.abs(found[:n_checked] / truth - 1.0)
-        rows.append(row(f"hysim, tolerance {tolerance:g}", seconds, cpu, n_sets, n_samples, errors))
-    for substeps in (1, 8):
-        newmark_peaks(few, a[:100], substeps)
-        seconds, cpu, found = timed(lambda substeps=substeps: newmark_peaks(sets, a, substeps), repeats)
-        errors = np.abs(found[:n_checked] / truth - 1.0)
-        rows.append(row(f"Newmark, {substeps} steps a sample", seconds, cpu, n_sets, n_samples, errors))
+        rows.append(row(method, seconds, cpu, n_sets, n_samples, errors))
     return rows
 
 

@@ -26,18 +26,8 @@ from typing import Any
 import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parent))
-from magnetic_reference import (
-    Circuit,
-    Core,
-    Exact,
-    JAmodel,
-    euler,
-    of_circuit,
-    of_jamodel,
-    runge_kutta,
-    spelled,
-    strokes,
-)
+import magnetic_reference as reference
+from magnetic_reference import Circuit, Core, JAmodel, of_circuit, of_jamodel
 from more_samples import draw_case, judged, response_run, runs, spread
 from more_samples_inverse import inputs_for, inverse_verdict, wanted_case
 from results_folder import write_results
@@ -65,7 +55,7 @@ SPELLINGS = {
         hs.JilesAtherton.from_jamodel,
     ),
 }
-SCHEMES = {"Euler": euler, "Runge-Kutta 4": runge_kutta}
+SCHEMES = {"Euler": reference.euler, "Runge-Kutta 4": reference.runge_kutta}
 Array = np.ndarray[Any, np.dtype[Any]]
 Row = dict[str, Any]
 
@@ -90,7 +80,7 @@ def digits_error(seed: int) -> float:
     rng = np.random.default_rng([42, seed])
     core, reach = random_core(rng), 10.0 ** rng.uniform(-0.7, 0.7)
     turns = reach * np.array([0.0, 1.0, -rng.uniform(0.2, 1.0), rng.uniform(-0.2, 1.0)])
-    exact = np.array([float(M) for M in Exact(core).magnetisation(turns)])
+    exact = np.array([float(M) for M in reference.Exact(core).magnetisation(turns)])
     return float(np.abs(law_of(core).response(turns) - exact).max() / np.ptp(exact))
 
 
@@ -130,9 +120,9 @@ def spelling_errors(steps: int) -> dict[str, float]:
     """Largest distance of hysim's M from that of the other program's equation, in units of the range."""
     errors = {}
     for name, (slope, core, law_from) in SPELLINGS.items():
-        fields = strokes((core.A if isinstance(core, Circuit) else core.a) * TURNS, steps)
+        fields = reference.strokes((core.A if isinstance(core, Circuit) else core.a) * TURNS, steps)
         M = law_from(**core._asdict()).magnetisation(fields)
-        errors[name] = float(np.abs(spelled(slope, core, fields) - M).max() / np.ptp(M))
+        errors[name] = float(np.abs(reference.spelled(slope, core, fields) - M).max() / np.ptp(M))
     return errors
 
 
@@ -146,7 +136,7 @@ def cost_rows(smoke: bool) -> list[Row]:
         law = law_of(core)
         turns = core.a * TURNS
         for steps in STEPS[:1] if smoke else STEPS:
-            fields = strokes(turns, steps)
+            fields = reference.strokes(turns, steps)
             exact, ends = law.response(fields), law.response(turns)
             inputs = np.tile(fields, max(1, (2_000 if smoke else N_TIMED) // fields.size))
             for method, scheme in {"hysim": None, **SCHEMES}.items():

@@ -19,10 +19,10 @@ first call that compiles; for the Jiles-Atherton law also those of the clock on 
 goes on with the evolution that is stored, up to so many seconds for each set.
 """
 
-import json
 import sys
 import time
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -33,12 +33,13 @@ from hysim.plot import Figure, figure
 
 sys.path.insert(0, str(Path(__file__).parent))
 from magnetic_evolution import Core, errors, evolve_until, loop_of
-from results_folder import write_results
+from measured_cores import core_loops
+from results_folder import append_lines, stored_result, write_results
 
 RESULTS = Path(__file__).parent / "results" / "magnetic_loops"
 STORED = RESULTS / "evolution.jsonl"
 SECONDS = 600.0  # of the evolution, for each set of records
-MATERIALS = {"ferrite": ("MnZn_ferrite", 3), "steel": ("M130_27s", 3), "amorphous alloy": ("amorf", 1)}
+MATERIALS = {"ferrite": "MnZn_ferrite", "steel": "M130_27s", "amorphous alloy": "amorf"}
 OWN, BY_HAND = "Jiles-Atherton", "Jiles-Atherton, differential evolution"
 LAWS: dict[str, Any] = {
     OWN: hs.JilesAtherton,
@@ -63,22 +64,12 @@ Records = list[hs.Record]
 
 def measured(folder: Path) -> dict[str, Records]:
     """The sets of records that are identified together, by name."""
-    sets = {}
-    for name, (file, amplitudes) in MATERIALS.items():
-        places = [f"[{k}]" for k in range(amplitudes)] if amplitudes > 1 else [""]
-        sets[name] = [record_of(folder, name, file, place) for place in places]
+    units = {"u": "A/m", "y": "T"}
+    sets = {
+        name: [replace(each, name=name, units=units) for each in core_loops(folder, material)]
+        for name, material in MATERIALS.items()
+    }
     return sets | {f"{each.name} {each.u.max():.3g} A/m": [each] for each in sets["steel"]}
-
-
-def record_of(folder: Path, name: str, file: str, place: str) -> hs.Record:
-    """One loop."""
-    field, flux = (column(folder / "magnetic_jamodel" / f"{x}_{file}.mat", f"{x}measT{place}") for x in "HB")
-    return hs.Record(u=field, y=flux, name=name, units={"u": "A/m", "y": "T"})
-
-
-def column(path: Path, name: str) -> Array:
-    """A column of a file."""
-    return hs.load(path, u=name, y=name, t=False).u
 
 
 def stand_in() -> dict[str, Records]:
@@ -234,12 +225,10 @@ def main(smoke: bool = False, folder: Path | None = None, seconds: float = SECON
 
 def restored() -> None:
     """Write the runs of the evolution that the last result has to the file of the present ones."""
-    result = RESULTS / "result.json"
     RESULTS.mkdir(parents=True, exist_ok=True)
-    if not STORED.exists() and result.exists():
-        sets = json.loads(result.read_text(encoding="utf-8"))["sets"]
-        runs = [json.dumps({"set": name, **run}) for name, each in sets.items() for run in each["runs"]]
-        STORED.write_text("".join(f"{run}\n" for run in runs), encoding="utf-8")
+    if not STORED.exists():
+        sets = stored_result(RESULTS).get("sets", {})
+        append_lines(STORED, *({"set": name, **run} for name, each in sets.items() for run in each["runs"]))
 
 
 def line_of(row: Row) -> str:

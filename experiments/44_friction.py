@@ -135,10 +135,10 @@ def seconds(run: Callable[[], Any], repeats: int) -> float:
     return (time.process_time() - begin) / repeats
 
 
-def in_turns(run: Callable[[], Any], own: Callable[[], Any], most: int) -> tuple[float, float]:
+def in_turns(run: Callable[[], Any], own: Callable[[], Any], most: int, repeats: int = 200) -> tuple[float, float]:
     """Medians of the time of a call, and of its ratio to that of hysim's."""
     own()
-    pairs = np.array([(seconds(run, 1), seconds(own, 200)) for _ in range(most)])
+    pairs = np.array([(seconds(run, 1), seconds(own, repeats)) for _ in range(most)])
     return float(np.median(pairs[:, 0])), float(np.median(pairs[:, 0] / pairs[:, 1]))
 
 
@@ -222,17 +222,11 @@ def pulled(duration: float, most: int) -> tuple[list[Row], float, Array, Array]:
 
     def judged(method: str, setting: float, run: Callable[[], Array]) -> Row:
         error = float(np.abs(run() - expected).max() / expected.max())
-        own()
-        times = np.array([(seconds(run, 1), seconds(own, 5)) for _ in range(most)])
-        return row(
-            "pulled mass", method, sigma0=1e5, setting=setting, error=error,
-            ns_per_sample=float(1e9 * np.median(times[:, 0]) / t.size),
-            times_hysim=float(np.median(times[:, 0] / times[:, 1])),
-        )  # fmt: skip
+        taken, ratio = in_turns(run, own, most, repeats=5)
+        numbers = {"error": error, "ns_per_sample": 1e9 * taken / t.size, "times_hysim": ratio}
+        return row("pulled mass", method, sigma0=1e5, setting=setting, **numbers)
 
-    rows = [
-        judged("hysim", tol, lambda tol=tol: pulled_mass(tol).response(force, PULLED_H)) for tol in TOLERANCES
-    ]  # fmt: skip
+    rows = [judged("hysim", tol, lambda tol=tol: pulled_mass(tol).response(force, PULLED_H)) for tol in TOLERANCES]
     rows += [
         judged(name, tol, lambda name=name, tol=tol: pulled_by_solver(name, tol, t))
         for name in SOLVERS

@@ -26,7 +26,7 @@ import hysim as hs
 from hysim.plot import Figure, figure, panels
 
 sys.path.insert(0, str(Path(__file__).parent))
-from results_folder import write_results
+from results_folder import median_and_worst, write_results
 
 RESULTS = Path(__file__).parent / "results" / "channels"
 SUPPLIES, LEFT_OUT = (0.0, 0.5, 1.0, 1.5, 2.0), 1.5
@@ -39,6 +39,7 @@ ON_TEMPERATURE = {"gain": ("T", 1), "beta": ("T", 1)}
 MEASURED = {"bouc_wen.gain": ("supply", 1), "bouc_wen.feedthrough": ("supply", 1), "dashpot.c": ("supply", 1)}
 FILES = {"4.1": 0.0, "4.2": 0.88, "4.4": None}
 N_MEASURED = 1500  # samples of each file: 15 s
+MODELS = ("in the supply", "means of the next two laws", "the law of the next supply", "one law for all supplies")
 Row = dict[str, float | str | None]
 
 
@@ -113,10 +114,7 @@ def one_seed(seed: int, supplies: tuple[float, ...]) -> dict[str, Any]:
     jointly, seconds = timed(lambda: hs.identify(structure(), records, depends=DEPENDS, fixed=FIXED))
     alone = [hs.identify(structure(), each, fixed=FIXED) for each in records]
     one_law = hs.identify(structure(), records, fixed=FIXED)
-    below, above = (
-        max((s, k) for k, s in enumerate(supplies) if s < LEFT_OUT)[1],
-        min((s, k) for k, s in enumerate(supplies) if s > LEFT_OUT)[1],
-    )
+    above = int(np.searchsorted(supplies, LEFT_OUT))
     unknown = dataclasses.replace(measured(LEFT_OUT, seed), channels={}, units={})
     found = hs.estimate_channel(jointly, unknown, "supply", initial="rest")
     return {
@@ -126,12 +124,26 @@ def one_seed(seed: int, supplies: tuple[float, ...]) -> dict[str, Any]:
         "seconds": seconds,
         "in the supply": error_percent(jointly.model.at(supply=LEFT_OUT)),
         "one law for all supplies": error_percent(one_law.model),
-        "the law of the next supply": error_percent(alone[below].model),
-        "means of the next two laws": error_percent(averaged([alone[below], alone[above]])),
+        "the law of the next supply": error_percent(alone[above - 1].model),
+        "means of the next two laws": error_percent(averaged(alone[above - 1 : above + 1])),
         "held": held(jointly, damper),
         "supply": found.estimates["supply"],
         "supply_stderr": found.stderr["supply"],
         "n_parameters": {"in the supply": jointly.n_parameters, "one law for all supplies": one_law.n_parameters},
+    }
+
+
+def row(
+    case: str, model: str, n_parameters: int, errors: list[float], holds: float | None, seconds: float | None
+) -> Row:
+    """A row of the table."""
+    return {
+        "case": case,
+        "model": model,
+        "n_parameters": n_parameters,
+        **median_and_worst("error_percent", errors),
+        "intervals_that_hold_percent": holds,
+        "seconds_per_fit": seconds,
     }
 
 
@@ -140,26 +152,11 @@ def simulated(seeds: range, supplies: tuple[float, ...]) -> tuple[list[Row], dic
     draws = [one_seed(seed, supplies) for seed in seeds]
     holds = 100.0 * float(np.mean([each["held"] for each in draws]))
     seconds = float(np.median([each["seconds"] for each in draws]))
-    rows: list[Row] = []
-    for name in (
-        "in the supply",
-        "means of the next two laws",
-        "the law of the next supply",
-        "one law for all supplies",
-    ):
-        errors = [each[name] for each in draws]
-        is_joint = name == "in the supply"
-        rows.append(
-            {
-                "case": "simulated damper, a supply left out",
-                "model": name,
-                "n_parameters": draws[0]["n_parameters"].get(name),
-                "median_error_percent": float(np.median(errors)),
-                "worst_error_percent": max(errors),
-                "intervals_that_hold_percent": holds if is_joint else None,
-                "seconds_per_fit": seconds if is_joint else None,
-            }
-        )
+    rows = []
+    for name in MODELS:
+        beside = (holds, seconds) if name == "in the supply" else (None, None)
+        n_parameters, errors = draws[0]["n_parameters"].get(name), [each[name] for each in draws]
+        rows.append(row("simulated damper, a supply left out", name, n_parameters, errors, *beside))
     off = [(each["supply"] - LEFT_OUT) for each in draws]
     numbers = {
         "seeds": len(draws),
@@ -211,17 +208,10 @@ def along(seeds: range, n: int) -> list[Row]:
         for name, model in (("in the temperature", fit.model.at(T=40.0)), ("one law for the record", plain.model)):
             errors[name].append(100.0 * float(np.sqrt(np.mean((model.response(u) - truth) ** 2)) / np.ptp(truth)))
         n_parameters = {"in the temperature": fit.n_parameters, "one law for the record": plain.n_parameters}
+    own = 100.0 * float(np.mean(holds)), float(np.median(seconds))
     return [
-        {
-            "case": "temperature along a record",
-            "model": name,
-            "n_parameters": n_parameters[name],
-            "median_error_percent": float(np.median(each)),
-            "worst_error_percent": max(each),
-            "intervals_that_hold_percent": 100.0 * float(np.mean(holds)) if name == "in the temperature" else None,
-            "seconds_per_fit": float(np.median(seconds)) if name == "in the temperature" else None,
-        }
-        for name, each in errors.items()
+        row("temperature along a record", name, n_parameters[name], each, *beside)
+        for (name, each), beside in zip(errors.items(), (own, (None, None)), strict=True)
     ]
 
 
@@ -248,21 +238,11 @@ def of_folder(folder: Path) -> tuple[list[Row], dict[str, Any]]:
         "a law for each supply": [each.rmse for each in alone],
     }
     spans = [float(np.ptp(each.y)) for each in records]
-    rows: list[Row] = []
-    for name, values in rms.items():
+    costs = (jointly.n_parameters, joint_seconds), (sum(each.n_parameters for each in alone), seconds)
+    rows = []
+    for (name, values), (n_parameters, taken) in zip(rms.items(), costs, strict=True):
         percent = [100.0 * value / span for value, span in zip(values, spans, strict=True)]
-        is_joint = name == "in the supply"
-        rows.append(
-            {
-                "case": "measured damper, 0 V and 0.88 V",
-                "model": name,
-                "n_parameters": jointly.n_parameters if is_joint else sum(each.n_parameters for each in alone),
-                "median_error_percent": float(np.median(percent)),
-                "worst_error_percent": max(percent),
-                "intervals_that_hold_percent": None,
-                "seconds_per_fit": joint_seconds if is_joint else seconds,
-            }
-        )
+        rows.append(row("measured damper, 0 V and 0.88 V", name, n_parameters, percent, None, taken))
     unknown = recorded(folder, "4.4")
     found = hs.estimate_channel(jointly, unknown, "supply", bounds=(0.0, 2.0))
     own = hs.identify(structure(), unknown)

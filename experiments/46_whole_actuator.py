@@ -14,7 +14,6 @@ two poles and a delay behind it, identified on the steps, the one record that sh
     python experiments/46_whole_actuator.py [CASES.jsonl]    with a file, its cases are kept and others are added to it
 """
 
-import json
 import sys
 import time
 from dataclasses import replace
@@ -27,14 +26,14 @@ import hysim as hs
 from hysim.plot import Figure, figure
 
 sys.path.insert(0, str(Path(__file__).parent))
-from results_folder import write_results
+from results_folder import append_lines, median_and_worst, stored_lines, write_results
+from simulated_stages import RANGE, STRUCTURE, drawn_law, noise_of, record
 
 RESULTS = Path(__file__).parent / "results" / "whole_actuator"
 N_DRAWS, N_PLAYS = 50, 10
 N_OF_ALONE, N_OF_CASCADE = 25, 5
 FAST, MEDIUM, SLOW = 1.0 / 20e3, 1e-3, 0.02  # sample times [s]
 HIGHEST = 125.0  # V
-RANGE = 3.0  # um, of the sensor of 12 bits
 WHOLE, CASCADE, ALONE = "whole actuator", "law >> transfer function", "law alone"
 Row = dict[str, Any]
 
@@ -66,14 +65,7 @@ def law_of(draw: int, rng: np.random.Generator) -> tuple[Any, Any]:
         weights[0] = 6.0
         law = hs.PrandtlIshlinskii(thresholds=tuple(thresholds), weights=tuple(0.02 * weights / weights.sum()))
         return law, hs.PrandtlIshlinskii.structure(plays=N_PLAYS)
-    structure = hs.PolynomialBoucWen(input_coefficients=(1.0, 0.1))
-    law = hs.identify(structure, hs.datasets.table1(), fixed={"n": 1.0}).model
-    return replace(
-        law,
-        beta=law.beta * rng.uniform(0.7, 1.4),
-        gamma=law.beta * rng.uniform(-0.5, 0.5),
-        gain=law.gain * rng.uniform(0.6, 1.4),
-    ), structure
+    return drawn_law(rng), STRUCTURE
 
 
 def stage(draw: int) -> tuple[hs.Actuator, Any, list[hs.Record], dict[str, float]]:
@@ -95,8 +87,7 @@ def stage(draw: int) -> tuple[hs.Actuator, Any, list[hs.Record], dict[str, float
     records = []
     for k, (u, step) in enumerate(commands(rng, 2 + draw // 4 % 2)):
         read = replace(truth, sensor=replace(sensor, seed=10 * draw + k))
-        units = {"t": "s", "u": "V", "y": "um"}
-        records.append(hs.Record(u=u, y=read.measured(u, step), t=step * np.arange(u.size), units=units))
+        records.append(record(read, u, step))
     values = {f"hysteresis.{name}": value for name, value in law.scalars.items() if not name.startswith("z0")}
     values |= {
         "creep.percent": percent,
@@ -105,11 +96,6 @@ def stage(draw: int) -> tuple[hs.Actuator, Any, list[hs.Record], dict[str, float
         "vibration.delay": delay,
     }
     return truth, structure, records, {name: float(value) for name, value in values.items()}
-
-
-def noise_of(sensor: hs.Sensor) -> float:
-    """Its rms value with that of the rounding [um]."""
-    return float(np.hypot(sensor.noise, sensor.quantum / np.sqrt(12.0)))
 
 
 # ---------------------------------------------------------------------------------- one case
@@ -155,23 +141,15 @@ def case(draw: int, model: str) -> Row:
     }  # fmt: skip
 
 
-def stored(file: Path | None) -> dict[tuple[int, str], Row]:
-    """Cases that were computed before."""
-    lines = file.read_text(encoding="utf-8").splitlines() if file is not None and file.exists() else []
-    return {(row["draw"], row["model"]): row for row in map(json.loads, lines)}
-
-
 def computed(file: Path | None) -> list[Row]:
     """All cases, each stored in the file as soon as it is known; all whole actuators first."""
-    known = stored(file)
+    known = {(row["draw"], row["model"]): row for row in stored_lines(file)}
     for model, n in ((WHOLE, N_DRAWS), (ALONE, N_OF_ALONE), (CASCADE, N_OF_CASCADE)):
         for draw in range(n):
             if (draw, model) not in known:
                 known[draw, model] = case(draw, model)
                 print(draw, model, known[draw, model]["error_in_noise"], flush=True)
-                if file is not None:
-                    with file.open("a", encoding="utf-8") as lines:
-                        lines.write(json.dumps(known[draw, model], allow_nan=False) + "\n")
+                append_lines(file, known[draw, model])
     return [known[key] for key in sorted(known)]
 
 
@@ -181,15 +159,11 @@ def computed(file: Path | None) -> list[Row]:
 def summary(cases: list[Row], model: str) -> Row:
     """One row of the table."""
     own = [each for each in cases if each["model"] == model]
-    errors = [each["error_in_noise"] for each in own]
-    cpu = [each["cpu_seconds"] for each in own]
     return {
         "model": model,
         "draws": len(own),
-        "median_error_in_noise": float(np.median(errors)),
-        "worst_error_in_noise": max(errors),
-        "median_cpu_seconds": float(np.median(cpu)),
-        "worst_cpu_seconds": max(cpu),
+        **median_and_worst("error_in_noise", (each["error_in_noise"] for each in own)),
+        **median_and_worst("cpu_seconds", (each["cpu_seconds"] for each in own)),
         "worst_wall_seconds": max(each["wall_seconds"] for each in own),
         "converged": sum(each["success"] for each in own),
     }

@@ -17,9 +17,7 @@ FOLDER holds fsm_subset.npz: u_100mV_train, y_100mV_train, ... of the axes (samp
 Nothing of it is stored here but errors and parameters.
 """
 
-import json
 import sys
-import tempfile
 import time
 from collections.abc import Callable, Sequence
 from pathlib import Path
@@ -28,10 +26,11 @@ from typing import Any
 import numpy as np
 
 import hysim as hs
+from hysim.models.storage import from_json, to_json
 from hysim.plot import Figure, figure
 
 sys.path.insert(0, str(Path(__file__).parent))
-from results_folder import write_results
+from results_folder import append_lines, stored_lines, write_results
 
 RESULTS = Path(__file__).parent / "results" / "mirror"
 INPUTS = ("u", "u2", "u3")
@@ -140,38 +139,21 @@ def case(folder: Path, output: str, name: str, start: Any) -> Row:
         "cpu_seconds": seconds,
         "success": fit.success,
         "message": fit.message,
-        "stored": as_text(model),
+        "stored": to_json(model),
     }
-
-
-def as_text(model: hs.MultiInputActuator) -> str:
-    """The file of a model."""
-    with tempfile.TemporaryDirectory() as folder:
-        hs.save(model, f"{folder}/model.json")
-        return Path(folder, "model.json").read_text(encoding="utf-8")
-
-
-def from_text(text: str) -> hs.MultiInputActuator:
-    """The model of a file."""
-    with tempfile.TemporaryDirectory() as folder:
-        Path(folder, "model.json").write_text(text, encoding="utf-8")
-        return hs.load_model(f"{folder}/model.json")
 
 
 def computed(folder: Path, file: Path | None) -> list[Row]:
     """All cases, each stored in the file as soon as it is known; the lines first, with whose modes the others begin."""
-    lines = file.read_text(encoding="utf-8").splitlines() if file is not None and file.exists() else []
-    known = {(row["output"], row["model"]): row for row in map(json.loads, lines)}
+    known = {(row["output"], row["model"]): row for row in stored_lines(file)}
     for output in OUTPUTS:
         for name in (*LAWS, *ALONE):
             if (output, name) in known:
                 continue
-            start = None if name == LINES else from_text(known[output, LINES]["stored"])
+            start = None if name == LINES else from_json(known[output, LINES]["stored"], "the lines")[0]
             row = known[output, name] = case(folder, output, name, start)
             print({key: value for key, value in row.items() if key != "stored"}, flush=True)
-            if file is not None:
-                with file.open("a", encoding="utf-8") as stored:
-                    stored.write(json.dumps(row, allow_nan=False) + "\n")
+            append_lines(file, row)
     return [known[output, name] for output in OUTPUTS for name in (*LAWS, *ALONE)]
 
 

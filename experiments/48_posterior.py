@@ -13,7 +13,6 @@
 Draws are stored one by one; `python experiments/48_posterior.py resume` goes on after those that are there.
 """
 
-import json
 import math
 import sys
 import time
@@ -27,7 +26,7 @@ import hysim as hs
 from hysim.plot import Figure, figure
 
 sys.path.insert(0, str(Path(__file__).parent))
-from results_folder import PIXEL, write_results
+from results_folder import PIXEL, stored_result, write_results
 
 RESULTS = Path(__file__).parent / "results" / "posterior"
 N_DRAWS, EFFECTIVE, MOST_STEPS = 400, 400, 6000
@@ -162,8 +161,7 @@ def main(smoke: bool = False, resume: bool = False) -> list[Row]:
         line = hs.identify(hs.Line, rec, noise="quantised")
         return [own_speed(rec, line, samples=50)]
     rec, fit = fitted()
-    stored = RESULTS / "result.json"
-    before = json.loads(stored.read_text()) if resume and stored.exists() else {}
+    before = stored_result(RESULTS) if resume else {}
     speeds = before.get("speeds") or [own_speed(rec, fit, 10_000), plain_speed(rec, fit, PLAIN_STEPS)]
     draws: list[dict[str, Any]] = before.get("draws", [])
     rows = _write(speeds, draws) if draws else []

@@ -28,7 +28,7 @@ from hysim.plot import Figure, figure
 from hysim.posterior import FACTORS, Evidence, EvidenceRow, log_evidence
 
 sys.path.insert(0, str(Path(__file__).parent))
-from results_folder import write_results
+from results_folder import stored_result, write_results
 
 RESULTS = Path(__file__).parent / "results" / "evidence"
 FIVE_TERMS = {"u'": 0.024, "u' y^2": -0.0013, "|u'|": -0.007, "|u'| u": 0.00024, "|u'| y^2": -0.003}
@@ -105,7 +105,7 @@ def main(smoke: bool = False, resume: bool = False) -> list[Row]:
     """Measure, print and write table, figure and result."""
     if smoke:
         return [measured("line", 1.0, "bridge"), measured("line", 1.0, "nested", live_points=40)]
-    rows = _stored() if resume else []
+    rows = stored_result(RESULTS).get("rows", []) if resume else []
     done = {(row["model"], row["factor"], row["method"]) for row in rows}
     for task in tasks():
         if task not in done:
@@ -116,11 +116,6 @@ def main(smoke: bool = False, resume: bool = False) -> list[Row]:
             )
             _write(rows)
     return rows
-
-
-def _stored() -> list[Row]:
-    stored = RESULTS / "result.json"
-    return json.loads(stored.read_text())["rows"] if stored.exists() else []
 
 
 def _write(rows: list[Row]) -> None:

@@ -17,11 +17,9 @@ predicted: a sine of 17 Hz, then steps held for 0.1 s; its error is in units of 
     python experiments/51_design.py [CASES.jsonl]    with a file, its cases are kept and others are added to it
 """
 
-import json
 import sys
 import time
 from dataclasses import replace
-from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -31,14 +29,14 @@ import hysim as hs
 from hysim.plot import Figure, figure
 
 sys.path.insert(0, str(Path(__file__).parent))
-from results_folder import write_results
+from results_folder import append_lines, median_and_worst, stored_lines, write_results
+from simulated_stages import RANGE, STRUCTURE, drawn_law, noise_of, record
 
 RESULTS = Path(__file__).parent / "results" / "design"
 N_DRAWS = 5
 DESIGNED = "designed"
 INPUTS = (DESIGNED, "triangle", "fading triangle", "multisine")
 LIMITS = hs.InputLimits(amplitude=50.0, centre=50.0, slew=2e4, duration=0.6, sample_time=0.5e-3)
-RANGE = 3.0  # um, of the sensor
 FREQUENCY, DAMPING = "vibration.natural_frequencies[0]", "vibration.damping_ratios[0]"
 FREE = (
     *(f"hysteresis.{name}" for name in ("beta", "gamma", "gain", "offset")),
@@ -56,22 +54,10 @@ Row = dict[str, Any]
 # ---------------------------------------------------------------------------------- simulated stages
 
 
-@cache
-def law_of_table1() -> Any:
-    structure = hs.PolynomialBoucWen(input_coefficients=(1.0, 0.1))
-    return replace(hs.identify(structure, hs.datasets.table1(), fixed={"n": 1.0}).model, z0=0.0)
-
-
 def stage(draw: int) -> tuple[hs.Actuator, dict[str, float]]:
     """The true actuator, and its parameters beside those of the law."""
     rng = np.random.default_rng(draw)
-    law = law_of_table1()
-    law = replace(
-        law,
-        beta=law.beta * rng.uniform(0.7, 1.4),
-        gamma=law.beta * rng.uniform(-0.5, 0.5),
-        gain=law.gain * rng.uniform(0.6, 1.4),
-    )
+    law = replace(drawn_law(rng), z0=0.0)
     parts = {
         "creep.percent": rng.uniform(0.5, 3.0),
         FREQUENCY: 2.0 * np.pi * np.exp(rng.uniform(np.log(100.0), np.log(400.0))),
@@ -156,15 +142,6 @@ def expected(truth: hs.Actuator, parts: dict[str, float], u: np.ndarray) -> dict
     return dict(zip(columns, np.sqrt(np.diag(covariance)).tolist(), strict=True))
 
 
-def record(truth: hs.Actuator, u: np.ndarray, step: float) -> hs.Record:
-    return hs.Record(u=u, y=truth.measured(u, step), t=step * np.arange(u.size), units={"t": "s", "u": "V", "y": "um"})
-
-
-def noise_of(sensor: hs.Sensor) -> float:
-    """Its rms value with that of the rounding [um]."""
-    return float(np.hypot(sensor.noise, sensor.quantum / np.sqrt(12.0)))
-
-
 # ---------------------------------------------------------------------------------- one draw
 
 
@@ -179,7 +156,7 @@ def cases(draw: int, inputs: dict[str, np.ndarray], design_seconds: float) -> li
     for name in INPUTS:
         own, best = errors_of[name], errors_of[DESIGNED]
         begin = time.process_time()
-        structure = structure_of(truth, hs.PolynomialBoucWen(input_coefficients=(1.0, 0.1)))
+        structure = structure_of(truth, STRUCTURE)
         fit = hs.identify(structure, [first, record(truth, inputs[name], LIMITS.sample_time)], fixed=FIXED)
         seconds = time.process_time() - begin
         errors = {each: abs(fit.estimates[each] - values[each]) for each in FREE if each in fit.free_names}
@@ -204,16 +181,13 @@ def cases(draw: int, inputs: dict[str, np.ndarray], design_seconds: float) -> li
 
 def computed(file: Path | None) -> list[Row]:
     """All cases, those of a draw stored in the file as soon as they are known."""
-    lines = file.read_text(encoding="utf-8").splitlines() if file is not None and file.exists() else []
-    known = [json.loads(line) for line in lines]
+    known = stored_lines(file)
     for draw in range(N_DRAWS):
         if all(row["draw"] != draw for row in known):
             found = cases(draw, *designs(draw))
             known += found
             print(draw, {row["input"]: round(row["error_in_noise"], 3) for row in found}, flush=True)
-            if file is not None:
-                with file.open("a", encoding="utf-8") as stored:
-                    stored.writelines(json.dumps(row, allow_nan=False) + "\n" for row in found)
+            append_lines(file, *found)
     return known
 
 
@@ -223,7 +197,7 @@ def computed(file: Path | None) -> list[Row]:
 def summary(rows: list[Row], name: str) -> Row:
     """One row of the table."""
     own = [row for row in rows if row["input"] == name]
-    pooled = {unit: [value for row in own for value in row[unit].values()] for unit in ("in_designed", "in_own")}
+    errors = {unit: [value for row in own for value in row[unit].values()] for unit in ("in_designed", "in_own")}
     parts = {}
     for part in ("hysteresis", "creep", "vibration"):
         ratios = [value for row in own for each, value in row["expected_ratio"].items() if each.startswith(part)]
@@ -231,14 +205,11 @@ def summary(rows: list[Row], name: str) -> Row:
     return {
         "input": name,
         "draws": len(own),
-        "median_error_in_expected_of_designed": float(np.median(pooled["in_designed"])),
-        "worst_error_in_expected_of_designed": max(pooled["in_designed"]),
-        "median_error_in_own_expected": float(np.median(pooled["in_own"])),
-        "worst_error_in_own_expected": max(pooled["in_own"]),
+        **median_and_worst("error_in_expected_of_designed", errors["in_designed"]),
+        **median_and_worst("error_in_own_expected", errors["in_own"]),
         **parts,
         "not_determined": sum(len(row["not_determined"]) for row in own),
-        "median_prediction_in_noise": float(np.median([row["error_in_noise"] for row in own])),
-        "worst_prediction_in_noise": max(row["error_in_noise"] for row in own),
+        **median_and_worst("prediction_in_noise", (row["error_in_noise"] for row in own)),
         "converged": sum(row["success"] for row in own),
         "median_fit_cpu_seconds": float(np.median([row["fit_cpu_seconds"] for row in own])),
     }

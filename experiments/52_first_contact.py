@@ -15,7 +15,6 @@ best filter, and each true parameter is looked for in its interval at 95 %.
 """
 
 import shutil
-import subprocess
 import sys
 import tempfile
 import warnings
@@ -30,7 +29,9 @@ from hysim.plot import Figure, figure
 
 sys.path.insert(0, str(Path(__file__).parent))
 from every_verb import largest_difference, numbers_of_every_verb
+from measured_cores import core_loops
 from results_folder import write_results
+from step_runners import program_output
 
 RESULTS = Path(__file__).parent / "results" / "first_contact"
 NOISES = (0.0, 0.01, 0.03, 0.1, 0.3, 1.0)  # % of the span of the input
@@ -51,13 +52,7 @@ LAWS: dict[str, hs.Law] = {
     "Dahl": hs.Dahl(stiffness=1.0, coulomb=20.0),
     "plays": hs.PrandtlIshlinskii(thresholds=(0.0, 5.0, 15.0, 30.0), weights=(1.0, 0.3, 0.2, 0.1)),
 }
-FAMILIES: dict[str, Any] = {
-    "Bouc-Wen": hs.BoucWen,
-    "polynomial Bouc-Wen": hs.PolynomialBoucWen,
-    "Zhu-Wang": hs.ZhuWangBoucWen,
-    "Dahl": hs.Dahl,
-    "plays": hs.PrandtlIshlinskii,
-}
+FAMILIES: dict[str, Any] = {name: type(law) for name, law in LAWS.items()}
 OTHERS: dict[str, Any] = {
     "generalised Bouc-Wen": hs.GeneralizedBoucWen,
     "Baber-Noori": hs.BoucWenBaberNoori,
@@ -144,21 +139,14 @@ def others() -> Iterator[Case]:
 def measured(folder: Path) -> Iterator[Case]:
     """The records of a folder: mirror, damper, magnets, steel."""
     every = tuple(FAMILIES)
-    for level in (300,):
-        path, place = folder / "fsm_cubespec" / "fsm_subset.npz", f"{level}mV_train[0,0,0]"
-        record = hs.load(path, u=f"u_{place}", y=f"y_{place}", t=False, name=f"mirror {level} mV")
-        yield from _each(record[:MIRROR], every)
+    path, place = folder / "fsm_cubespec" / "fsm_subset.npz", "300mV_train[0,0,0]"
+    record = hs.load(path, u=f"u_{place}", y=f"y_{place}", t=False, name="mirror 300 mV")
+    yield from _each(record[:MIRROR], every)
     path = folder / "mr_damper_labcontrol" / "data_simulation_4.2_MRdamper.mat"
     yield from _each(hs.load(path, u="x_F[0]", y="x_F[2]", t=False, name="damper 4.2"), every)
-    for material, amplitudes in (("MnZn_ferrite", 3), ("amorf", 1)):
-        for k in range(amplitudes):
-            place = f"[{k}]" if amplitudes > 1 else ""
-            columns = [
-                hs.load(folder / "magnetic_jamodel" / f"{x}_{material}.mat", u=f"{x}measT{place}", y=f"{x}measT{place}",
-                        t=False).u
-                for x in "HB"
-            ]  # fmt: skip
-            yield from _each(hs.Record(u=columns[0], y=columns[1], name=f"{material} {k + 1}"), every)
+    for material in ("MnZn_ferrite", "amorf"):
+        for loop in core_loops(folder, material):
+            yield from _each(loop, every)
     for k in (1, 2, 3):
         path = folder / "steel_resspylab" / f"example_{k}.csv"
         yield from _each(hs.load(path, u="e_true", y="Sigma_true", name=f"coupon {k}"), (*every, "Baber-Noori"))
@@ -249,14 +237,7 @@ def _of_c(feedforward: Any, wanted: np.ndarray, folder: Path) -> float | None:
     """Largest difference between the commands of the exported C and of Python, in spans of these."""
     if (compiler := shutil.which("cc")) is None:
         return None
-    code = hs.to_c(feedforward, name="inverse")
-    code.write(folder)
-    program = folder / "inverse"
-    sources = [str(folder / "inverse.c"), str(folder / "inverse_main.c")]
-    subprocess.run([compiler, "-std=c99", "-O2", "-ffp-contract=off", *sources, "-lm", "-o", str(program)], check=True)
-    lines = "\n".join(repr(each) for each in wanted.tolist()) + "\n"
-    text = subprocess.run([str(program)], input=lines, capture_output=True, text=True, check=True).stdout
-    commands = np.array([float(line.split()[-1]) for line in text.split("\n") if line.strip()])
+    commands = program_output(compiler, hs.to_c(feedforward, name="inverse"), wanted[np.newaxis], folder)
     step, parameters, state = feedforward.compiled(1.0, feedforward.u0 or 0.0)
     ours = np.array([step(parameters, state, each, 0.0) for each in wanted.tolist()])
     known = ~(np.isnan(commands) & np.isnan(ours))  # where no input has the wanted output
@@ -279,25 +260,20 @@ def main(smoke: bool = False, folder: Path | None = None) -> list[Row]:
                 print(line_of(rows[-1]), flush=True)
     if smoke:
         return rows
-    numbers = summary(rows)
-    write_results(RESULTS, rows, draw, numbers)
+    write_results(RESULTS, rows, draw, summary(rows))
     return rows
 
 
 def line_of(row: Row) -> str:
     """A row in words."""
-    floor = (
-        ""
-        if row["over_floor"] is None
-        else f", {row['over_floor']:.2f} of the floor, {row['held']}/{row['parameters']}"
-    )
-    flow = (
-        "" if row["flow"] is None else f", flow {row['flow']} [{row['lowest']}, {row['highest']}], C {row['c_apart']}"
-    )
-    return (
+    line = (
         f"{row['record']}: {row['model']}, {row['fit_percent']:.3f} %, verbs within {row['largest_difference']:.1e} %"
-        f"{floor}{flow}"
     )
+    if row["over_floor"] is not None:
+        line += f", {row['over_floor']:.2f} of the floor, {row['held']}/{row['parameters']}"
+    if row["flow"] is not None:
+        line += f", flow {row['flow']} [{row['lowest']}, {row['highest']}], C {row['c_apart']}"
+    return line
 
 
 def summary(rows: list[Row]) -> Row:

@@ -7,6 +7,7 @@ outputs are whatever the compiled step returns from there on.
 
 from collections.abc import Callable, Iterator
 from dataclasses import replace
+from functools import cache
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -317,7 +318,7 @@ def paths(of: Drawn, rng: Rng, path: Callable[[Rng, float, int], Array], n: int)
     return np.stack([of.centre + np.clip(path(rng, of.length, n), -of.reach, of.reach) for _ in range(count)])
 
 
-_ENTRIES: dict[tuple[Any, Any], tuple[str, bool]] = {}
+_entries = cache(entries)
 
 
 def case(family: str, kind: str, thing: Any, inputs: Array) -> Case:
@@ -329,10 +330,7 @@ def case(family: str, kind: str, thing: Any, inputs: Array) -> Case:
         replay(step, parameters, state, inputs[0], inputs[1], command, u)
         return Case(family, kind, thing, program.source, False, False, program.parameters, program.state, inputs, u)
     model = startable(thing, SAMPLE_TIME)
-    key = model.step, model.start
-    if key not in _ENTRIES:
-        _ENTRIES[key] = entries(*key)
-    source, has_start = _ENTRIES[key]
+    source, has_start = _entries(model.step, model.start)
     law = model.started(float(inputs[0, 0]))
     y = everything(law.step, law.parameters, law.state, inputs[0])
     return Case(family, kind, thing, source, has_start, True, model.parameters, model.state, inputs, y)

@@ -10,7 +10,6 @@ whenever it has converged, until the time is spent. Each run is stored as it end
 goes on with the next seed.
 """
 
-import json
 import math
 import time
 from collections.abc import Sequence
@@ -18,8 +17,9 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
-from magnetic_reference import Core, susceptibility
+from magnetic_reference import Core, runge_kutta_step, susceptibility
 from numba import njit
+from results_folder import append_lines, stored_lines
 from scipy.optimize import OptimizeResult, differential_evolution
 
 MU0 = 4e-7 * math.pi
@@ -52,14 +52,8 @@ def moved(core: Core, start: float, end: float, M: float, steps: int) -> float:
     if end == start:
         return M
     h = (end - start) / steps
-    delta = 1.0 if h > 0.0 else -1.0
     for k in range(steps):
-        H = start + k * h
-        first = susceptibility(core, H, M, delta)
-        second = susceptibility(core, H + 0.5 * h, M + 0.5 * h * first, delta)
-        third = susceptibility(core, H + 0.5 * h, M + 0.5 * h * second, delta)
-        fourth = susceptibility(core, H + h, M + h * third, delta)
-        M += h / 6.0 * (first + 2.0 * second + 2.0 * third + fourth)
+        M = runge_kutta_step(susceptibility, core, start + k * h, M, h)
     return M
 
 
@@ -145,20 +139,11 @@ def thinned(course: list[tuple[float, float]]) -> list[tuple[float, float]]:
     return kept if kept[-1] == course[-1] else [*kept, course[-1]]
 
 
-def runs_of(path: Path, name: str) -> list[dict[str, Any]]:
-    """The runs on a set of records that are stored."""
-    if not path.exists():
-        return []
-    rows = [json.loads(line) for line in path.read_text(encoding="utf-8").splitlines()]
-    return [{key: value for key, value in row.items() if key != "set"} for row in rows if row["set"] == name]
-
-
 def evolve_until(path: Path | None, name: str, loops: Sequence[Loop], seconds: float) -> list[dict[str, Any]]:
     """Runs on a set of records, until they have taken `seconds` of the processor together; stored in `path`, if any."""
-    runs = [] if path is None else runs_of(path, name)
+    stored = [row for row in stored_lines(path) if row["set"] == name]
+    runs = [{key: value for key, value in row.items() if key != "set"} for row in stored]
     while (rest := seconds - sum(run["seconds"] for run in runs)) > 0.0:
         runs.append(evolve(loops, len(runs), rest))
-        if path is not None:
-            with path.open("a", encoding="utf-8") as file:
-                file.write(json.dumps({"set": name, **runs[-1]}) + "\n")
+        append_lines(path, {"set": name, **runs[-1]})
     return runs

@@ -142,19 +142,25 @@ def euler(core: Core, fields: Array, M: float) -> Array:
 
 
 @njit
+def runge_kutta_step(slope: Any, core: Any, H: float, M: float, h: float) -> float:
+    """M after a step of the classical rule of order 4."""
+    delta = 1.0 if h > 0.0 else -1.0
+    first = slope(core, H, M, delta)
+    second = slope(core, H + 0.5 * h, M + 0.5 * h * first, delta)
+    third = slope(core, H + 0.5 * h, M + 0.5 * h * second, delta)
+    fourth = slope(core, H + h, M + h * third, delta)
+    return M + h / 6.0 * (first + 2.0 * second + 2.0 * third + fourth)
+
+
+@njit
 def runge_kutta(core: Core, fields: Array, M: float) -> Array:
     """M at the fields by the classical rule of order 4, one step from each to the next."""
     found = np.empty(fields.size)
     found[0] = M
     for k in range(1, fields.size):
-        H, h = fields[k - 1], fields[k] - fields[k - 1]
-        delta = 1.0 if h > 0.0 else -1.0
+        h = fields[k] - fields[k - 1]
         if h != 0.0:
-            first = susceptibility(core, H, M, delta)
-            second = susceptibility(core, H + 0.5 * h, M + 0.5 * h * first, delta)
-            third = susceptibility(core, H + 0.5 * h, M + 0.5 * h * second, delta)
-            fourth = susceptibility(core, H + h, M + h * third, delta)
-            M += h / 6.0 * (first + 2.0 * second + 2.0 * third + fourth)
+            M = runge_kutta_step(susceptibility, core, fields[k - 1], M, h)
         found[k] = M
     return found
 
@@ -217,12 +223,7 @@ def spelled(slope: Any, core: Any, fields: Array) -> Array:
     """M of a demagnetised core at the fields, by the classical rule of order 4, one step from each to the next."""
     found, M = np.zeros(fields.size), 0.0
     for k in range(1, fields.size):
-        H, h = fields[k - 1], fields[k] - fields[k - 1]
-        delta = 1.0 if h > 0.0 else -1.0
-        first = slope(core, H, M, delta)
-        second = slope(core, H + 0.5 * h, M + 0.5 * h * first, delta)
-        third = slope(core, H + 0.5 * h, M + 0.5 * h * second, delta)
-        M += h / 6.0 * (first + 2.0 * second + 2.0 * third + slope(core, H + h, M + h * third, delta))
+        M = runge_kutta_step(slope, core, fields[k - 1], M, fields[k] - fields[k - 1])
         found[k] = M
     return found
 

@@ -137,9 +137,8 @@ def _double(content: bytes, rng: random.Random) -> bytes:
 
 def _insert(content: bytes, rng: random.Random) -> bytes:
     at = rng.randrange(len(content) + 1)
-    return (
-        content[:at] + rng.choice((b"\0", b"\n", b",", b'"', b"nan", b"-inf", b"1e999", b"#", b"\xff")) + content[at:]
-    )
+    word = rng.choice((b"\0", b"\n", b",", b'"', b"nan", b"-inf", b"1e999", b"#", b"\xff"))
+    return content[:at] + word + content[at:]
 
 
 def _join(content: bytes, rng: random.Random) -> bytes:

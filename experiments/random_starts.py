@@ -7,7 +7,7 @@ Its seconds are those of the processor, so that other work on the machine takes 
 
 import contextlib
 import time
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from types import MappingProxyType
 from typing import Any, NamedTuple
 
@@ -16,6 +16,7 @@ import numpy.typing as npt
 from scipy.optimize import least_squares
 
 import hysim as hs
+from hysim.plot import Figure, figure
 
 N_STARTS = 20
 PATIENCE = 10.0  # times as long as the default call
@@ -53,6 +54,26 @@ def reaches(fit: hs.Identification, cost: float, least: float, n_parameters: int
     """
     samples, saved = fit.residual.size, max(0, n_parameters - fit.n_parameters)
     return bool(cost <= REACHED * least or samples * np.log(cost / least) <= saved * np.log(samples))
+
+
+def share_percent(rows: Sequence[Mapping[str, Any]], name: str) -> float:
+    """Share of the cases of which a column is true."""
+    return 100.0 * float(np.mean([row[name] for row in rows]))
+
+
+def draw_cases(rows: Sequence[Mapping[str, Any]], places: Sequence[float], names: Sequence[str], unit: str) -> Figure:
+    """Cost over the best known, and the seconds of the default call, each case at its place beside the names."""
+    canvas = figure(height=5.6)
+    above, below = canvas.subplots(2, 1, sharex=True)
+    for row, place in zip(rows, places, strict=True):
+        mark = {"marker": "o", "markersize": 3.5, "color": "#0072B2" if row["reached"] else "#D55E00"}
+        above.plot(place, max(row["over_best_known"] - 1.0, 1e-12), **mark)
+        below.plot(place, row["seconds"], **mark)
+    above.axhline(REACHED - 1.0, color="#999999", linewidth=0.8)
+    above.set(yscale="log", ylabel="Sum of squares over\nthe best known, less 1")
+    below.set(yscale="log", ylabel=f"Default call [{unit}]")
+    below.set_xticks(range(len(names)), names, rotation=20, ha="right")
+    return canvas
 
 
 class Descents(NamedTuple):

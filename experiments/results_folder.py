@@ -2,9 +2,11 @@
 
 import csv
 import json
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
 from typing import Any, TypeVar
+
+import numpy as np
 
 import hysim as hs
 from hysim.plot import Figure, house_style, save_svg
@@ -17,18 +19,73 @@ Row = TypeVar("Row", bound=Mapping[str, Any])
 def write_results(
     folder: Path, rows: list[Row], draw: Callable[[list[Row]], Figure], numbers: Mapping[str, Any]
 ) -> None:
-    """Print `numbers`, and write table.csv, figure.svg, and result.json with them before the rows, into `folder`."""
+    """Print `numbers`, and write table.csv, figure.svg, and result.json with them before the rows, into `folder`.
+
+    Cells of the table are empty where a row lacks a column.
+    """
     for name, value in numbers.items():
         print(name, value)
     folder.mkdir(parents=True, exist_ok=True)
+    columns = dict.fromkeys(name for row in rows for name in row)
     with (folder / "table.csv").open("w", newline="", encoding="utf-8") as file:
-        table = csv.DictWriter(file, rows[0], lineterminator="\n")
+        table = csv.DictWriter(file, columns, lineterminator="\n")
         table.writeheader()
         table.writerows(rows)
     document = json.dumps({**numbers, "rows": rows}, indent=2, allow_nan=False)
     (folder / "result.json").write_text(document + "\n", encoding="utf-8")
     with house_style():
         save_svg(draw(rows), folder / "figure.svg", name=folder.name)
+
+
+def stored_result(folder: Path) -> dict[str, Any]:
+    """What result.json of an earlier run holds; nothing if there was none."""
+    file = folder / "result.json"
+    return dict(json.loads(file.read_text(encoding="utf-8"))) if file.exists() else {}
+
+
+def stored_lines(file: Path | None) -> list[dict[str, Any]]:
+    """Rows of a file with a row of JSON on each line; none if there is no file."""
+    if file is None or not file.exists():
+        return []
+    return [json.loads(line) for line in file.read_text(encoding="utf-8").splitlines()]
+
+
+def append_lines(file: Path | None, *rows: Mapping[str, Any]) -> None:
+    """Add rows to such a file, if there is to be one."""
+    if file is not None:
+        with file.open("a", encoding="utf-8") as lines:
+            lines.writelines(json.dumps(row, allow_nan=False) + "\n" for row in rows)
+
+
+def median_and_worst(name: str, values: Iterable[float]) -> dict[str, float]:
+    """The columns of a summary of some values of `name`."""
+    collected = np.array(list(values), dtype=float)
+    return {f"median_{name}": float(np.median(collected)), f"worst_{name}": float(collected.max())}
+
+
+def label_grid(canvas: Figure, axes: np.ndarray, xlabel: str, ylabel: str, names: Iterable[str]) -> None:
+    """Label a grid of panels at its lower and left side, with one legend of these names, where they are drawn."""
+    for ax in axes[-1]:
+        ax.set_xlabel(xlabel)
+    for ax in axes[:, 0]:
+        ax.set_ylabel(ylabel)
+    handles = {label: handle for ax in axes.flat for handle, label in zip(*ax.get_legend_handles_labels(), strict=True)}
+    shown = [name for name in names if name in handles]
+    canvas.legend([handles[name] for name in shown], shown, loc="outside lower center", ncols=3)
+
+
+def draw_models(
+    canvas: Figure, rows: list[Row], filled: list[bool], panels: Iterable[tuple[str, float, str]]
+) -> np.ndarray:
+    """A dot for each model and panel, filled or not; a panel is a column, its scale and its label."""
+    axes = canvas.subplots(1, 2, sharey=True)
+    for ax, (column, scale, label) in zip(axes, panels, strict=True):
+        for place, (row, full) in enumerate(zip(rows, filled, strict=True)):
+            ax.plot(scale * row[column], place, "o", color="#0072B2", markerfacecolor="#0072B2" if full else "white")
+        ax.set_xlabel(label)
+    axes[0].set_yticks(range(len(rows)), [row["model"] for row in rows])
+    axes[0].invert_yaxis()
+    return axes
 
 
 def loop_columns(loop: hs.control.LoopAssessment) -> dict[str, float | bool | None]:

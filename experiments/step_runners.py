@@ -30,8 +30,8 @@ _PROGBITS, _WRITE, _ALLOC = 1, 1, 2  # of a section of an ELF file
 
 _ARGUMENTS = "const double *parameters, int n_parameters, double *state, int n_state"
 _LOOP = """
-{export}void begin({arguments}, double u0);
-{export}void run({arguments}, const double *u, const double *m, double *y, int n);
+{exported[begin]}void begin({arguments}, double u0);
+{exported[run]}void run({arguments}, const double *u, const double *m, double *y, int n);
 
 void begin({arguments}, double u0) {{
     (void)parameters; (void)n_parameters; (void)state; (void)n_state; (void)u0;
@@ -71,23 +71,14 @@ int main(void) {
 def text(case: Case, export: bool = False) -> str:
     """The C source of a case, with a loop over samples."""
     sizes = ("parameters", "n_parameters", "state", "n_state") if case.has_sizes else ("parameters", "state")
-    if case.has_sizes:
-        inputs = ["u[k]"]
-    else:
-        inputs = ["u[k]"] if isinstance(case.thing, hs.InverseFeedforward) else ["u[k]", "m[k]"]
+    inputs = ("u[k]", "m[k]")[: len(inputs_of(case))]
     places = {
+        "exported": {name: f'__attribute__((export_name("{name}")))\n' if export else "" for name in ("begin", "run")},
         "arguments": _ARGUMENTS,
         "start": f"start({', '.join([*sizes, 'u0'])})" if case.has_start else "(void)0",
         "call": ", ".join([*sizes, *inputs]),
     }
-    names = ("begin", "run")
-    loop = _LOOP.format(export="", **places)
-    if export:
-        for name in names:
-            loop = loop.replace(
-                f"void {name}({_ARGUMENTS}", f'__attribute__((export_name("{name}")))\nvoid {name}({_ARGUMENTS}', 1
-            )
-    return f"#include <math.h>\n\n{case.source}{loop}"
+    return f"#include <math.h>\n\n{case.source}{_LOOP.format(**places)}"
 
 
 def compiled(command: Sequence[str], source: str, target: Path, *options: str) -> Path:
@@ -141,16 +132,20 @@ def least_seconds(call: Callable[[], Any]) -> float:
     return min(times)
 
 
-def program_output(source: hs.CSource, case: Case, folder: Path) -> Array:
-    """Outputs of the program that `hysim.to_c` makes, which reads and prints text."""
+def inputs_of(case: Case) -> Array:
+    """What the step reads, (n_inputs, n_samples): an inverse has no measurement."""
+    return case.inputs[:1] if isinstance(case.thing, hs.InverseFeedforward) else case.inputs
+
+
+def program_output(compiler: str, source: hs.CSource, inputs: Array, folder: Path) -> Array:
+    """Outputs of the program that `hysim.to_c` makes, which reads `inputs` (n_inputs, n_samples) and prints text."""
     source.write(folder)
     files = [f"{source.name}.c", f"{source.name}_main.c"]
-    command = ["gcc", *STRICT, *files, "-o", f"{source.name}_main", "-lm"]
+    command = [compiler, *STRICT, *files, "-o", f"{source.name}_main", "-lm"]
     done = subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False)
     if done.returncode or done.stderr:
-        raise RuntimeError(f"{case.family}: {done.stderr}")
-    n_inputs = 1 if isinstance(case.thing, hs.InverseFeedforward) else len(case.inputs)
-    lines = "\n".join(" ".join(map(repr, values)) for values in case.inputs[:n_inputs].T.tolist())
+        raise RuntimeError(f"{source.name}: {done.stderr}")
+    lines = "\n".join(" ".join(map(repr, values)) for values in inputs.T.tolist())
     main = folder / f"{source.name}_main"
     printed = subprocess.run([main], input=lines, capture_output=True, text=True, check=True).stdout
     return np.array([float(word) for word in printed.split()])

@@ -66,13 +66,31 @@ class Group(Protocol):
     def scales(self, d: float) -> Array: ...
 
 
-class Memories:
-    """Bouc-Wen laws, z' = v (A - |z|^n (gamma + beta sgn(z v))), with weights `gain`; Dahl's is one with gamma = 0."""
+class Signed:
+    """What laws have in common whose equation depends on the sign of their memory, which stands first in the states.
+
+    `of` are their elements, and `A` the rates of their memories at zero.
+    """
 
     clamped = False
+    of: Array
+    A: Array
+    side: Array
+
+    def turn(self, elements: Array, z: Array, s: Array) -> None:
+        """A memory of exactly zero goes to the side that the motion takes it to."""
+        at_zero = z[: self.of.size] == 0.0
+        self.side = np.where(at_zero, np.where(self.A < 0.0, -1.0, 1.0) * s[self.of], self.side)
+
+    def switch(self, which: Array, d: Array, s: Array, z: Array) -> None:
+        self.side[which] *= -1.0
+
+
+class Memories(Signed):
+    """Bouc-Wen laws, z' = v (A - |z|^n (gamma + beta sgn(z v))), with weights `gain`; Dahl's is one with gamma = 0."""
 
     def __init__(self, place: Sequence[int], laws: Sequence[hs.BoucWen]) -> None:
-        self.place = np.array(place)
+        self.place = self.of = np.array(place)
         fields = ("A", "beta", "gamma", "n", "gain", "z0")
         self.A, self.beta, self.gamma, self.n, self.gain, self.z0 = np.array(
             [[vars(law)[name] for name in fields] for law in laws]
@@ -84,10 +102,6 @@ class Memories:
         self.side = np.where(self.z0 < 0.0, -1.0, 1.0)
         return self.z0.copy()
 
-    def turn(self, elements: Array, z: Array, s: Array) -> None:
-        """A memory of exactly zero goes to the side that the motion takes it to."""
-        self.side = np.where(z == 0.0, np.where(self.A < 0.0, -1.0, 1.0) * s[self.place], self.side)
-
     def force(self, z: Array) -> Array:
         return self.gain * z
 
@@ -97,9 +111,6 @@ class Memories:
 
     def margins(self, d: Array, s: Array, z: Array) -> Array:
         return self.side * z
-
-    def switch(self, which: Array, d: Array, s: Array, z: Array) -> None:
-        self.side[which] *= -1.0
 
     def scales(self, d: float) -> Array:
         return np.abs(self.A) * d
@@ -141,28 +152,21 @@ class Plays:
         return np.full(self.place.size, d)
 
 
-class Worn:
+class Worn(Signed):
     """Baber and Noori's laws: states z, then e with e' = z v, as `hysim.BoucWenBaberNoori` documents them."""
-
-    clamped = False
 
     def __init__(self, place: Sequence[int], laws: Sequence[hs.BoucWenBaberNoori]) -> None:
         self.of = np.array(place)
         self.place = np.concatenate([self.of, self.of])
         names = ("A", "beta", "gamma", "n", "delta_a", "delta_nu", "delta_eta", "zeta_s", "q", "p", "psi", "delta_psi")
         self.values = {name: np.array([vars(law)[name] for law in laws]) for name in (*names, "lambda_", "gain", "z0")}
-        self.power = _power(self.values["n"])
+        self.A, self.power = self.values["A"], _power(self.values["n"])
         self.side = np.ones(self.of.size)
 
     def start(self) -> Array:
         z0 = self.values["z0"]
         self.side = np.where(z0 < 0.0, -1.0, 1.0)
         return np.concatenate([z0, np.zeros_like(z0)])
-
-    def turn(self, elements: Array, z: Array, s: Array) -> None:
-        of = self.values["A"]
-        at_zero = z[: self.of.size] == 0.0
-        self.side = np.where(at_zero, np.where(of < 0.0, -1.0, 1.0) * s[self.of], self.side)
 
     def force(self, z: Array) -> Array:
         return np.concatenate([self.values["gain"] * z[: self.of.size], np.zeros(self.of.size)])
@@ -175,17 +179,14 @@ class Worn:
         width = (k["psi"] + k["delta_psi"] * e) * (k["lambda_"] + depth)
         pinched = 1.0 - depth * np.exp(-(((memory * direction - k["q"] * yielding) / width) ** 2))
         bend = k["gamma"] + k["beta"] * self.side * direction
-        slope = k["A"] - k["delta_a"] * e - strength * self.power(self.side * memory) * bend
+        slope = self.A - k["delta_a"] * e - strength * self.power(self.side * memory) * bend
         return np.concatenate([speed * pinched * slope / stiffness, speed * memory])
 
     def margins(self, d: Array, s: Array, z: Array) -> Array:
         return np.concatenate([self.side * z[: self.of.size], np.full(self.of.size, np.inf)])
 
-    def switch(self, which: Array, d: Array, s: Array, z: Array) -> None:
-        self.side[which] *= -1.0
-
     def scales(self, d: float) -> Array:
-        z = np.abs(self.values["A"]) * d
+        z = np.abs(self.A) * d
         return np.concatenate([z, z * d])
 
 
@@ -212,8 +213,8 @@ class Elements(NamedTuple):
 def elements_of(laws: Sequence[Any]) -> Elements:
     """The differential equations of hysim's laws, sums among them; TypeError for a law that is not known here."""
     offset, slope, rate = np.zeros((3, len(laws)))
-    memories: tuple[list[int], list[Any]] = ([], [])
-    worn: tuple[list[int], list[Any]] = ([], [])
+    memories: list[tuple[int, hs.BoucWen]] = []
+    worn: list[tuple[int, hs.BoucWenBaberNoori]] = []
     plays: list[tuple[int, float, float, float]] = []
 
     def add(e: int, law: Any) -> None:
@@ -227,22 +228,18 @@ def elements_of(laws: Sequence[Any]) -> Elements:
         offset[e] += law.offset
         if isinstance(law, hs.BoucWen):
             slope[e] += law.feedthrough
-            memories[0].append(e)
-            memories[1].append(law)
+            memories.append((e, law))
         elif isinstance(law, hs.Dahl):
             beta = law.stiffness / law.coulomb
-            memories[0].append(e)
-            memories[1].append(hs.BoucWen(A=law.stiffness, beta=beta, gamma=0.0, n=1.0, z0=law.z0))
+            memories.append((e, hs.BoucWen(A=law.stiffness, beta=beta, gamma=0.0, n=1.0, z0=law.z0)))
         elif isinstance(law, hs.BoucWenBaberNoori):
             (linear,) = law.input_coefficients
             slope[e] += linear
-            worn[0].append(e)
-            worn[1].append(law)
+            worn.append((e, law))
         elif isinstance(law, hs.MaxwellSlip):
             slope[e] += law.feedthrough + sum(law.stiffness)
-            plays.extend(
-                (e, r, -k, z) for r, k, z in zip(law.slips, law.stiffness, _each(law.z0, law.slips), strict=True)
-            )
+            z0 = _each(law.z0, law.slips)
+            plays.extend((e, r, -k, z) for r, k, z in zip(law.slips, law.stiffness, z0, strict=True))
         elif isinstance(law, hs.PrandtlIshlinskii):
             z0 = _each(law.z0, law.weights)
             plays.extend((e, r, w, z) for r, w, z in zip(law.thresholds, law.weights, z0, strict=True))
@@ -256,14 +253,9 @@ def elements_of(laws: Sequence[Any]) -> Elements:
 
     for e, law in enumerate(laws):
         add(e, law)
-    groups: list[Group] = []
-    if memories[0]:
-        groups.append(Memories(*memories))
-    if worn[0]:
-        groups.append(Worn(*worn))
-    if plays:
-        groups.append(Plays(*(list(column) for column in zip(*plays, strict=True))))
-    return Elements(offset, slope, rate, tuple(groups))
+    kinds: tuple[tuple[type[Group], Sequence[Any]], ...] = ((Memories, memories), (Worn, worn), (Plays, plays))
+    groups = tuple(kind(*zip(*members, strict=True)) for kind, members in kinds if members)
+    return Elements(offset, slope, rate, groups)
 
 
 def _each(z0: tuple[float, ...], of: Sequence[float]) -> tuple[float, ...]:

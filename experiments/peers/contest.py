@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 from types import ModuleType
+from typing import Any
 
 import numpy as np
 
@@ -33,27 +34,30 @@ def steps(count: int) -> str:
     return f"{count} step{'s' if count > 1 else ''} a sample"
 
 
-def clock(run: Run) -> float:
+def clock(run: Callable[[], Any], timer: Callable[[], float] = time.perf_counter) -> float:
     """Time of a call [s]; of a short one the median of several."""
     times: list[float] = []
     while not times or (sum(times) < 5e-3 and len(times) < 15):
-        begin = time.perf_counter()
+        begin = timer()
         run()
-        times.append(time.perf_counter() - begin)
+        times.append(timer() - begin)
     return statistics.median(times)
 
 
-def in_turns(run: Run, own: Run, least: int = 3, most: int = 21) -> np.ndarray:
-    """Times [s] of both, shape (repeats, 2), until `most` repeats or, after `least`, 3 s; no call is the first."""
+def in_turns(
+    timed: Callable[[], float], own: Callable[[], float], least: int, most: int, enough: float = 3.0
+) -> np.ndarray:
+    """Times [s] that both return, shape (repeats, 2): at least `least` turns, then until `most` or `enough` seconds."""
     turns: list[tuple[float, float]] = []
-    while len(turns) < least or (len(turns) < most and sum(map(sum, turns)) < 3.0):
-        turns.append((clock(run), clock(own)))
+    while len(turns) < least or (len(turns) < most and sum(map(sum, turns)) < enough):
+        turns.append((timed(), own()))
     return np.array(turns)
 
 
-def quartiles(values: np.ndarray) -> list[float]:
-    """First quartile, median, third quartile."""
-    return [float(value) for value in np.quantile(values, [0.25, 0.5, 0.75])]
+def spread(name: str, values: np.ndarray) -> dict[str, float]:
+    """Median under `name`, and the quartiles beside it."""
+    low, median, high = np.quantile(values, [0.25, 0.5, 0.75]).tolist()
+    return {name: median, f"{name}_q1": low, f"{name}_q3": high}
 
 
 @cache

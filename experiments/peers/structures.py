@@ -9,7 +9,6 @@ displacements with 16 digits (its `-dT` is one step off); what is timed is this 
 building the model and without reading a file.
 """
 
-import statistics
 import tempfile
 import time
 from collections.abc import Callable, Iterator
@@ -22,6 +21,7 @@ import numpy as np
 from scipy.integrate import odeint, solve_ivp
 from structure_cases import Case
 
+from peers import contest
 from peers.contest import peer
 
 Array = np.ndarray
@@ -40,13 +40,8 @@ class Entry:
 
 
 def clock(run: Callable[[], Any]) -> float:
-    """Processor time of a call [s], which others on the machine lengthen less; of a short one the median of several."""
-    times: list[float] = []
-    while not times or (sum(times) < 5e-3 and len(times) < 15):
-        begin = time.process_time()
-        run()
-        times.append(time.process_time() - begin)
-    return statistics.median(times)
+    """Processor time of a call [s], which others on the machine lengthen less."""
+    return contest.clock(run, time.process_time)
 
 
 def timed(tool: str, method: str, setting: str, run: Callable[[], Array]) -> Entry:
