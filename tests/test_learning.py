@@ -148,6 +148,19 @@ def test_repetitive_control_removes_what_the_inverse_leaves_on_a_plant_that_is_o
         replace(control, period=0.4005).compiled(H)
 
 
+def test_corrections_stop_growing_where_a_limit_holds_the_command():
+    limited = inverse_of(STAGE, limits=(0.0, 65.0))
+    control = hs.RepetitiveControl(controller=limited, model=STAGE, stroke=STROKE, period=0.4)
+    r = hs.signals.triangle(*STROKE, cycles=60, samples_per_cycle=400)
+    errors = (r - hs.close_loop(off(STAGE, 1.0, 0.95), control, H * np.arange(r.size), r).y)[:-1].reshape(60, 400)
+    largest = np.abs(errors).max(axis=1)
+    assert largest[5] > 0.2  # the top is out of reach
+    assert largest[-1] < 1.02 * largest[5]
+    trials = hs.IterativeLearning(controller=limited, model=STAGE, stroke=STROKE).learn(STAGE, T, R, trials=40)
+    assert trials.commands.max() == 65.0
+    assert np.abs(trials.corrections[-1]).max() < 0.2 * largest[5]  # without that, 40 times as large
+
+
 # ------------------------------------------------------------------------------------ prediction
 
 HORIZON = 30
