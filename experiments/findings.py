@@ -645,7 +645,7 @@ def learning(result: Result) -> list[str]:
     milliseconds = lambda value: "not within 90 ms" if value is None else f"{1e3 * value:.1f} ms"  # noqa: E731
     return [
         f"With law, creep and mode each up to {spread:g} % off, {slow['trials_to_noise']} trials take the error of a "
-        f"triangle of 1 Hz to the sensor's noise of {1e3 * result['noise_um']:g} nm in the median. No draw diverges.",
+        "triangle of 1 Hz to the sensor's noise in the median. No draw diverges.",
         by_row(
             learned,
             ("learned from trials, median rms in nm", "reference", str),
@@ -655,10 +655,10 @@ def learning(result: Result) -> list[str]:
             ("tenth", last, nanometres),
             ("largest of all draws", "largest_um", nanometres),
         ),
-        "What a reference asks for above the low pass is not learned: the corners of 100 Hz excite a mode whose frequency "
-        "is not known well.",
+        "What a reference asks for above the low pass is not learned: the corners of 100 Hz excite a mode whose "
+        "frequency is not known well.",
         by_row(
-            [row for row in rows if "margin" in row and row["margin"] is not None],
+            [row for row in rows if row.get("margin") is not None],
             ("in a loop, rms in nm", "reference", str),
             ("controller", "kind", str),
             ("median", "median_um", nanometres),

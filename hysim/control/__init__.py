@@ -23,7 +23,6 @@ from hysim.control._filters import Notch as Notch
 from hysim.control._filters import Shaper as Shaper
 from hysim.control._learning import IterativeLearning as IterativeLearning
 from hysim.control._learning import LearnedTrials as LearnedTrials
-from hysim.control._learning import LearningCondition as LearningCondition
 from hysim.control._learning import RepetitiveControl as RepetitiveControl
 from hysim.control._loop import ClosedLoop as ClosedLoop
 from hysim.control._loop import RestingPlant as RestingPlant
@@ -32,7 +31,6 @@ from hysim.control._loop import close_loop as close_loop
 from hysim.control._loop import secant_gain as secant_gain
 from hysim.control._loop import slopes as slopes
 from hysim.control._loop_shaping import LinearController as LinearController
-from hysim.control._loop_shaping import LoopShaping as LoopShaping
 from hysim.control._loop_shaping import loop_shaping as loop_shaping
 from hysim.control._predictive import PredictiveControl as PredictiveControl
 from hysim.control._stability import LinearLoop as LinearLoop

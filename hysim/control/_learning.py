@@ -244,8 +244,7 @@ class IterativeLearning(_Learning):
         learning.renew(filters.low_pass, filters.inverse, np.array(c, dtype=float), errors, following)
         return following
 
-    def _replayed(self, r: FloatArray, sample_time: float, u0: float | None) -> FloatArray:
-        """Commands of a controller without feedback, before and after the limits, shape (2, n)."""
+    def _commands(self, r: FloatArray, sample_time: float, u0: float | None) -> FloatArray:
         samples = min(preview(self.controller, sample_time), r.size)
         ahead = read_only(np.append(r[samples:], np.full(samples, r[-1])))
         compiled = begun(self.controller, sample_time, (self.u0 or 0.0) if u0 is None else u0, float(r[0]))
@@ -325,7 +324,7 @@ class IterativeLearning(_Learning):
     ) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Measurement of a trial, and its commands before and after the limits."""
         if callable(trial):
-            before, after = (r, r) if is_fed_back(self.controller) else self._replayed(r, float(t[1] - t[0]), u0)
+            before, after = (r, r) if is_fed_back(self.controller) else self._commands(r, float(t[1] - t[0]), u0)
             measurement = np.array(trial(after), dtype=float)
             if measurement.shape != r.shape:
                 raise ValueError(f"trial must return a measurement of shape {r.shape}, got {measurement.shape}")

@@ -105,6 +105,7 @@ def loop_shaping(
     Parameters
     ----------
     plant : Actuator, law, linear plant or fit
+        What it controls.
     sample_time : float
         Of the controller [s].
     stroke : (float, float)
