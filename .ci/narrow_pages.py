@@ -42,7 +42,7 @@ def opened(browser: Browser, page: Path) -> None:
     browser.send("Page.navigate", url="about:blank")
     browser.events.clear()
     browser.send("Page.navigate", url=page.resolve().as_uri())
-    wait_for(lambda: browser.value(f"location.href === {address} && document.readyState === 'complete'"))
+    wait_for(lambda: browser.value(f"location.href.split('#')[0] === {address} && document.readyState === 'complete'"))
     browser.value("document.fonts.ready.then(() => new Promise(done => requestAnimationFrame(() => done(0))))")
 
 
