@@ -26,8 +26,8 @@ ALLOWED: dict[tuple[str, ...], tuple[str, ...]] = {
     # A mass on a Bouc-Wen spring.
     ("plants/oscillator.py",): ("BoucWen", "PolynomialBoucWen"),
     ("plants/oscillator_structure.py",): ("BoucWen",),
-    # A chain or an element without hysteresis has a line in its place, and a viscous part is moved exactly.
-    ("control/_tracking.py", "control/_open_loop.py", "plants/chain.py", "plants/multi_input_actuator.py"): ("Line",),
+    # What is linear, or is linearised, has a line in place of a law, and a viscous part is moved exactly.
+    ("control/", "plants/chain.py", "plants/multi_input_actuator.py"): ("Line",),
     ("plants/structures/parts.py",): ("Dashpot", "Line"),
     # The filter of small reversals is what a fit of a noisy input has in front of any law.
     ("identification/_assumptions.py", "identification/_measured.py"): ("ReversalFilter",),
