@@ -8,8 +8,8 @@ import sys
 from pathlib import Path
 
 from hysim.export._compilers import FOLDER, Kernels, c_source, compiled, compressed
+from hysim.export._page import presets
 from hysim.export._page_model import steps_of
-from hysim.export._page_presets import presets
 
 ROOT = Path(__file__).resolve().parent.parent
 

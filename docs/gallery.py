@@ -18,7 +18,7 @@ from front_door import GROUPS, heading_of
 from numpy.typing import NDArray
 
 import hysim as hs
-from hysim.export._page_presets import presets
+from hysim.export._page import presets
 from hysim.models.model import every_family
 
 HERE = Path(__file__).parent

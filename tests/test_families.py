@@ -36,7 +36,7 @@ ALLOWED: dict[tuple[str, ...], tuple[str, ...]] = {
     # A page computes a curve of knots, which has no step, and plays that widen with the speed, in the browser.
     ("export/_page_model.py",): ("RateDependentPrandtlIshlinskii", "SingleValued"),
     # Devices are sums of laws, or laws with the numbers of a material.
-    ("export/_page_presets.py",): ("BoucWen", "Dahl", "Dashpot", "ExcessLoss", "JilesAtherton", "Line", "MaxwellSlip"),
+    ("export/_page.py",): ("BoucWen", "Dahl", "Dashpot", "ExcessLoss", "JilesAtherton", "Line", "MaxwellSlip"),
     # Messages and examples name a law that a user may take.
     ("cli/",): ("BoucWen", "Preisach", "PrandtlIshlinskii"),
     ("control/_adaptive.py", "control/_tracking.py", "design/", "plants/actuator.py"): ("BoucWen",),

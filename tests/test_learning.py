@@ -38,14 +38,25 @@ def off(plant, speed, slope):
     return replace(plant, vibration=mode, hysteresis=replace(law, **changed))
 
 
+def ahead_of_time(device):
+    """Taps of a device, whose corrections are those of references ahead of their time."""
+    low_pass, inverse, _ = _filters(device, H)
+    return np.pad(low_pass, device.ahead(H)), np.pad(inverse, (2 * device.ahead(H), 0))
+
+
+def faded(n, reach):
+    """Weights of the corrections of a trial."""
+    fade = np.minimum(np.arange(1, n + 1), np.arange(n - reach, -reach, -1)) / (reach + 1)
+    return np.clip(fade, 0.0, 1.0) ** 2 * (3.0 - 2.0 * np.clip(fade, 0.0, 1.0))
+
+
 def test_corrections_of_the_next_trial_are_the_literal_sums():
     low_pass, inverse, _ = _filters(learner(), H)
     reach, rng = low_pass.size // 2, np.random.default_rng(0)
     c, e = rng.standard_normal((2, 5 * reach))
-    fade = np.clip(np.minimum(np.arange(1, c.size + 1), np.arange(c.size - reach, -reach, -1)) / (reach + 1), 0.0, 1.0)
     sums = np.correlate(c, low_pass, "same") + np.correlate(e, inverse, "same")
     following = learner().following(c, e, H)
-    assert np.allclose(following, fade**2 * (3.0 - 2.0 * fade) * sums, rtol=0.0, atol=1e-12)
+    assert np.allclose(following, faded(c.size, reach) * sums, rtol=0.0, atol=1e-12)
     assert not following[-reach:].any()
     present = np.arange(c.size) != 7
     missing = learner().following(c, np.where(present, e, math.nan), H)
@@ -102,22 +113,23 @@ def test_a_line_in_place_of_the_law_learns_slower_and_says_so():
 
 
 def test_a_device_that_counts_trials_learns_as_learn_does():
-    device, samples = learner(duration=H * R.size), R.size
-    state, errors, rng = device.initial(H), np.zeros(R.size), np.random.default_rng(1)
+    device, samples = learner(duration=1.0), round(1.0 / H)
+    state, errors, rng = device.initial(H), np.zeros(samples), np.random.default_rng(1)
     for k in range(samples + 1):
         noise = rng.standard_normal()
         errors[min(k, samples - 1)] = 0.0 - noise if k < samples else errors[-1]
         _, state = device.step(state, 0.0, noise)
-    low_pass = _filters(device, H).low_pass
+    low_pass, inverse = ahead_of_time(device)
     stored = state.state[3 + device.ahead(H) + 1 + 2 :][:samples]
     assert low_pass.size < samples
-    assert np.allclose(stored, device.following(np.zeros(samples), errors, H), rtol=0.0, atol=1e-12)
+    expected = faded(samples, low_pass.size // 2) * np.correlate(errors, inverse, "same")
+    assert np.allclose(stored, expected, rtol=0.0, atol=1e-12)
 
 
 @pytest.mark.parametrize("samples", [60, 400])
 def test_repetitive_control_is_the_literal_sum_over_the_periods_before(samples):
     control = hs.RepetitiveControl(controller=inverse_of(LINEAR), model=LINEAR, stroke=STROKE, period=H * samples)
-    low_pass, inverse, _ = _filters(control, H)
+    low_pass, inverse = ahead_of_time(control)
     reach, ahead = low_pass.size // 2, control.ahead(H)
     back = samples * (reach // samples + 1)
     n = 3 * back
@@ -146,6 +158,31 @@ def test_repetitive_control_removes_what_the_inverse_leaves_on_a_plant_that_is_o
     assert np.std(error[-400:]) < 0.1 * np.std(error[:400])
     with pytest.raises(ValueError, match=r"no whole number of samples"):
         replace(control, period=0.4005).compiled(H)
+
+
+def test_a_margin_holds_for_a_reference_that_is_known_far_ahead():
+    shaper = hs.Shaper(natural_frequencies=(), damping_ratios=(), smoothing=20 * H)
+    far = hs.TrackingController(
+        feedforward=hs.InverseFeedforward(law=hs.Line(slope=0.025)), shaper=shaper, preview=True
+    )
+    control = hs.RepetitiveControl(controller=far, model=LAW, stroke=STROKE, period=0.4)
+    assert control.ahead(H) == 10
+    assert control.margin(H) > 0.5
+    r = hs.signals.triangle(*STROKE, cycles=30, samples_per_cycle=400)
+    errors = (r - hs.close_loop(LAW, control, H * np.arange(r.size), r).y)[:-1].reshape(30, 400)
+    assert np.std(errors[-1]) < 1.5 * np.std(errors[9]) < 0.02 * np.std(errors[0])
+
+
+@pytest.mark.parametrize("gain", [0.1, 10.0])
+def test_the_condition_does_not_depend_on_where_the_gain_is(gain):
+    amplifier = hs.Amplifier(gain=gain)
+    line = hs.InverseFeedforward(law=hs.Line(slope=0.025), amplifier=amplifier)
+    plain = hs.IterativeLearning(controller=hs.InverseFeedforward(law=line.law), model=LAW, stroke=STROKE)
+    for plant in (amplifier, replace(amplifier, time_constant=0.1 * H)):
+        model = hs.Actuator(amplifier=plant, hysteresis=LAW)
+        behind = hs.IterativeLearning(controller=line, model=model, stroke=STROKE)
+        assert behind.condition(H).rate == pytest.approx(plain.condition(H).rate, rel=1e-3)
+        assert behind.learn(model, T, R).rms[-1] < 0.01 * behind.learn(model, T, R, trials=1).rms[0]
 
 
 def test_corrections_stop_growing_where_a_limit_holds_the_command():
@@ -221,7 +258,27 @@ def test_output_limits_take_the_overshoot_where_they_can():
     assert 1.0 < bounded < free
 
 
-def test_a_horizon_and_an_amplifier_that_do_not_fit_are_refused():
+@pytest.mark.parametrize("scale", [1e-6, 1e6])
+def test_prediction_does_not_depend_on_the_unit_of_the_displacement(scale):
+    def run(unit):
+        model, plant = (
+            hs.TransferFunction(num=(k * unit * w,), den=(1.0, 4.0, w)) for k, w in ((1.0, 1e4), (1.1, 8e3))
+        )
+        mpc = hs.PredictiveControl(model=model, horizon=0.02, output_limits=(-0.1 * unit, 1.02 * unit))
+        return hs.close_loop(plant, mpc, T, np.where(T < 0.05, 0.0, unit)).y / unit
+
+    assert np.allclose(run(scale), run(1.0), rtol=0.0, atol=1e-6)
+
+
+def test_a_law_that_is_flat_at_its_reversals_is_driven_to_its_place():
+    edges = np.linspace(-10.0, 10.0, 41)
+    law = hs.Preisach.from_density(edges, lambda a, b: np.exp(-((a + b) ** 2) / 200.0 - (a - b - 4.0) ** 2 / 50.0))
+    r = np.where(T < 0.05, law.response([0.0])[0], 30.0)
+    y = hs.close_loop(law, hs.PredictiveControl(model=law, horizon=0.02, limits=(-10.0, 10.0)), T, r).y
+    assert np.abs(y[60:] - 30.0).max() < 1e-6
+
+
+def test_what_does_not_fit_is_refused():
     with pytest.raises(ValueError, match=r"at most 200 samples, got 300"):
         hs.PredictiveControl(model=STAGE, horizon=0.3).ahead(H)
     slow = replace(STAGE, amplifier=hs.Amplifier(slew_rate=100.0))
@@ -229,11 +286,39 @@ def test_a_horizon_and_an_amplifier_that_do_not_fit_are_refused():
         hs.PredictiveControl(model=slow, horizon=0.02)
     with pytest.raises(TypeError, match=r"controller must be an InverseFeedforward, or a TrackingController with one"):
         hs.RepetitiveControl(controller=hs.PID(ki=1.0), model=STAGE, stroke=STROKE, period=0.1)
+    integral = hs.TransferFunction(num=(1.0,), den=(1.0, 0.0))
+    late = hs.TransferFunction(num=(1.0,), den=(1.0, 1.0), delay=0.01)
+    with pytest.raises(ValueError, match=r"must come to rest"):
+        hs.PredictiveControl(model=integral, horizon=0.02).compiled(H)
+    with pytest.raises(ValueError, match=r"longer than the plant's dead time"):
+        hs.PredictiveControl(model=late, horizon=0.005).compiled(H)
     with pytest.raises(ValueError, match=r"needs their duration="):
         learner().compiled(H)
+    with pytest.raises(ValueError, match=r"a trial needs more than \d+ samples"):
+        learner(duration=0.05).compiled(H)
+    with pytest.raises(ValueError, match=r"no low pass of 32768 samples"):
+        learner(uncertainty=0.9).condition(H)
+    with pytest.raises(ValueError, match=r"the model integrates"):
+        hs.IterativeLearning(controller=inverse_of(STAGE), model=integral, stroke=STROKE)
+    with pytest.raises(ValueError, match=r"amplifier has limits"):
+        replace(learner(), model=replace(STAGE, amplifier=hs.Amplifier(limits=(0.0, 9.0))))
 
 
 # ------------------------------------------------------------------------------------ norms
+
+
+@pytest.mark.extra("slycot")
+def test_loop_shaping_does_not_depend_on_units_and_refuses_weights_of_zero():
+    pytest.importorskip("slycot", reason="the extra synthesis has it")
+    shaped = [
+        hs.control.loop_shaping(
+            hs.TransferFunction(num=(1e4 * s,), den=(1.0, 4.0, 1e4)), H, (0.0, 2.0 * s), bandwidth=63.0
+        )
+        for s in (1e-6, 1.0, 1e6)
+    ]
+    assert np.ptp([each.max_sensitivity for each in shaped]) < 1e-6
+    with pytest.raises(ValueError, match=r"effort must be positive, got 0"):
+        hs.control.loop_shaping(STAGE, H, STROKE, bandwidth=20.0, effort=0.0)
 
 
 @pytest.mark.extra("slycot")

@@ -16,9 +16,8 @@ from hysim._columns.turning import TOLERANCE, complete_cycles
 from hysim.cli import main
 from hysim.export import explorer
 from hysim.export._compilers import FOLDER, c_source, compiled, mark, module_of
-from hysim.export._page import LARGEST, Shown, page_text, to_page
+from hysim.export._page import LARGEST, Shown, page_text, presets, to_page
 from hysim.export._page_model import output_of, steps_of
-from hysim.export._page_presets import presets
 from hysim.laws.dashpot import RatePart
 from hysim.laws.friction.rated_law import RatedLaw
 from hysim.models.model import every_family

@@ -21,7 +21,17 @@ import numpy as np
 import numpy.typing as npt
 from scipy.signal import firwin, kaiser_beta, kaiserord
 
-from hysim._basics.frozen import FloatArray, Interval, NotNegative, Positive, frozen, read_only, vectors
+from hysim._basics.frozen import (
+    FloatArray,
+    Interval,
+    NotNegative,
+    Positive,
+    check_whole,
+    checked,
+    frozen,
+    read_only,
+    vectors,
+)
 from hysim._basics.printing import printed, quantity, summary_text
 from hysim._basics.results import model_of
 from hysim.control._controller import SteppedController, begun, limits_of, preview
@@ -34,9 +44,13 @@ from hysim.laws.static import Line
 from hysim.models.model import family
 from hysim.models.protocols import CompiledController, law_at, positive_time
 from hysim.plants.actuator import Actuator, as_actuator
+from hysim.plants.amplifier import Amplifier
 from hysim.plants.sensor import Sensor
+from hysim.plants.state_space import StateSpace
 from hysim.plants.structures.structure import Structure
 from hysim.signals import triangle
+
+Spectrum = npt.NDArray[np.complex128]
 
 _bound = functools.lru_cache(maxsize=64)(learning.learning)
 
@@ -46,7 +60,6 @@ _STEADY = 3  # cycles, the last of which counts
 _MOVES = 1e-6  # of the largest change of the inverse's output: smaller ones have no slope
 _TRUSTED = 0.8  # rate of an ideal filter of gain one above which the automatic low pass stops
 _LEARNS = 0.05  # of the gain: part of the error that the automatic low pass must take away
-_LOWEST = 1e-3  # of pi / sample_time: its taps still fit into an impulse response
 _HIGHEST = 0.5  # of pi / sample_time: highest automatic cutoff
 _NARROWER, _TRIES = 0.85, 20
 _RIPPLE = 60.0  # dB: an error of 0.1 % in the pass band is learned no further
@@ -84,20 +97,26 @@ class _Filters(NamedTuple):
     condition: LearningCondition
 
 
+@checked
 class _Learning(SteppedController):
     controller: Any
     model: Any
     stroke: Interval
-    cutoff: Positive | None
-    gain: Positive
-    uncertainty: NotNegative
+    cutoff: Positive | None = None
+    gain: Positive = 1.0
+    uncertainty: NotNegative = 0.1
 
     def __post_init__(self) -> None:
         if not isinstance(self.controller, InverseFeedforward | TrackingController) or self.controller.plant is None:
             raise TypeError("controller must be an InverseFeedforward, or a TrackingController with one")
         if not self.uncertainty < 1.0:
             raise ValueError(f"uncertainty must be below 1, got {self.uncertainty:g}")
-        as_actuator(self.model)
+        actuator = as_actuator(self.model)
+        if not math.isfinite(actuator.dc_gain):
+            raise ValueError("the model integrates: close a loop around it, and learn the reference of that")
+        bounds, inverted = actuator.amplifier and actuator.amplifier.limits, self.controller.plant.amplifier
+        if bounds and not (self.limits or (inverted and inverted.limits)):
+            raise ValueError("the model's amplifier has limits, which the controller must have too: give it limits=")
 
     @property
     def u0(self) -> float | None:
@@ -122,16 +141,21 @@ class _Learning(SteppedController):
         self, duration: float, is_trial: bool, sample_time: float, u0: float, y0: float
     ) -> CompiledController:
         filters, inner = _filters(self, sample_time), self.controller.compiled(sample_time, u0, y0)
-        samples, reach = round(duration / sample_time), filters.low_pass.size // 2
+        samples, ahead = round(duration / sample_time), preview(self.controller, sample_time)
+        # corrections are those of references ahead of their time, and errors are of the present
+        low_pass, inverse = np.pad(filters.low_pass, ahead), np.pad(filters.inverse, (2 * ahead, 0))
+        reach = low_pass.size // 2
         if abs(samples * sample_time - duration) > 1e-6 * duration:
             raise ValueError(f"a repetition of {duration:g} s is no whole number of samples of {sample_time:g} s")
+        if is_trial and samples <= 3 * reach:
+            raise ValueError(f"a trial needs more than {3 * reach} samples, most of them at rest, got {samples}")
         if not is_trial:
             samples *= reach // samples + 1
-        late = preview(self.controller, sample_time) + _delay(self.model) / sample_time
+        late = ahead + _delay(self.model) / sample_time
         whole = math.floor(late + 1e-9)
         room = (3 if is_trial else 2) * (samples if is_trial else samples + reach + 1)
         head = [samples, reach, whole, max(late - whole, 0.0), float(is_trial), inner.state.size]
-        parameters = [np.array(head), filters.low_pass, filters.inverse, inner.state, inner.parameters]
+        parameters = [np.array(head), low_pass, inverse, inner.state, inner.parameters]
         state = [np.array([u0, 0.0, 0.0]), np.full(whole + 2, y0), np.zeros(room), inner.state]
         step = _bound(inner.step)
         return CompiledController(step, read_only(np.concatenate(parameters), finite=False), np.concatenate(state))
@@ -178,13 +202,7 @@ class RepetitiveControl(_Learning):
     True
     """
 
-    controller: Any
-    model: Any
-    stroke: Interval
     period: Positive
-    cutoff: Positive | None = None
-    gain: Positive = 1.0
-    uncertainty: NotNegative = 0.1
 
     def compiled(self, sample_time: float, u0: float = 0.0, y0: float = 0.0) -> CompiledController:
         return self._compiled(self.period, False, positive_time(sample_time), u0, y0)
@@ -220,12 +238,6 @@ class IterativeLearning(_Learning):
     True
     """
 
-    controller: Any
-    model: Any
-    stroke: Interval
-    cutoff: Positive | None = None
-    gain: Positive = 1.0
-    uncertainty: NotNegative = 0.1
     duration: Positive | None = None
 
     def compiled(self, sample_time: float, u0: float = 0.0, y0: float = 0.0) -> CompiledController:
@@ -239,9 +251,8 @@ class IterativeLearning(_Learning):
         The error is the reference, as the sensor reads it, minus the measurement; where it is not finite it is zero.
         """
         filters, (c, e) = _filters(self, positive_time(sample_time)), np.broadcast_arrays(correction, error)
-        following = np.empty(c.size)
-        errors = np.where(np.isfinite(e), e, 0.0)
-        learning.renew(filters.low_pass, filters.inverse, np.array(c, dtype=float), errors, following)
+        c, e, following = np.array(c, dtype=float), np.where(np.isfinite(e), e, 0.0), np.empty(c.size)
+        learning.renew(filters.low_pass, filters.inverse, c, e, following)
         return following
 
     def _commands(self, r: FloatArray, sample_time: float, u0: float | None) -> FloatArray:
@@ -291,6 +302,7 @@ class IterativeLearning(_Learning):
         ValueError
             If lengths differ, or times are uneven.
         """
+        check_whole(trials, "trials")
         times, r, h = sampled(t, reference)
         lead = _filters(self, h).low_pass.size // 2
         rest = RestingPlant(as_actuator(self.model), h, self.u0 if u0 is None else u0).y0
@@ -383,58 +395,44 @@ def _filters(learner: _Learning, sample_time: float) -> _Filters:
     off = learner.uncertainty
     extremes = {slopes[0] * (1.0 - off), slopes[1] * (1.0 + off)}
     speeds = {1.0 - off, 1.0, 1.0 + off} if actuator.vibration is not None else {1.0}
-    nominal = _response(learner.controller, actuator, slope, 0.5 * sum(slopes), 1.0, sample_time)
-    plants = np.stack(
-        [
-            _response(learner.controller, actuator, slope, each, speed, sample_time)
-            for each, speed in itertools.product(sorted(extremes), sorted(speeds))
-        ]
-    )
-    damped = (_DAMPED * abs(nominal[0])) ** 2
-    inverse = learner.gain * np.conj(nominal) / (np.abs(nominal) ** 2 + damped)
+    response = functools.partial(_response, learner.controller, actuator, slope, sample_time)
+    nominal = response(0.5 * sum(slopes), 1.0)
+    plants = np.stack([response(*each) for each in itertools.product(sorted(extremes), sorted(speeds))])
+    ideal = np.conj(nominal) / (np.abs(nominal) ** 2 + (_DAMPED * abs(nominal[0])) ** 2)
     late = math.ceil(_delay(learner.model) / sample_time)
-    if learner.cutoff is not None:
-        return _with_cutoff(learner.cutoff, inverse, plants, late, sample_time, slopes)
-    doubtful = np.flatnonzero(np.abs(1.0 - inverse / learner.gain * plants).max(axis=0) > _TRUSTED)
+    doubtful = np.flatnonzero(np.abs(1.0 - ideal * plants).max(axis=0) > _TRUSTED)
     edge = doubtful[0] / nominal.size if doubtful.size else 1.0
-    cutoff = min(edge / (1.0 + 0.5 * _TRANSITION), _HIGHEST) * math.pi / sample_time
-    for _ in range(_TRIES):
-        filters = _with_cutoff(cutoff, inverse, plants, late, sample_time, slopes)
+    highest = min(edge / (1.0 + 0.5 * _TRANSITION), _HIGHEST) * math.pi / sample_time
+    for cutoff in highest * _NARROWER ** np.arange(_TRIES) if learner.cutoff is None else [learner.cutoff]:
+        filters = _with_cutoff(float(cutoff), learner.gain * ideal, plants, late, sample_time, slopes)
         if filters.condition.rate < 1.0 - _LEARNS * learner.gain:
             break
-        cutoff *= _NARROWER
     return filters
 
 
 def _with_cutoff(
-    cutoff: float,
-    inverse: npt.NDArray[np.complex128],
-    plants: npt.NDArray[np.complex128],
-    late: int,
-    sample_time: float,
-    slopes: tuple[float, float],
+    cutoff: float, inverse: Spectrum, plants: Spectrum, late: int, sample_time: float, slopes: tuple[float, float]
 ) -> _Filters:
     """Taps of a low pass, and of it times the inverse, and what they leave of the error."""
     corner = cutoff * sample_time / math.pi
-    if not _LOWEST < corner < 1.0:
-        low, high = (part * math.pi / sample_time for part in (_LOWEST, 1.0))
-        raise ValueError(
-            f"cutoff must lie between {low:.4g} and {high:.4g} rad/s at this sample time, got {cutoff:.4g}"
-        )
-    half = kaiserord(_RIPPLE, min(_TRANSITION * corner, 1.0 - corner))[0] // 2
+    half = kaiserord(_RIPPLE, min(_TRANSITION * corner, 1.0 - corner))[0] // 2 if 0.0 < corner < 1.0 else _LENGTH
     reach = half + max(half // 2, 16) + late
+    if 2 * reach >= _LENGTH:
+        raise ValueError(
+            f"no low pass of {_LENGTH} samples of {sample_time:g} s learns up to {cutoff:.4g} rad/s: give cutoff=, "
+            "less uncertainty, a model whose sensor is not so late, or a controller that inverts the law"
+        )
     taps = np.pad(firwin(2 * half + 1, corner, window=("kaiser", kaiser_beta(_RIPPLE))), reach - half)
     low_pass = _spectrum(taps)
     learns = np.fft.irfft(low_pass * inverse, _LENGTH)[-np.arange(-reach, reach + 1)]
     rates = np.abs(low_pass - _spectrum(learns) * plants).max(axis=0)
     worst = int(np.argmax(rates))
     frequency = 2.0 * math.pi * worst / (_LENGTH * sample_time)
-    return _Filters(
-        taps, np.ascontiguousarray(learns), LearningCondition(float(rates[worst]), frequency, float(cutoff), slopes)
-    )
+    condition = LearningCondition(float(rates[worst]), frequency, cutoff, slopes)
+    return _Filters(taps, np.ascontiguousarray(learns), condition)
 
 
-def _spectrum(taps: FloatArray) -> npt.NDArray[np.complex128]:
+def _spectrum(taps: FloatArray) -> Spectrum:
     """Response of taps for the samples -m ... m around a sample."""
     reach, around = taps.size // 2, np.zeros(_LENGTH)
     around[-np.arange(-reach, reach + 1)] = taps
@@ -454,24 +452,25 @@ def _slopes(controller: Any, actuator: Actuator, stroke: Interval) -> tuple[floa
     inverse = controller if isinstance(controller, InverseFeedforward) else controller.feedforward
     inverted = Line(slope=1.0) if inverse.law is None else law_at(inverse.law, math.inf)
     u = inverted.inverse_response(cycle)
-    level, v = np.diff(law.response(u))[-_CYCLE:], np.diff(inverted.response(u))[-_CYCLE:]
+    own, other = inverse.amplifier or Amplifier(), replace(actuator.amplifier or Amplifier(), limits=None)
+    level = np.diff(law.response(other.voltage((u - own.offset) / own.gain)))[-_CYCLE:]
+    v = np.diff(inverted.response(u))[-_CYCLE:]
     moves = np.abs(v) > _MOVES * np.abs(v).max()
-    ratios = level[moves] / v[moves]
+    ratios = level[moves] / v[moves] * (own.gain / other.gain)
     last = u[-_CYCLE:]
     slope = math.copysign(np.ptp(cycle) / np.ptp(last), float(np.diff(last) @ np.diff(cycle[-_CYCLE:])))
     return slope, (float(ratios.min()), float(ratios.max()))
 
 
 def _response(
-    controller: Any, actuator: Actuator, slope: float, ratio: float, speed: float, sample_time: float
-) -> npt.NDArray[np.complex128]:
+    controller: Any, actuator: Actuator, slope: float, sample_time: float, ratio: float, speed: float
+) -> Spectrum:
     """Frequency response from a change of the reference to that of the measurement, with lines in place of laws.
 
     The plant's line has `ratio` times the controller's `slope`; its natural frequencies are `speed` times as high.
     """
-    line, amplifier = Line(slope=slope), actuator.amplifier
-    if amplifier == controller.plant.amplifier:  # which the controller inverts
-        amplifier = None
+    line, amplifier, inverted = Line(slope=slope), actuator.amplifier, controller.plant.amplifier
+    inverted = inverted and Amplifier(gain=inverted.gain)
     plant = replace(
         actuator,
         amplifier=amplifier and replace(amplifier, offset=0.0, limits=None, slew_rate=None),
@@ -480,13 +479,13 @@ def _response(
         sensor=Sensor(delay=_delay(actuator)),
     )
     if isinstance(controller, InverseFeedforward):
-        linear: Any = replace(controller, law=line, amplifier=None)
+        linear: Any = replace(controller, law=line, amplifier=inverted)
     else:
         model = controller.model
         linear = replace(
             controller,
-            feedforward=replace(controller.feedforward, law=line, amplifier=None),
-            model=None if model is None else replace(model, hysteresis=line, amplifier=None),
+            feedforward=replace(controller.feedforward, law=line, amplifier=inverted),
+            model=None if model is None else replace(model, hysteresis=line, amplifier=inverted),
             limits=None,
         )
     impulse = np.zeros(_LENGTH)
@@ -501,5 +500,6 @@ def _faster(vibration: Any, speed: float) -> Any:
 
     if speed == 1.0:
         return vibration
-    system = control.ss(to_control(vibration))
-    return control.ss(speed * system.A, speed * system.B, system.C, system.D)
+    system = control.ss(to_control(replace(vibration, delay=0.0) if vibration.delay else vibration))
+    A, B, C, D = speed * system.A, speed * system.B[:, 0], system.C[0], float(system.D[0, 0])
+    return StateSpace(A=A, B=B, C=C, D=D, delay=vibration.delay)

@@ -15,7 +15,7 @@ import numpy.typing as npt
 from scipy.linalg import schur
 from scipy.signal import cont2discrete
 
-from hysim._basics.frozen import FloatArray, Interval, read_only
+from hysim._basics.frozen import FloatArray, Interval, check_positive, read_only
 from hysim.control._controller import Feedback, SampledController
 from hysim.control._loop import as_actuator, secant_gain, slopes
 from hysim.control._stability import LinearLoop
@@ -70,7 +70,7 @@ class LinearController(SampledController):
         return CompiledController(kernels.linear, parameters, np.append(u0, np.zeros(2 * B.size)))
 
     def frequency_response(self, frequency: npt.ArrayLike, sample_time: float) -> npt.NDArray[np.complex128]:
-        w = 2.0 / sample_time * 1j * np.tan(0.5 * np.asarray(frequency, dtype=float) * sample_time)
+        w = np.asarray(2j / sample_time * np.tan(0.5 * np.asarray(frequency, dtype=float) * sample_time))
         system = self.system
         states = np.linalg.solve(w[..., None, None] * np.eye(system.B.size) - system.A, system.B[:, np.newaxis])
         return np.asarray((system.C @ states)[..., 0] + system.D)
@@ -130,43 +130,43 @@ def loop_shaping(
     """
     import control
 
+    check_positive(bandwidth=bandwidth, max_sensitivity=max_sensitivity, effort=effort, disturbance=disturbance)
     if not control.slycot_check():
         raise ImportError("loop_shaping needs slycot: pip install 'hysim[synthesis]'")
 
     cycle, actuator = triangle(*stroke, cycles=1, samples_per_cycle=_CYCLE), as_actuator(plant)
     gain = secant_gain(actuator, cycle)
     along = slopes(actuator, cycle / gain)
-    slope = gain / actuator.dc_gain
     loops = [LinearLoop(each, positive_time(sample_time)) for each in (plant, *variations)]
-    A, B, C, D = _in_w(loops[0].system, slope, sample_time)
+    A, B, C, D = _in_w(loops[0].system, 1.0 / actuator.dc_gain, sample_time)
     n, b = B.size, bandwidth
     # inputs are the reference, the disturbance and the command; outputs the weighted error, the effort and the error
-    through = np.array([1.0, -disturbance / slope * D, -D])
-    inputs = np.vstack([np.outer(B, [0.0, disturbance / slope, 1.0]), through])
+    through = np.array([1.0, -disturbance * D, -D])
+    inputs = np.vstack([np.outer(B, [0.0, disturbance, 1.0]), through])
     error, lag = np.append(-C, 0.0), b * _SLOW * np.eye(1, n + 1, n)
     states = np.vstack([np.pad(A, ((0, 0), (0, 1))), error - lag])
     weighted = error / max_sensitivity + (b - b * _SLOW / max_sensitivity) * np.eye(1, n + 1, n)[0]
     outputs = np.stack([weighted, np.zeros(n + 1), error])
-    direct = np.stack([through / max_sensitivity, [0.0, 0.0, effort * slope], through])
+    direct = np.stack([through / max_sensitivity, [0.0, 0.0, effort], through])
     K, _, norm, _ = control.hinfsyn(control.ss(states, inputs, outputs, direct), 1, 1)
-    controller = LinearController(system=_without_fast_states(K, _FAST / sample_time), limits=limits)
+    controller = LinearController(system=_without_fast_states(K, 1.0 / gain, _FAST / sample_time), limits=limits)
     worst = max(loop.max_sensitivity(controller, each) for loop, each in itertools.product(loops, along))
     return LoopShaping(controller, float(norm), worst)
 
 
-def _without_fast_states(system: Any, fastest: float) -> StateSpace:
-    """A system whose poles beyond a rate have settled: the synthesis has such near its best norm."""
+def _without_fast_states(system: Any, scale: float, fastest: float) -> StateSpace:
+    """A scaled system whose poles beyond a rate have settled: the synthesis has such near its best norm."""
     A, basis, n = schur(system.A, sort=lambda re, im: math.hypot(re, im) < fastest)
-    B, C = basis.T @ system.B[:, 0], system.C[0] @ basis
+    B, C = scale * basis.T @ system.B[:, 0], system.C[0] @ basis
     settled = -np.linalg.solve(A[n:, n:], B[n:])
-    D = float(system.D[0, 0] + C[n:] @ settled)
+    D = float(scale * system.D[0, 0] + C[n:] @ settled)
     return StateSpace(A=A[:n, :n], B=B[:n] + A[:n, n:] @ settled, C=C[:n], D=D)
 
 
-def _in_w(system: Any, slope: float, sample_time: float) -> tuple[FloatArray, FloatArray, FloatArray, float]:
-    """A sampled plant behind a slope in the plane of w."""
+def _in_w(system: Any, gain: float, sample_time: float) -> tuple[FloatArray, FloatArray, FloatArray, float]:
+    """A sampled plant times a gain in the plane of w."""
     n, root = len(system.A), 2.0 / math.sqrt(sample_time)
     back = np.linalg.inv(system.A + np.eye(n))
     B, C = root * back @ system.B[:, 0], root * system.C[0] @ back
     D = -float(system.C[0] @ back @ system.B[:, 0])
-    return 2.0 / sample_time * back @ (system.A - np.eye(n)), slope * B, C, slope * D
+    return 2.0 / sample_time * back @ (system.A - np.eye(n)), B, gain * C, gain * D

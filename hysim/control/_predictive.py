@@ -11,7 +11,6 @@ from scipy.linalg import block_diag, solve_discrete_are, toeplitz
 
 from hysim._basics.frozen import Count, FloatArray, Interval, NotNegative, Positive, read_only
 from hysim.control._controller import SteppedController
-from hysim.control._loop import slopes
 from hysim.control._to_control import to_control
 from hysim.kernels import predictive as kernels
 from hysim.kernels.tracking import bound
@@ -30,14 +29,17 @@ _LONGEST = 200  # samples of a horizon: K^-1 then has 40 000 numbers
 _STEP = 0.1  # rho, of the geometric mean of these: 30 iterations then miss the optimum by 1e-5 of a step's error
 _REGULAR = 1e-6  # sigma, of the largest eigenvalue of P
 _CYCLE = 400  # samples of a cycle between the limits, along which slopes are taken
-_FORGETTING = 1e-12  # noise of each state: else a stage at rest, such as a delay, has no filter
+_FLAT = 0.3  # of the mean slope: a law that is flatter at its reversals would hold the command for long
+_FORGETTING = (
+    1e-12  # noise of each state, of that of the law's output: else a stage at rest, such as a delay, has no filter
+)
 
 
 @family
 class PredictiveControl(SteppedController):
     """Controller that minimises the predicted error over a horizon, within limits of the command and of its rate.
 
-    The limits hold exactly; in the prediction they are those of the law's least slope.
+    The limits hold exactly, but the rate comes first where the command begins outside its limits.
 
     Parameters
     ----------
@@ -121,22 +123,28 @@ class PredictiveControl(SteppedController):
         inverse = inverse_step(law, float(amplifier.voltage(u0)), (low, high), sample_time)
         A, B, C, M = _linear(plant, sample_time)
         level = inverse.state[1]
+        if not np.abs(np.linalg.eigvals(A)).max(initial=0.0) < 1.0:
+            raise ValueError("the vibration must come to rest: it integrates, or is unstable")
         rest = np.linalg.solve(np.eye(B.size) - A, B)
+        size = abs(float(C @ rest)) or 1.0
+        C, M = C / size, M / size
         powers = list(itertools.accumulate(range(p), lambda row, _: row @ A, initial=C))
         free, pulse = np.stack(powers[1:]), np.stack(powers[:-1]) @ B
-        K, effort, rho, sigma = self._problem(pulse, float(C @ rest))
+        if not pulse.any():
+            raise ValueError(f"horizon must be longer than the plant's dead time, got {self.horizon:g} s")
+        K, rho, sigma = self._problem(pulse)
         gains = _observer(A, B, M, self.model_error, self.drift)
         change = math.inf if self.rate is None else abs(amplifier.gain) * self.rate * sample_time
         head: list[Any] = [
             B.size, p, self.iterations, float(self.preview), gains[-1], low, high, change, _flattest(law, low, high),
-            effort, float(self.output_limits is not None), *(self.output_limits or (-math.inf, math.inf)),
-            2.0 * self.softness / (2.0 * self.softness + rho), rho, sigma, amplifier.gain, amplifier.offset,
+            self.effort, float(self.output_limits is not None), *np.array(self.output_limits or (0.0, 0.0)) / size,
+            2.0 * self.softness / (2.0 * self.softness + rho), rho, sigma, amplifier.gain, amplifier.offset, size,
         ]  # fmt: skip
         parameters: list[Any] = [head, A.ravel(), B, M, gains[:-1], free.ravel(), pulse, K.ravel(), inverse.parameters]
         state: list[Any] = [
-            [u0, y0 - level * M @ rest], level * rest, np.zeros(B.size), np.full(p, y0), np.full(p, level), np.zeros(p),
-            np.full(p, level), level * np.eye(1, p)[0], level * np.cumsum(pulse), np.zeros(4 * p), inverse.parameters,
-            inverse.state,
+            [u0, y0 / size - level * M @ rest], level * rest, np.zeros(B.size), np.full(p, y0 / size),
+            np.full(p, level), np.zeros(p), np.full(p, level), level * np.eye(1, p)[0], level * np.cumsum(pulse),
+            np.zeros(4 * p), inverse.parameters, inverse.state,
         ]  # fmt: skip
         return CompiledController(
             _with_inverse(kernels.predict, inverse.step),
@@ -144,17 +152,17 @@ class PredictiveControl(SteppedController):
             np.concatenate(state),
         )
 
-    def _problem(self, pulse: FloatArray, gain: float) -> tuple[FloatArray, float, float, float]:
-        """K^-1, effort in units of the displacement, rho and sigma, for a linear stage with this gain at rest."""
-        n, effort = pulse.size, self.effort * gain**2
+    def _problem(self, pulse: FloatArray) -> tuple[FloatArray, float, float]:
+        """K^-1, rho and sigma, for a linear stage with this response."""
+        n = pulse.size
         respond, differ = np.tril(toeplitz(pulse)), np.eye(n) - np.eye(n, k=-1)
-        P = 2.0 * (respond.T @ respond + effort * differ.T @ differ)
+        P = 2.0 * (respond.T @ respond + self.effort * differ.T @ differ)
         least, largest = np.linalg.eigvalsh(P)[[0, -1]]
         sigma = _REGULAR * largest
         rho = _STEP * math.sqrt(max(least, sigma) * largest)
         limited = respond if self.output_limits is not None else np.zeros((n, n))
         bounds = np.eye(n) + differ.T @ differ + limited.T @ limited
-        return np.linalg.inv(P + sigma * np.eye(n) + rho * bounds), effort, rho, sigma
+        return np.linalg.inv(P + sigma * np.eye(n) + rho * bounds), rho, sigma
 
 
 def _linear(plant: Actuator, sample_time: float) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
@@ -162,25 +170,23 @@ def _linear(plant: Actuator, sample_time: float) -> tuple[FloatArray, FloatArray
     delay = 0.0 if plant.sensor is None else plant.sensor.delay
     stages = Actuator(creep=plant.creep, vibration=plant.vibration)
     true, read = (to_control(replace(stages, sensor=sensor), sample_time) for sensor in (None, Sensor(delay=delay)))
-    n, m = len(true.A), len(read.A)
-    return (
-        block_diag(true.A, read.A),
-        np.concatenate([true.B[:, 0], read.B[:, 0]]),
-        np.concatenate([true.C[0], np.zeros(m)]),
-        np.concatenate([np.zeros(n), read.C[0]]),
-    )
+    displacement, measurement = block_diag(true.C, read.C)
+    return block_diag(true.A, read.A), np.append(true.B, read.B), displacement, measurement
 
 
 def _observer(A: FloatArray, B: FloatArray, M: FloatArray, model_error: float, drift: float) -> FloatArray:
     """Gains of the stationary Kalman filter for the states, and for the disturbance of the measurement."""
     measured = np.append(M, 1.0)
-    noise = block_diag(model_error**2 * np.outer(B, B) + _FORGETTING * np.eye(B.size), drift**2)
+    noise = block_diag(model_error**2 * (np.outer(B, B) + _FORGETTING * (B @ B) * np.eye(B.size)), drift**2)
     P = solve_discrete_are(block_diag(A, 1.0).T, measured[:, np.newaxis], noise, np.eye(1))
     return np.asarray(P @ measured / (measured @ P @ measured + 1.0))
 
 
 def _flattest(law: Any, low: float, high: float) -> float:
-    """Slope of a law that is nearest to zero, along a cycle between two inputs; around its first one without limits."""
-    ends = (low, high) if math.isfinite(high - low) else (-1.0, 1.0)
-    along = slopes(Actuator(hysteresis=law_at(law, math.inf)), triangle(*ends, cycles=1, samples_per_cycle=_CYCLE))
-    return min(along, key=abs)
+    """Least slope of a law along a cycle between two inputs, but for what is flatter than a part of its mean slope."""
+    ends = np.array([low, high] if math.isfinite(high - low) else [-1.0, 1.0])
+    cycle = np.tile(triangle(*ends.tolist(), cycles=1, samples_per_cycle=_CYCLE)[:-1], 2)
+    level = np.asarray(law_at(law, math.inf).response(cycle))
+    mean = float((level[_CYCLE // 2] - level[0]) / np.ptp(ends))
+    steps = np.diff(level)[-_CYCLE + 1 :] / np.diff(cycle)[-_CYCLE + 1 :]
+    return math.copysign(max(_FLAT * abs(mean), float(np.abs(steps).min())), mean)

@@ -17,7 +17,7 @@ multipliers, as OSQP does (B. Stellato et al., Math. Prog. Comp. 12 (2020) 637),
 
 with a = 1.6 A z - 0.6 s. The number of iterations is fixed. v_0 goes through the inverse of the law, whose limits are
 those of the command and of its change since the last one, so that these hold exactly. The linear stage then takes what
-the law has given.
+the law has given. Displacements are in units of those that the law's unit causes at rest.
 """
 
 import math
@@ -27,7 +27,7 @@ from hysim.kernels._compile import borrowed, kernel
 from hysim.kernels.stepping import Step
 from hysim.kernels.tracking import dot, push
 
-N_HEAD = 18
+N_HEAD = 19
 RELAXED = 1.6  # of a step of the solver, as in OSQP
 N_PLACES = 2  # of the state before its arrays: command and disturbance
 
@@ -38,17 +38,17 @@ def predict(inverse: Step, parameters: FloatArray, state: FloatArray, reference:
 
     `parameters` are a head (states, samples of the horizon, iterations, whether the reference comes ahead of its time,
     part of the disturbance that a sample corrects, lowest and highest voltage at the law, its largest change, slope of
-    the law, effort, whether the displacement has limits, its lowest and highest, hardness of these, rho, sigma, gain
-    and offset of the amplifier), A, B, M, responses of the displacement to the states (p, n) and to one output (p),
-    K^-1, and the parameters of the inverse. `state` is (command, disturbance, x and room for it, references, z and room
-    for it, s, l, displacement without new outputs, parameters of the inverse, its state).
+    the law, effort, whether the displacement has limits, these, their hardness, rho, sigma, gain and offset of the
+    amplifier, unit of the displacement), A, B, M, gains of the filter, responses of the displacement to the states
+    (p, n) and to one output (p), K^-1, parameters of the inverse. `state` is (command, disturbance, x and room for it,
+    references, z and room for it, s, l, displacement without new outputs, parameters of the inverse, its state).
     """
     parameters, state = borrowed(parameters), borrowed(state)
     n, p, iterations = int(parameters[0]), int(parameters[1]), int(parameters[2])
     is_ahead, correction, lowest, highest = parameters[3] > 0.0, parameters[4], parameters[5], parameters[6]
     change, slope, effort, has_limits = parameters[7], parameters[8], parameters[9], parameters[10] > 0.0
     low, high, hardness, rho, sigma = parameters[11], parameters[12], parameters[13], parameters[14], parameters[15]
-    gain, offset, at = parameters[16], parameters[17], N_HEAD
+    gain, offset, size, at = parameters[16], parameters[17], parameters[18], N_HEAD
     A, at = parameters[at : at + n * n], at + n * n
     B, at = parameters[at : at + n], at + n
     M, at = parameters[at : at + n], at + n
@@ -68,11 +68,11 @@ def predict(inverse: Step, parameters: FloatArray, state: FloatArray, reference:
     limits, s = state[s : s + own.size], s + own.size
     law = state[s:]
 
-    push(ahead, reference)
+    push(ahead, reference / size)
     if not is_ahead:
         for i in range(p):
-            ahead[i] = reference
-    surprise = measurement - dot(M, x) - state[1]
+            ahead[i] = reference / size
+    surprise = measurement / size - dot(M, x) - state[1]
     state[1] += correction * surprise
     for i in range(n):
         x[i] += L[i] * surprise
@@ -119,7 +119,8 @@ def predict(inverse: Step, parameters: FloatArray, state: FloatArray, reference:
 
     for i in range(own.size):
         limits[i] = own[i]
-    limits[0], limits[1] = max(lowest, last - change), min(highest, last + change)
+    limits[0] = min(max(lowest, last - change), last + change)
+    limits[1] = max(min(highest, last + change), last - change)
     wanted = inverse(limits, law, slack[0])
     state[0] = ((law[0] if math.isnan(wanted) else wanted) - offset) / gain
     for i in range(n):
