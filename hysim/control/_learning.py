@@ -85,8 +85,8 @@ class LearningCondition(NamedTuple):
 
     def __str__(self) -> str:
         hertz, corner = self.frequency / (2.0 * math.pi), self.cutoff / (2.0 * math.pi)
-        left = f"a repetition leaves at most {100.0 * self.rate:.3g} % of the error, at {hertz:.4g} Hz"
-        return f"{'converges' if self.converges else 'MAY DIVERGE'}: {left}; learns up to {corner:.4g} Hz"
+        shrinks = f"a repetition leaves at most {100.0 * self.rate:.3g} % of the error, at {hertz:.4g} Hz"
+        return f"{'converges' if self.converges else 'MAY DIVERGE'}: {shrinks}; learns up to {corner:.4g} Hz"
 
 
 class _Filters(NamedTuple):
@@ -152,11 +152,11 @@ class _Learning(SteppedController):
         if not is_trial:
             samples *= reach // samples + 1
         late = ahead + _delay(self.model) / sample_time
-        whole = math.floor(late + 1e-9)
+        full = math.floor(late + 1e-9)
         room = (3 if is_trial else 2) * (samples if is_trial else samples + reach + 1)
-        head = [samples, reach, whole, max(late - whole, 0.0), float(is_trial), inner.state.size]
+        head = [samples, reach, full, max(late - full, 0.0), float(is_trial), inner.state.size]
         parameters = [np.array(head), low_pass, inverse, inner.state, inner.parameters]
-        state = [np.array([u0, 0.0, 0.0]), np.full(whole + 2, y0), np.zeros(room), inner.state]
+        state = [np.array([u0, 0.0, 0.0]), np.full(full + 2, y0), np.zeros(room), inner.state]
         step = _bound(inner.step)
         return CompiledController(step, read_only(np.concatenate(parameters), finite=False), np.concatenate(state))
 

@@ -109,10 +109,10 @@ def predict(inverse: Step, parameters: FloatArray, state: FloatArray, reference:
             slack[p + i] = min(max(wanted, lower), upper)
             multiplier[p + i] = rho * (wanted - slack[p + i])
             if has_limits:
-                given = 0.0
+                displaced = 0.0
                 for j in range(i + 1):
-                    given += pulse[i - j] * z[j]
-                wanted = RELAXED * given + (1.0 - RELAXED) * slack[2 * p + i] + multiplier[2 * p + i] / rho
+                    displaced += pulse[i - j] * z[j]
+                wanted = RELAXED * displaced + (1.0 - RELAXED) * slack[2 * p + i] + multiplier[2 * p + i] / rho
                 inside = min(max(wanted, low - base[i]), high - base[i])
                 slack[2 * p + i] = wanted + hardness * (inside - wanted)
                 multiplier[2 * p + i] = rho * (wanted - slack[2 * p + i])
