@@ -166,7 +166,7 @@ def _learned(
     reference: FloatArray,
     reduction: Callable[[FloatArray], float],
 ) -> dict[str, Any]:
-    """Figures of the last repetition of a reference that is learned from the readings of the paper's camera at a sample time."""
+    """Figures of the last repetition of a reference that is learned from the paper's camera, at a sample time."""
     (quantum, shake), figures = SENSORS[-1], []
     for seed in range(_SEED, _SEED + _FEW):
         read = replace(plant, sensor=Sensor(quantum=quantum * PIXEL, noise=shake * PIXEL, delay=h, seed=seed))
