@@ -20,7 +20,7 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 
 import hysim as hs
 from hysim.export import explorer
-from hysim.export._page_presets import presets
+from hysim.export._page import presets
 from hysim.models.parts import response_of
 from hysim.plot import Figure, figure
 
