@@ -173,15 +173,15 @@ class RepetitiveControl(_Learning):
         What it drives, vibration and delay included; the law may be another one than the controller inverts.
     stroke : (float, float)
         Lowest and highest reference, along which slopes are taken [unit of y].
-    period : float
-        Of the reference [s], a whole number of samples. Where the low pass is longer than a period, it learns from the
-        errors of several periods before.
     cutoff : float, optional
         Corner of the low pass [rad/s]; by default the highest at which the errors shrink.
     gain : float
         Part of the error that is corrected at once.
     uncertainty : float
         Relative error of natural frequencies and slopes for which errors must shrink.
+    period : float
+        Of the reference [s], a whole number of samples. Where the low pass is longer than a period, it learns from the
+        errors of several periods before.
 
     Raises
     ------
