@@ -160,6 +160,14 @@ def test_repetitive_control_removes_what_the_inverse_leaves_on_a_plant_that_is_o
         replace(control, period=0.4005).compiled(H)
 
 
+def test_uncertain_frequencies_leave_the_dead_time_of_a_mode():
+    mode = hs.TransferFunction(num=(9e4,), den=(1.0, 30.0, 9e4), delay=2.5 * H)
+    late = replace(LINEAR, vibration=mode, sensor=None)
+    read_late = replace(late, vibration=replace(mode, delay=0.0), sensor=hs.Sensor(delay=2.5 * H))
+    rates = [learner(plant).condition(H).rate for plant in (late, read_late)]
+    assert rates[0] == pytest.approx(rates[1], rel=0.02)
+
+
 def test_a_margin_holds_for_a_reference_that_is_known_far_ahead():
     shaper = hs.Shaper(natural_frequencies=(), damping_ratios=(), smoothing=20 * H)
     far = hs.TrackingController(
@@ -236,6 +244,15 @@ def test_limits_and_rate_hold_exactly_whatever_is_asked_for():
     assert run.drive.min() >= -5.0
     assert run.drive.max() <= 70.0
     assert np.abs(np.diff(run.drive, prepend=0.0)).max() <= 8.0 * (1.0 + 1e-12)
+
+
+@pytest.mark.parametrize("u0", [-3.0, 75.0])
+def test_a_command_outside_its_limits_returns_at_the_rate(u0):
+    mpc = hs.PredictiveControl(model=STAGE, horizon=0.02, limits=(0.0, 70.0), rate=1e2)
+    drive = hs.close_loop(STAGE, mpc, T, np.ones(T.size), u0=u0).drive
+    inside = np.clip(u0, 0.0, 70.0)
+    assert np.allclose(np.abs(np.diff(drive[:20], prepend=u0)), 0.1, rtol=1e-9)
+    assert np.abs(drive[20] - inside) < np.abs(u0 - inside)
 
 
 @pytest.mark.parametrize("preview", [True, False])
