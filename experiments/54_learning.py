@@ -1,8 +1,8 @@
 """What do repetition and prediction add to an inverse whose model is 10 % off?
 
 The plant is that of `table1_actuator`; every parameter of the law, the creep, and the mode's frequency and damping
-ratio are drawn uniformly within 10 % of what the controllers believe. All errors are those of the true displacement
-beside the reference, and the sensor has 1 nm of noise.
+ratio are drawn uniformly within 10 % of what the controllers believe. The sensor has 1 nm of noise.
+Errors of trials are those of the measurement, less the variance of the noise; all others are of the true displacement.
 
 Learning corrects the reference of the inverse of law, creep and mode with a damping loop, from trials at rest and,
 periodically, in the loop: triangles from 0.5 to 2.5 um, a raster (ten lines of 10 Hz, which rise by 0.9 um in all) and

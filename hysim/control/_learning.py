@@ -35,7 +35,7 @@ from hysim._basics.frozen import (
 from hysim._basics.printing import printed, quantity, summary_text
 from hysim._basics.results import model_of
 from hysim.control._controller import SteppedController, begun, limits_of, preview
-from hysim.control._loop import RestingPlant, close_loop, sampled
+from hysim.control._loop import RestingPlant, close_loop, known_ahead, sampled
 from hysim.control._to_control import to_control
 from hysim.control._tracking import InverseFeedforward, TrackingController, is_fed_back
 from hysim.errors import HysimWarning
@@ -68,7 +68,7 @@ _DAMPED = 1e-2  # of the response at rest: smaller responses are not inverted
 
 
 class LearningCondition(NamedTuple):
-    """What a repetition leaves of the error, at worst over frequencies, slopes of the law and uncertain plants.
+    """Part of the error that remains after a repetition, the largest over frequencies, slopes and uncertain plants.
 
     `rate` is that part, `frequency` its place, `cutoff` the corner of the low pass [rad/s]; `slopes` are the law's.
     """
@@ -134,7 +134,7 @@ class _Learning(SteppedController):
         return preview(self.controller, sample_time)
 
     def condition(self, sample_time: float) -> LearningCondition:
-        """What a repetition leaves of the error at worst, at a sample time [s]."""
+        """Part of the error that remains after a repetition at worst, at a sample time [s]."""
         return _filters(self, positive_time(sample_time)).condition
 
     def _compiled(
@@ -256,8 +256,7 @@ class IterativeLearning(_Learning):
         return following
 
     def _commands(self, r: FloatArray, sample_time: float, u0: float | None) -> FloatArray:
-        samples = min(preview(self.controller, sample_time), r.size)
-        ahead = read_only(np.append(r[samples:], np.full(samples, r[-1])))
+        ahead = known_ahead(self.controller, r, sample_time)
         compiled = begun(self.controller, sample_time, (self.u0 or 0.0) if u0 is None else u0, float(r[0]))
         commands = np.empty((2, r.size))
         controllers.replay(compiled.step, compiled.parameters, compiled.state, ahead, ahead, *commands)
@@ -363,7 +362,7 @@ class LearnedTrials:
     rms : array, shape (n_trials,)
         Rms of the error of each trial, without the rest but with the sensor's noise in it [unit of y].
     condition : LearningCondition
-        What a trial leaves of the error at worst.
+        Part of the error that remains after a trial at worst.
     """
 
     t: FloatArray

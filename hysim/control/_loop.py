@@ -290,8 +290,7 @@ class RestingPlant:
     def attempt(self, controller: Controller, reference: FloatArray, progress: Reports = None) -> Signals:
         """As `run`; where the loop diverges, the signals name the sample."""
         compiled = begun(controller, self.sample_time, self.u0, self.y0)
-        samples = min(preview(controller, self.sample_time), reference.size)
-        ahead = read_only(np.append(reference[samples:], np.full(samples, reference[-1])))
+        ahead = known_ahead(controller, reference, self.sample_time)
         with along(progress or False):
             signals: Signals = self.chain.run(compiled, self.state, ahead)[0]
         return signals._replace(held=held_samples(compiled))
@@ -319,6 +318,11 @@ def sampled(t: npt.ArrayLike, reference: npt.ArrayLike) -> tuple[FloatArray, Flo
     """Times, reference and sample time; ValueError unless the times are even and as many."""
     r, times = vectors(reference=reference, t=t)
     return times, r, even_step(times)
+
+
+def known_ahead(controller: object, reference: FloatArray, sample_time: float) -> FloatArray:
+    samples = min(preview(controller, sample_time), reference.size)
+    return read_only(np.append(reference[samples:], np.full(samples, reference[-1])))
 
 
 def is_controller(value: Any) -> TypeGuard[Controller]:

@@ -115,7 +115,7 @@ def loop_shaping(
     max_sensitivity : float
         M, the sensitivity that is accepted beyond.
     effort : float
-        Weight of the command, times the slope, beside errors.
+        Weight of the command, times the plant's gain, against that of errors.
     disturbance : float
         Part of the plant's output range that a disturbance of the command causes.
     variations : sequence of plants
@@ -133,7 +133,6 @@ def loop_shaping(
     check_positive(bandwidth=bandwidth, max_sensitivity=max_sensitivity, effort=effort, disturbance=disturbance)
     if not control.slycot_check():
         raise ImportError("loop_shaping needs slycot: pip install 'hysim[synthesis]'")
-
     cycle, actuator = triangle(*stroke, cycles=1, samples_per_cycle=_CYCLE), as_actuator(plant)
     gain = secant_gain(actuator, cycle)
     along = slopes(actuator, cycle / gain)
