@@ -48,6 +48,8 @@ SHARES = {"kernels": 0.5, "metrics": 0.25, "identification": 0.25}
 CIRCLES = {"first": [], "second": ["-m", "page or smoke or digits or search or slow"]}
 LONGER, LEAST = 4.0, 150.0  # times the run without a mutant; seconds, since a kernel must be compiled anew
 
+STRUCTURES = "structures structures_static structure_studies structures_in_loops friction_in_structures"
+
 # The quickest test first: the first failure ends a run.
 MAPPED = {
     "kernels/loop.py": "actuator_stages actuator_chain close_loop",
@@ -70,6 +72,33 @@ MAPPED = {
     "kernels/play_sums.py": "clamp_operators extended_plays",
     "kernels/preisach.py": "preisach",
     "kernels/tracking.py": "tracking_controller shaping",
+    "kernels/actuator_columns.py": "whole_actuator",
+    "kernels/adaptive_inverse.py": "close_loop extreme_plants",
+    "kernels/anhysteretic.py": "jiles_atherton core_laws",
+    "kernels/backlash.py": "friction",
+    "kernels/chan.py": "core_laws",
+    "kernels/copies.py": "called_twice close_loop tracking",
+    "kernels/core_losses.py": "core_loss core_laws",
+    "kernels/energy_plays.py": "core_laws inverse_of_every_law",
+    "kernels/friction_rates.py": "friction",
+    "kernels/jiles_atherton.py": "jiles_atherton",
+    "kernels/jiles_atherton_inverse.py": "jiles_atherton inverse_of_every_law",
+    "kernels/learning.py": "learning",
+    "kernels/lugre.py": "friction",
+    "kernels/maxwell.py": "friction",
+    "kernels/predictive.py": "learning",
+    "kernels/stribeck.py": "friction",
+    "kernels/tellinen.py": "core_laws",
+    "kernels/tellinen_table.py": "core_laws",
+    "kernels/varying.py": "channels",
+    "kernels/structure_ensembles.py": STRUCTURES,
+    "kernels/structure_flows.py": STRUCTURES,
+    "kernels/structure_layout.py": STRUCTURES,
+    "kernels/structure_loop.py": STRUCTURES,
+    "kernels/structure_moments.py": STRUCTURES,
+    "kernels/structure_path.py": STRUCTURES,
+    "kernels/structure_pointers.py": STRUCTURES,
+    "kernels/structure_sweeps.py": STRUCTURES,
     "kernels/zhu_wang.py": "zhu_wang branch asymmetric",
     "metrics/criteria.py": "fit_measures",
     "metrics/_cycle_table.py": "cycle_metrics",
