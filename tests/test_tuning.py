@@ -9,6 +9,7 @@ from strategies import refused
 
 import hysim as hs
 from hysim.control import Tuning
+from hysim.control._tune import as_template
 
 H = 0.05
 MODE = hs.TransferFunction(num=(1.0,), den=(1.0, 0.4, 1.0))
@@ -35,6 +36,23 @@ TASKS = {
     "chain": (hs.Actuator(hysteresis=LAW, vibration=MODE), T_RAMP, RAMP, "rms"),
 }
 TUNED: dict[object, Tuning] = {}
+
+
+@pytest.mark.parametrize(
+    "template",
+    [
+        hs.PID(kp=0.2, ki=3.0, limits=(-1.0, 1.0)),
+        hs.TrackingController(feedback=hs.PID(ki=2.0, kd=0.01), damping=hs.DampingLoop(gain=0.3, frequency=2.0)),
+        hs.TrackingController(damping=hs.DampingLoop(gain=0.3, frequency=2.0)),
+    ],
+    ids=["feedback", "both", "damping"],
+)
+def test_the_point_of_a_controller_leads_back_to_it(template):
+    form = as_template(template, 1.0)
+    back = form.controller(form.point((form.pid.kp, form.pid.ki, form.pid.kd)))
+    gains = as_template(back, 1.0).gains
+    assert gains == pytest.approx(form.gains, rel=1e-12)
+    assert gains.any()
 
 
 def tuned(name, turned=False, **options):
