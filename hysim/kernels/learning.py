@@ -34,11 +34,15 @@ def renew(
     """The corrections of the trial that follows, from the corrections and the errors of one."""
     reach, end = low_pass.size // 2, corrections.size
     for k in range(end):
-        total, faded = 0.0, min(1.0, (k + 1.0) / (reach + 1.0), (end - reach - k) / (reach + 1.0))
-        if faded > 0.0:
-            for i in range(max(0, reach - k), low_pass.size):
-                total += low_pass[i] * corrections[k + i - reach] + inverse[i] * errors[k + i - reach]
-        following[k] = faded * faded * (3.0 - 2.0 * faded) * total
+        following[k] = 0.0
+    for i in range(low_pass.size):  # tap by tap, so that several samples are summed at once
+        first = max(0, reach - i)
+        sums, c, e = following[first : end - reach], corrections[first + i - reach :], errors[first + i - reach :]
+        for k in range(end - reach - first):
+            sums[k] += low_pass[i] * c[k] + inverse[i] * e[k]
+    for k in range(end):
+        faded = max(0.0, min(1.0, (k + 1.0) / (reach + 1.0), (end - reach - k) / (reach + 1.0)))
+        following[k] *= faded * faded * (3.0 - 2.0 * faded)
 
 
 @kernel
