@@ -11,7 +11,8 @@ __all__ = ["__version__", *MODULE_OF]
 
 def __getattr__(name: str) -> Any:
     if name not in MODULE_OF:
-        words = f"module 'hysim' has no attribute {name!r}{meant(name, __all__)}"
+        near = "" if name.startswith("__") else meant(name, __all__)  # tools ask for many names of Python's own
+        words = f"module 'hysim' has no attribute {name!r}{near}"
         raise AttributeError(words, name=name, obj=None)  # without the object: Python would guess once more
     is_module = MODULE_OF[name] == __name__
     value: Any = importlib.import_module(f"hysim.{name}" if is_module else MODULE_OF[name])
