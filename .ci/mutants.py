@@ -412,14 +412,13 @@ def main() -> int:
     }
     if given.survivors:
         chosen = [mutant for mutant in chosen if known.get(mutant.name, {}).get("survived")]
-    lock, by_second = Lock(), 0
+    lock, by_second = Lock(), {name for name in outcomes if known[name].get("by") == "2nd only"}
     with tempfile.TemporaryDirectory() as folder, ThreadPoolExecutor(given.workers) as threads:
         copies: SimpleQueue[Copy] = SimpleQueue()
         for k in range(given.workers):
             copies.put(Copy(Path(folder) / str(k)))
 
         def attempt(mutant: Mutant) -> None:
-            nonlocal by_second
             copy, word = copies.get(), "killed"
             try:
                 if (survived := copy.survives(mutant, "first")) and given.circles:
@@ -427,9 +426,10 @@ def main() -> int:
             finally:
                 copies.put(copy)
             with lock:
-                by_second += word != "killed" and not survived
                 outcomes[mutant.name] = survived
-                known[mutant.name] = {"survived": survived, "state": state_of(mutant.module)}
+                known[mutant.name] = {"survived": survived, "by": word, "state": state_of(mutant.module)}
+                if word != "killed" and not survived:
+                    by_second.add(mutant.name)
                 place = f"{mutant.name} {mutant.module}:{mutant.line}  {mutant.shown}"
                 print(f"{len(outcomes):4} {'SURVIVED' if survived else word:8} {place}", flush=True)
                 if given.store:
@@ -446,7 +446,8 @@ def main() -> int:
         why = reasons.get(mutant.name, "NOT EXPLAINED")
         print(f"  {mutant.name} {mutant.module}:{mutant.line}  {mutant.shown}\n      {why}")
     if given.circles:
-        print(f"{len(chosen) - len(survivors) - by_second} killed by the first circle, {by_second} by the second alone")
+        alone = len(by_second)
+        print(f"{len(chosen) - len(survivors) - alone} killed by the first circle, {alone} by the second alone")
     return 1 if open_ones else 0
 
 
