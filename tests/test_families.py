@@ -2,6 +2,7 @@
 
 import ast
 import re
+from dataclasses import replace
 from functools import cache
 from pathlib import Path
 
@@ -104,6 +105,24 @@ def test_every_family_has_an_example_in_its_own_class(name):
     assert low < high
     assert np.isfinite([low, high]).all()
     assert hs.families()[name](**family.example.fields) == law
+
+
+@pytest.mark.parametrize("name", [name for name, each in hs.families().items() if hasattr(each, "searched")])
+def test_parameters_are_declared_affine_if_the_output_is_affine_in_them(name):
+    """Those are solved for, and not searched; a memory in which the output begins affine may grow into another one."""
+    family = hs.families()[name]
+    law, (low, high) = family(**family.example.fields), family.example.between
+    u = low + (high - low) * (0.5 + 0.5 * np.linspace(0.2, 1.0, 200) * np.sin(np.linspace(0.0, 12.0, 200)))
+    names = [each.name for each in law.searched if each.name != "z0"]
+    values = {name: value for name in names if isinstance(value := getattr(law, name), float)}
+    affine = set()
+    for parameter, value in values.items():
+        step = 0.1 * abs(value) or 0.05
+        laws = [replace(law, **{parameter: value + sign * step}) for sign in (-1.0, 0.0, 1.0)]
+        below, there, above = (hs.simulate(other, 0.01 * np.arange(u.size), u).y for other in laws)
+        if np.abs(below - 2.0 * there + above).max() <= 1e-9 * np.abs(above - below).max():
+            affine.add(parameter)
+    assert affine == {each.name for each in law.searched if each.affine and each.name in values}
 
 
 def test_the_families_are_the_laws_of_the_registry_in_the_order_of_the_public_names():
