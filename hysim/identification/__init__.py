@@ -1,22 +1,13 @@
 """Parameters from records: `identify` and its result, and `select` among several candidates; no family is named."""
 
-from hysim.identification._channel import ParameterCurve, estimate_channel, parameter_curve
-from hysim.identification._diagnostics import folds
-from hysim.identification._identify import identify
-from hysim.identification._profile import Profile
-from hysim.identification._result import Candidate, Identification, Width
-from hysim.identification._select import Selection, select
-
-__all__ = [
-    "Candidate",
-    "Identification",
-    "ParameterCurve",
-    "Profile",
-    "Selection",
-    "Width",
-    "estimate_channel",
-    "folds",
-    "identify",
-    "parameter_curve",
-    "select",
-]
+from hysim.identification._channel import ParameterCurve as ParameterCurve
+from hysim.identification._channel import estimate_channel as estimate_channel
+from hysim.identification._channel import parameter_curve as parameter_curve
+from hysim.identification._diagnostics import folds as folds
+from hysim.identification._identify import identify as identify
+from hysim.identification._profile import Profile as Profile
+from hysim.identification._result import Candidate as Candidate
+from hysim.identification._result import Identification as Identification
+from hysim.identification._result import Width as Width
+from hysim.identification._select import Selection as Selection
+from hysim.identification._select import select as select
