@@ -209,16 +209,13 @@ def controller(actuator: hs.Actuator, kind: str, within: Pair | None, tuned: Any
     if kind == "inverse":
         return open_loop
     tracking = replace(open_loop, feedback=replace(tuned, limits=None))
-    return tracking if kind == "tracking" else _following(tracking, actuator)
-
-
-def _following(controller: hs.TrackingController, actuator: hs.Actuator) -> hs.TrackingController:
-    """A controller with the plant as its model; before a mode, the reference is smoothed and known ahead."""
+    if kind == "tracking":
+        return tracking
     if actuator.vibration is None:
-        return replace(controller, model=actuator)
+        return replace(tracking, model=actuator)
     frequency, ratio = _only_mode(actuator, "the controller model-following")
-    return replace(
-        controller,
+    return replace(  # before a mode, the reference is smoothed and known ahead
+        tracking,
         model=actuator,
         shaper=hs.Shaper(smoothing=_SMOOTHING * 2.0 * math.pi / frequency),
         mode_inverse=hs.ModeInverse(natural_frequency=frequency, damping_ratio=ratio),

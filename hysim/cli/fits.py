@@ -142,21 +142,17 @@ def posterior(
     rows = draws.rows()
     conditions = outputs.fields_of(draws, ("noise", "resolution", "priors", "n_evaluations", "seed", "warnings"))
     document = {"family": type(draws.model).__name__, "parameters": rows, **conditions}
+    n = len(draws.names)
+    side = max(1.25 * n, 4.0)  # inches, of a panel 1.25
     contents: tuple[Callable[[], Any], ...] = (
         lambda: csv_text([rows[0], *(row.values() for row in rows)]),
         draws.to_csv,
-        lambda: _corner(draws),
+        lambda: outputs.drawn(lambda canvas: hs.plot.corner(draws, axes=canvas.subplots(n, n)), side, side),
         lambda: outputs.to_json(document),
     )
     files: outputs.Files = dict(zip(paths, contents, strict=bool(paths)))
     outputs.write(files, draws.summary, lambda: document)
     return bool(result.success) and not draws.warnings
-
-
-def _corner(posterior: "hs.Posterior") -> Any:
-    n = len(posterior.names)
-    side = max(1.25 * n, 4.0)  # inches, of a panel 1.25
-    return outputs.drawn(lambda canvas: hs.plot.corner(posterior, axes=canvas.subplots(n, n)), side, side)
 
 
 def compare(

@@ -147,7 +147,7 @@ def page_text(models: Mapping[str, Shown], record: Record | None = None, *, titl
         version=__version__,
         style=folder.joinpath("page.css").read_text(encoding="utf-8").strip(),
         script="\n".join(folder.joinpath(f"{name}.js").read_text(encoding="utf-8").strip() for name in _PARTS),
-        packs=",\n".join(_expression(pack, k) for k, pack in enumerate(packs)),
+        packs=",\n".join(f"(() => {{\n{pack.strip()}\nreturn pack{k};\n}})()" for k, pack in enumerate(packs)),
         data=_json_for_script(json.dumps(data, separators=(",", ":"), ensure_ascii=False)),
     )
 
@@ -251,10 +251,6 @@ def _ranges(samples: Samples) -> list[list[int]]:
 
 def _packed(values: FloatArray) -> str:
     return base64.b64encode(compressed(values.astype("<f8").tobytes())).decode()
-
-
-def _expression(function: str, place: int) -> str:
-    return f"(() => {{\n{function.strip()}\nreturn pack{place};\n}})()"
 
 
 def _json_for_script(text: str) -> str:

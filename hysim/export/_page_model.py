@@ -59,11 +59,6 @@ def sliders_of(law: Law, free: Sequence[str], u: FloatArray, names: Sequence[str
     return sliders
 
 
-def by_fields(law: Law) -> bool:
-    """Whether the numbers of a law are named by its fields, so that the constructor takes them."""
-    return {name.partition("[")[0] for name in law.scalars} <= set(law.arguments)
-
-
 class _Reach:
     """How far the numbers of a law can be moved on an input."""
 
@@ -275,18 +270,15 @@ def _general(law: Law) -> Law:
 def _printed(law: Law, first: int) -> dict[str, Any]:
     """Fields by the places of their numbers, and the values that need not be said; or the law to begin with."""
     names, defaults = list(law.scalars), law.defaults()
-    if not by_fields(law):
-        return {"fields": [], "base": _in_python(law), "named": [[name, first + k] for k, name in enumerate(names)]}
+    if not {name.partition("[")[0] for name in names} <= set(law.arguments):
+        plain = {name: np.asarray(value).tolist() for name, value in law.arguments.items()}
+        base = f"{_name(type(law))}({', '.join(f'{name}={value!r}' for name, value in plain.items())})"
+        return {"fields": [], "base": base, "named": [[name, first + k] for k, name in enumerate(names)]}
     fields = []
     for name, value in law.arguments.items():
         places = [first + k for k, each in enumerate(names) if each.partition("[")[0] == name]
         fields.append([name, places if isinstance(value, tuple) else places[0], defaults.get(name)])
     return {"fields": fields}
-
-
-def _in_python(law: Law) -> str:
-    plain = {name: np.asarray(value).tolist() for name, value in law.arguments.items()}
-    return f"{_name(type(law))}({', '.join(f'{name}={value!r}' for name, value in plain.items())})"
 
 
 def _name(family: type) -> str:

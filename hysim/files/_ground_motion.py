@@ -199,7 +199,8 @@ def load_ground_motion(
     >>> t.tolist(), acceleration.round(6).tolist()
     ([0.0, 0.005, 0.01], [0.0, 0.980665, -1.96133])
     """
-    check_unit(units)
+    if units is not None and _name(units) is None:
+        raise ValueError(f"units must be a unit of acceleration: {_KNOWN}, got {units!r}")
     is_step = sample_time is None or 0.0 < sample_time < np.inf
     require(is_step, f"sample_time must be positive and finite, got {sample_time}")
     require(sample_time is None or t is None, "give either sample_time or the column t, not both")
@@ -251,7 +252,8 @@ def _of_text(lines: list[str], choice: _Choice, skip: int, delimiter: str | None
         )
         unit = choice.units or stated_unit(lines[line - 1])
         require(unit is not None, f"line {line} states no unit of its accelerations: pass units=")
-        return _of_stated(block_below(lines, line), block, choice._replace(units=unit), line, decimal, "")
+        below = lines[:line] + list(takewhile(_NUMBERS_ONLY.fullmatch, lines[line:]))
+        return _of_stated(below, block, choice._replace(units=unit), line, decimal, "")
     if not by_column and choice.sample_time is not None:
         require(delimiter is None, "delimiter is for columns: a list of numbers needs none")
         list_of_numbers = number_list(lines, decimal, skip)
@@ -308,7 +310,12 @@ def _of_stated(
 
 
 def _in_stated_unit(numbers: NumberList, choice: _Choice, unit: str) -> FloatArray:
-    check_quantity(numbers.header)
+    words = {word.upper() for word in re.findall(r"[A-Za-z]+", numbers.header)}
+    other = next((word for word in ("VELOCITY", "DISPLACEMENT") if word in words), None)
+    require(
+        other is None or any(word.startswith("ACC") for word in words),
+        f"the header says {other}: load the file of the acceleration, which PEER calls .AT2",
+    )
     return in_si(numbers.values, choice.units or stated_unit(numbers.header) or unit)
 
 
@@ -411,11 +418,6 @@ def in_si(values: FloatArray, unit: str) -> FloatArray:
     return accelerations
 
 
-def check_unit(unit: str | None) -> None:
-    if unit is not None and _name(unit) is None:
-        raise ValueError(f"units must be a unit of acceleration: {_KNOWN}, got {unit!r}")
-
-
 def stated_unit(header: str) -> str | None:
     """The unit that the text above some numbers states, None without one; ValueError if it is not understood.
 
@@ -467,19 +469,6 @@ def cosmos_blocks(lines: list[str], skip: int) -> list[StatedValues]:
     """Every line below the first `skip` ones above a block of accelerations, as files of COSMOS have it."""
     numbered = [(number, _BLOCK.match(line)) for number, line in enumerate(lines, 1) if number > skip]
     return [StatedValues(number, int(block[1]), _real(block[2])) for number, block in numbered if block]
-
-
-def block_below(lines: list[str], line: int) -> list[str]:
-    return lines[:line] + list(takewhile(_NUMBERS_ONLY.fullmatch, lines[line:]))
-
-
-def check_quantity(header: str) -> None:
-    words = {word.upper() for word in re.findall(r"[A-Za-z]+", header)}
-    other = next((word for word in ("VELOCITY", "DISPLACEMENT") if word in words), None)
-    require(
-        other is None or any(word.startswith("ACC") for word in words),
-        f"the header says {other}: load the file of the acceleration, which PEER calls .AT2",
-    )
 
 
 def number_list(lines: list[str], decimal: str | None, skip: int = 0) -> NumberList:
