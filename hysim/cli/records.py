@@ -135,7 +135,11 @@ def read(settings: InputOptions, path: str, source: Source | None = None, *, unc
     if not isinstance(settings, RecordOptions):
         record = _loaded(settings, path, source(), u, u)
     elif settings.y_file is not None:
-        record = _from_two_files(settings, path, source, settings.y_file)
+        other = source_of(settings.y_file)  # the only column of either file need not be named
+        u = _only_column(settings, source(), "u") if settings.u is None else settings.u
+        y = _only_column(settings, other(), "y") if settings.y is None else settings.y
+        drive = _loaded(settings, path, source(), u, u, resolution=None)
+        record = hs.join_records(drive, _loaded(settings, settings.y_file, other(), y, y))
     elif u == ("y" if settings.y is None else settings.y):
         raise ValueError(f"the input and the output are both the column {u}: name them by --u and --y")
     else:
@@ -249,15 +253,6 @@ def _loaded(settings: InputOptions, path: str, source: Any, u: Any, y: Any, **ch
     own = {"u": u, "y": y, "t": time, "name": "record" if path == STANDARD else None, **changed}
     record: hs.Record = hs.load(source, **options.taken(hs.load, settings) | own)
     return record
-
-
-def _from_two_files(settings: RecordOptions, path: str, source: Source, y_file: str) -> "hs.Record":
-    """The record of an input in one file and an output in another; a file's only column need not be named."""
-    other = source_of(y_file)
-    u = _only_column(settings, source(), "u") if settings.u is None else settings.u
-    y = _only_column(settings, other(), "y") if settings.y is None else settings.y
-    drive = _loaded(settings, path, source(), u, u, resolution=None)
-    return hs.join_records(drive, _loaded(settings, y_file, other(), y, y))
 
 
 def _only_column(settings: InputOptions, source: Any, name: str) -> str:

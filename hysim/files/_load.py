@@ -173,9 +173,11 @@ def load(
     with opened(path) as source:
         with table_of(source, for_text, progress or None) as table:
             columns = _columns(table, {"u": u, "y": y, "t": t})
-            signals, places = [*columns], _channels(table, channels)
-            constants = {label: place for label, place in places.items() if isinstance(place, float)}
-            columns |= {label: place for label, place in places.items() if isinstance(place, Column)}
+            signals = [*columns]
+            names = [channels] if isinstance(channels, str) else table.notes.channels if channels is None else channels
+            keys = names if isinstance(names, Mapping) else {label: label for label in names}
+            constants = {label: key for label, key in keys.items() if isinstance(key, float)}
+            columns |= {label: table.column(key) for label, key in keys.items() if not isinstance(key, float)}
             labels = _units(table, columns, constants) | dict(units or {})
             values = table.values([*columns.values()])
         parts = _parts(table, columns, values, on_missing)
@@ -189,7 +191,7 @@ def load(
         records = tuple(
             Record(
                 **{signal: chosen[signal] for signal in signals},
-                channels={label: chosen.get(label, place) for label, place in places.items()},
+                channels={label: chosen[label] if label in chosen else constants[label] for label in keys},
                 units=labels,
                 resolution=resolution,
                 name=name,
@@ -368,15 +370,6 @@ def _parts(
         advice = "sort the samples, remove repeated ones, or load without time: t=False"
         check_increasing(table, times, part, advice)
     return long_enough
-
-
-def _channels(
-    table: Table, channels: Sequence[str] | Mapping[str, str | int | float] | None
-) -> dict[str, Column | float]:
-    """The column of each channel, or its number where it is constant; by default those that the file names."""
-    names = [channels] if isinstance(channels, str) else table.notes.channels if channels is None else channels
-    keys = names if isinstance(names, Mapping) else {name: name for name in names}
-    return {label: key if isinstance(key, float) else table.column(key) for label, key in keys.items()}
 
 
 def _units(table: Table, columns: Mapping[str, Column], constants: Iterable[str]) -> dict[str, str]:

@@ -3,7 +3,7 @@
 import io
 import json
 import re
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -73,19 +73,14 @@ def save_record(record: Record, path: str | Path) -> None:
     varying = along(record.channels)
     columns = {} if record.t is None else {"t": record.t}
     columns |= {"u": record.u, "y": record.y, **varying}
-    _check_columns(varying, path)
-    channels = {name: name if name in varying else value for name, value in record.channels.items()}
-    write_all({path: packed(columns, path, Notes(record.units, record.resolution, record.name, channels))})
-
-
-def _check_columns(names: Iterable[str], path: str | Path) -> None:
-    """Refuse channels whose names a file of this ending has no place for, or would read in another way."""
     form = _VARIABLE if Path(path).suffix.lower() == ".mat" else _PLAIN_NAME
-    for name in names:
+    for name in varying:  # of which the file has no place for some, or would read them in another way
         if not form.fullmatch(name) or name in NOTES or name.endswith(UNITS):
             raise ValueError(
                 f"{Path(path).name}: a column cannot be called {name!r}; rename the channel, with letters, digits and _"
             )
+    channels = {name: name if name in varying else value for name, value in record.channels.items()}
+    write_all({path: packed(columns, path, Notes(record.units, record.resolution, record.name, channels))})
 
 
 def packed(columns: Mapping[str, FloatArray], path: str | Path, notes: Notes) -> bytes:
@@ -205,24 +200,16 @@ def join_records(u: Record, y: Record) -> Record:
     units = {name: unit for name, unit in y.units.items() if name != "u"}
     units |= {name: unit for name, unit in u.units.items() if name in ("t", "u")}
     if u.t is not None and y.t is not None and not np.array_equal(u.t, y.t):
-        return _at_times_of_the_output(u.t, u.u, y.t, y, units)
+        first, last = int(np.searchsorted(y.t, u.t[0])), int(np.searchsorted(y.t, u.t[-1], side="right"))
+        if last - first < 2:
+            raise ValueError(
+                f"the output's times, {y.t[0]:g} to {y.t[-1]:g}, are not within the input's, {u.t[0]:g} to {u.t[-1]:g}"
+            )
+        t = y.t[first:last]
+        return replace(y[first:last], u=np.interp(t, u.t, u.u), t=t, units=units)
     if len(u) != len(y):
         raise ValueError(
             f"the input has {len(u)} samples and the output {len(y)}: without a time in both files the numbers must "
             "agree"
         )
-    return _record(u.u, y.t if u.t is None else u.t, y, units)
-
-
-def _at_times_of_the_output(t_u: FloatArray, u: FloatArray, t: FloatArray, y: Record, units: dict[str, str]) -> Record:
-    first, last = int(np.searchsorted(t, t_u[0])), int(np.searchsorted(t, t_u[-1], side="right"))
-    if last - first < 2:
-        raise ValueError(
-            f"the output's times, {t[0]:g} to {t[-1]:g}, are not within the input's, {t_u[0]:g} to {t_u[-1]:g}"
-        )
-    part = y[first:last]
-    return _record(np.interp(t[first:last], t_u, u), t[first:last], part, units)
-
-
-def _record(u: FloatArray, t: FloatArray | None, y: Record, units: dict[str, str]) -> Record:
-    return replace(y, u=u, t=t, units=units)
+    return replace(y, u=u.u, t=y.t if u.t is None else u.t, units=units)
