@@ -143,7 +143,10 @@ def noel_schoukens(
         force = np.tile(level * period, periods + 1 + (initial == "periodic"))
     y = noel_schoukens_plant().response(force, 1.0 / (SAMPLE_RATE * _OVERSAMPLING))
     if noise > 0.0:
-        y += noise * _band_limited_noise(y.size, disturbances)
+        # white to 375 Hz, root mean square 1, independent from period to period
+        length = PERIOD if y.size % (_OVERSAMPLING * PERIOD) == 0 else y.size // _OVERSAMPLING
+        blocks = disturbances.standard_normal((y.size // (_OVERSAMPLING * length), length))
+        y += noise * np.concatenate([interpolated(block, _OVERSAMPLING) for block in blocks])
     part = slice(lead, lead + n_samples)
     return Record(
         u=force[::_OVERSAMPLING][part],
@@ -216,10 +219,3 @@ def _unit_sweep(n_samples: int) -> FloatArray:
     """The sweep at 15 kHz, amplitude 1, as long as `n_samples` at 750 Hz."""
     t = np.arange(_OVERSAMPLING * n_samples) / (_OVERSAMPLING * SAMPLE_RATE)
     return np.asarray(np.sin(2.0 * np.pi * (18.0 * t + t**2 / 12.0)))
-
-
-def _band_limited_noise(n_samples: int, rng: np.random.Generator) -> FloatArray:
-    """Noise at 15 kHz, white to 375 Hz, root mean square 1, independent from period to period."""
-    length = PERIOD if n_samples % (_OVERSAMPLING * PERIOD) == 0 else n_samples // _OVERSAMPLING
-    blocks = rng.standard_normal((n_samples // (_OVERSAMPLING * length), length))
-    return np.concatenate([interpolated(block, _OVERSAMPLING) for block in blocks])

@@ -46,7 +46,9 @@ def output_quantum(values: FloatArray) -> float | None:
     for first in range(0, waves.size, batch):
         steps, errors, farthest = _fitted(places, waves[first : first + batch])
         farthest = np.maximum(farthest, rounding / (steps * span))
-        likely = (farthest <= _FARTHEST) & (_log_chance(levels.size, farthest, 1.0 / steps) < math.log(_BY_CHANCE))
+        # logarithm of the probability that values without a quantum fit as well
+        log_chance = (levels.size - 2) * np.log(2.0 * farthest) + 2.0 * np.log(1.0 / steps)
+        likely = (farthest <= _FARTHEST) & (log_chance < math.log(_BY_CHANCE))
         if likely.any():
             k = int(np.argmax(likely))
             return _shortest(float(steps[k]) * span, max(float(errors[k]), _DIGITS * float(steps[k])) * span)
@@ -76,11 +78,6 @@ def _fitted(places: FloatArray, waves: FloatArray) -> tuple[FloatArray, FloatArr
     off = places - shifts[:, None] - steps[:, None] * multiples
     errors = np.sqrt((off**2).sum(axis=1) / (places.size - 2) / weights)
     return steps, errors, np.abs(off).max(axis=1) / steps
-
-
-def _log_chance(n_levels: int, farthest: FloatArray, n_steps: FloatArray) -> FloatArray:
-    """Logarithm of the probability that values without a quantum fit as well."""
-    return (n_levels - 2) * np.log(2.0 * farthest) + 2.0 * np.log(n_steps)
 
 
 def _shortest(value: float, error: float) -> float:

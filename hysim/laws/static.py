@@ -67,7 +67,8 @@ def smoothing_spline(u: FloatArray, y: FloatArray) -> Smooth:
     splines = _Splines.on(x.size)
     rows = splines.at(x)
     bands, moments = _normal_equations(rows, share, means, np.zeros(x.size, dtype=np.intp), 1, splines.size)
-    gram = _symmetric(bands[0])
+    lower = sum((np.diag(bands[0][k, : splines.size - k], -k) for k in range(1, 4)), np.diag(bands[0][0]))
+    gram = lower + np.tril(lower, -1).T
     penalised = bands[0] + _strength(splines, rows, share, means) * splines.penalty
     inverse = solveh_banded(penalised, np.eye(splines.size), lower=True)
     coefficients = inverse @ moments[0]
@@ -210,11 +211,6 @@ def _quadratic_form(bands: FloatArray, z: FloatArray) -> FloatArray:
     for k in range(1, 4):
         total += 2.0 * (z[:, k:] * z[:, :-k]) @ bands[k, :-k]
     return np.asarray(np.maximum(total, 0.0))
-
-
-def _symmetric(bands: FloatArray) -> FloatArray:
-    lower = sum((np.diag(bands[k, : bands.shape[1] - k], -k) for k in range(1, 4)), np.diag(bands[0]))
-    return np.asarray(lower + np.tril(lower, -1).T)
 
 
 @family

@@ -117,14 +117,11 @@ class Batch(NamedTuple):
         in_chunks(work, self.n_sets, workers=workers, minimum=few, n_samples=n_samples)
 
     def _inputs(self, sets: Sets) -> FloatArray:
-        return self.u if len(self.u) == 1 else part_of(self.u, sets)
-
-
-def part_of(table: FloatArray, sets: Sets) -> FloatArray:
-    """Rows of a read-only table, read-only as kernels take them."""
-    rows = table[sets]
-    rows.setflags(write=False)
-    return rows
+        if len(self.u) == 1:
+            return self.u
+        rows = self.u[sets]
+        rows.setflags(write=False)  # as kernels take them
+        return rows
 
 
 def _blocks(start: int, stop: int, size: int) -> Iterator[slice]:

@@ -150,7 +150,8 @@ class Dependent:
         Play(threshold=1.0, gain=1.0, offset=0.0, z0=0.0)
         """
         if unknown := set(channels) - set(self.channels):
-            raise ValueError(f"the law depends on {self._channels_in_words()}, got {sorted(unknown)[0]!r}")
+            known = ", ".join(map(repr, self.channels)) or "no channel"
+            raise ValueError(f"the law depends on {known}, got {sorted(unknown)[0]!r}")
         for name, value in channels.items():
             if np.ndim(value):
                 raise ValueError(f"{name} must be one number, got {np.size(value)}: use response(u, channels=...)")
@@ -214,9 +215,6 @@ class Dependent:
     def _warn(self, channels: Channels) -> None:
         if doubt := self.extrapolation(channels):
             warnings.warn(doubt, stacklevel=3)
-
-    def _channels_in_words(self) -> str:
-        return ", ".join(map(repr, self.channels)) or "no channel"
 
     def _along(self, u: FloatArray, sample_time: float | None, values: Mapping[str, Any]) -> FloatArray:
         series = {each.parameter: each.value(values[each.channel]) for each in self.polynomials}

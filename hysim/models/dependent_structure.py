@@ -176,12 +176,9 @@ class DependentStructure(Subject):
             spans[name] = (float(different[0]), float(different[-1]))
         structure = replace(self, spans=spans, columns=space.columns)
         for record in records:
-            structure._check_may_vary(record)
+            varying = [name for name in structure.at if name in space.columns and structure._channel(name, record).ndim]
+            check_memory_is_its_own(self.law, varying, record)
         return structure
-
-    def _check_may_vary(self, record: Record) -> None:
-        affine = [name for name in self.at if name in self.columns and self._channel(name, record).ndim]
-        check_memory_is_its_own(self.law, affine, record)
 
     @cached_property
     def at(self) -> Places:

@@ -150,7 +150,13 @@ def columns_along(
     if isinstance(subject, Sum):
         return columns_along(subject.as_structure(), parameters, varying, record)
     if isinstance(subject, SumStructure):
-        return _of_sum(subject, parameters, varying, record)
+        known = tuple(part for part in subject.parts if not isinstance(part, Identifiable))
+        blocks = [
+            columns_along(part, own(parameters, name), own(varying, name), record)
+            for name, part in zip(labels(subject.parts), subject.parts, strict=True)
+            if isinstance(part, Identifiable)
+        ]
+        return columns_beside(blocks, replace(subject, parts=known).regressors({}, record) if known else 0.0)
     law = subject() if isinstance(subject, type) else subject
     if not isinstance(law, Law) or isinstance(law, Sampled):
         raise _cannot_vary(varying, law)
@@ -190,18 +196,6 @@ def _cannot_vary(names: Iterable[str], model: Any) -> TypeError:
         "them, and what the output is linear in can change from sample to sample; split the record where the channel "
         "is nearly constant"
     )
-
-
-def _of_sum(
-    structure: SumStructure, parameters: Parameters, varying: Mapping[str, FloatArray], record: Record
-) -> FloatArray:
-    known = tuple(part for part in structure.parts if not isinstance(part, Identifiable))
-    blocks = [
-        columns_along(part, own(parameters, name), own(varying, name), record)
-        for name, part in zip(labels(structure.parts), structure.parts, strict=True)
-        if isinstance(part, Identifiable)
-    ]
-    return columns_beside(blocks, replace(structure, parts=known).regressors({}, record) if known else 0.0)
 
 
 def paths(law: Law, parameters: Parameters, u: FloatArray) -> FloatArray:

@@ -262,26 +262,18 @@ def notes(record: Record, y: FloatArray, n_parameters: int) -> tuple[str, ...]:
     """Phrases on a plant with this output on the record, and so many coefficients."""
     phrases = []
     if np.unique(record.u).size <= len(record) // 2:
-        curve = _static_curve(record, n_parameters)
-        if _as_well((record.y - curve) ** 2, (record.y - y) ** 2):
+        low, high = record.u.min(), record.u.max()
+        scaled = (2.0 * record.u - low - high) / ((high - low) or 1.0)
+        columns = chebyshev.chebvander(scaled, min(n_parameters, np.unique(scaled).size) - 1)
+        curve = columns @ np.linalg.lstsq(columns, record.y)[0]
+        of_curve, of_plant = (record.y - curve) ** 2, (record.y - y) ** 2
+        worse, is_clear = of_curve - of_plant, of_plant.mean() < _LEAST**2 * of_curve.mean()
+        if not is_clear and worse.mean() <= _SURE * _stderr_of_mean(worse):
             fit = metrics.fit_percent(record.y, curve)
             phrases.append(f"a single-valued curve of u fits {fit:.1f} %: as well as this model within the noise")
     if _one_rate(record):
         phrases.append("the record holds one rate only: lag and hysteresis cannot be told apart")
     return tuple(phrases)
-
-
-def _static_curve(record: Record, n_coefficients: int) -> FloatArray:
-    low, high = record.u.min(), record.u.max()
-    scaled = (2.0 * record.u - low - high) / ((high - low) or 1.0)
-    columns = chebyshev.chebvander(scaled, min(n_coefficients, np.unique(scaled).size) - 1)
-    return np.asarray(columns @ np.linalg.lstsq(columns, record.y)[0])
-
-
-def _as_well(curve: FloatArray, plant: FloatArray) -> bool:
-    worse = curve - plant
-    clearly = plant.mean() < _LEAST**2 * curve.mean()
-    return not clearly and bool(worse.mean() <= _SURE * _stderr_of_mean(worse))
 
 
 def _stderr_of_mean(values: FloatArray) -> float:

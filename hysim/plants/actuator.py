@@ -310,7 +310,10 @@ class Actuator:
     @property
     def as_read(self) -> "Actuator":
         """The actuator whose displacement is what the sensor of this one reads, without noise and steps."""
-        return self if self.sensor is None else self._late(self.sensor.delay)
+        if self.sensor is None or not self.sensor.delay:
+            return self
+        vibration = self.vibration or TransferFunction(num=(1.0,), den=(1.0,))
+        return replace(self, vibration=replace(vibration, delay=vibration.delay + self.sensor.delay))
 
     def measured(
         self, u: npt.ArrayLike, sample_time: float | None = None, *, substeps: int | None = None
@@ -394,13 +397,6 @@ class Actuator:
     def _drive_takes_time(self) -> bool:
         return self.amplifier is not None and self.amplifier.dynamic
 
-    def _late(self, delay: float) -> "Actuator":
-        """The actuator whose true displacement is this one's of some time ago."""
-        if not delay:
-            return self
-        vibration = self.vibration or TransferFunction(num=(1.0,), den=(1.0,))
-        return replace(self, vibration=replace(vibration, delay=vibration.delay + delay))
-
 
 def as_actuator(plant: Any) -> Actuator:
     """Any plant as an actuator: a law becomes its hysteresis, a linear plant its vibration; others are a TypeError.
@@ -426,18 +422,13 @@ def as_actuator(plant: Any) -> Actuator:
     if isinstance(plant, Amplifier):
         return Actuator(amplifier=plant)
     if isinstance(plant, Cascade) and isinstance(plant.stages[-1], TransferFunction):
-        return _hammerstein(plant.stages)
+        laws = plant.stages[:-1]
+        hysteresis = Cascade(stages=laws) if len(laws) > 1 else laws[0] if laws else None
+        return Actuator(hysteresis=hysteresis, vibration=plant.stages[-1])
     vibration = linear_plant(plant)
     if isinstance(vibration, Vibration):
         return Actuator(vibration=vibration)
     raise TypeError(f"plant must be an Actuator, a law or a linear plant, got {type(plant).__name__}")
-
-
-def _hammerstein(stages: tuple[Any, ...]) -> Actuator:
-    """Laws in front of a transfer function; TypeError if one of them is no law that a loop can step."""
-    if len(stages) < 3:
-        return Actuator(hysteresis=stages[0] if len(stages) > 1 else None, vibration=stages[-1])
-    return Actuator(hysteresis=Cascade(stages=stages[:-1]), vibration=stages[-1])
 
 
 def as_stepwise(plant: Any) -> Stepwise:

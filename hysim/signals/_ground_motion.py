@@ -106,6 +106,8 @@ def ground_motion(
     >>> a.size, float(np.abs(a).max()), bool(abs(np.trapezoid(a, dx=0.01)) < 1e-12)
     (2001, 3.0, True)
     """
+    from scipy.signal import freqs  # loading it takes longer than all other signals together
+
     n = _n_samples(duration, sample_time)
     check_positive(peak=peak, ground_frequency=ground_frequency, ground_damping=ground_damping)
     check_positive(corner_frequency=corner_frequency, corner_damping=corner_damping)
@@ -119,9 +121,11 @@ def ground_motion(
             )
     shape = _envelope(envelope, np.arange(float(n)) * (sample_time / duration), rise, plateau, end)
     n_noise = 1 << (2 * n - 1).bit_length()  # twice the motion, so that its end does not know its begin
-    soil = _soil_motion(
-        np.random.default_rng(seed).standard_normal(n_noise), sample_time, ground_frequency, ground_damping
-    )
+    noise = np.random.default_rng(seed).standard_normal(n_noise)
+    # the filter of Kanai and Tajimi, by its spectrum: a recursion would bend it at high frequencies
+    own = [2.0 * ground_damping * ground_frequency, ground_frequency**2]
+    w = 2.0 * np.pi * np.fft.rfftfreq(n_noise, sample_time)
+    soil = np.fft.irfft(np.fft.rfft(noise) * freqs(own, [1.0, *own], worN=w)[1], n_noise)
     if envelope == "none":  # the high pass has settled when the motion begins
         motion = _high_passed(soil, sample_time, corner_frequency, corner_damping)[-n:]
     else:
@@ -163,16 +167,6 @@ def _envelope(name: str, time: FloatArray, rise: float, plateau: float, end: flo
         raise ValueError(f"rise + plateau must be below 1, got {rise} + {plateau}")
     fading = np.exp(math.log(end) * np.maximum(0.0, (time - fall) / (1.0 - fall)))
     return np.asarray(np.minimum(1.0, (time / rise) ** 2) * fading)
-
-
-def _soil_motion(noise: FloatArray, sample_time: float, frequency: float, damping: float) -> FloatArray:
-    """Noise after the filter of Kanai and Tajimi, by its spectrum: a recursion would bend it at high frequencies."""
-    from scipy.signal import freqs  # loading it takes longer than all other signals together
-
-    viscous = 2.0 * damping * frequency
-    w = 2.0 * np.pi * np.fft.rfftfreq(noise.size, sample_time)
-    _, response = freqs([viscous, frequency**2], [1.0, viscous, frequency**2], worN=w)
-    return np.asarray(np.fft.irfft(np.fft.rfft(noise) * response, noise.size))
 
 
 def _high_passed(motion: FloatArray, sample_time: float, frequency: float, damping: float) -> FloatArray:

@@ -64,9 +64,10 @@ def search_space(
     if np.ptp(record.u) == 0.0:
         raise ValueError("the input is constant: nothing can be identified from it")
     terms = {name: Term.parse(name) for name in defaults if name not in _OUTPUT}
+    has_own_memory = any(defaults[name] for name in _OUTPUT[:2]) or any(term.absolute for term in terms.values())
     held = freedom.held(
         defaults,
-        redundant=() if _has_memory_of_its_own(defaults, terms) else (("feedthrough",), ("offset",)),
+        redundant=() if has_own_memory else (("feedthrough",), ("offset",)),
         at_rest=("y0",) if freedom.starts_at_rest() else (),
     )
     limits = freedom.limits(defaults, held)
@@ -97,10 +98,6 @@ def search_space(
         parameters=parameters,
         state=("y0",),
     )
-
-
-def _has_memory_of_its_own(defaults: Mapping[str, float], terms: Mapping[str, Term]) -> bool:
-    return any(defaults[name] for name in _OUTPUT[:2]) or any(term.absolute for term in terms.values())
 
 
 def _units(terms: Mapping[str, Term], defaults: Mapping[str, float], record: Record) -> dict[str, float]:
