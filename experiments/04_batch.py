@@ -2,8 +2,9 @@
 
 The throughput is that of 100 000 laws on a 52-point staircase: n = 1, n = 2, one other n, 64 values of n, all n
 different; as rows, and reduced to the sum of squares. The growth is measured from 1e3 to 1e7 samples of one law and
-from 1 to 1e6 laws, whose rows are never held together. Times are medians over repeats in one run, with the spread
-between the quartiles; beside them that of `np.exp` on as many numbers.
+from 1 to 1e6 laws, whose rows are never held together. Sums of 16 to 1024 plays run on a sine, on a sine with noise of
+1 % and on noise alone, beside a loop of the law's step, which clamps all plays at each sample. Times are medians over
+repeats in one run, with the spread between the quartiles; beside them that of `np.exp` on as many numbers.
 """
 
 import statistics
@@ -15,6 +16,7 @@ from pathlib import Path
 import numpy as np
 
 import hysim as hs
+from hysim.models.law import Law
 from hysim.plot import Figure, figure
 
 sys.path.insert(0, str(Path(__file__).parent))
@@ -22,6 +24,7 @@ from results_folder import write_results
 
 RESULTS = Path(__file__).parent / "results" / "batch"
 Row = dict[str, float | str]
+each_step = Law.path.__func__  # which is that of every law without a path of its own
 
 
 def staircase() -> np.ndarray:
@@ -61,7 +64,7 @@ def timed(work: Callable[[], object], repeats: int) -> tuple[float, float]:
     return statistics.median(times), high - low
 
 
-def row(kind: str, exponents: str, n_sets: int, n_samples: int, time_and_spread: tuple[float, float]) -> Row:
+def row(kind: str, law: str, n_sets: int, n_samples: int, time_and_spread: tuple[float, float]) -> Row:
     """One measurement, beside `np.exp` on as many numbers."""
     seconds, spread = time_and_spread
     size = n_sets * n_samples
@@ -69,7 +72,7 @@ def row(kind: str, exponents: str, n_sets: int, n_samples: int, time_and_spread:
     exponential = timed(lambda: np.exp(numbers), 5)[0] / numbers.size
     return {
         "kind": kind,
-        "n": exponents,
+        "law": law,
         "sets": n_sets,
         "samples": n_samples,
         "seconds": seconds,
@@ -86,9 +89,9 @@ def throughput(n_sets: int, repeats: int) -> list[Row]:
     for exponents in ("1", "2", "1.5", "64 values", "all differ"):
         sets = laws(n_sets, exponents)
         plain = timed(lambda sets=sets: hs.BoucWen.responses(sets, u), repeats)
-        rows.append(row("rows", exponents, n_sets, u.size, plain))
+        rows.append(row("rows", f"n = {exponents}", n_sets, u.size, plain))
         sse = timed(lambda sets=sets: hs.BoucWen.responses(sets, u, reduce="sse", target=target), repeats)
-        rows.append(row("sse", exponents, n_sets, u.size, sse))
+        rows.append(row("sse", f"n = {exponents}", n_sets, u.size, sse))
     return rows
 
 
@@ -99,12 +102,31 @@ def growth(most_samples: int, most_sets: int, repeats: int) -> list[Row]:
         law = hs.BoucWen(beta=0.6, gamma=0.3, n=float(exponents))
         for n_samples in 10 ** np.arange(3, 1 + round(np.log10(most_samples))):
             u = two_tone(int(n_samples))
-            rows.append(row("samples", exponents, 1, u.size, timed(lambda law=law, u=u: law.response(u), repeats)))
+            rows.append(
+                row("samples", f"n = {exponents}", 1, u.size, timed(lambda law=law, u=u: law.response(u), repeats))
+            )
         u = staircase()
         for n_sets in 10 ** np.arange(0, 1 + round(np.log10(most_sets))):
             sets = laws(int(n_sets), exponents)
             final = timed(lambda sets=sets, u=u: hs.BoucWen.responses(sets, u, reduce="final"), repeats)
-            rows.append(row("sets", exponents, int(n_sets), u.size, final))
+            rows.append(row("sets", f"n = {exponents}", int(n_sets), u.size, final))
+    return rows
+
+
+def many_plays(n_samples: int, repeats: int) -> list[Row]:
+    """One sum of plays, and a loop of its step."""
+    rng, rows = np.random.default_rng(0), []
+    sine, noise = np.sin(np.arange(n_samples) / 300.0), rng.standard_normal(n_samples)
+    inputs = {"sine": sine, "sine and noise": sine + 0.01 * noise, "noise": 0.5 * noise}
+    for count in (16, 64, 256, 1024):
+        thresholds, weights = np.linspace(0.0, 1.0, count, endpoint=False), rng.uniform(0.1, 1.0, count) / count
+        law = hs.PrandtlIshlinskii(thresholds=tuple(thresholds), weights=tuple(weights))
+        for name, u in inputs.items():
+            y = np.empty(n_samples)
+            seconds = timed(lambda law=law, u=u: law.response(u), repeats)
+            rows.append(row("path", f"{count} plays, {name}", 1, n_samples, seconds))
+            steps = timed(lambda law=law, u=u, y=y: each_step(type(law), law.compiled(u[0]), u, y), repeats)
+            rows.append(row("steps", f"{count} plays, {name}", 1, n_samples, steps))
     return rows
 
 
@@ -113,7 +135,11 @@ def slopes(rows: list[Row]) -> dict[str, float]:
     fits = {}
     for kind, least in (("samples", 1e4), ("sets", 1e3)):
         for exponents in ("1", "1.5"):
-            chosen = [line for line in rows if (line["kind"], line["n"]) == (kind, exponents) and line[kind] >= least]
+            chosen = [
+                line
+                for line in rows
+                if (line["kind"], line["law"]) == (kind, f"n = {exponents}") and line[kind] >= least
+            ]
             sizes, seconds = (np.log([line[name] for line in chosen]) for name in (kind, "seconds"))
             fits[f"{kind}, n = {exponents}"] = float(np.polyfit(sizes, seconds, 1)[0])
     return fits
@@ -121,9 +147,10 @@ def slopes(rows: list[Row]) -> dict[str, float]:
 
 def main(smoke: bool = False) -> list[Row]:
     """Measure, and unless it is a smoke run write table, figure and JSON."""
-    rows = throughput(500, 1) + growth(1000, 10, 1) if smoke else throughput(100_000, 7) + growth(10**7, 10**6, 5)
-    if not smoke:
-        write_results(RESULTS, rows, draw, {"slopes": slopes(rows)})
+    if smoke:
+        return throughput(500, 1) + growth(1000, 10, 1) + many_plays(100, 1)
+    rows = throughput(100_000, 7) + growth(10**7, 10**6, 5) + many_plays(100_000, 7)
+    write_results(RESULTS, rows, draw, {"slopes": slopes(rows)})
     return rows
 
 
@@ -133,7 +160,7 @@ def draw(rows: list[Row]) -> Figure:
     for place, kind in enumerate(("samples", "sets")):
         ax = canvas.add_subplot(1, 2, place + 1)
         for exponents, marker in (("1", "o"), ("1.5", "s")):
-            chosen = [line for line in rows if line["kind"] == kind and line["n"] == exponents]
+            chosen = [line for line in rows if line["kind"] == kind and line["law"] == f"n = {exponents}"]
             sizes, seconds = ([float(line[name]) for line in chosen] for name in (kind, "seconds"))
             (points,) = ax.loglog(sizes, seconds, marker, label=f"n = {exponents}")
             ax.loglog(sizes, [seconds[-1] * size / sizes[-1] for size in sizes], "-", color=points.get_color(), lw=0.8)
@@ -146,7 +173,7 @@ def draw(rows: list[Row]) -> Figure:
 if __name__ == "__main__":
     for line in main():
         print(
-            f"{line['kind']:8} n = {line['n']:10} {line['sets']:>8} sets x {line['samples']:>8} samples"
+            f"{line['kind']:8} {line['law']:26} {line['sets']:>8} sets x {line['samples']:>8} samples"
             f" {line['million_samples_per_second']:8.1f} million samples a second"
             f" +- {100 * float(line['spread']) / float(line['seconds']):.0f} %, {line['times_exp']:.1f} times np.exp"
         )
