@@ -318,7 +318,10 @@ class Law(Placed, Searched, ABC):
         inputs = read_only(u, "u", ndim=1)
         law, start = self._begun(_first(inputs), state)
         y = np.empty(inputs.size)
-        self._follow(law, inputs, y)
+        with np.errstate(all="ignore"):
+            lost = in_pieces(lambda k: self.path(law, inputs[k], y[k]), inputs.size)
+        if lost >= 0:
+            raise SimulationError(self.divergence(lost, inputs[lost], y[lost]))
         return y, tuple(law.state[: len(start)].tolist()) if y.size else start
 
     def response_jacobian(self, u: npt.ArrayLike, names: Iterable[str] | None = None) -> "Jacobian":
@@ -385,10 +388,7 @@ class Law(Placed, Searched, ABC):
 
     def compiled(self, u0: float = 0.0) -> CompiledLaw:
         """The law as compiled loops take it; the state is that after a first sample at the input `u0`."""
-        law = self.startable().started(u0)
-        with np.errstate(all="ignore"):
-            law.step(law.parameters, law.state, u0)
-        return law
+        return _after_first(self.startable(), u0)
 
     def startable(self, sample_time: float | None = None) -> Startable:
         """The law as a step that runs from any first input; it has no use for the sample time.
@@ -400,7 +400,10 @@ class Law(Placed, Searched, ABC):
         state = np.zeros(memory.size + workspace)
         state[: memory.size] = memory
         model = Startable(compiled_step(step), parameters, state, compiled_start(start))
-        return model if self.u0 is None else _standing_at(model, self.u0)
+        if self.u0 is None:
+            return model
+        # no other first input completes this state
+        return Startable(*_after_first(model, self.u0), stepping.complete)
 
     def state_at(self, u: float) -> State:
         """Input and memory at the input `u`, to which the law moves from its own `u0` if it has one."""
@@ -620,7 +623,9 @@ class Law(Placed, Searched, ABC):
         ValueError if an affine parameter moves the memory: it is not known yet where the others are searched.
         """
         names, u = self.initial_names, np.append(record.u, record.u[0])
-        corners = u[_corners(record)]
+        turns = record.reversals()
+        turns = turns if turns.size < _FEW * len(record) else record.reversals(TOLERANCE)
+        corners = u[[0, *turns.tolist(), len(record)]]
         self._check_memory_is_its_own(parameters, corners)
 
         def through(path: FloatArray) -> PassOf:
@@ -719,13 +724,6 @@ class Law(Placed, Searched, ABC):
             law.state[:size] = state
         return law, tuple(law.state[:size].tolist())
 
-    def _follow(self, law: CompiledLaw, u: FloatArray, y: FloatArray) -> None:
-        """Outputs at `u` into `y`, the state moving along."""
-        with np.errstate(all="ignore"):
-            lost = in_pieces(lambda k: self.path(law, u[k], y[k]), u.size)
-        if lost >= 0:
-            raise SimulationError(self.divergence(lost, u[lost], y[lost]))
-
 
 @lru_cache(maxsize=256)
 def _with_tolerance(family: type[Law], tolerance: float) -> type[Law]:
@@ -749,19 +747,11 @@ def _sizes(rest: FloatArray, u: FloatArray) -> FloatArray:
     return np.asarray(np.exp2(np.frexp(least)[1]))
 
 
-def _corners(record: Record) -> npt.NDArray[np.intp]:
-    """First sample, turning points, and the place after the last sample."""
-    turns = record.reversals()
-    turns = turns if turns.size < _FEW * len(record) else record.reversals(TOLERANCE)
-    return np.array([0, *turns.tolist(), len(record)])
-
-
-def _standing_at(model: Startable, u0: float) -> Startable:
-    """The model after a first sample at `u0`, whose state no other first input completes."""
+def _after_first(model: Startable, u0: float) -> CompiledLaw:
     law = model.started(u0)
     with np.errstate(all="ignore"):
         law.step(law.parameters, law.state, u0)
-    return Startable(*law, stepping.complete)
+    return law
 
 
 def _tables(
