@@ -214,20 +214,18 @@ def parameter(
         axes.fill_between(channel, *curve.band(channel), color=style["color"], alpha=0.25, linewidth=0.0)
         axes.plot(channel, curve.value(channel), label="jointly", **style)
         for k, (each, record) in enumerate(zip(one_by_one, records, strict=True)):
-            _draw_alone(axes, each, known.parameter, steady(record.channel(known.channel)), k == 0)
+            place: Any = steady(record.channel(known.channel))
+            if np.ndim(place):
+                raise ValueError("a channel varies along a record of these fits: a fit stands at one value of it")
+            value = each.estimates[known.parameter]
+            low, high = each.intervals.get(known.parameter, (np.nan, np.nan))
+            points: dict[str, Any] = {"color": MEASURED, "fmt": "o", "markersize": 4, "capsize": 2}
+            points["label"] = None if k else "one by one"
+            axes.errorbar([place], [value], yerr=[[value - low], [high - value]], **points)
         axes.set(xlabel=in_unit(known.channel, units.get(known.channel, "")), ylabel=in_unit(known.parameter, unit))
         if one_by_one:
             axes.legend()
     return axes
-
-
-def _draw_alone(ax: Axes, fit: Identification, parameter: str, place: Any, is_first: bool) -> None:
-    if np.ndim(place):
-        raise ValueError("a channel varies along a record of these fits: a fit stands at one value of it")
-    value, (low, high) = fit.estimates[parameter], fit.intervals.get(parameter, (np.nan, np.nan))
-    label = "one by one" if is_first else None
-    reach = [[value - low], [high - value]]
-    ax.errorbar([place], [value], yerr=reach, color=MEASURED, fmt="o", markersize=4, capsize=2, label=label)
 
 
 def track(

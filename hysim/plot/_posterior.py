@@ -141,9 +141,12 @@ def evidence(evidence: Evidence, ax: Axes | None = None) -> Axes:
 
 
 def _draw_pair(ax: Axes, x: FloatArray, y: FloatArray) -> None:
+    from scipy.ndimage import convolve1d
+
     limits = [_shown(x), _shown(y)]
-    counts, across, up = np.histogram2d(x, y, bins=_BINS, range=limits)
-    smooth = _smoothed(counts)
+    smooth, across, up = np.histogram2d(x, y, bins=_BINS, range=limits)
+    for axis in (0, 1, 0, 1):  # means of neighbours, 1 : 2 : 1 along both axes, twice
+        smooth = convolve1d(smooth, [0.25, 0.5, 0.25], axis, mode="nearest")
     ordered = np.sort(smooth.ravel())[::-1]
     held = np.cumsum(ordered) / ordered.sum()
     levels = [float(ordered[np.searchsorted(held, share)]) for share in reversed(_SHARES)]
@@ -152,15 +155,6 @@ def _draw_pair(ax: Axes, x: FloatArray, y: FloatArray) -> None:
         return
     middle = [0.5 * (each[1:] + each[:-1]) for each in (across, up)]
     ax.contourf(*middle, smooth.T, levels=[*levels, float(smooth.max())], colors=_SHADES)
-
-
-def _smoothed(counts: FloatArray) -> FloatArray:
-    """Counts averaged over neighbours, 1 : 2 : 1 along both axes, twice."""
-    from scipy.ndimage import convolve1d
-
-    for axis in (0, 1, 0, 1):
-        counts = convolve1d(counts, [0.25, 0.5, 0.25], axis, mode="nearest")
-    return counts
 
 
 def _shown(draws: FloatArray) -> tuple[float, float]:

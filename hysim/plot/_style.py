@@ -200,7 +200,11 @@ def to_svg(figure: Figure, *, name: str = "figure") -> str:
     """
     if not _NAME.fullmatch(name):
         raise ValueError(f"name must be a letter followed by letters, digits, _ and -, got {name!r}")
-    _forget_layout(figure)
+    if figure.get_layout_engine() is not None:
+        for ax in figure.axes:  # back where they were before any drawing: the layout starts from where they are
+            place = ax.get_subplotspec()
+            if place is not None and ax.get_in_layout():
+                ax.set_subplotspec(place)
     buffer = io.StringIO()
     with house_style(), matplotlib.rc_context({"svg.hashsalt": name}):
         figure.savefig(buffer, format="svg", metadata=_METADATA["svg"])
@@ -208,15 +212,6 @@ def to_svg(figure: Figure, *, name: str = "figure") -> str:
     element = document[document.index("<svg") :]
     own = _TAG.sub(lambda tag: _REFERENCE.sub(rf"\1{name}-", tag[0]), element)
     return own.replace("*{stroke", f"#{name}-figure_1 *{{stroke", 1)
-
-
-def _forget_layout(figure: Figure) -> None:
-    """Put the Axes where they were before any drawing, since the layout starts from where they are."""
-    if figure.get_layout_engine() is not None:
-        for ax in figure.axes:
-            place = ax.get_subplotspec()
-            if place is not None and ax.get_in_layout():
-                ax.set_subplotspec(place)
 
 
 def save_svg(figure: Figure, path: str | Path, *, name: str | None = None) -> None:

@@ -242,7 +242,17 @@ def residual_map(
     y = model.y if isinstance(model, Simulation) else free_run(model, record).y
     if y.shape != record.y.shape:
         raise ValueError(f"the model's output must be as long as the record, {len(record)} samples, got {y.size}")
-    edges, tables = _mean_residuals(record, (record.y - y) / quantum, bins, tolerance)
+    branches = turns(record.u, tolerance).branches
+    if not branches:
+        raise ValueError("the input is constant: there is no branch to draw")
+    typical = int(np.median([branch.stop - branch.start for branch in branches]))
+    n_bins = bins or max(1, min(_MOST_BINS, typical // 2))
+    edges = np.linspace(record.u.min(), record.u.max(), n_bins + 1)
+    residual, tables = (record.y - y) / quantum, []
+    for sign in (1.0, -1.0):
+        same_way = [part for part in branches if sign * (record.u[part.stop - 1] - record.u[part.start]) > 0.0]
+        rows = [_means(record.u[part], residual[part], edges) for part in same_way]
+        tables.append(np.array(rows).reshape(-1, n_bins))
     reach = max(float(np.nanmax(np.abs(table))) for table in tables if table.size) or 1.0
     scale: dict[str, Any] = {"cmap": DIVERGING, "norm": Normalize(-reach, reach)}
     with several(axes, 2, height=3.4, columns=2, sharey=True) as panels:
@@ -321,24 +331,6 @@ def forc(
         unit = f"{labels['y']}/{labels['u']}²" if {"u", "y"} <= labels.keys() else ""
         axes.figure.colorbar(cells, ax=axes, label=in_unit("Density of relays", unit))
     return axes
-
-
-def _mean_residuals(
-    record: Record, residual: FloatArray, bins: int | None, tolerance: float
-) -> tuple[FloatArray, list[FloatArray]]:
-    """Edges of the input's intervals, and means (n_branches, n_bins) in them: of rising, and of falling branches."""
-    branches = turns(record.u, tolerance).branches
-    if not branches:
-        raise ValueError("the input is constant: there is no branch to draw")
-    typical = int(np.median([branch.stop - branch.start for branch in branches]))
-    n_bins = bins or max(1, min(_MOST_BINS, typical // 2))
-    edges = np.linspace(record.u.min(), record.u.max(), n_bins + 1)
-    tables = []
-    for sign in (1.0, -1.0):
-        same_way = [part for part in branches if sign * (record.u[part.stop - 1] - record.u[part.start]) > 0.0]
-        rows = [_means(record.u[part], residual[part], edges) for part in same_way]
-        tables.append(np.array(rows).reshape(-1, n_bins))
-    return edges, tables
 
 
 def _means(u: FloatArray, values: FloatArray, edges: FloatArray) -> FloatArray:
