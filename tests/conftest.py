@@ -9,6 +9,7 @@ import os
 import pickle
 import signal
 import sqlite3
+import subprocess
 import sys
 import tomllib
 from collections import defaultdict
@@ -184,11 +185,15 @@ def shell(monkeypatch, capsys):
     return run
 
 
+def shared_folder(tmp_path_factory):
+    """Of what all processes compute once: that of HYSIM_SHARED, where several sessions test one state, or a new one."""
+    own = tmp_path_factory.getbasetemp()
+    return Path(os.environ.get("HYSIM_SHARED") or (own.parent if "PYTEST_XDIST_WORKER" in os.environ else own))
+
+
 def once_for_all_processes(tmp_path_factory, name, compute):
     """The result of `compute`, called with a folder by the first process that asks; the others read a file."""
-    folder = tmp_path_factory.getbasetemp()
-    if "PYTEST_XDIST_WORKER" in os.environ:
-        folder = folder.parent  # which all processes share
+    folder = shared_folder(tmp_path_factory)
     with contextlib.closing(sqlite3.connect(folder / f"{name}.lock", timeout=600.0)) as lock:
         lock.execute("BEGIN EXCLUSIVE")  # waits until no other process holds it
         stored = folder / f"{name}.pickle"
@@ -203,6 +208,20 @@ def reproduction(tmp_path_factory):
     from hysim.paper import reproduce
 
     return once_for_all_processes(tmp_path_factory, "reproduction", reproduce)
+
+
+@pytest.fixture(scope="session")
+def again(tmp_path_factory):
+    """The command in a process of its own: folder, stdout, stderr. The gate has run it from a wheel."""
+    folder = shared_folder(tmp_path_factory) / "again"
+    if not folder.exists():
+        folder.mkdir()
+        command = [sys.executable, "-W", "error", "-m", "hysim", "reproduce", "--out", str(folder / "out")]
+        done = subprocess.run(command, capture_output=True, text=True)
+        assert done.returncode == 0, done.stderr
+        (folder / "stdout").write_text(done.stdout)
+        (folder / "stderr").write_text(done.stderr)
+    return folder / "out", (folder / "stdout").read_text(), (folder / "stderr").read_text()
 
 
 @pytest.fixture(scope="session")

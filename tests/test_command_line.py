@@ -3,9 +3,6 @@
 import contextlib
 import json
 import re
-import subprocess
-import sys
-from pathlib import Path
 
 import pytest
 
@@ -18,19 +15,6 @@ FIGURES = [
     "figure3", "figure4", "figure5", "figure9", "figure10", "figure12", "figure13", "figure14",
     "loops", "widths", "residuals", "discovery", "hysteresis", "dwell", "camera", "periods", "opening", "evidence",
 ]  # fmt: skip
-
-
-@pytest.fixture(scope="session")
-def again(tmp_path_factory) -> tuple[Path, str, str]:
-    """The command in a process of its own: folder, stdout, stderr."""
-    folder = tmp_path_factory.mktemp("again") / "out"
-    done = subprocess.run(
-        [sys.executable, "-W", "error", "-m", "hysim", "reproduce", "--out", str(folder)],
-        capture_output=True,
-        text=True,
-    )
-    assert done.returncode == 0, done.stderr
-    return folder, done.stdout, done.stderr
 
 
 @pytest.fixture(scope="module")
