@@ -317,7 +317,7 @@ class IterativeLearning(_Learning):
             with warnings.catch_warnings():
                 if k < trials - 1:
                     warnings.simplefilter("ignore", HysimWarning)
-                measurements[k], wanted, commands[k] = self._measured(trial, times, r + c, u0, k)
+                measurements[k], wanted, commands[k] = self._measured(trial, times, r + c, u0, k, k == trials - 1)
             limited = np.convolve(wanted != commands[k], shown)[: r.size] > 0.0
             c = self.following(c, np.where(limited, 0.0, read - measurements[k]), h)
         return LearnedTrials(
@@ -331,9 +331,9 @@ class IterativeLearning(_Learning):
         )
 
     def _measured(
-        self, trial: Any, t: FloatArray, r: FloatArray, u0: float | None, number: int
+        self, trial: Any, t: FloatArray, r: FloatArray, u0: float | None, number: int, is_last: bool
     ) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Measurement of a trial, and its commands before and after the limits."""
+        """Measurement of a trial, and its commands before and after the limits; the last one warns as a loop does."""
         if callable(trial):
             before, after = (r, r) if is_fed_back(self.controller) else self._commands(r, float(t[1] - t[0]), u0)
             measurement = np.array(trial(after), dtype=float)
@@ -343,7 +343,11 @@ class IterativeLearning(_Learning):
         plant = model_of(trial)
         if not isinstance(plant, Structure) and (sensor := as_actuator(plant).sensor) is not None:
             plant = replace(as_actuator(plant), sensor=replace(sensor, seed=sensor.seed + number))
-        run = close_loop(plant, self.controller, t, r, u0=u0)
+        if is_last or isinstance(plant, Structure):
+            run: Any = close_loop(plant, self.controller, t, r, u0=u0)
+        else:
+            _, reference, h = sampled(t, r)
+            run = RestingPlant(as_actuator(plant), h, u0).run(self.controller, reference)
         return run.measurement, run.command, run.drive
 
 
