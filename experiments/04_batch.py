@@ -89,9 +89,9 @@ def throughput(n_sets: int, repeats: int) -> list[Row]:
     for exponents in ("1", "2", "1.5", "64 values", "all differ"):
         sets = laws(n_sets, exponents)
         plain = timed(lambda sets=sets: hs.BoucWen.responses(sets, u), repeats)
-        rows.append(row("rows", f"n = {exponents}", n_sets, u.size, plain))
+        rows.append(row("rows", f"n: {exponents}", n_sets, u.size, plain))
         sse = timed(lambda sets=sets: hs.BoucWen.responses(sets, u, reduce="sse", target=target), repeats)
-        rows.append(row("sse", f"n = {exponents}", n_sets, u.size, sse))
+        rows.append(row("sse", f"n: {exponents}", n_sets, u.size, sse))
     return rows
 
 
@@ -103,13 +103,13 @@ def growth(most_samples: int, most_sets: int, repeats: int) -> list[Row]:
         for n_samples in 10 ** np.arange(3, 1 + round(np.log10(most_samples))):
             u = two_tone(int(n_samples))
             rows.append(
-                row("samples", f"n = {exponents}", 1, u.size, timed(lambda law=law, u=u: law.response(u), repeats))
+                row("samples", f"n: {exponents}", 1, u.size, timed(lambda law=law, u=u: law.response(u), repeats))
             )
         u = staircase()
         for n_sets in 10 ** np.arange(0, 1 + round(np.log10(most_sets))):
             sets = laws(int(n_sets), exponents)
             final = timed(lambda sets=sets, u=u: hs.BoucWen.responses(sets, u, reduce="final"), repeats)
-            rows.append(row("sets", f"n = {exponents}", int(n_sets), u.size, final))
+            rows.append(row("sets", f"n: {exponents}", int(n_sets), u.size, final))
     return rows
 
 
@@ -138,7 +138,7 @@ def slopes(rows: list[Row]) -> dict[str, float]:
             chosen = [
                 line
                 for line in rows
-                if (line["kind"], line["law"]) == (kind, f"n = {exponents}") and line[kind] >= least
+                if (line["kind"], line["law"]) == (kind, f"n: {exponents}") and line[kind] >= least
             ]
             sizes, seconds = (np.log([line[name] for line in chosen]) for name in (kind, "seconds"))
             fits[f"{kind}, n = {exponents}"] = float(np.polyfit(sizes, seconds, 1)[0])
@@ -160,7 +160,7 @@ def draw(rows: list[Row]) -> Figure:
     for place, kind in enumerate(("samples", "sets")):
         ax = canvas.add_subplot(1, 2, place + 1)
         for exponents, marker in (("1", "o"), ("1.5", "s")):
-            chosen = [line for line in rows if line["kind"] == kind and line["law"] == f"n = {exponents}"]
+            chosen = [line for line in rows if line["kind"] == kind and line["law"] == f"n: {exponents}"]
             sizes, seconds = ([float(line[name]) for line in chosen] for name in (kind, "seconds"))
             (points,) = ax.loglog(sizes, seconds, marker, label=f"n = {exponents}")
             ax.loglog(sizes, [seconds[-1] * size / sizes[-1] for size in sizes], "-", color=points.get_color(), lw=0.8)
