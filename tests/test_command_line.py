@@ -197,6 +197,7 @@ def test_full_searches_come_to_the_same_verdicts(reproduction, summary, tmp_path
     }
     for name, known in computed.items():
         monkeypatch.setattr(f"hysim.paper.findings.{name}", known)
+    monkeypatch.setattr("hysim.paper.reproduction._as_svg", lambda drawings: dict.fromkeys(drawings, "<svg></svg>"))
     assert main(["reproduce", "--thorough", "--quick", "--json", "--out", str(tmp_path)]) == 0
     thorough = json.loads(capsys.readouterr().out)
     verdicts, stored = ([(each["id"], each["verdict"]) for each in of["claims"]] for of in (thorough, summary))
