@@ -187,7 +187,7 @@ def batch(result: Result) -> list[str]:
         f"The cost grows at most in proportion to samples and laws (powers of {span(slopes, 2)}). The speeds are those "
         f"of {count(rows[0]['sets'])} laws with {rows[0]['samples']} samples each, on all cores.",
         by_row(rows, ("law", "law", str), ("million samples a second", speed, number)),
-        f"One sum of 16 to 1024 plays takes {span(plays['path'], 2)} ns a sample, on inputs from a sine to noise. A "
+        f"One sum of up to 1024 plays takes {span(plays['path'], 2)} ns a sample, on inputs from a sine to noise. A "
         f"loop of its step, in which each sample clamps all plays, takes {span(plays['steps'], 2)} ns.",
     ]
 
