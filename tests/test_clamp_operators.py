@@ -209,38 +209,28 @@ def test_batch_is_the_path_to_the_bit(u, seed, own_inputs):
     st.sampled_from(["at zero", "after a past", "anywhere"]),
     st.integers(0, 40),
 )
-def test_many_plays_are_the_sum_of_their_definitions(seed, plays, motion, before, cut):
+def test_many_plays_and_stops_are_the_sum_of_their_definitions(seed, plays, motion, before, cut):
     rng = np.random.default_rng(seed)
-    r = np.sort(rng.choice(1000, plays, replace=False)) / 1000.0
-    w, u = (
-        rng.normal(size=plays),
-        {
-            "walk": 0.1 * np.cumsum(rng.normal(size=60)),
-            "noise": rng.uniform(-1.0, 1.0, 60),
-            "steps": rng.integers(-3, 4, 60) / 3.0,
-        }[motion],
-    )
-    z = rng.uniform(-1.0, 1.0, plays) if before == "anywhere" else np.zeros(plays)
+    r, w = np.sort(rng.choice(1000, plays, replace=False)) / 1000.0, rng.normal(size=plays)
+    inputs = {
+        "walk": 0.1 * np.cumsum(rng.normal(size=60)),
+        "noise": rng.uniform(-1.0, 1.0, 60),
+        "steps": rng.integers(-3, 4, 60) / 3.0,
+    }
+    u, z0 = inputs[motion], rng.uniform(-1.0, 1.0, plays) if before == "anywhere" else np.zeros(plays)
     if before == "after a past":
-        for past in rng.uniform(-1.0, 1.0, 5):
-            z = np.clip(z, past - r, past + r)
-    law = hs.PrandtlIshlinskii(thresholds=tuple(r), weights=tuple(w), offset=0.3, z0=tuple(z))
-    stops = hs.MaxwellSlip(slips=tuple(r + 1e-3), stiffness=tuple(w), z0=tuple(z))
-    expected, still = [], z
-    for value in u:
-        z = np.clip(z, value - r, value + r)
-        expected.append(0.3 + w @ z)
-    stopped = []
-    for value in u:
-        still = np.clip(still, value - (r + 1e-3), value + (r + 1e-3))
-        stopped.append(w @ (value - still))
-    within = 1e-15 * plays * (1.0 + np.abs(w).sum())
-    begun, state = law.advance(u[:cut])
-    ended, state = law.advance(u[cut:], state)
-    assert np.append(begun, ended) == pytest.approx(np.array(expected), abs=within)
-    assert law.response(u) == pytest.approx(np.array(expected), abs=within)
-    assert stops.response(u) == pytest.approx(np.array(stopped), abs=2.0 * within)
-    assert state[1:] == pytest.approx(z, abs=4e-16 * (1.0 + np.abs(u).max()))
+        z0 = literal(hs.PrandtlIshlinskii(thresholds=r, weights=w), rng.uniform(-1.0, 1.0, 5))[1][-1]
+    for law in (
+        hs.PrandtlIshlinskii(thresholds=r, weights=w, offset=0.3, z0=z0),
+        hs.MaxwellSlip(slips=r + 1e-3, stiffness=w, feedthrough=0.7, z0=z0),
+    ):
+        y, z = literal(law, u)
+        begun, state = law.advance(u[:cut])
+        ended, state = law.advance(u[cut:], state)
+        within = 1e-15 * plays * (1.0 + np.abs(w).sum())
+        assert np.append(begun, ended) == pytest.approx(y, abs=within)
+        assert law.response(u) == pytest.approx(y, abs=within)
+        assert state[1:] == pytest.approx(z[-1], abs=4e-16 * (1.0 + np.abs(u).max()))
 
 
 def test_every_law_has_a_batch():
@@ -491,5 +481,7 @@ def test_a_constant_input_cannot_be_identified(law):
 
 def test_nothing_in_nothing_out():
     assert EXAMPLE.response([]).size == 0
+    many = {"thresholds": np.arange(80.0), "weights": np.ones((3, 80))}
+    assert hs.PrandtlIshlinskii.responses(many, []).shape == (3, 0)
     assert EXAMPLE.advance([], (1.0, *EXAMPLE.z0))[1] == (1.0, *EXAMPLE.z0)
     assert hs.PrandtlIshlinskii(offset=2.0).response([0.0, 1.0]).tolist() == [2.0, 2.0]

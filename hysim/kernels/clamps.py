@@ -28,7 +28,7 @@ from hysim.kernels.stepping import START, STEP
 N_OUTPUT = 3
 N_BENT = 4
 _ROUNDING = 2.0**-50
-_MANY = 64  # plays from which on their turns are faster than all clamps, also on a noisy input: experiments/04_batch.py
+_MANY = 64  # plays from which on turns are faster than clamps on a noisy input too: experiments/04_batch.py
 
 
 @inlined
@@ -51,7 +51,7 @@ def batch(parameters: FloatArray, state: FloatArray, u: FloatArray, out: FloatAr
         sign, z, inputs = 1.0 - 2.0 * through, state[k, 1:].copy(), u[min(k, u.shape[0] - 1)]
         elements = parameters[k, N_OUTPUT:].copy()  # known to be apart, which makes the loop faster
         thresholds, weights = elements[:n_plays], elements[n_plays:]
-        if n_plays >= _MANY and is_ordered(thresholds, z, inputs[0]):
+        if n_plays >= _MANY and inputs.size > 0 and is_ordered(thresholds, z, inputs[0]):
             slope = feedthrough + through * weights.sum()
             by_turns(thresholds, sign * weights, z, inputs, out[k])
             for j in range(inputs.size):
