@@ -96,28 +96,40 @@ class Descent:
     def slopes(self, theta: FloatArray, outputs: FloatArray, columns: FloatArray) -> FloatArray:
         """dm/dtheta, (n_sets, n_samples, n_theta), at points with these `outputs` and `columns`."""
         n_sets, n_x = len(theta), self.problem.n_x
+        jacobian = np.empty((n_sets, n_x + columns.shape[2], outputs.shape[1]))  # rows are in one piece
+        jacobian[:, n_x:] = columns.transpose(0, 2, 1)
         if not n_x:
-            return columns.copy()
+            return jacobian.transpose(0, 2, 1)
         x = theta[:, :n_x]
         ends, steps = self.problem.beside(x)
-        every: Sets = np.indices(steps.shape).reshape(2, -1)
-        changes = _changes(self.problem, theta, outputs, ends, every)
-        stiff, shares = self._stiff(changes, outputs[every[0]])
-        places = every[:, stiff]
-        ends[tuple(places)] = x[places[0]] + shares[:, np.newaxis] * (ends[tuple(places)] - x[places[0]])
-        steps[tuple(places)] = ends[(*places, places[1])] - x[tuple(places)]
-        changes[stiff] = _changes(self.problem, theta, outputs, ends, places)
-        by_x = changes.reshape(n_sets, n_x, -1)
+        changes = jacobian[:, :n_x]
+        self._change(changes, theta, outputs, ends, np.indices(steps.shape).reshape(2, -1))
+        stiff, shares = self._stiff(changes, outputs)
+        places: Sets = np.stack(np.nonzero(stiff))
+        ends[stiff] = x[places[0]] + shares[:, np.newaxis] * (ends[stiff] - x[places[0]])
+        steps[stiff] = ends[(*places, places[1])] - x[stiff]
+        self._change(changes, theta, outputs, ends, places)
         with np.errstate(over="ignore", invalid="ignore"):
-            by_x /= steps[..., np.newaxis]
-        by_x[~np.isfinite(by_x)] = 0.0
-        return np.concatenate([by_x.transpose(0, 2, 1), columns], axis=2)
+            changes /= steps[..., np.newaxis]
+        changes[~np.isfinite(changes)] = 0.0
+        return jacobian.transpose(0, 2, 1)
+
+    def _change(
+        self, changes: FloatArray, theta: FloatArray, outputs: FloatArray, ends: FloatArray, places: Sets
+    ) -> None:
+        """Fill in `changes` (n_sets, n_x, n_samples) of the `outputs` where the coordinates at `places` (2, n) end."""
+        for part in self.problem.chunks(places.shape[1]):
+            sets, coordinates = places[:, part]
+            there = theta[sets]
+            there[:, : self.problem.n_x] = ends[sets, coordinates]
+            with np.errstate(over="ignore", invalid="ignore"):
+                changes[sets, coordinates] = self.problem.model(there) - outputs[sets]
 
     def _stiff(self, changes: FloatArray, outputs: FloatArray) -> tuple[Flags, FloatArray]:
-        """Rows whose change is too large for a slope, and the shares of their distances that are short enough."""
+        """Sets and coordinates whose change is too large for a slope, and the shares of their distances that do."""
         wanted = max(_CHANGE, _CHANGE_OF_CLOSE * self.problem.accuracy)
         with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
-            sizes = np.linalg.norm(changes, axis=1) / np.linalg.norm(outputs, axis=1)
+            sizes = np.linalg.norm(changes, axis=2) / np.linalg.norm(outputs, axis=1)[:, np.newaxis]
         stiff = np.isfinite(sizes) & (sizes > max(_STIFF, wanted))
         return stiff, wanted / sizes[stiff]
 
@@ -185,12 +197,11 @@ class _Sets:
 
     def linearised(self, x: FloatArray, sets: Sets, evaluated: tuple[FloatArray, ...]) -> tuple[FloatArray, FloatArray]:
         outputs, columns, sigma = evaluated
+        jacobian = self.descent.slopes(x, outputs, columns)
         _, slope, curvature = self.descent.noise.terms(self.targets[sets] - outputs, sigma)
         root = self._root(sets, curvature, sigma)
-        goal = -self.weights[sets] * slope / np.where(root > 0.0, root, 1.0)
-        jacobian = self.descent.slopes(x, outputs, columns)
         jacobian *= root[..., np.newaxis]
-        return jacobian, goal
+        return jacobian, -self.weights[sets] * slope / np.where(root > 0.0, root, 1.0)
 
     def _root(self, sets: Sets, curvature: FloatArray, sigma: FloatArray) -> FloatArray:
         return np.asarray(np.sqrt(self.weights[sets] * np.maximum(curvature, 1e-12 / sigma**2)))
@@ -240,17 +251,6 @@ class _Sets:
 
 def _some(rows: FloatArray, sets: slice) -> FloatArray:
     return rows[sets] if len(rows) > 1 else rows
-
-
-def _changes(law: Problem, theta: FloatArray, outputs: FloatArray, ends: FloatArray, places: Sets) -> FloatArray:
-    """Changes (n, n_samples) of the `outputs` of sets where a coordinate moves to its end; `places` (2, n) are both."""
-    there = theta[places[0]]
-    there[:, : law.n_x] = ends[tuple(places)]
-    changed = law.model(there)
-    with np.errstate(over="ignore", invalid="ignore"):
-        for row, k in zip(changed, places[0].tolist(), strict=True):
-            row -= outputs[k]
-    return changed
 
 
 def named_slopes(problem: Problem, theta: FloatArray) -> FloatArray:

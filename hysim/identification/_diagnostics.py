@@ -197,12 +197,5 @@ def bootstrap(
         targets = y_model + rng.choice(enlarged, (draws, residual.size))
     else:
         targets = noise.draw(y_model, sigma * np.sqrt(residual.size / freedom), rng)
-    at_once = max(1, _SAMPLES_AT_ONCE // problem.y.size)
-    weights = np.ones((1, residual.size))
-    descents = [
-        Descent(problem, noise, targets[k : k + at_once], weights).run(
-            np.tile(theta, (len(targets[k : k + at_once]), 1))
-        )
-        for k in range(0, draws, at_once)
-    ]
-    return np.concatenate([reached.theta[np.isfinite(reached.loss)] for reached in descents])
+    reached = Descent(problem, noise, targets, np.ones((1, residual.size))).run(np.tile(theta, (draws, 1)))
+    return reached.theta[np.isfinite(reached.loss)]

@@ -22,6 +22,7 @@ from hysim._basics.frozen import FloatArray
 from hysim.errors import SimulationError
 from hysim.identification._descent import named_slopes
 from hysim.identification._problem import Problem
+from hysim.identification.marquardt import pieces
 from hysim.models.law import Law
 from hysim.models.search_space import Flags
 
@@ -67,7 +68,6 @@ def uncertainty(problem: Problem, theta: FloatArray, curvature: FloatArray) -> U
     if n_samples <= n_names:
         return _unknown(problem, theta, f"no standard errors: {n_samples} samples for {n_names} parameters")
     slopes, way_back = output_slopes(problem, theta), named_slopes(problem, theta[np.newaxis])[0]
-    computed = slopes.copy()
     if not np.isfinite(slopes).all():
         return _unknown(problem, theta, "no standard errors: the output is not finite beside the optimum")
     x, linear = np.split(theta, [problem.n_x])
@@ -78,11 +78,14 @@ def uncertainty(problem: Problem, theta: FloatArray, curvature: FloatArray) -> U
     stopped, reasons = _bounds_in_words(problem, theta, way_back, is_end & has_effect)
     reasons += [_EDGE] if (at_side & ~is_end).any() else []
     known = np.concatenate([at_side & has_effect, np.zeros(linear.size, dtype=bool)])
-    slopes[:, : x.size][:, at_side & ~has_effect] = 0.0
-    scaled, way_back = np.where(known, 0.0, slopes) * np.sqrt(curvature)[:, np.newaxis], np.where(known, 0.0, way_back)
-    norms = np.linalg.norm(scaled, axis=0)
+    way_back = np.where(known, 0.0, way_back)
+    moves = np.concatenate([~at_side, np.ones(linear.size, dtype=bool)])
+    weights = np.sqrt(curvature)[:, np.newaxis]
+    few = [np.linalg.qr(np.where(moves, slopes[each], 0.0) * weights[each], mode="r") for each in pieces(len(slopes))]
+    rows = np.concatenate(few)
+    norms = np.linalg.norm(rows, axis=0)
     norms[norms == 0.0] = 1.0
-    _, singular, right = np.linalg.svd(np.linalg.qr(scaled / norms, mode="r"))  # on few rows
+    _, singular, right = np.linalg.svd(np.linalg.qr(rows / norms, mode="r"))
     is_determined = singular > _SINGULAR * singular[0]
     factor = np.sqrt(n_samples / (n_samples - n_names))
     spread = factor * (right[is_determined].T / singular[is_determined]) / norms[:, np.newaxis]
@@ -99,47 +102,56 @@ def uncertainty(problem: Problem, theta: FloatArray, curvature: FloatArray) -> U
     covariance[unknown], covariance[:, unknown] = np.nan, np.nan
     free = singular[: np.count_nonzero(~known)]
     condition = float(free[0] / free[-1]) if free.size and free[-1] > 0.0 else np.inf
-    output = np.linalg.norm(slopes @ spread, axis=1)
+    seen = np.where(moves | known, 1.0, 0.0)[:, np.newaxis] * spread
+    output = np.concatenate([np.linalg.norm(slopes[each] @ seen, axis=1) for each in pieces(len(slopes))])
     together = spread @ (way_back @ spread).T
     return Uncertainty(
-        covariance, spread @ spread.T, together, output, condition, redundant, tuple(reasons), stopped, computed
+        covariance, spread @ spread.T, together, output, condition, redundant, tuple(reasons), stopped, slopes
     )
 
 
 def output_slopes(problem: Problem, theta: FloatArray, *, refined: bool = True) -> FloatArray:
     """dm/dtheta, (n_samples, n_theta), refined where the output bends within the step of a difference."""
     slopes, share = _differences(problem, theta, 1.0), _SHARE
-    if not refined or not problem.n_x or not np.isfinite(slopes).all():
+    if not refined or not np.isfinite(slopes).all():
         return slopes
     for _ in range(_MOST_SHARES):
-        shorter = _differences(problem, theta, share)
-        if not _apart(slopes, shorter):
+        if not any(_bends(slopes, problem, theta, share, some) for some in problem.chunks(problem.n_x)):
             return slopes
         own = _extrapolated(problem, theta)
         if own is not None:
             return own
-        slopes, share = shorter, _SHARE * share
+        slopes, share = _differences(problem, theta, share), _SHARE * share
     return slopes
 
 
-def _apart(slopes: FloatArray, shorter: FloatArray) -> bool:
-    """Whether the derivative by a coordinate is another one over a shorter step."""
+def _bends(slopes: FloatArray, problem: Problem, theta: FloatArray, share: float, some: slice) -> bool:
+    """Whether the derivative by one of `some` coordinates is another one over a shorter step."""
+    shorter = _rates(problem, theta, share, some)
     with np.errstate(invalid="ignore"):
-        distance = np.linalg.norm(slopes - shorter, axis=0)
-        return bool((distance > _CLOSE * np.linalg.norm(shorter, axis=0)).any())
+        distance = np.linalg.norm(slopes.T[: problem.n_x][some] - shorter, axis=1)
+        return bool((distance > _CLOSE * np.linalg.norm(shorter, axis=1)).any())
 
 
 def _differences(problem: Problem, theta: FloatArray, share: float) -> FloatArray:
-    n_x = problem.n_x
-    x, linear = theta[np.newaxis, :n_x], theta[n_x:]
-    ahead, behind, steps = (values[0] for values in problem.neighbours(x, share))
-    points, outputs = np.concatenate([ahead, behind]), np.empty((2 * n_x, problem.y.size))
-    for sets in problem.chunks(len(points)):
-        columns, fixed_part = problem.split(points[sets])
-        outputs[sets] = columns @ linear + fixed_part
+    slopes = np.empty((theta.size, problem.y.size))
+    slopes[problem.n_x :] = problem.split(theta[np.newaxis, : problem.n_x])[0][0].T
+    for some in problem.chunks(problem.n_x):
+        slopes[: problem.n_x][some] = _rates(problem, theta, share, some)
+    return slopes.T
+
+
+def _rates(problem: Problem, theta: FloatArray, share: float, some: slice) -> FloatArray:
+    """Central differences (n, n_samples) of the output by `some` coordinates."""
+    x, linear = np.split(theta, [problem.n_x])
+    ahead, behind, steps = (values[0, some] for values in problem.neighbours(x[np.newaxis], share))
     with np.errstate(invalid="ignore"):
-        outputs[:n_x] -= outputs[n_x:]
-    return np.column_stack([outputs[:n_x].T / steps, problem.split(x)[0][0]])
+        rates, below = (
+            problem.model(np.column_stack([end, np.tile(linear, (len(end), 1))])) for end in (ahead, behind)
+        )
+        rates -= below
+    rates /= steps[:, np.newaxis]
+    return rates
 
 
 def _extrapolated(problem: Problem, theta: FloatArray) -> FloatArray | None:

@@ -21,7 +21,7 @@ from hysim._basics.frozen import FloatArray
 
 _RANK = 1e-11  # singular values of the normalised columns below this are taken as zero
 _MANY = 8  # columns from which on a triangle costs clearly less
-_LONG = 100_000  # rows from which on they are taken in pieces, to bound the memory
+_LONG = 100_000  # rows that are taken at once, to bound the memory
 _WELL = 1e9  # norm of an inverse below which no singular value is near `_RANK`
 
 
@@ -47,11 +47,16 @@ class Settled:
 def triangle(columns: FloatArray, target: FloatArray) -> tuple[FloatArray, FloatArray]:
     """The same regression with one row more than it has columns: the last one holds what no parameters explain."""
     if columns.shape[1] > _LONG:
-        pieces = [slice(first, first + _LONG) for first in range(0, columns.shape[1], _LONG)]
-        rows, goals = zip(*(triangle(columns[:, piece], target[:, piece]) for piece in pieces), strict=True)
+        parts = (triangle(columns[:, part], target[:, part]) for part in pieces(columns.shape[1]))
+        rows, goals = zip(*parts, strict=True)
         return triangle(np.concatenate(rows, axis=1), np.concatenate(goals, axis=1))
     both = np.asarray(np.linalg.qr(np.concatenate([columns, target[..., np.newaxis]], axis=2), mode="r"))
     return both[..., :-1], both[..., -1]
+
+
+def pieces(n_samples: int) -> list[slice]:
+    """Samples that are taken at once, to bound the memory."""
+    return [slice(first, first + _LONG) for first in range(0, n_samples, _LONG)]
 
 
 def least_squares(columns: FloatArray, target: FloatArray) -> FloatArray:
@@ -171,20 +176,24 @@ def descend(
         if not moving.size:
             break
         fresh = moving[is_stale[moving]]
-        if fresh.size:
+        if fresh.size == len(x):
+            jacobian = goal = np.empty(0)  # their memory is needed now
+            jacobian, goal = problem.linearised(x, every, evaluated)
+        elif fresh.size:
             system = problem.linearised(x[fresh], fresh, tuple(each[fresh] for each in evaluated))
             if not jacobian.size:
                 jacobian, goal = (np.zeros((len(x), *each.shape[1:])) for each in system)
-            jacobian[fresh], goal[fresh], is_stale[fresh] = *system, False
+            jacobian[fresh], goal[fresh] = system
+        is_stale[fresh] = False
         sets = np.repeat(moving, factors.size)
         dampings = np.outer(damping[moving], factors).ravel()
-        trial = problem.stepped(x[sets], sets, jacobian[sets], goal[sets], dampings)
+        trial = problem.stepped(x[sets], sets, _rows(jacobian, sets), _rows(goal, sets), dampings)
         aim = trial.copy()
         losses, evaluated_there = problem.evaluate(trial, sets)
         if bend is not None and steps - remaining > _STRAIGHT:
             schedule = _BENT
-            begin, straight = tuple(each[sets] for each in evaluated), Trial(aim, trial, evaluated_there)
-            bent = bend(x[sets], sets, jacobian[sets], dampings, begin, straight)
+            begin, straight = tuple(_rows(each, sets) for each in evaluated), Trial(aim, trial, evaluated_there)
+            bent = bend(x[sets], sets, _rows(jacobian, sets), dampings, begin, straight)
             bent_losses, evaluated_bent = problem.evaluate(bent, sets)
             is_lower = bent_losses < losses
             for values, others in zip(
@@ -198,6 +207,7 @@ def descend(
         x[won], loss[won], is_stale[won] = trial[place], losses[place], True
         for values, trial_values in zip(evaluated, evaluated_there, strict=True):
             values[won] = trial_values[place]
+        del evaluated_there
         lowered = np.clip(dampings[best] * schedule.success, schedule.least, schedule.most)
         damping[moving] = np.where(is_better, lowered, damping[moving] * schedule.failure)
         rests = (gained <= tolerance + relative * before) | (before - (1 + remaining) * gained > hopeless)
@@ -205,6 +215,11 @@ def descend(
         stuck[moving] = is_stuck & (schedule is _BENT)
         moving = moving[~(is_better & rests | is_stuck)]
     return Reached(x, loss, evaluated, ~(np.isin(every, moving) | stuck))
+
+
+def _rows(values: FloatArray, sets: Sets) -> FloatArray:
+    """Rows of these sets; where they are all, the array itself, to bound the memory."""
+    return values if np.array_equal(sets, np.arange(len(values))) else values[sets]
 
 
 def bounded_steps(

@@ -172,5 +172,9 @@ class MemoryLaw(Law):
     ) -> FloatArray:
         """Columns u, u^2, ..., z, 1, 0 of the output, shape (n_sets, n_samples, n_columns + 1)."""
         z = outputs({**parameters, **self.memory_only}, u)
-        powers = [np.broadcast_to(u**k, z.shape) for k in range(1, len(self.coefficient_names) + 1)]
-        return np.stack([*powers, z, np.ones_like(z), np.zeros_like(z)], axis=-1)
+        n_powers = len(self.coefficient_names)
+        columns = np.zeros((*z.shape, n_powers + 3))
+        for k in range(n_powers):
+            columns[..., k] = u ** (k + 1)
+        columns[..., n_powers], columns[..., n_powers + 1] = z, 1.0
+        return columns
