@@ -182,13 +182,16 @@ def batch(result: Result) -> list[str]:
     require(max(slopes) < 1.05, "the cost grows at most in proportion")
     speed = "million_samples_per_second"
     plays = {name: [1e3 / row[speed] for row in where(result["rows"], kind=name)] for name in ("path", "steps")}
+    fit = result["long_fit"]
     return [
-        f"A batch takes {span(column(rows, 'times_exp'), 2)} times as long as `np.exp` on as many numbers.",
-        f"The cost grows at most in proportion to samples and laws (powers of {span(slopes, 2)}). The speeds are those "
+        f"A batch takes {span(column(rows, 'times_exp'), 2)} times as long as `np.exp` on as many numbers. The "
+        f"cost grows at most in proportion to samples and laws (powers of {span(slopes, 2)}). The speeds are those "
         f"of {count(rows[0]['sets'])} laws with {rows[0]['samples']} samples each, on all cores.",
         by_row(rows, ("law", "law", str), ("million samples a second", speed, number)),
         f"One sum of up to 1024 plays takes {span(plays['path'], 2)} ns a sample, on inputs from a sine to noise. A "
         f"loop of its step, in which each sample clamps all plays, takes {span(plays['steps'], 2)} ns.",
+        f"Identifying a law on {count(fit['samples'])} noisy samples takes {number(fit['cpu_seconds'], 2)} CPU seconds."
+        f" The process, of {number(fit['before'], 3)} MB with the record, grows to {number(fit['at_most'], 3)} MB.",
     ]
 
 

@@ -78,11 +78,9 @@ def uncertainty(problem: Problem, theta: FloatArray, curvature: FloatArray) -> U
     stopped, reasons = _bounds_in_words(problem, theta, way_back, is_end & has_effect)
     reasons += [_EDGE] if (at_side & ~is_end).any() else []
     known = np.concatenate([at_side & has_effect, np.zeros(linear.size, dtype=bool)])
-    way_back = np.where(known, 0.0, way_back)
-    moves = np.concatenate([~at_side, np.ones(linear.size, dtype=bool)])
-    weights = np.sqrt(curvature)[:, np.newaxis]
-    few = [np.linalg.qr(np.where(moves, slopes[each], 0.0) * weights[each], mode="r") for each in pieces(len(slopes))]
-    rows = np.concatenate(few)
+    moves, way_back = np.concatenate([~at_side, np.ones(linear.size, dtype=bool)]), np.where(known, 0.0, way_back)
+    root, every = np.sqrt(curvature)[:, np.newaxis], pieces(len(slopes))
+    rows = np.concatenate([np.linalg.qr(np.where(moves, slopes[k], 0.0) * root[k], mode="r") for k in every])
     norms = np.linalg.norm(rows, axis=0)
     norms[norms == 0.0] = 1.0
     _, singular, right = np.linalg.svd(np.linalg.qr(rows / norms, mode="r"))
@@ -102,8 +100,8 @@ def uncertainty(problem: Problem, theta: FloatArray, curvature: FloatArray) -> U
     covariance[unknown], covariance[:, unknown] = np.nan, np.nan
     free = singular[: np.count_nonzero(~known)]
     condition = float(free[0] / free[-1]) if free.size and free[-1] > 0.0 else np.inf
-    seen = np.where(moves | known, 1.0, 0.0)[:, np.newaxis] * spread
-    output = np.concatenate([np.linalg.norm(slopes[each] @ seen, axis=1) for each in pieces(len(slopes))])
+    visible = np.where(moves | known, 1.0, 0.0)[:, np.newaxis] * spread
+    output = np.concatenate([np.linalg.norm(slopes[k] @ visible, axis=1) for k in every])
     together = spread @ (way_back @ spread).T
     return Uncertainty(
         covariance, spread @ spread.T, together, output, condition, redundant, tuple(reasons), stopped, slopes
@@ -144,14 +142,10 @@ def _differences(problem: Problem, theta: FloatArray, share: float) -> FloatArra
 def _rates(problem: Problem, theta: FloatArray, share: float, some: slice) -> FloatArray:
     """Central differences (n, n_samples) of the output by `some` coordinates."""
     x, linear = np.split(theta, [problem.n_x])
-    ahead, behind, steps = (values[0, some] for values in problem.neighbours(x[np.newaxis], share))
+    *ends, steps = (values[0, some] for values in problem.neighbours(x[np.newaxis], share))
+    above, below = (problem.model(np.column_stack([end, np.tile(linear, (len(end), 1))])) for end in ends)
     with np.errstate(invalid="ignore"):
-        rates, below = (
-            problem.model(np.column_stack([end, np.tile(linear, (len(end), 1))])) for end in (ahead, behind)
-        )
-        rates -= below
-    rates /= steps[:, np.newaxis]
-    return rates
+        return np.asarray((above - below) / steps[:, np.newaxis])
 
 
 def _extrapolated(problem: Problem, theta: FloatArray) -> FloatArray | None:

@@ -9,6 +9,7 @@ from hysim._basics.frozen import LAST, items, own_items
 from hysim._basics.results import model_of
 from hysim.models.model import Example
 from hysim.models.protocols import Responding
+from hysim.models.tables import arguments_of, scalars_of
 
 
 class _Kind(NamedTuple):
@@ -85,6 +86,15 @@ class Placed(Composable):
     @property
     def arguments(self) -> dict[str, Any]:
         return own_items(self)
+
+    @property
+    def scalars(self) -> dict[str, float]:
+        """Every number by the name that `hysim.identify` has for it, ``name`` or ``name[k]``."""
+        return scalars_of(self.arguments)
+
+    def with_scalars(self, scalars: Mapping[str, float]) -> Self:
+        """The law with other numbers, by their names in `scalars`; ValueError if the constructor refuses them."""
+        return type(self)(**{**items(self), **arguments_of({**self.scalars, **scalars})})
 
     def placed(self, u0: float | None, u_range: tuple[float, ...] | None = None) -> Self:
         """This law with its memory at the input `u0`, and the range of the identified input."""

@@ -34,7 +34,7 @@ from hysim.models.search_space import ALL_FREE, Freedom, Parameters, SearchSpace
 from hysim.models.slope import HOOKS, states_of, step_of
 from hysim.models.stages import Simpler, Stage, Subset
 from hysim.models.steady_cycle import Pass, PassOf, fixed_point
-from hysim.models.tables import Tables, arguments_of, check_signs, scalars_of, table_of_one, tables_of
+from hysim.models.tables import Tables, check_signs, table_of_one, tables_of
 from hysim.records import Record
 
 if TYPE_CHECKING:
@@ -214,15 +214,6 @@ class Law(Placed, Searched, ABC):
         """Parameters of the step and memory before the first sample, as `pack` has them of this law."""
         parameters, memory = self.pack(self.tables)
         return read_only(parameters[0], finite=False), read_only(memory[0], finite=False)
-
-    @property
-    def scalars(self) -> dict[str, float]:
-        """Every number by the name that `hysim.identify` has for it, ``name`` or ``name[k]``."""
-        return scalars_of(self.arguments)
-
-    def with_scalars(self, scalars: Mapping[str, float]) -> Self:
-        """The law with other numbers, by their names in `scalars`; ValueError if the constructor refuses them."""
-        return type(self)(**{**items(self), **arguments_of({**self.scalars, **scalars})})
 
     @property
     def stepping(self) -> Stepping:

@@ -23,7 +23,7 @@ from hysim.models.law import Law, State
 from hysim.models.parameters import Parameter, declared_space, rate_spans
 from hysim.models.protocols import CompiledLaw, Startable, Subject, needed_time, positive_time
 from hysim.models.search_space import ALL_FREE, Freedom, Parameters, SearchSpace
-from hysim.models.tables import Tables, arguments_of, check_signs, scalars_of
+from hysim.models.tables import Tables, check_signs
 from hysim.records import Record
 
 if TYPE_CHECKING:
@@ -82,15 +82,6 @@ class RatedLaw(Subject, Placed, ABC):
 
     def __post_init__(self) -> None:
         self.at_sample_time(1.0)  # which checks the numbers
-
-    @property
-    def scalars(self) -> dict[str, float]:
-        """Every number by the name that `hysim.identify` has for it, ``name`` or ``name[k]``."""
-        return scalars_of(self.arguments)
-
-    def with_scalars(self, scalars: Mapping[str, float]) -> Self:
-        """The law with other numbers, by their names in `scalars`; ValueError if the constructor refuses them."""
-        return type(self)(**{**items(self), **arguments_of({**self.scalars, **scalars})})
 
     def at_sample_time(self, sample_time: float) -> Law:
         """The law for one sample time [s]; ValueError if that is not positive."""
