@@ -26,6 +26,7 @@ from hysim.identification.sharing import sharing
 from hysim.metrics import LoopMetrics, loop_metrics
 from hysim.models.dependent import on_record
 from hysim.models.model import candidates, candidates_named, is_identifiable, is_searched
+from hysim.models.parts import response_of
 from hysim.models.protocols import Direct, Responding, needs_time
 from hysim.records import Record, as_record, several
 from hysim.simulation import free_run, models_on, simulate
@@ -336,7 +337,7 @@ def _loop(model: Any, record: Record, y: FloatArray) -> LoopMetrics:
     loop = loop_metrics(record.u, y)
     if not isinstance(model, Direct):
         return loop
-    curve, zeros = model.response(loop.u), np.zeros(loop.u.size)
+    curve, zeros = response_of(model, loop.u, None), np.zeros(loop.u.size)
     names = ("max_width", "mean_width", "mid_width", "area", "relative_width", "energy")
     changes: dict[str, Any] = dict.fromkeys(names, 0.0) | {"loading": curve, "unloading": curve, "width": zeros}
     damping = 0.0 if loop.secant_stiffness > 0.0 else math.nan

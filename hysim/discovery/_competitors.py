@@ -74,7 +74,7 @@ class Yardstick:
         """Outputs at all samples, the numbers fitted to `y` where the weights are not zero."""
         fitted = weights > 0.0
         if self.u is not None:
-            first: FloatArray = SingleValued.fitted(self.u[fitted], y[fitted]).model.response(self.u)
+            first: FloatArray = SingleValued.fitted([Record(u=self.u[fitted], y=y[fitted])]).models[0].response(self.u)
             return np.asarray(first + replace(self, u=None).outputs(y - first, weights))
         means = self.columns[fitted].mean(axis=0)
         sizes = np.linalg.norm(self.columns - self.columns.mean(axis=0), axis=0)

@@ -12,7 +12,6 @@ from typing import Any, Protocol, runtime_checkable
 import numpy as np
 import numpy.typing as npt
 
-from hysim import metrics
 from hysim._basics.blas import one_blas_thread
 from hysim._basics.frozen import FloatArray, check_choice, check_count, read_only
 from hysim._basics.parallel import at_most
@@ -20,22 +19,21 @@ from hysim._basics.progress import Progress, Reports, reports
 from hysim._basics.results import model_of
 from hysim.identification._admissible import choose, danger, excursion, implausible
 from hysim.identification._assumptions import Treated, decided, in_units_of_noise, quiet_rmse, treated
-from hysim.identification._diagnostics import fit_measures, left_out, left_out_errors, rate_noise_warning, rms_of_known
+from hysim.identification._diagnostics import left_out, left_out_errors, rate_noise_warning, rms_of_known
 from hysim.identification._measured import as_measured, said_of_noise
 from hysim.identification._noise import Quantised, density
+from hysim.identification._one_step import better, in_one_step, refuse
 from hysim.identification._problem import Problem, Setting
-from hysim.identification._result import Identification, Width
+from hysim.identification._result import Identification
 from hysim.identification._search import PERFECT, chosen, stages_in_words, widened
 from hysim.identification._searched import Search
 from hysim.identification._starts import begun, begun_by_parts
-from hysim.identification.forms import CONSTANT
 from hysim.identification.swapped import swapped_columns, swapped_for
-from hysim.metrics.rows import LoopRows
 from hysim.models.by_structure import searched
 from hysim.models.dependent import Dependent, on_record
 from hysim.models.dependent_structure import DependentStructure
 from hysim.models.model import family_named
-from hysim.models.protocols import Direct, Identifiable, PartByPart, Recorded, needs_time, placed
+from hysim.models.protocols import Direct, Identifiable, PartByPart, Placeable, Recorded, needs_time, placed
 from hysim.models.search_space import Freedom
 from hysim.records import Record, several
 
@@ -171,8 +169,10 @@ def identify(
         check_count("max_evaluations", max_evaluations)
     with at_most(workers), one_blas_thread():
         if isinstance(model_or_class, Direct) and depends is None:
-            _refuse(model_or_class, options, noise or "gaussian", intervals, shares)
-            fit = _in_one_step(model_or_class, records, left_out(cross_validate, records), seed)
+            refuse(model_or_class, options, noise or "gaussian", intervals)
+            fit = in_one_step(model_or_class, records, shares, left_out(cross_validate, records), seed)
+            if isinstance(fit.model, Placeable):
+                fit = as_measured(fit, records, shares, Treated(records))
             doubts = [swapped_columns(records)]
         else:
             family, ends, is_cut = placed(_family(model_or_class, depends), None), None, False
@@ -189,8 +189,10 @@ def identify(
                 choice = choice._replace(problems=[replace(each, ends=ends) for each in choice.problems])
             searched = [in_units_of_noise(each, seed) for each in choice.problems]
             folds = left_out(cross_validate, records)
+            is_plain = (options == _freedom({}, (), {}), initial, noise or "gaussian", intervals)
+            rival = family.in_one_step() if is_plain == (True, None, "gaussian", "linear") else None
             fit = _searched(
-                searched, noise or "gaussian", intervals, folds, seed, progress or None, treatment, admissible
+                searched, noise or "gaussian", intervals, folds, seed, progress or None, treatment, admissible, rival
             )
             fit = replace(fit, message="; ".join(filter(None, (fit.message, choice.sentence))))
             if all(type(record) is Record for record in records):  # not in units of sensors, nor weighted by a verb
@@ -223,6 +225,7 @@ def _searched(
     progress: Progress | None,
     treatment: Treated,
     admissible: bool | None,
+    rival: Any | None,
 ) -> Identification:
     problem = problems[0]
     n_samples, n_names = problem.n_samples, len(problem.space.names)
@@ -243,8 +246,10 @@ def _searched(
     plain = squares[0].x if search is best else likely[0].theta[: problem.n_x]
     result, likely = search.described(likely, intervals, plain)
     message = "; ".join(filter(None, (result.message, remark, stages_in_words(problems, problem.stage))))
-    errors = left_out_errors(search.problem, noise_model, np.array([optimum.theta for optimum in likely]), folds)
-    return replace(result, message=message, regions=named, cv_residual=errors, cv_rmse=rms_of_known(errors))
+    optima = np.array([optimum.theta for optimum in likely])
+    errors = left_out_errors(search.problem, noise_model, optima, folds)
+    fit = replace(result, message=message, regions=named, cv_residual=errors, cv_rmse=rms_of_known(errors))
+    return fit if rival is None else better(fit, search.problem, noise_model, optima, rival, folds)
 
 
 def _weights(weights: Any, records: Sequence[Record]) -> list[FloatArray] | None:
@@ -303,63 +308,3 @@ def _in_words(subject: Any) -> str:
     if isinstance(subject, type) and isinstance(subject, _Structured):
         return f"the class {subject.__name__}: pass its structure, hs.{subject.__name__}.structure(...)"
     return repr(subject)
-
-
-def _refuse(family: Direct, freedom: Freedom, noise: str, intervals: str, weights: Sequence[FloatArray] | None) -> None:
-    name = family.__name__ if isinstance(family, type) else type(family).__name__
-    if freedom.fixed or freedom.free or freedom.bounds:
-        raise ValueError(f"{name} has no parameters by name: leave out fixed=, free= and bounds=")
-    if weights is not None:
-        raise ValueError(f"{name} is fitted without weights: leave out weights=, and cut samples off the record")
-    if noise != "gaussian":
-        raise ValueError(f'{name} is fitted by least squares: noise must be "gaussian", got {noise!r}')
-    if intervals != "linear":
-        raise ValueError(f'{name} has no parameters by name: intervals must be "linear", got {intervals!r}')
-
-
-def _in_one_step(
-    family: Direct, records: Sequence[Record], folds: Sequence[npt.NDArray[np.intp]], seed: int
-) -> Identification:
-    u = np.concatenate([record.u for record in records])
-    y = np.concatenate([record.y for record in records])
-    fit = family.fitted(u, y)
-    residual, n_parameters = y - fit.model.response(u), max(1, round(fit.degrees_of_freedom))
-    measures = fit_measures(y, residual, n_parameters)
-    freedom = y.size - fit.degrees_of_freedom
-    sigma = float(np.sqrt(np.sum(residual**2) / freedom)) if freedom > 0.5 else float("nan")
-    errors = _left_out_errors(family, u, y, folds)
-    return Identification(
-        model=fit.model,
-        models=(fit.model,) * len(records),
-        n_parameters=n_parameters,
-        **measures,
-        sigma=measures["rmse"],
-        log_likelihood=-0.5 * metrics.aic(residual, 0) - 0.5 * y.size,
-        residual=residual,
-        resolution=records[0].resolution,
-        response_stderr=sigma * fit.spread,
-        loop_width=_no_width(records[0]),
-        success=True,
-        message="fitted in one step",
-        cv_residual=errors,
-        cv_rmse=rms_of_known(errors),
-        seed=seed,
-        warnings=() if np.ptp(y) else (CONSTANT,),
-    )
-
-
-def _left_out_errors(family: Direct, u: FloatArray, y: FloatArray, folds: Sequence[npt.NDArray[np.intp]]) -> FloatArray:
-    errors = np.full(y.size, np.nan)
-    for fold in folds:
-        training = np.ones(y.size, dtype=bool)
-        training[fold] = False
-        errors[fold] = y[fold] - family.fitted(u[training], y[training]).model.response(u[fold])
-    return errors
-
-
-def _no_width(record: Record) -> Width | None:
-    try:
-        LoopRows(record.u)
-    except ValueError:  # there is no complete cycle
-        return None
-    return Width(value=0.0, lower=0.0, upper=0.0)

@@ -147,6 +147,13 @@ class Problem:
         """
         return self._shortened(lambda part: _beginning(part, samples))
 
+    def at(self, samples: npt.NDArray[np.intp]) -> "Problem":
+        """This problem on some samples, by their places in all records."""
+        cuts = zip(self.cuts, self.cuts[1:], strict=False)
+        chosen = [samples[(samples >= first) & (samples < end)] - first for first, end in cuts]
+        parts = tuple(_at(part, own) for part, own in zip(self.parts, chosen, strict=True))
+        return replace(self, parts=parts, simpler=None, settled=None)
+
     def _shortened(self, shortened: Callable[[Part], Part]) -> "Problem | None":
         parts = tuple(shortened(part) for part in self.parts)
         short = replace(self, parts=parts, simpler=self.simpler and self.simpler._shortened(shortened), settled=None)

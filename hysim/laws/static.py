@@ -18,7 +18,7 @@ Soc. B 58 (1996) 379 for fewer knots than groups; D. R. Roberts et al., Ecograph
 """
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import ClassVar, NamedTuple, Self
 
 import numpy as np
@@ -56,14 +56,14 @@ class Smooth(NamedTuple):
     spread: FloatArray
 
 
-def smoothing_spline(u: FloatArray, y: FloatArray) -> Smooth:
-    """The smoothing spline of outputs `y` (n,) at inputs `u` (n,), which take at least two values."""
+def smoothing_spline(u: FloatArray, y: FloatArray, weights: FloatArray) -> Smooth:
+    """The smoothing spline of outputs `y` (n,) at inputs `u` (n,), which take at least two values; positive weights."""
     from scipy.linalg import solveh_banded
 
     place, scaled = _groups(u)
-    counts = np.bincount(place)
-    x, means = np.bincount(place, scaled) / counts, np.bincount(place, y) / counts
-    share = counts / u.size
+    counts, total = np.bincount(place, weights), float(weights.sum())
+    x, means = np.bincount(place, weights * scaled) / counts, np.bincount(place, weights * y) / counts
+    share = counts / total
     splines = _Splines.on(x.size)
     rows = splines.at(x)
     bands, moments = _normal_equations(rows, share, means, np.zeros(x.size, dtype=np.intp), 1, splines.size)
@@ -81,7 +81,7 @@ def smoothing_spline(u: FloatArray, y: FloatArray) -> Smooth:
         u=inputs,
         y=splines.at(knots[remaining]).combined(coefficients),
         degrees_of_freedom=float(np.sum(gram * inverse)),
-        spread=np.sqrt(_quadratic_form(bands[0], rows.combined(inverse)) / u.size)[place],
+        spread=np.sqrt(_quadratic_form(bands[0], rows.combined(inverse)) / total)[place],
     )
 
 
@@ -298,15 +298,20 @@ class SingleValued(Composable):
         return self.response(u), ()
 
     @classmethod
-    def fitted(cls, u: FloatArray, y: FloatArray) -> DirectFit:
-        """The smoothing spline of outputs `y` at inputs `u`, both of shape (n,).
+    def fitted(cls, records: Sequence[Record], weights: FloatArray | None = None) -> DirectFit:
+        """The smoothing spline of all records, with a weight for each of their samples (n,).
 
         Raises ValueError if the input is constant.
         """
-        if np.ptp(u) == 0.0:
+        u, y = (np.concatenate([vars(record)[name] for record in records]) for name in "uy")
+        shares = np.ones(u.size) if weights is None else weights
+        kept = shares > 0.0
+        if np.ptp(u[kept]) == 0.0:
             raise ValueError("the input is constant: nothing can be identified from it")
-        smooth = smoothing_spline(u, y)
-        return DirectFit(cls(u=smooth.u, y=smooth.y), smooth.degrees_of_freedom, smooth.spread)
+        smooth = smoothing_spline(u[kept], y[kept], shares[kept])
+        order = np.argsort(u[kept], kind="stable")
+        spread = np.interp(u, u[kept][order], smooth.spread[order])
+        return DirectFit((cls(u=smooth.u, y=smooth.y),) * len(records), smooth.degrees_of_freedom, spread)
 
     @classmethod
     def through_means(cls, record: Record) -> Self:

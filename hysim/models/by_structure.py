@@ -40,6 +40,9 @@ class ByStructure(Searched, ABC):
     def variants(self) -> tuple[Variant, ...]:
         return self.as_structure().variants()
 
+    def in_one_step(self) -> Any | None:
+        return self.as_structure().in_one_step()
+
     def longer_past(self) -> Any | None:
         return self.as_structure().longer_past()
 

@@ -9,6 +9,7 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import Any, ClassVar, NamedTuple, Protocol, Self, TypeGuard, runtime_checkable
 
 import numpy as np
+import numpy.typing as npt
 
 from hysim._basics.frozen import FloatArray
 from hysim.models.search_space import ALL_FREE, Freedom, Parameters, SearchSpace
@@ -306,6 +307,10 @@ class Searched:
         """Further choices that it decides, the simplest first; the last one contains all others."""
         return ()
 
+    def in_one_step(self) -> Any | None:
+        """A fit in one step (`Direct`) that may predict better than a search; it has `parts` to be left out."""
+        return None
+
     def longer_past(self) -> Any | None:
         """The family whose free state at the first sample has one number more, if it has one."""
         return None
@@ -373,27 +378,67 @@ class LinearStructure(Identifiable, Protocol):
         """The structure with the gain at rest one."""
 
 
+class Smoother(NamedTuple):
+    """Outputs at the `samples` that a fit takes (n,), linear in the measured ones: R R' W y.
+
+    `rows` R are (n, k), the `weights` W (n,).
+    """
+
+    samples: npt.NDArray[np.intp]
+    rows: FloatArray
+    weights: FloatArray
+
+    @property
+    def degrees_of_freedom(self) -> float:
+        """Trace of R R' W."""
+        return float(np.sum(self.weights[:, np.newaxis] * self.rows**2))
+
+    @property
+    def gram(self) -> FloatArray:
+        """R' W R; for noise of standard deviation 1 the outputs have the covariance R (R' W R) R'."""
+        return np.asarray(self.rows.T @ (self.weights[:, np.newaxis] * self.rows))
+
+    def spread(self, n_samples: int) -> FloatArray:
+        """Standard errors of the outputs for noise of standard deviation 1, linear between the fitted samples."""
+        own = np.sqrt(np.maximum(np.sum((self.rows @ self.gram) * self.rows, axis=1), 0.0))
+        return np.asarray(np.interp(np.arange(n_samples), self.samples, own))
+
+    def left_out(self, residual: FloatArray, folds: Sequence[npt.NDArray[np.intp]]) -> FloatArray:
+        """Errors (n_samples,) of predictions by fits of the same smoothness without each fold; nan elsewhere.
+
+        `residual` (n_samples,) is that of the fit; the errors of a fold are (I - H)^-1 times it, H being the fold's
+        part of R R' W.
+        """
+        errors, root = np.full(residual.size, np.nan), np.sqrt(self.weights)
+        for fold in folds:
+            own = np.flatnonzero(np.isin(self.samples, fold) & (root > 0.0))
+            rows = root[own, np.newaxis] * self.rows[own]
+            rest = np.linalg.solve(np.eye(own.size) - rows @ rows.T, root[own] * residual[self.samples[own]])
+            errors[self.samples[own]] = rest / root[own]
+        return errors
+
+
 class DirectFit(NamedTuple):
     """A model that was fitted in one step.
 
-    The `model`; its effective number of parameters, `degrees_of_freedom`; and at each sample that it was fitted to the
-    standard error of its output for noise of standard deviation 1, `spread` (n,).
+    The `models`, one for each record; their effective number of parameters, `degrees_of_freedom`; at each sample the
+    standard error of the output for noise of standard deviation 1, `spread` (n,); what was fitted, in `words`; and the
+    `smoother`, if the fit is linear in the outputs and chooses nothing anew where samples are left out.
     """
 
-    model: Any
+    models: tuple[Any, ...]
     degrees_of_freedom: float
     spread: FloatArray
+    words: str = ""
+    smoother: Smoother | None = None
 
 
 @runtime_checkable
 class Direct(Protocol):
-    """A family without memory that is fitted in one step, not searched for: `identify` takes it too."""
+    """A family that is fitted in one step, not searched for: `identify` takes it too."""
 
-    def fitted(self, u: FloatArray, y: FloatArray) -> DirectFit:
-        """The fit to outputs `y` at inputs `u`, both of shape (n,)."""
-
-    def response(self, u: FloatArray) -> FloatArray:
-        """Output at the inputs `u`, shape (n,)."""
+    def fitted(self, records: Sequence[Record], weights: FloatArray | None = None) -> DirectFit:
+        """The fit to the outputs of records, with a weight for each of their samples (n,)."""
 
 
 def needs_time(plant: Any) -> TypeGuard[Dynamic]:

@@ -22,9 +22,12 @@ The density is linear between the centres of coarse cells, and the law's weights
 finer pairs of intervals between the levels: a law as coarse as the cells would be wrong between its levels by as much
 as the density is bent. With the output A w + d of weights w and offset d, smoothness is a small sum of squares of
 second differences of neighbouring cells, along each threshold and across both; the weights of the diagonal have their
-own along it. A ridge holds what these leave free. For each strength the best cells are those of
+own along it. A ridge holds what these leave free. A line k u, which weights of the diagonal make,
+is free of both: its slope may be a thousand times that of the loop. For each strength the best cells are those of
 
-    min ||y - d - A B c||^2 + strength (trace(B'A'A B) / trace(P)) c' P c,    P = D'D + ridge
+    min ||y - d - k u - A B c||^2 + strength (trace(N) / trace(P)) c' P c,    P = D'D + ridge
+
+with N = B'A'A B less what d and k explain of it.
 
 Parts are left out one at a time and predicted by fits to the others: each record whose input the others reach, or each
 cycle or curve of a single record; and a quarter of each record. The rms error of each part is taken over its least for
@@ -40,7 +43,9 @@ Source: P. H. C. Eilers, B. D. Marx, Statist. Sci. 11 (1996), for differences as
 """
 
 import itertools
+import math
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -48,6 +53,7 @@ import numpy.typing as npt
 
 from hysim._basics.frozen import FloatArray, read_only
 from hysim._columns.turning import TOLERANCE
+from hysim.models.protocols import DirectFit, Smoother
 from hysim.models.tables import Tables
 from hysim.records import Record
 
@@ -55,6 +61,7 @@ STRENGTHS = np.logspace(-10.0, 4.0, 43)
 _SMALLEST = 1e-280  # a smaller incomplete gamma function is its first term
 _RIDGE = 1e-3  # of the squares of second differences
 _MOST_CURVES = 8
+_FOLDS = 64  # of single samples, or of every 64th
 _MOST_INTERVALS = 64
 _MOST_CELLS = 24  # along a threshold; of 16, 24 and 32 those with the best predictions for their time
 _MOST_SAMPLES, _TURN = 2000, 0.01  # of a record, beside reversals by more than this part of the span
@@ -181,49 +188,127 @@ def relay_weights(grid: FloatArray, density: Density) -> tuple[float, ...]:
     return tuple(np.sum(area * heights, axis=(1, 2)).tolist())
 
 
-def chosen(
-    columns: FloatArray, y: FloatArray, parts: Sequence[Parts], penalty: FloatArray, strength: float | None = None
-) -> tuple[float, FloatArray, float]:
-    """The rms of the errors at left-out samples, coefficients and offset of the fit with the strength they choose."""
-    strengths = STRENGTHS if strength is None else np.array([strength])
-    centre, middle = columns.mean(axis=0), float(y.mean())  # about which the sums keep more digits
-    columns, y = columns - centre, y - middle
-    total, exact = _moments(columns, y), max(_EXACT * float(np.std(y)), np.finfo(float).tiny)
+@dataclass(frozen=True)
+class _Ridge:
+    """Samples of a regression: `columns` (n, n_cells) with a penalty, `free` ones without, outputs and weights (n,)."""
+
+    columns: FloatArray
+    free: FloatArray
+    y: FloatArray
+    weights: FloatArray
+    penalty: FloatArray
+
+    def sums(self, part: Any = slice(None)) -> FloatArray:
+        """Sums of products of columns, free ones and outputs; those of parts add up."""
+        beside = np.column_stack([self.columns[part], self.free[part], self.y[part]])
+        return np.asarray(beside.T @ (self.weights[part, np.newaxis] * beside))
+
+    def directions(self, sums: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+        """Curvatures of the sum of squares over those of the penalty, their directions; free ones of a cell; (F'F)^-1.
+
+        The free columns F are eliminated: they explain F (shares C) of the columns C.
+        """
+        from scipy.linalg import eigh  # imported where it is needed
+
+        n = len(self.penalty)
+        inverse = np.linalg.pinv(sums[n:-1, n:-1], hermitian=True)
+        shares = inverse @ sums[n:-1, :n]
+        normal = sums[:n, :n] - sums[:n, n:-1] @ shares
+        scale = float(np.trace(normal) / np.trace(self.penalty)) or 1.0
+        size, vectors = eigh(normal / scale, self.penalty)
+        return np.maximum(size, 0.0), vectors / np.sqrt(scale), shares, np.asarray(inverse)
+
+    def fits(self, sums: FloatArray, strengths: FloatArray) -> FloatArray:
+        """Coefficients (n_cells + n_free, n_strengths) of the best fits."""
+        n = len(self.penalty)
+        size, vectors, shares, inverse = self.directions(sums)
+        goal = vectors.T @ (sums[:n, -1] - shares.T @ sums[n:-1, -1])
+        cells = vectors @ (goal[:, np.newaxis] / (size[:, np.newaxis] + np.maximum(strengths, _LEAST)))
+        return np.concatenate([cells, inverse @ sums[n:-1, -1:] - shares @ cells])
+
+    def errors(self, part: npt.NDArray[np.intp], coefficients: FloatArray) -> FloatArray:
+        """Measured outputs less those of coefficients, (n, n_strengths)."""
+        n = len(self.penalty)
+        outputs = self.columns[part] @ coefficients[:n] + self.free[part] @ coefficients[n:]
+        return np.asarray(self.y[part, np.newaxis] - outputs)
+
+    def rows(self, strength: float) -> FloatArray:
+        """R (n, k): the outputs of the best fit are R R' W y."""
+        size, vectors, shares, inverse = self.directions(self.sums())
+        cells = (self.columns - self.free @ shares) @ vectors / np.sqrt(size + max(strength, _LEAST))
+        return np.column_stack([cells, self.free @ np.linalg.cholesky(inverse)])
+
+
+def chosen(ridge: _Ridge, parts: Sequence[Parts], strength: float | None = None) -> tuple[float, float, FloatArray]:
+    """The rms of the errors at left-out samples, the strength of the best predictions, and the coefficients."""
+    strengths, total = STRENGTHS if strength is None else np.array([strength]), ridge.sums()
+    exact = max(_EXACT * float(np.std(ridge.y)), np.finfo(float).tiny)
     score, squares = np.zeros(strengths.size), np.zeros(strengths.size)
     for kind in parts:
         for part in kind:
-            weights, offsets = _fits(total - _moments(columns[part], y[part]), penalty, strengths)
-            each = np.sum((y[part, np.newaxis] - columns[part] @ weights - offsets) ** 2, axis=0)
+            errors = ridge.errors(part, ridge.fits(total - ridge.sums(part), strengths))
+            each = np.sum(ridge.weights[part, np.newaxis] * errors**2, axis=0)
             rms = np.maximum(np.sqrt(each / part.size), exact)
             score += rms / rms.min() / len(kind)
             squares += each
     best = int(np.argmin(score))
-    weights, offsets = _fits(total, penalty, strengths[[best]])
     left_out = float(np.sqrt(squares[best] / sum(part.size for each in parts for part in each)))
-    return left_out, weights[:, 0], middle + float(offsets[0]) - float(centre @ weights[:, 0])
+    return left_out, float(strengths[best]), ridge.fits(total, strengths[[best]])[:, 0]
 
 
-def smooth(law: type[Any], records: Sequence[Record], intervals: int | None, strength: float | None) -> Any:
+def smooth(
+    law: type[Any],
+    records: Sequence[Record],
+    intervals: int | None = None,
+    strength: float | None = None,
+    weights: FloatArray | None = None,
+) -> DirectFit:
     """The law of spread relays with the density of the best strength, after the inputs before the first record."""
     low, high = min(float(each.u.min()) for each in records), max(float(each.u.max()) for each in records)
     n = _supported(high - low, records) if intervals is None else intervals
     levels = tuple(np.linspace(low, high, n + 1).tolist())
     short = [thinned(record, _MOST_SAMPLES) for record in records]
-    y, parts, cells = np.concatenate([record.y for record in short]), parts_of(short), min(n, _MOST_CELLS)
+    begins = np.cumsum([0, *(len(record) for record in records)]).tolist()
+    kept = np.concatenate([k + samples for k, (_, samples) in zip(begins, short, strict=False)])
+    of_records = [record for record, _ in short]
+    u, y = (np.concatenate([vars(record)[name] for record in of_records]) for name in "uy")
+    shares = np.ones(y.size) if weights is None else weights[kept]
+    cells = min(n, _MOST_CELLS)
     table, penalty = linear_between(cells, n), roughness(cells)
     relays = law(levels=levels, weights=(0.0,) * len(table))
+    middle, free = float(y.mean()), np.column_stack([np.ones(y.size), 2.0 * (u - low) / (high - low) - 1.0])
 
-    at_rest = [levels[:1] for _ in short]
-    repeated = [(*levels[:1], *relays.advance(record.u)[1][1:]) for record in short]
+    at_rest = [levels[:1] for _ in of_records]  # the inputs before each record
+    repeated = [(*levels[:1], *relays.advance(record.u)[1][1:]) for record in of_records]
     fits = []
     for pasts in (at_rest, repeated):
         memories = [np.tile(past, (table.shape[1], 1)) for past in pasts]
         sets = [{"levels": np.array(levels), "weights": table.T, "z0": z0} for z0 in memories]
-        columns = [law.responses(each, record.u).T for each, record in zip(sets, short, strict=True)]
-        fits.append((*chosen(np.concatenate(columns), y, parts, penalty, strength), pasts[0]))
-    _, weights, offset, past = min(fits, key=lambda fit: fit[0])
-    z0 = tuple(value for value in past if value > levels[0])
-    return law(levels=levels, weights=tuple((table @ weights).tolist()), offset=offset, z0=z0)
+        columns = np.concatenate(
+            [law.responses(each, record.u).T for each, record in zip(sets, of_records, strict=True)]
+        )
+        centre = columns.mean(axis=0)  # about which, and about `middle`, the sums keep more digits
+        ridge = _Ridge(columns - centre, free, y - middle, shares, penalty)
+        fits.append((*chosen(ridge, parts_of(of_records), strength), ridge, centre, pasts))
+    _, strength, coefficients, ridge, centre, pasts = min(fits, key=lambda fit: fit[0])
+    *own, offset, slope = coefficients.tolist()
+    diagonal = np.equal(*np.tril_indices(n))
+    best = law(
+        levels=levels,
+        weights=tuple((table @ own + slope / n * diagonal).tolist()),
+        offset=middle + offset - float(centre @ own),
+    )
+    models = tuple(replace(best, z0=tuple(value for value in past if value > levels[0])) for past in pasts)
+    smoother = Smoother(kept, ridge.rows(strength), shares)
+    words = f"density of {cells} cells along a threshold, smooth by a penalty of strength {strength:.2g}"
+    return DirectFit(models, smoother.degrees_of_freedom, smoother.spread(begins[-1]), words, smoother)
+
+
+def check_strength(value: Any) -> float:
+    """A strength of the penalty; else a ValueError."""
+    if isinstance(value, str) or not 0.0 <= value < math.inf:
+        raise ValueError(f"the strength must be finite and not negative, got {value!r}")
+    return float(value)
 
 
 def _supported(span: float, records: Sequence[Record]) -> int:
@@ -234,11 +319,11 @@ def _supported(span: float, records: Sequence[Record]) -> int:
     return int(np.clip(span / np.median(steps[steps > 0.0]), 2, _MOST_INTERVALS))
 
 
-def thinned(record: Record, most: int) -> Record:
-    """At most so many even samples of a record, and its reversals beyond noise."""
+def thinned(record: Record, most: int) -> tuple[Record, npt.NDArray[np.intp]]:
+    """At most so many even samples of a record and its reversals beyond noise, and their places."""
     evenly = np.linspace(0, len(record) - 1, min(most, len(record))).round().astype(np.intp)
     kept = np.union1d(evenly, record.reversals(_TURN))
-    return Record(u=record.u[kept], y=record.y[kept])
+    return Record(u=record.u[kept], y=record.y[kept]), kept
 
 
 def parts_of(records: Sequence[Record]) -> list[Parts]:
@@ -254,6 +339,13 @@ def parts_of(records: Sequence[Record]) -> list[Parts]:
         count = min(_MOST_CURVES, len(curves))
         complete = [np.concatenate(curves[k::count]) for k in range(count if count > 2 else 0)]
     return [complete, quarters] if complete else [quarters]
+
+
+def judged_parts(records: Sequence[Record]) -> list[Parts]:
+    """As `parts_of`; of one loop, of which a quarter tells nothing of the others without assumptions, all samples."""
+    kinds = parts_of(records)
+    n = sum(len(record) for record in records)
+    return kinds if len(kinds) > 1 else [[np.arange(k, n, _FOLDS) for k in range(min(n, _FOLDS))]]
 
 
 def _covered(u: FloatArray, others: Sequence[Record]) -> bool:
@@ -319,25 +411,6 @@ def _beyond_diagonal(cells: int) -> FloatArray:
     k = np.arange(cells - 1)
     values[k, k + 1] = values[k, k] + values[k + 1, k + 1] - values[k + 1, k]
     return values
-
-
-def _moments(columns: FloatArray, y: FloatArray) -> FloatArray:
-    """Sums of products (n_columns + 2, n_columns + 2) of columns, a constant and outputs; those of parts add up."""
-    beside = np.column_stack([columns, np.ones(y.size), y])
-    return np.asarray(beside.T @ beside)
-
-
-def _fits(sums: FloatArray, penalty: FloatArray, strengths: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Coefficients (n_columns, n_strengths) and offsets (n_strengths,) of the best fits, from `_moments`."""
-    from scipy.linalg import eigh  # imported where it is needed
-
-    columns, middle = sums[:-2, -2] / sums[-2, -2], sums[-1, -2] / sums[-2, -2]
-    normal = sums[:-2, :-2] - np.outer(columns, sums[-2, :-2])
-    scale = float(np.trace(normal) / np.trace(penalty)) or 1.0
-    size, vectors = eigh(normal / scale, penalty)
-    share = vectors.T @ (sums[:-2, -1] - columns * sums[-1, -2]) / scale
-    weights = vectors @ (share[:, np.newaxis] / (np.maximum(size, 0.0)[:, np.newaxis] + np.maximum(strengths, _LEAST)))
-    return weights, middle - columns @ weights
 
 
 def gamma_plays(tables: Tables) -> tuple[FloatArray, FloatArray]:

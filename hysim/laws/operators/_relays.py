@@ -28,7 +28,7 @@ only if no memory tells it. The user frees others by name.
 """
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any, ClassVar
 
 import numpy as np
@@ -38,14 +38,17 @@ from hysim._basics.frozen import FloatArray, check_whole, checked, read_only
 from hysim._basics.parallel import in_pieces
 from hysim.kernels import preisach as kernels
 from hysim.laws.operators._bank_search import TURN, SignedStructure, check_increasing, named, table_of, with_offset
+from hysim.laws.operators._densities import Parts, check_strength, judged_parts, smooth
 from hysim.models.by_structure import ByStructure
 from hysim.models.law import Law, Packed, State
 from hysim.models.parameters import Coordinate, space_of, spans
+from hysim.models.protocols import DirectFit
 from hysim.models.search_space import ALL_FREE, Freedom, Parameters, SearchSpace
 from hysim.models.tables import Tables
 from hysim.records import Record
 
 _STARTS = 9  # former turning points from which the search begins
+_INTERVALS = 4
 _RANK = 1e-9  # of a column's length: what is left of one that others make up for
 _ROOM = 1000  # extremes that a compiled loop remembers
 _NOTHING = np.array([[0.0, 1.0]]), np.array([[0.0]])  # levels and weights of a law without any
@@ -55,14 +58,14 @@ _NOTHING = np.array([[0.0, 1.0]]), np.array([[0.0]])  # levels and weights of a 
 class PreisachStructure(SignedStructure):
     """A bank of relays to be identified; see `Preisach.structure`."""
 
-    law: type[Law]
+    law: Any
     levels: tuple[float, ...] = ()
-    intervals: int = 4
+    intervals: int | None = None  # four, or a smooth density where that predicts better
     one_signed: bool | None = None
     against: bool = False  # whether weights of one sign turn against the loop of the record
 
     def __post_init__(self) -> None:
-        check_whole(self.intervals, "intervals")
+        check_whole(self.intervals or _INTERVALS, "intervals")
         levels = np.array(self.levels)
         check_relays(levels[np.newaxis], np.zeros((1, _n_weights(levels))))
 
@@ -70,7 +73,7 @@ class PreisachStructure(SignedStructure):
         """The memory as a coordinate where it is free; the rest is linear."""
         scale, levels = spans(record)["h"], np.array(self.levels)
         if not levels.size:  # even steps over the span of the input
-            levels = np.linspace(record.u.min(), record.u.max(), self.intervals + 1)
+            levels = np.linspace(record.u.min(), record.u.max(), (self.intervals or _INTERVALS) + 1)
         places = named("levels", levels.tolist())
         columns = (*named("weights", range(_n_weights(levels))), "offset")
         lowest, highest = float(levels[0]), float(levels[-1])
@@ -119,6 +122,11 @@ class PreisachStructure(SignedStructure):
         told = f"{untold} of the {len(law.weights)} weights cannot be estimated separately from this record"
         return (told,) if untold else ()
 
+    def in_one_step(self) -> "SmoothRelays | None":
+        """The smooth density, where nothing was said of levels and signs."""
+        is_open = self.law.spread and self.intervals is None and self.one_signed is None and not self.levels
+        return SmoothRelays(law=self.law) if is_open else None
+
     def assumed_states(self, record: Record) -> tuple[str, ...]:
         """All relays down, after the cycle, or after one former turning point."""
         return "rest", "periodic", "free"
@@ -137,6 +145,22 @@ class PreisachStructure(SignedStructure):
         used = _support(relays, goal[:, 0], [signs.get(f"weights[{k}]", (-np.inf, np.inf)) for k in range(rows.size)])
         independent = _independent(relays, [rows.size, *nearest[used[nearest]], *nearest[~used[nearest]]])
         return tuple(f"weights[{k}]" for k in range(rows.size) if k not in independent)
+
+
+@checked
+class SmoothRelays:
+    """Spread relays with a smooth density, which are fitted in one step; see `Preisach.structure`."""
+
+    law: Any
+    smoothness: float | None = None
+
+    def fitted(self, records: Sequence[Record], weights: FloatArray | None = None) -> DirectFit:
+        """The law of the given smoothness, or of that which predicts left-out parts best."""
+        return smooth(self.law, records, strength=self.smoothness, weights=weights)
+
+    def parts(self, records: Sequence[Record]) -> list[Parts]:
+        """Samples by which such a law is judged beside others."""
+        return judged_parts(records)
 
 
 def check_relays(levels: FloatArray, weights: FloatArray) -> None:
@@ -276,9 +300,19 @@ class RelayLaw(ByStructure, Law):
 
     @classmethod
     def structure(
-        cls, *, intervals: int = 4, levels: npt.ArrayLike = (), one_signed: bool | None = None
-    ) -> PreisachStructure:
+        cls,
+        *,
+        intervals: int | None = None,
+        levels: npt.ArrayLike = (),
+        one_signed: bool | None = None,
+        smoothness: float | str | None = None,
+    ) -> "PreisachStructure | SmoothRelays":
         """Levels for `hysim.identify`: equal `intervals` of the span of the input, or the `levels` [unit of u].
+
+        Where none of these options is given, four intervals are compared with a smooth density, and what predicts
+        left-out parts better is returned: the density if its error is less than nine tenths of the grid's. With a
+        `smoothness` it is the density, by that strength of the penalty or, for ``"auto"``, by the best; see
+        `Preisach.smoothed`.
 
         N intervals have N (N + 1) / 2 weights; one loop between two inputs determines 2 N - 1 combinations of them.
         With `one_signed` all weights off the diagonal have the sign of the record's loop, positive for a
@@ -293,6 +327,10 @@ class RelayLaw(ByStructure, Law):
         6
         """
         places = tuple(read_only(levels, "levels", ndim=1).tolist())
+        if smoothness is not None:
+            if not cls.spread or intervals is not None or places or one_signed is not None:
+                raise ValueError("a smooth density has levels and signs of its own: give smoothness alone, to Preisach")
+            return SmoothRelays(law=cls, smoothness=None if smoothness == "auto" else check_strength(smoothness))
         return PreisachStructure(law=cls, levels=places, intervals=intervals, one_signed=one_signed)
 
     def _staircase(self, past: State, n_samples: int) -> tuple[FloatArray, FloatArray, FloatArray, int]:

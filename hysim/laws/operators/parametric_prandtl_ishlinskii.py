@@ -181,7 +181,7 @@ class ParametricPrandtlIshlinskii(Law):
 
         What counts is the residual of the best of the densities from which a search begins.
         """
-        short, first, (exponent, decay) = thinned(record, _SAMPLES), float(record.u[0]), np.array(_DENSITIES).T
+        short, first, (exponent, decay) = thinned(record, _SAMPLES)[0], float(record.u[0]), np.array(_DENSITIES).T
         density = {"exponent": exponent, "decay": spans(short)["h"] * decay}
         best, criterion = conditioned(record.u), np.inf
         for past in (best, (0.0, 0.0), (first, first)):

@@ -28,7 +28,7 @@ from hysim._basics.blas import one_blas_thread
 from hysim._basics.frozen import FloatArray, check_whole, read_only
 from hysim._columns.turning import TOLERANCE
 from hysim.kernels import preisach as kernels
-from hysim.laws.operators._densities import Density, everett_from_curves, relay_weights, smooth
+from hysim.laws.operators._densities import Density, check_strength, everett_from_curves, relay_weights, smooth
 from hysim.laws.operators._relays import RelayLaw, everett_of, weights_of
 from hysim.laws.operators.prandtl_ishlinskii import PrandtlIshlinskii
 from hysim.models.law import State
@@ -275,12 +275,12 @@ class Preisach(RelayLaw):
         True
         """
         all_records = several(records, "Preisach.smoothed")
-        if strength is not None and not 0.0 <= strength < math.inf:
-            raise ValueError(f"strength must be finite and not negative, got {strength}")
+        if strength is not None:
+            check_strength(strength)
         if intervals is not None:
             check_whole(intervals, "intervals")
         with one_blas_thread():
-            law: Self = smooth(cls, all_records, intervals, strength)
+            law: Self = smooth(cls, all_records, intervals, strength).models[0]
         return law
 
     def slope_bounds(self) -> tuple[float, float]:
