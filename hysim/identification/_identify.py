@@ -170,10 +170,13 @@ def identify(
     with at_most(workers), one_blas_thread():
         if isinstance(model_or_class, Direct) and depends is None:
             refuse(model_or_class, options, noise or "gaussian", intervals)
-            fit = in_one_step(model_or_class, records, shares, left_out(cross_validate, records), seed)
+            fit = in_one_step(model_or_class, records, shares, left_out(cross_validate, records), seed, admissible)
+            doubts = [swapped_columns(records)]
             if isinstance(fit.model, Placeable):
                 fit = as_measured(fit, records, shares, Treated(records))
-            doubts = [swapped_columns(records)]
+                off = excursion(fit.models, records)
+                doubts += [implausible(off)]
+                fit = _marked(fit, danger(off, records, None), admissible)
         else:
             family, ends, is_cut = placed(_family(model_or_class, depends), None), None, False
             setting = Setting(records, options, initial, shares, max_evaluations, seed)
@@ -249,7 +252,7 @@ def _searched(
     optima = np.array([optimum.theta for optimum in likely])
     errors = left_out_errors(search.problem, noise_model, optima, folds)
     fit = replace(result, message=message, regions=named, cv_residual=errors, cv_rmse=rms_of_known(errors))
-    return fit if rival is None else better(fit, search.problem, noise_model, optima, rival, folds)
+    return fit if rival is None else better(fit, search.problem, noise_model, optima, rival, folds, admissible)
 
 
 def _weights(weights: Any, records: Sequence[Record]) -> list[FloatArray] | None:

@@ -1,7 +1,8 @@
 """Fits in one step, of families that are not searched for, and the choice between such a fit and a search.
 
 A law of few parameters with names and standard errors stands against a smooth one of many. Both predict what is left
-out of the fit; the smooth one is returned where its mean squared error is lower by a clear part.
+out of the fit; the smooth one is returned where its rms error is lower by a clear part. It is made smoother until it
+is safe on cycles that the record does not have.
 """
 
 from collections.abc import Sequence
@@ -13,6 +14,7 @@ import numpy.typing as npt
 
 from hysim import metrics
 from hysim._basics.frozen import FloatArray
+from hysim.identification._admissible import excursion
 from hysim.identification._diagnostics import fit_measures, left_out_errors, rms_of_known
 from hysim.identification._noise import Noise
 from hysim.identification._problem import Problem
@@ -42,19 +44,30 @@ def refuse(family: Direct, freedom: Freedom, noise: str, intervals: str) -> None
 
 
 def in_one_step(
-    family: Direct, records: Sequence[Record], weights: Sequence[FloatArray] | None, folds: Folds, seed: int
+    family: Direct,
+    records: Sequence[Record],
+    weights: Sequence[FloatArray] | None,
+    folds: Folds,
+    seed: int,
+    admissible: bool | None,
 ) -> Identification:
     """The fit, and its errors at samples that are left out."""
-    return _described(family, _fitted(family, records, weights), records, weights, folds, seed)
+    return _described(family, _fitted(family, records, weights, admissible), records, weights, folds, seed)
 
 
 def better(
-    fit: Identification, search: Problem, noise: Noise, optima: FloatArray, rival: Any, folds: Folds
+    fit: Identification,
+    search: Problem,
+    noise: Noise,
+    optima: FloatArray,
+    rival: Any,
+    folds: Folds,
+    admissible: bool | None,
 ) -> Identification:
     """The `fit` of a search from its `optima`, or that of the `rival` where it predicts left-out parts better."""
     records, weights = [part.record for part in search.parts], [part.weights for part in search.parts]
     shares = [each for each in weights if each is not None] or None
-    smooth = _fitted(rival, records, shares)
+    smooth = _fitted(rival, records, shares, admissible)
     if (smoother := smooth.smoother) is None:
         raise TypeError(f"{rival!r} does not say how its fit depends on the outputs")
     samples, residual = smoother.samples, _residual(smooth, records)
@@ -72,8 +85,18 @@ def better(
     return replace(result, message=f"{result.message}; it predicts parts left out better than a grid, {told}")
 
 
-def _fitted(family: Direct, records: Sequence[Record], weights: Sequence[FloatArray] | None) -> DirectFit:
-    return family.fitted(records, None if weights is None else np.concatenate(weights))
+def _fitted(
+    family: Direct, records: Sequence[Record], weights: Sequence[FloatArray] | None, admissible: bool | None
+) -> DirectFit:
+    """The fit, the next smoother one as long as it is not safe on smaller cycles."""
+    shares = None if weights is None else np.concatenate(weights)
+    fit = family.fitted(records, shares)
+    while admissible is not False and fit.smoother_family is not None:
+        off = excursion(fit.models, records)
+        if off is None or off.is_safe:
+            break
+        fit = fit.smoother_family.fitted(records, shares)
+    return fit
 
 
 def _described(

@@ -422,8 +422,9 @@ class DirectFit(NamedTuple):
     """A model that was fitted in one step.
 
     The `models`, one for each record; their effective number of parameters, `degrees_of_freedom`; at each sample the
-    standard error of the output for noise of standard deviation 1, `spread` (n,); what was fitted, in `words`; and the
-    `smoother`, if the fit is linear in the outputs and chooses nothing anew where samples are left out.
+    standard error of the output for noise of standard deviation 1, `spread` (n,); what was fitted, in `words`; the
+    `smoother`, if the fit is linear in the outputs and chooses nothing anew where samples are left out; and the family
+    of the next smoother fit, if the smoothness may be chosen.
     """
 
     models: tuple[Any, ...]
@@ -431,6 +432,7 @@ class DirectFit(NamedTuple):
     spread: FloatArray
     words: str = ""
     smoother: Smoother | None = None
+    smoother_family: "Direct | None" = None
 
 
 @runtime_checkable

@@ -262,8 +262,8 @@ def smooth(
     intervals: int | None = None,
     strength: float | None = None,
     weights: FloatArray | None = None,
-) -> DirectFit:
-    """The law of spread relays with the density of the best strength, after the inputs before the first record."""
+) -> tuple[DirectFit, float]:
+    """The law of spread relays with the density of the best strength, after the inputs before each record; and it."""
     low, high = min(float(each.u.min()) for each in records), max(float(each.u.max()) for each in records)
     n = _supported(high - low, records) if intervals is None else intervals
     levels = tuple(np.linspace(low, high, n + 1).tolist())
@@ -301,7 +301,7 @@ def smooth(
     models = tuple(replace(best, z0=tuple(value for value in past if value > levels[0])) for past in pasts)
     smoother = Smoother(kept, ridge.rows(strength), shares)
     words = f"density of {cells} cells along a threshold, smooth by a penalty of strength {strength:.2g}"
-    return DirectFit(models, smoother.degrees_of_freedom, smoother.spread(begins[-1]), words, smoother)
+    return DirectFit(models, smoother.degrees_of_freedom, smoother.spread(begins[-1]), words, smoother), strength
 
 
 def check_strength(value: Any) -> float:

@@ -29,6 +29,7 @@ only if no memory tells it. The user frees others by name.
 
 import math
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import Any, ClassVar
 
 import numpy as np
@@ -49,6 +50,8 @@ from hysim.records import Record
 
 _STARTS = 9  # former turning points from which the search begins
 _INTERVALS = 4
+_STIFFER = 10.0  # from one strength of the penalty to the next, as long as a law is not safe
+_STIFFEST, _LEAST = 1e8, 1e-10  # strengths: beyond, a density has no shape any more, and none at all
 _RANK = 1e-9  # of a column's length: what is left of one that others make up for
 _ROOM = 1000  # extremes that a compiled loop remembers
 _NOTHING = np.array([[0.0, 1.0]]), np.array([[0.0]])  # levels and weights of a law without any
@@ -153,10 +156,14 @@ class SmoothRelays:
 
     law: Any
     smoothness: float | None = None
+    is_given: bool = False
 
     def fitted(self, records: Sequence[Record], weights: FloatArray | None = None) -> DirectFit:
         """The law of the given smoothness, or of that which predicts left-out parts best."""
-        return smooth(self.law, records, strength=self.smoothness, weights=weights)
+        fit, strength = smooth(self.law, records, strength=self.smoothness, weights=weights)
+        if self.is_given or strength > _STIFFEST:
+            return fit
+        return fit._replace(smoother_family=replace(self, smoothness=_STIFFER * max(strength, _LEAST)))
 
     def parts(self, records: Sequence[Record]) -> list[Parts]:
         """Samples by which such a law is judged beside others."""
@@ -330,7 +337,9 @@ class RelayLaw(ByStructure, Law):
         if smoothness is not None:
             if not cls.spread or intervals is not None or places or one_signed is not None:
                 raise ValueError("a smooth density has levels and signs of its own: give smoothness alone, to Preisach")
-            return SmoothRelays(law=cls, smoothness=None if smoothness == "auto" else check_strength(smoothness))
+            if smoothness == "auto":
+                return SmoothRelays(law=cls)
+            return SmoothRelays(law=cls, smoothness=check_strength(smoothness), is_given=True)
         return PreisachStructure(law=cls, levels=places, intervals=intervals, one_signed=one_signed)
 
     def _staircase(self, past: State, n_samples: int) -> tuple[FloatArray, FloatArray, FloatArray, int]:

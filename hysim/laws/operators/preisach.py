@@ -280,7 +280,7 @@ class Preisach(RelayLaw):
         if intervals is not None:
             check_whole(intervals, "intervals")
         with one_blas_thread():
-            law: Self = smooth(cls, all_records, intervals, strength).models[0]
+            law: Self = smooth(cls, all_records, intervals, strength)[0].models[0]
         return law
 
     def slope_bounds(self) -> tuple[float, float]:
