@@ -135,8 +135,8 @@ def test_wrong_weights_are_named(weights, message):
     u = np.linspace(0.0, 1.0, 12)
     with pytest.raises(ValueError, match=message):
         hs.identify(hs.Line, hs.Record(u=u, y=u), weights=weights)
-    with pytest.raises(ValueError, match="fitted without weights"):
-        hs.identify(hs.SingleValued, hs.Record(u=u, y=u), weights=np.ones(12))
+    with pytest.raises(ValueError, match=message):
+        hs.identify(hs.SingleValued, hs.Record(u=u, y=u), weights=weights)
 
 
 @pytest.mark.parametrize("source", ["spoilt.csv", "-"])

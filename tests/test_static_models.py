@@ -41,7 +41,7 @@ def test_sines_whose_extremes_differ_by_a_rounding_are_fitted(period, cycles):
 
 def test_the_lowest_inputs_may_be_one_rounding_apart():
     u = np.array([-1.0, np.nextafter(-1.0, 0.0), 0.0, 0.3, 0.5, 1.0])
-    assert hs.SingleValued.fitted(u, u).model.u[[0, -1]].tolist() == [-1.0, 1.0]
+    assert hs.SingleValued.fitted([hs.Record(u=u, y=u)]).models[0].u[[0, -1]].tolist() == [-1.0, 1.0]
 
 
 def a_play(n=400, noise=0.01):
@@ -89,7 +89,7 @@ def test_the_spline_is_that_of_scipy():
     for strength in (1e-5, 1e-3, 1.0):
         static._STRENGTHS = np.array([strength])
         try:
-            smooth = static.smoothing_spline(x, y)
+            smooth = static.smoothing_spline(x, y, np.ones(x.size))
         finally:
             static._STRENGTHS = chosen
         reference = interpolate.make_smoothing_spline(x, y, lam=30 * strength)(x)
@@ -198,3 +198,18 @@ def test_the_log_likelihood_is_that_of_normal_residuals_of_the_best_sigma(family
     fit = hs.identify(family, record)
     logarithms = stats.norm.logpdf(fit.residual, scale=np.sqrt(np.mean(fit.residual**2)))
     assert fit.log_likelihood == pytest.approx(logarithms.sum() + 30.0 * np.log(2.0 * np.pi), rel=1e-10)
+
+
+def test_a_weight_counts_samples_of_a_curve():
+    rng = np.random.default_rng(0)
+    u = np.linspace(0.0, 1.0, 40)
+    y = np.sin(3.0 * u) + 0.05 * rng.normal(size=u.size)
+    twice = np.where(np.arange(40) % 3 == 0, 2, 1)
+    own = hs.identify(hs.SingleValued, hs.Record(u=u, y=y), weights=twice)
+    repeated = hs.identify(hs.SingleValued, hs.Record(u=np.repeat(u, twice), y=np.repeat(y, twice)))
+    assert own.model.response(u) == pytest.approx(repeated.model.response(u), rel=1e-9)
+    left_out = np.where(np.arange(40) == 20, 0.0, 1.0)
+    without = hs.identify(hs.SingleValued, hs.Record(u=u[left_out > 0.0], y=y[left_out > 0.0]))
+    spoiled = hs.identify(hs.SingleValued, hs.Record(u=u, y=np.where(left_out > 0.0, y, 9.0)), weights=left_out)
+    assert spoiled.model.response(u) == pytest.approx(without.model.response(u), rel=1e-12)
+    assert spoiled.rmse == pytest.approx(without.rmse)

@@ -101,6 +101,7 @@ class StructureOptions:
     ------
     plays : number of plays, or of a Maxwell-slip model's elements
     relay_intervals : number of intervals between the levels of a Preisach model
+    smoothness : strength of the penalty on a Preisach model's density, auto for the best
     one_signed : whether the weights of plays or relays have one sign (default: chosen by the BIC)
     degree : degree of a Duhem law's polynomials
 
@@ -124,6 +125,7 @@ class StructureOptions:
 
     plays: options.Count | None = None
     relay_intervals: options.Count | None = None
+    smoothness: options.Smoothness | None = None
     one_signed: options.YesNo | None = None
     degree: options.Count | None = None
     poles: int | None = None

@@ -296,6 +296,7 @@ Depends = dict[str, Annotated[tuple[str, int], parts("NAME=CHANNEL:DEGREE", str,
 _SENSOR = "SENSOR=COLUMN, or the name of both"
 Sensors = dict[str, Annotated[str | int, Value("SENSOR=COLUMN", _sensor, _SENSOR)]]
 Quantum = Annotated[float | str, Value("QUANTUM", float, "a number or detect", words=("detect",))]
+Smoothness = Annotated[float | str, Value("STRENGTH", float, "a number or auto", words=("auto",))]
 Cycles = Annotated[int, Value("CYCLES", lambda text: 0 if text == "all" else at_least(1)(text), _CYCLES, bare="all")]
 Folds = Annotated[str | int, either("loo|cycles|K", at_least(0), "loo, cycles or a number of blocks")]
 Blocks = Annotated[str | int, either("loo|K", at_least(2), "loo or a number of blocks from 2 on")]

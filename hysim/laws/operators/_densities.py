@@ -342,7 +342,7 @@ def parts_of(records: Sequence[Record]) -> list[Parts]:
 
 
 def judged_parts(records: Sequence[Record]) -> list[Parts]:
-    """As `parts_of`; of one loop, of which a quarter tells nothing of the others without assumptions, all samples."""
+    """As `parts_of`; of one loop, whose quarters tell nothing of each other without assumptions, all samples."""
     kinds = parts_of(records)
     n = sum(len(record) for record in records)
     return kinds if len(kinds) > 1 else [[np.arange(k, n, _FOLDS) for k in range(min(n, _FOLDS))]]

@@ -37,6 +37,7 @@ import numpy.typing as npt
 
 from hysim._basics.frozen import FloatArray, check_whole, checked, read_only
 from hysim._basics.parallel import in_pieces
+from hysim.errors import warn_beyond
 from hysim.kernels import preisach as kernels
 from hysim.laws.operators._bank_search import TURN, SignedStructure, check_increasing, named, table_of, with_offset
 from hysim.laws.operators._densities import Parts, check_strength, judged_parts, smooth
@@ -68,7 +69,8 @@ class PreisachStructure(SignedStructure):
     against: bool = False  # whether weights of one sign turn against the loop of the record
 
     def __post_init__(self) -> None:
-        check_whole(self.intervals or _INTERVALS, "intervals")
+        if self.intervals is not None:
+            check_whole(self.intervals, "intervals")
         levels = np.array(self.levels)
         check_relays(levels[np.newaxis], np.zeros((1, _n_weights(levels))))
 
@@ -166,7 +168,7 @@ class SmoothRelays:
         return fit._replace(smoother_family=replace(self, smoothness=_STIFFER * max(strength, _LEAST)))
 
     def parts(self, records: Sequence[Record]) -> list[Parts]:
-        """Samples by which such a law is judged beside others."""
+        """Samples by which such a law is compared with others."""
         return judged_parts(records)
 
 
@@ -250,6 +252,15 @@ class RelayLaw(ByStructure, Law):
     def everett(self) -> FloatArray:
         """E at the pairs of levels (upper, lower), shape (n_levels, n_levels) [unit of y]; zero above the diagonal."""
         return read_only(everett_of(np.array([self.weights]))[0])
+
+    def response(self, u: npt.ArrayLike) -> FloatArray:
+        """Output (n_samples,) as of `Law.response`; a `hysim.HysimWarning` where the input leaves `u_range`.
+
+        Relays that the record did not switch have no weights to go by: beyond the levels the output stands still.
+        """
+        y = super().response(u)
+        warn_beyond(self.u_range, np.asarray(u, dtype=float), type(self).__name__, stacklevel=3)
+        return y
 
     def advance(
         self, u: npt.ArrayLike, state: State | None = None, *, sample_time: float | None = None
