@@ -27,9 +27,10 @@ class IdentifyOptions(models.FitOptions):
 
     Parameters
     ----------
-    model :
+    model : by default that which predicts best what is left out of the record
     bounds : bounds of a parameter: beta=0:2 [unit of the parameter]
     depends : parameter that is a polynomial in a channel: gain=T:1
+    seconds : time of the processor within which families are tried without --model
     intervals : method of the 95 % intervals
     cross_validate : leave out one sample at a time, one cycle, or one of K blocks
     max_evaluations : most parameter sets that the search simulates; a fit that ends by it is partial
@@ -37,6 +38,8 @@ class IdentifyOptions(models.FitOptions):
         the loss of fit)
     """
 
+    model: models.ToIdentify | None = None  # type: ignore[assignment]
+    seconds: float = 30.0
     bounds: options.Ranges | None = None
     depends: options.Depends | None = None
     intervals: Literal["linear", "profile", "bootstrap"] = "linear"
@@ -57,7 +60,8 @@ def identify(
 ) -> bool:
     """Identify a model on a file of your own.
 
-    Identify a model's parameters by its error in free run, and print them with their standard errors.
+    Identify a model's parameters by its error in free run, and print them with their standard errors. Without --model
+    the family is chosen, too.
 
     Exit code 1: the search did not converge, or the law is unsafe on smaller cycles.
 
@@ -69,6 +73,7 @@ def identify(
 
     Examples
     --------
+    hysim identify loop.csv
     hysim identify loop.csv --model polynomial-bouc-wen --out law.json --plot fit.svg
     hysim identify loop.csv --u voltage --y displacement --model bouc-wen --fix n=1
     hysim identify drive.csv --y-file sensor.csv --model prandtl-ishlinskii --plays 8
@@ -77,14 +82,17 @@ def identify(
     """
     from hysim.models.storage import to_json
 
-    subject = models.to_identify(fit)
+    if fit.model is None:
+        models.refuse_without_model(fit)
+    subject = None if fit.model is None else models.to_identify(fit)
     if others and (settings.weights is not None or settings.sensor or settings.y_file is not None):
         raise ValueError("--weights, --sensor and --y-file are for one file: leave out the others, or use Python")
     record, weights = records.read_with_weights(settings, file)
     further = [records.read(settings, path) for path in others]
     measured: Any = records.of_structure(subject, record, settings.sensor) if settings.sensor else record
     measured = [measured, *further] if further else measured
-    result = hs.identify(subject, measured, weights=weights, **options.taken(hs.identify, fit))
+    subjects = (measured,) if subject is None else (subject, measured)
+    result = hs.identify(*subjects, weights=weights, **options.taken(hs.identify, fit))
 
     def picture() -> Any:
         if settings.sensor:  # the record of one sensor is not the output of the structure

@@ -308,6 +308,12 @@ def _used(chosen: FitOptions, group: type[StructureOptions | ActuatorOptions]) -
     return {each.name: value for each in fields(group) if (value := vars(chosen)[each.name]) != each.default}
 
 
+def refuse_without_model(chosen: FitOptions) -> None:
+    """Refuse options of a model's structure where no model is given."""
+    for each in (*_used(chosen, ActuatorOptions), *_used(chosen, StructureOptions)):
+        raise ValueError(f"{flag(each)} is an option of one model: give --model, too")
+
+
 def _refuse(foreign: Iterable[str], name: str) -> None:
     for each in foreign:
         raise ValueError(f"{flag(each)} is no option of the model {name}")

@@ -32,7 +32,7 @@ from hysim.identification.swapped import swapped_columns, swapped_for
 from hysim.models.by_structure import searched
 from hysim.models.dependent import Dependent, on_record
 from hysim.models.dependent_structure import DependentStructure
-from hysim.models.model import family_named
+from hysim.models.model import family_named, is_identifiable
 from hysim.models.protocols import Direct, Identifiable, PartByPart, Placeable, Recorded, needs_time, placed
 from hysim.models.search_space import Freedom
 from hysim.records import Record, several
@@ -41,7 +41,7 @@ from hysim.records import Record, several
 @reports
 def identify(
     model_or_class: Any,
-    record_or_records: Record | Sequence[Record],
+    record_or_records: Record | Sequence[Record] | None = None,
     *,
     fixed: Mapping[str, float] | None = None,
     free: Sequence[str] = (),
@@ -58,8 +58,11 @@ def identify(
     seed: int = 0,
     workers: int | None = None,
     progress: Reports = None,
+    seconds: float = 30.0,
 ) -> Identification:
     """Identify a model's parameters on one or several records, by its error in free run.
+
+    ``identify(record)`` chooses the family, too, within so many `seconds`.
 
     Parameters
     ----------
@@ -122,6 +125,10 @@ def identify(
         Number of threads; by default one for each core.
     progress : callable or False, optional
         Called as ``progress(done, total)``; see `hysim.simulate`.
+    seconds : float, optional
+        Without a model: time of the processor after which no further family is begun. The families of `hysim.compare`
+        predict what is left out of fits and continue the record, the best one is searched completely, and ``choice``
+        of the result has them all. Options that need a family are refused.
 
     Returns
     -------
@@ -151,6 +158,22 @@ def identify(
     >>> round(fit.estimates["beta"], 6), round(fit.estimates["gain"], 6)
     (0.7, 2.0)
     """
+    if record_or_records is None:
+        from hysim.identification._select import of_any_family  # which calls this function
+
+        for_one: dict[str, Any] = {
+            "fixed": fixed,
+            "free": free or None,
+            "bounds": bounds,
+            "depends": depends,
+            "initial": initial,
+        }
+        for_one |= {"noise": noise, "cross_validate": cross_validate, "weights": weights}
+        for_one |= {"max_evaluations": max_evaluations}
+        _refuse_for_any(model_or_class, for_one)
+        ways: dict[str, Any] = {"input": input, "admissible": admissible, "intervals": intervals}
+        ways |= {"seed": seed, "workers": workers}
+        return of_any_family(several(model_or_class, "identify"), ways, seconds, progress or None)
     if isinstance(model_or_class, str):
         model_or_class = family_named(model_or_class)
     model_or_class = model_of(model_or_class)
@@ -212,6 +235,14 @@ def identify(
             doubts += [implausible(off), rate_noise_warning(on_their_records, records)]
             fit = _marked(fit, danger(off, records, fit.regions.get("admissible")), admissible)
         return replace(fit, warnings=(*fit.warnings, *filter(None, doubts))) if any(doubts) else fit
+
+
+def _refuse_for_any(subject: Any, options: Mapping[str, Any]) -> None:
+    """Refuse a model without a record, and options that need a family."""
+    if isinstance(subject, (str, type)) or is_identifiable(subject):
+        raise TypeError(f"identify takes a model and a record, or a record alone; got {_in_words(subject)} alone")
+    if for_one := [f"{name}=" for name, value in options.items() if value is not None]:
+        raise ValueError(f"{', '.join(for_one)} is for one family: give a model, too")
 
 
 def _marked(fit: Identification, unsafe: str, admissible: bool | None) -> Identification:

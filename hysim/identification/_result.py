@@ -1,5 +1,6 @@
 """The result of `identify`."""
 
+import math
 from collections.abc import Mapping
 from dataclasses import field
 from typing import Any
@@ -7,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from hysim._basics.frozen import FloatArray, frozen
-from hysim._basics.printing import bic_in_words, folded, printed, summary_text, wrapped
+from hysim._basics.printing import aligned, bic_in_words, folded, printed, summary_text, wrapped
 from hysim.identification._profile import Profile
 from hysim.identification.forms import Stored
 from hysim.interop import frame
@@ -31,6 +32,89 @@ class Width:
     value: float
     lower: float
     upper: float
+
+
+@printed
+@frozen
+class Choice:
+    """Families that were tried on records.
+
+    Parameters
+    ----------
+    family : str
+        The chosen one.
+    left_out, continued : mapping
+        By family, the rms error of parts that the fits leave out, and of the rest of the record after fits to its
+        beginning [unit of y]; nan where there is none of a kind, inf where a fit failed or diverged.
+    score : mapping
+        By family, the mean of both errors over the least of each; the best first. A family that was clearly worse in
+        the first round has the errors of that.
+    bic : mapping
+        The BIC of the families whose scores are within a tenth of the best; the lowest one is chosen.
+    untried : tuple of str
+        Families for which there was no time.
+    amplitude : float
+        Largest amplitude of the input after a cut over that before it; nan without a continuation.
+    span : (float, float)
+        Lowest and highest input [unit of u].
+    seconds : float
+        Of the processor.
+    """
+
+    family: str
+    left_out: Mapping[str, float]
+    continued: Mapping[str, float]
+    score: Mapping[str, float]
+    bic: Mapping[str, float]
+    untried: tuple[str, ...]
+    amplitude: float
+    span: tuple[float, float]
+    seconds: float
+
+    @property
+    def undecided(self) -> tuple[str, ...]:
+        """Further families whose scores are within a tenth of the best: parts left out do not tell them apart."""
+        return tuple(name for name in self.bic if name != self.family)
+
+    def __str__(self) -> str:
+        return "\n".join([*folded(self.in_words()), self.to_text()])
+
+    def in_words(self) -> str:
+        """What was chosen, what comes next, what is not decided, and how far the choice reaches."""
+        others = [name for name in self.score if name != self.family]
+        words = [f"{self.family} is the best of {len(self.score)} families by what they predict"]
+        if others:
+            more = self.score[others[0]] / self.score[self.family]
+            words.append(f"the next is {others[0]} with {more:.3g} times its error")
+        if self.undecided:
+            words.append(f"only the BIC decides between it and {', '.join(self.undecided)}")
+        if math.isnan(self.amplitude):
+            words.append("no part was long enough to be continued")
+        else:
+            words.append(f"continued up to {self.amplitude:.3g} times the amplitude before")
+        words.append(f"inputs beyond {self.span[0]:.4g} to {self.span[1]:.4g} are untried")
+        if self.untried:
+            words.append(f"no time for {', '.join(self.untried)}")
+        return f"{'; '.join(words)}; {self.seconds:.2g} s"
+
+    def to_text(self) -> str:
+        """The table for a terminal, the best first."""
+        columns = self.left_out, self.continued, self.score
+        rows = [
+            [name, *(f"{each[name]:.3g}" for each in columns), f"{self.bic[name]:.5g}" if name in self.bic else ""]
+            for name in self.score
+        ]
+        header, *lines = aligned([["family", "left out", "continued", "over the best", "BIC"], *rows])
+        return "\n".join([header, "-" * len(header), *lines])
+
+    def to_frame(self) -> Any:
+        """The families as a `pandas.DataFrame`, one row each, the best first; ImportError without pandas."""
+        columns = {"left_out": self.left_out, "continued": self.continued, "score": self.score}
+        return frame(
+            {name: [each[family] for family in self.score] for name, each in columns.items()},
+            index=("family", [*self.score]),
+            notes={"family": self.family, "seconds": self.seconds},
+        )
 
 
 @printed
@@ -103,10 +187,12 @@ class Identification(Stored):
         input and output that may be swapped, or a response off the record that leaves the measured range by far.
     unsafe : str
         First line of the summary where the law is not safe on smaller cycles within its record's range; else empty.
+    choice : Choice, optional
+        The families that were tried, where none was given.
     """
 
     json_name = "identification"
-    json_parts = (Candidate, Width, Profile)
+    json_parts = (Candidate, Width, Profile, Choice)
 
     model: Any
     models: tuple[Any, ...]
@@ -143,6 +229,7 @@ class Identification(Stored):
     seed: int = 0
     warnings: tuple[str, ...] = ()
     unsafe: str = ""
+    choice: Choice | None = None
 
     @property
     def family(self) -> str:
@@ -179,6 +266,7 @@ class Identification(Stored):
                 "loop width": f"{width.value:.4g}, from {width.lower:.4g} to {width.upper:.4g}" if width else "",
                 "cross-validated": "" if np.isnan(self.cv_rmse) else f"rmse {self.cv_rmse:.4g}",
                 "search": self.message,
+                "choice": "" if self.choice is None else self.choice.in_words(),
                 "warnings": "; ".join(self.warnings),
             },
         )
@@ -205,6 +293,8 @@ class Identification(Stored):
             f"  best {name}: fit {each.fit_percent:.2f} %{_ASKED.get(name, '')}" for name, each in self.regions.items()
         ]
         lines.append(f"  {self.message}")
+        if self.choice is not None:
+            lines += [f"  {line}" for line in [*folded(self.choice.in_words()), *self.choice.to_text().splitlines()]]
         return "\n".join([*lines, *(["Warnings"] if self.warnings else []), *(f"  {each}" for each in self.warnings)])
 
     def to_frame(self) -> Any:

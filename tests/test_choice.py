@@ -1,0 +1,141 @@
+"""`identify` without a family: what predicts parts that are left out, and the rest of a record."""
+
+import numpy as np
+import pytest
+
+import hysim as hs
+from hysim._columns.turning import TOLERANCE
+from hysim.cli import main
+from hysim.identification import _select
+from hysim.identification._identify import identify as plain
+
+CYCLE = np.sin(np.linspace(0.0, 2.0 * np.pi, 40, endpoint=False))
+GROWING = np.concatenate([size * CYCLE for size in (0.3, 0.5, 0.7, 0.6, 1.0, 0.8)])
+LAW = hs.BoucWen(beta=2.0, gamma=0.5, n=1.4, feedthrough=0.5)
+
+
+def record_of(law, u=GROWING, noise=2e-3, seed=0):
+    y = law.response(u)
+    return hs.Record(u=u, y=y + noise * float(np.ptp(y)) * np.random.default_rng(seed).normal(size=u.size))
+
+
+@pytest.fixture
+def few(monkeypatch):
+    """Only some families are candidates."""
+
+    def only(**subjects):
+        monkeypatch.setattr(_select, "candidates", lambda: subjects)
+
+    return only
+
+
+def test_the_family_of_the_record_is_chosen_and_completely_searched(few):
+    few(Line=hs.Line, Dahl=hs.Dahl, BoucWen=hs.BoucWen, Play=hs.Play)
+    record = record_of(LAW)
+    fit = hs.identify(record)
+    assert fit.choice.family == "BoucWen"
+    assert fit.model == hs.identify(hs.BoucWen, record).model
+    assert next(iter(fit.choice.score)) == "BoucWen"
+    assert fit.choice.amplitude == pytest.approx(1.0 / 0.7, rel=0.01)
+    assert fit.choice.span == (float(record.u.min()), float(record.u.max()))
+    assert fit.choice.untried == ()
+    assert "BoucWen is the best of 4 families" in str(fit)
+    assert "left out  continued" in fit.summary()
+    assert hs.Identification.from_json(fit.to_json()).choice == fit.choice
+
+
+def test_errors_are_those_of_fits_to_the_other_parts(few):
+    few(Dahl=hs.Dahl, BoucWen=hs.BoucWen)
+    record = record_of(LAW)
+    choice = hs.identify(record).choice
+    turns = record.reversals(TOLERANCE)[1::2]
+    cycles = np.split(np.arange(len(record)), turns)[1:]
+    errors = []
+    for k in range(3):
+        fold = np.concatenate(cycles[k::3])
+        weights = np.ones(len(record))
+        weights[fold] = 0.0
+        model = hs.identify(hs.BoucWen, record, weights=weights, max_evaluations=3000).model
+        errors.append((record.y - model.response(record.u))[fold])
+    assert choice.left_out["BoucWen"] == pytest.approx(np.sqrt(np.mean(np.concatenate(errors) ** 2)), rel=1e-9)
+    errors = []
+    for cut in (120, 180):
+        model = hs.identify(hs.BoucWen, record[:cut], max_evaluations=3000).model
+        errors.append((record.y - model.response(record.u))[cut:])
+    assert choice.continued["BoucWen"] == pytest.approx(np.sqrt(np.mean(np.concatenate(errors) ** 2)), rel=1e-9)
+
+
+@pytest.mark.slow
+def test_a_continuation_tells_what_fades(few):
+    few(BoucWen=hs.BoucWen, BoucWenBaberNoori=hs.BoucWenBaberNoori(n=1.0))
+    worn = hs.BoucWenBaberNoori(beta=2.0, gamma=0.5, n=1.0, delta_nu=0.2, delta_eta=0.2)
+    choice = hs.identify(record_of(worn)).choice
+    assert choice.family == "BoucWenBaberNoori"
+    assert choice.continued["BoucWen"] > 3.0 * choice.continued["BoucWenBaberNoori"]
+
+
+def test_a_family_that_fails_or_diverges_is_last(few, monkeypatch):
+    few(Line=hs.Line, BoucWen=hs.BoucWen)
+
+    def failing(subject, *arguments, **options):
+        if subject is hs.BoucWen:
+            raise hs.SimulationError("it diverged")
+        return plain(subject, *arguments, **options)
+
+    monkeypatch.setattr(_select, "identify", failing)
+    choice = hs.identify(record_of(LAW)).choice
+    assert choice.family == "Line"
+    assert choice.score["BoucWen"] == np.inf
+
+
+def test_no_further_family_is_begun_after_the_time(few):
+    few(Line=hs.Line, Dahl=hs.Dahl, BoucWen=hs.BoucWen)
+    choice = hs.identify(record_of(LAW), seconds=0.0).choice
+    assert choice.family == "Line"
+    assert choice.untried == ("Dahl", "BoucWen")
+    assert "no time for Dahl, BoucWen" in choice.in_words()
+
+
+def test_a_loop_alone_and_several_records_are_judged_by_samples(few):
+    few(Line=hs.Line, PrandtlIshlinskii=hs.PrandtlIshlinskii)
+    loop = record_of(LAW, CYCLE)
+    assert np.isnan(hs.identify(loop).choice.continued["Line"])
+    fit = hs.identify([loop, record_of(LAW, 0.5 * CYCLE)])
+    assert fit.choice.family == "PrandtlIshlinskii"
+    assert len(fit.models) == 2
+    assert "no part was long enough to be continued" in fit.choice.in_words()
+
+
+def test_long_records_are_thinned_for_the_comparison_alone(few):
+    few(Line=hs.Line, Play=hs.Play)
+    u = np.interp(np.linspace(0, GROWING.size - 1, 9_000), np.arange(GROWING.size), GROWING)
+    fit = hs.identify(record_of(LAW, u))
+    assert fit.residual.size == u.size
+    short = hs.identify(record_of(LAW, u[::10], seed=1))
+    assert fit.choice.left_out["Play"] == pytest.approx(short.choice.left_out["Play"], rel=0.1)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "options", "message"),
+    [
+        ((hs.BoucWen,), {}, "a model and a record, or a record alone"),
+        (("bouc-wen",), {}, "a model and a record, or a record alone"),
+        ((3,), {}, "takes a Record"),
+        ((record_of(LAW),), {"fixed": {"n": 1.0}}, "fixed= is for one family"),
+        ((record_of(LAW),), {"weights": np.ones(GROWING.size), "free": "n"}, "free=, weights= is for one family"),
+    ],
+)
+def test_what_needs_a_family_is_refused(arguments, options, message):
+    with pytest.raises((TypeError, ValueError), match=message):
+        hs.identify(*arguments, **options)
+
+
+def test_the_command_line_chooses_without_a_model(few, tmp_path, capsys):
+    few(Line=hs.Line, Play=hs.Play)
+    file, law = tmp_path / "loop.csv", tmp_path / "law.json"
+    assert main(["example", str(file)]) == 0
+    assert main(["identify", str(file), "--out", str(law)]) == 0
+    assert "Play is the best of 2 families" in capsys.readouterr().out
+    assert isinstance(hs.load_model(law), hs.Play)
+    assert main(["identify", str(file), "--plays", "5"]) == 2
+    assert "--plays is an option of one model: give --model, too" in capsys.readouterr().err
