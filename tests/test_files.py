@@ -455,3 +455,61 @@ def test_the_command_line_takes_and_writes_every_format(tmp_path, capsys):
     assert "the ending must be one of" in capsys.readouterr().err
     assert main(["metrics", str(tmp_path / "loop.npz"), "--y", "z"]) == 2
     assert "no array 'z', the arrays are: 0: u (81), 1: y (81), 2: u_units (text)" in capsys.readouterr().err
+
+
+MICROMAG = """MicroMag 2900/3900 Data File (Series 0015)
+First-order reversal curves
+Configuration   :  VSM
+Units of measure:  Hybrid SI
+NCrv            = 2
+
++2.000000E-01,+9.000000E-05
+
++1.000000E-01,+5.000000E-05
++2.000000E-01,+8.000000E-05
+
++2.000000E-01,+9.000000E-05
+
+-1.000000E-01,-5.000000E-05
+
+MicroMag 2900/3900 Data File ends
+"""
+
+
+def micromag(tmp_path, text=MICROMAG, name="curves.forc"):
+    path = tmp_path / name
+    path.write_text(text, encoding="latin-1")
+    return path
+
+
+def test_field_and_moment_of_a_magnetometer_are_a_path(tmp_path):
+    record = hs.load(micromag(tmp_path))
+    assert record.u.tolist() == [0.2, 0.1, 0.2, 0.2, -0.1]
+    assert record.y.tolist() == [9e-5, 5e-5, 8e-5, 9e-5, -5e-5]
+    assert record.units == {"u": "T", "y": "A m^2"}
+    in_cgs = hs.load(micromag(tmp_path, MICROMAG.replace("Hybrid SI", "cgs")))
+    assert in_cgs.units == {"u": "Oe", "y": "emu"}
+    unknown = hs.load(micromag(tmp_path, MICROMAG.replace("Hybrid SI", "odd")))
+    assert unknown.units == {}
+
+
+def test_what_the_magnetometer_adjusted_is_in_further_columns(tmp_path):
+    adjusted = "\n".join(f"{line},+1.5,-2.5e-06" if line[:1] in "+-" else line for line in MICROMAG.split("\n"))
+    path = micromag(tmp_path, adjusted.replace("Data File ends", "Data File \xb0 ends"), "loop.hys")
+    assert [each.name for each in hs.list_columns(path)] == ["u", "y", "adjusted_u", "adjusted_y"]
+    assert hs.load(path, y="adjusted_y").y[0] == -2.5e-06
+    assert hs.list_columns(path)[3].unit == "A m^2"
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        ("MicroMag 2900/3900 Data File ends", "", "the file is cut"),
+        ("-1.000000E-01,", "-1.000000E-01,+1.0,+1.0,", "the same 2 to 4 numbers"),
+        ("-1.000000E-01,", "-1.0000.0E-01,", "is damaged"),
+    ],
+)
+def test_a_damaged_magnetometer_file_is_one_line(tmp_path, old, new, message):
+    with pytest.raises(ValueError, match=message) as caught:
+        hs.load(micromag(tmp_path, MICROMAG.replace(old, new)))
+    assert "\n" not in str(caught.value)

@@ -1,4 +1,4 @@
-"""Arrays with names, as a table: the content of NPZ, NPY, MAT and HDF5 files.
+"""Arrays with names, as a table: the content of NPZ, NPY, MAT, HDF5 and MicroMag files.
 
 A column is an array with one axis that is longer than one; of an array with more, the columns are those along its
 first axis: ``x[2]`` of shape (n, 3), ``x[0,1]`` of shape (n, 3, 2). A name leads into structs and groups with a
@@ -46,6 +46,9 @@ KINDS = {
 }  # fmt: skip
 """Contents of an array by the kind of its NumPy type."""
 
+_SAMPLE = re.compile(r"[+-][\d.]")
+_MEASURED = ("u", "y", "adjusted_u", "adjusted_y")  # field and moment, and what the instrument made of them
+_MICROMAG_UNITS = {"hybrid": ("T", "A m^2"), "si": ("A/m", "A m^2"), "cgs": ("Oe", "emu")}
 _INDEXED = re.compile(r"(.+)\[(\d{1,9}(?:, ?\d{1,9})*)\]", re.DOTALL)
 _LONGEST_TEXT = 10_000  # bytes of a unit or a name
 _ENDING = ".npy"
@@ -191,6 +194,37 @@ def _short_value(array: Array) -> str | float | None:
 
 def _path(name: str) -> str:
     return name.strip("/").replace("/", ".")
+
+
+def micromag(file: BinaryIO) -> Arrays:
+    """Field `u` and moment `y` that a MicroMag 2900 or 3900 measured, and further columns, in their order.
+
+    Of first-order reversal curves these are the points at the calibrating field, each followed by a curve: a path of
+    the field. The header says the units.
+    """
+    lines = file.read().decode("latin-1").splitlines()
+    ends = any(line.startswith("MicroMag") and line.rstrip().endswith("ends") for line in lines[-3:])
+    require(ends, "the end of the data is missing: the file is cut")
+    rows = [line.split(",") for line in lines if _SAMPLE.match(line)]
+    require(bool(rows), "there are no samples")
+    widths = {len(row) for row in rows}
+    require(len(widths) == 1 and 2 <= min(widths) <= len(_MEASURED), "its samples must have the same 2 to 4 numbers")
+    values = np.array(rows, dtype=float)
+    system = next((line for line in lines if line.startswith("Units of measure")), "").split()
+    units = next((each for name, each in _MICROMAG_UNITS.items() if name in map(str.lower, system)), (None, None))
+    names = (*_MEASURED[:2], "temperature") if values.shape[1] == 3 else _MEASURED
+    arrays = [
+        Array(
+            name,
+            (len(values),),
+            NUMBERS,
+            8,
+            partial(values[:, k].copy),
+            units[k % 2] if name != "temperature" else None,
+        )
+        for k, name in enumerate(names[: values.shape[1]])
+    ]
+    return with_notes(arrays, "a MicroMag file")
 
 
 def npz(file: BinaryIO) -> Arrays:

@@ -19,7 +19,7 @@ import numpy.typing as npt
 from hysim._basics.frozen import FloatArray, check_choice
 from hysim._basics.progress import Progress, Reports, reports
 from hysim._columns.resolution import output_quantum
-from hysim.files._arrays import NUMBERS, Arrays, mat, npy, npz
+from hysim.files._arrays import NUMBERS, Arrays, mat, micromag, npy, npz
 from hysim.files._delimited import DECIMALS, THOUSANDS, Delimited, Text, delimited
 from hysim.files._hdf5 import hdf5
 from hysim.files._table import Column, Frame, Table, check_complete, check_increasing, damaged, require
@@ -278,7 +278,7 @@ def _opened(name: str, file: BinaryIO, path: Path | None, encoding: str | None) 
     form = "text" if encoding and form != "model" else form
     size = file.seek(0, 2)
     require(
-        size <= MOST_TEXT or (path is not None and form != "text"),
+        size <= MOST_TEXT or (path is not None and form not in ("text", "micromag")),
         f"{name} is too large: a text or a stream may have {MOST_TEXT:,} bytes, got {size}; cut it, or save its "
         "columns as NPZ, MAT or HDF5 and pass the path",
     )
@@ -287,7 +287,9 @@ def _opened(name: str, file: BinaryIO, path: Path | None, encoding: str | None) 
 
 
 def format_of(head: bytes) -> str:
-    """The format of a file that begins so: "npz", "npy", "mat", "mat7.3", "hdf5", "model" or "text"."""
+    """The format of a file that begins so: "npz", "npy", "mat", "mat7.3", "hdf5", "micromag", "model" or "text"."""
+    if head.startswith(b"MicroMag"):
+        return "micromag"
     if head.startswith((b"PK\x03\x04", b"PK\x05\x06")):
         return "npz"
     if head.startswith(b"\x93NUMPY"):
@@ -318,7 +320,7 @@ def table_of(source: Opened, for_text: Mapping[str, Any], progress: Progress | N
             yield table
     else:
         with damaged(source.format.upper()):
-            arrays = {"npz": npz, "npy": npy, "mat": mat}[source.format](source.content)
+            arrays = {"npz": npz, "npy": npy, "mat": mat, "micromag": micromag}[source.format](source.content)
         yield arrays
 
 

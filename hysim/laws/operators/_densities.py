@@ -2,7 +2,7 @@
 
 Reversal curves tell the Everett function, between the turning points as well.
 
-A curve turns at a_m on its way up from the lowest input L and falls back to it. On its way down it measures
+A curve turns at a_m on its way up from the lowest input L and falls back, to L or less far. On its way down it measures
 
     E(a_m, b) = (y(a_m) - y(b)) / 2
 
@@ -110,8 +110,14 @@ def everett_from_curves(
 ) -> tuple[FloatArray, FloatArray, float]:
     """Levels, E at the pairs of them (upper, lower), and the output at the lowest input.
 
-    E is zero above the diagonal, and beyond the curves as at their ends.
+    E is zero above the diagonal, and beyond the curves as at their ends. Curves that rise are those of a record turned
+    by 180 degrees, of which E(a, b) is E(-b, -a).
     """
+    if _begins_at_the_top(record, tolerance):
+        turned = Record(u=-record.u, y=-record.y)
+        own = None if levels is None else -read_only(levels, "levels", ndim=1)[::-1]
+        grid, table, lowest = everett_from_curves(turned, own, tolerance)
+        return np.asarray(-grid[::-1]), table[::-1, ::-1].T, -lowest - 2.0 * float(table[-1, 0])
     low, slack, curves = float(record.u.min()), tolerance * float(np.ptp(record.u)), _curves_of(record, tolerance)
     grid = _levels_of(low, curves) if levels is None else read_only(levels, "levels", ndim=1)
     if not grid.size or grid[0] > low + slack:
@@ -120,6 +126,9 @@ def everett_from_curves(
     turn, below = low, np.zeros(grid.size)
     for curve in curves:
         above = np.where(grid < curve.turn, curve.everett(grid), 0.0)
+        end = float(curve.fall.u[-1])
+        if end > low + slack:  # beyond its end it runs as the curve below it
+            above += np.where(grid < end, below - np.interp(end, grid, below), 0.0)
         between = np.flatnonzero((grid > turn) & (grid <= curve.turn))
         reached = (grid[between] - turn) / (curve.turn - turn)
         share = np.append(
@@ -133,21 +142,24 @@ def everett_from_curves(
             table[k, inner] = t * curve.everett(stretched) + r * np.interp(stretched, grid, share)
         turn, below = curve.turn, above
     table[grid > turn] = below
-    return grid, table, float(np.mean([curve.fall.y[-1] for curve in curves]))
+    ends = [float(curve.fall.y[-1]) for curve in curves if curve.fall.u[-1] <= low + slack]
+    return grid, table, float(np.mean(ends or record.y[record.u.argmin()]))
+
+
+def _begins_at_the_top(record: Record, tolerance: float) -> bool:
+    """Whether more ways down begin at the highest input than ways up at the lowest one."""
+    slack = tolerance * float(np.ptp(record.u))
+    begins = [(branch.u[0], branch.u[-1]) for branch in record.branches(tolerance)]
+    falls = sum(first > last and first >= record.u.max() - slack for first, last in begins)
+    rises = sum(first < last and first <= record.u.min() + slack for first, last in begins)
+    return bool(falls > rises)
 
 
 def _curves_of(record: Record, tolerance: float) -> list[ReversalCurve]:
     """The curves of a record by their turning points, of equal ones the last; a ValueError without a curve."""
-    low, slack = float(record.u.min()), tolerance * float(np.ptp(record.u))
     branches = record.branches(tolerance)
     pairs = zip((None, *branches), branches, strict=False)
     every = [ReversalCurve(fall, rise) for rise, fall in pairs if fall.u[-1] < fall.u[0]]
-    for each in every:
-        end = float(each.fall.u[-1])
-        if end > low + slack:
-            raise ValueError(
-                f"the way down from {each.turn:g} must end at the lowest input {low:g}, it ends at {end:g}"
-            )
     if not every:
         raise ValueError("the input never falls: a reversal curve is a way up and the way down after it")
     curves = {each.turn: each for each in every}

@@ -203,7 +203,9 @@ class Preisach(RelayLaw):
         ----------
         record : Record
             Strokes from the lowest input up to rising turning points, each followed by one back down, such as
-            `hysim.signals.reversal_curves` has. The curves' samples need no common inputs.
+            `hysim.signals.reversal_curves` has; or curves that rise from falling turning points, such as a magnetometer
+            measures after saturation. The curves' samples need no common inputs. Of curves with one turning point the
+            last counts; one that ends early goes on as its neighbour.
         levels : array, shape (n_levels,), optional
             Levels of the law [unit of u]; by default the turning points and all inputs of the curves, or, if these are
             more than 100, the turning points and about 100 even steps between them.
@@ -219,7 +221,8 @@ class Preisach(RelayLaw):
         Raises
         ------
         ValueError
-            If the input does not turn, a curve does not begin and end at the lowest input, or levels begin above it.
+            If the input does not turn, or levels do not reach the input at which the curves end: the lowest one, or,
+            for curves that rise, the highest.
 
         Examples
         --------
