@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from scipy import signal
-from strategies import refused
+from strategies import rao_garnier, refused
 
 import hysim as hs
 from hysim.models.search_space import Freedom
@@ -228,16 +228,6 @@ def test_the_unit_of_time_does_not_matter():
 def test_a_denominator_cannot_be_fixed(options):
     with pytest.raises(ValueError, match="sections"):
         hs.identify(hs.TransferFunction.structure(poles=2, zeros=0), hs.datasets.table1(), **options)
-
-
-def rao_garnier(snr, seed):
-    """The stiff plant of Rao and Garnier under a binary input held for 0.2 s, with noise; and its clean output."""
-    true = hs.TransferFunction(num=(-6400.0, 1600.0), den=(1.0, 5.0, 408.0, 416.0, 1600.0))
-    rng = np.random.default_rng(seed)
-    u = np.repeat(rng.choice([-1.0, 1.0], 60), 20)
-    clean = true.response(u, 0.01)
-    noise = rng.standard_normal(u.size) * np.sqrt(np.var(clean) / snr)
-    return hs.Record(u=u, y=clean + noise, t=0.01 * np.arange(u.size)), clean, true
 
 
 def test_regressions_start_a_long_search_where_it_ends():
