@@ -283,31 +283,20 @@ def test_the_open_loop_is_read_when_the_closed_one_is(assess, sample):
     assert found.open_y == pytest.approx(closed, abs=1e-12)
 
 
+ONE_STEP = {"step": 1.0, "duration": 9.0, "sample_time": 0.1}
+INTEGRATOR = hs.TransferFunction(num=(1.0,), den=(1.0, 0.0))
 test_wrong_arguments_are_named = refused(
-    (lambda: assess_hysteresis(3, hs.PID(), **TRIANGLE), TypeError, "got int"),
-    (
-        lambda: assess_hysteresis(LAW, hs.PID(), **TRIANGLE | {"high": -1.0}),
-        "high must be above low, .* got low 0.0 and high -1.0",
-    ),
-    (
-        lambda: assess_hysteresis(LAW, hs.PID(), **TRIANGLE | {"sample_time": 0.4}),
-        "samples_per_cycle must be even, .* got 25",
-    ),
-    (lambda: assess_hysteresis(LAW, hs.PID(), **TRIANGLE, cycles=0), "at least 1, got 0"),
-    (lambda: assess_hysteresis(hs.Line(slope=0.0), hs.PID(), **TRIANGLE), "gain is 0.0: no voltage drives it"),
-    (
-        lambda: assess_step(
-            hs.TransferFunction(num=(1.0,), den=(1.0, 0.0)), hs.PID(), step=1.0, duration=9.0, sample_time=0.1
-        ),
-        "gain is inf",
-    ),
-    (lambda: assess_square_wave(LAG, hs.PID(), **WAVE | {"period": 1.03}), "whole number of samples"),
-    (lambda: assess_square_wave(LAG, hs.PID(), **WAVE | {"high": 0.0}), "high (must be )?above low"),
-    (
-        lambda: assess_square_wave(LAG, hs.PID(), **WAVE | {"low": 1.0, "high": 0.0}),
-        r"high must be above low.* got .*1.* and .*0",
-    ),
-    (lambda: assess_hysteresis(LAG, hs.PID(ki=1.0), **TRIANGLE | {"period": 10.02}), "period"),
+    (assess_hysteresis, 3, TRIANGLE, TypeError, "got int"),
+    (assess_hysteresis, LAW, TRIANGLE | {"high": -1.0}, "high must be above low, .* got low 0.0 and high -1.0"),
+    (assess_hysteresis, LAW, TRIANGLE | {"sample_time": 0.4}, "samples_per_cycle must be even, .* got 25"),
+    (assess_hysteresis, LAW, TRIANGLE | {"cycles": 0}, "at least 1, got 0"),
+    (assess_hysteresis, hs.Line(slope=0.0), TRIANGLE, "gain is 0.0: no voltage drives it"),
+    (assess_step, INTEGRATOR, ONE_STEP, "gain is inf"),
+    (assess_square_wave, LAG, WAVE | {"period": 1.03}, "whole number of samples"),
+    (assess_square_wave, LAG, WAVE | {"high": 0.0}, "high (must be )?above low"),
+    (assess_square_wave, LAG, WAVE | {"low": 1.0, "high": 0.0}, r"high must be above low.* got .*1.* and .*0"),
+    (assess_hysteresis, LAG, TRIANGLE | {"period": 10.02}, "period"),
+    call=lambda assess, plant, task: assess(plant, hs.PID(), **task),
 )
 
 

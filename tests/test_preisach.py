@@ -332,20 +332,20 @@ def test_slopes_lie_between_their_bounds(law, u):
     assert law.is_invertible()
 
 
+def one_weight(weight, y):
+    return hs.Preisach(levels=(0, 1), weights=(weight,), offset=1.0).inverse_response(y)
+
+
+def of_curves(*u, **options):
+    return hs.Preisach.from_reversal_curves(hs.Record(u=u, y=np.zeros(len(u))), **options)
+
+
 test_wrong_arguments_are_named = refused(
     (lambda: hs.Preisach(levels=(0, 1), weights=(0,)).inverse_response([0.0]), "from 0 to 0"),
     (lambda: hs.Preisach(levels=(0, 1, 2), weights=(1, -2, 1)).inverse_response([0.0]), "it goes from -2 to 2"),
     (lambda: hs.Preisach().inverse_response([0.0]), "slope must have one sign"),
-    (
-        lambda: hs.Preisach(levels=(0, 1), weights=(2,), offset=1.0).inverse_response([0.0, 3.5]),
-        hs.SimulationError,
-        r"sample 1 \(y = 3.5\): it saturates at -1 and 3",
-    ),
-    (
-        lambda: hs.Preisach(levels=(0, 1), weights=(-2,), offset=1.0).inverse_response([-1.5]),
-        hs.SimulationError,
-        r"sample 0 \(y = -1.5\): it saturates at -1 and 3",
-    ),
+    (lambda: one_weight(2, [0.0, 3.5]), hs.SimulationError, r"sample 1 \(y = 3.5\): it saturates at -1 and 3"),
+    (lambda: one_weight(-2, [-1.5]), hs.SimulationError, r"sample 0 \(y = -1.5\): it saturates at -1 and 3"),
     (lambda: a_law(hs.Preisach).inverse_response([0.0], u0=0.0, state=(0.0,)), "not both"),
     (lambda: hs.Preisach(levels=(0, 1, 2), weights=(1, 2)), "N \\(N \\+ 1\\) / 2 numbers, got 3 and 2"),
     (lambda: hs.Preisach(levels=(0,)), "got 1 and 0"),
@@ -359,15 +359,9 @@ test_wrong_arguments_are_named = refused(
     (lambda: hs.Preisach.structure(levels=(1, 0)), "increase"),
     (lambda: hs.identify(hs.Preisach, hs.Record(u=[1, 1], y=[0, 1])), "the input is constant"),
     (lambda: hs.identify(hs.Preisach, hs.datasets.table1(), free="levels[1]"), r"'levels\[1\]' is not searched"),
-    (lambda: hs.Preisach.from_reversal_curves(hs.Record(u=[0, 1], y=[0, 1])), "never falls"),
-    (
-        lambda: hs.Preisach.from_reversal_curves(hs.Record(u=[0, 1, 0.5, 1, 0], y=np.zeros(5))),
-        "from 1 must end at the lowest input 0, it ends at 0.5",
-    ),
-    (
-        lambda: hs.Preisach.from_reversal_curves(hs.Record(u=[0, 1, 0], y=np.zeros(3)), levels=(0.5, 1.0)),
-        r"levels must begin at the lowest input 0 or below, got \[0.5\]",
-    ),
+    (lambda: of_curves(0, 1), "never falls"),
+    (lambda: of_curves(0, 1, 0.5, 1, 0), "from 1 must end at the lowest input 0, it ends at 0.5"),
+    (lambda: of_curves(0, 1, 0, levels=(0.5, 1.0)), r"levels must begin at the lowest input 0 or below, got \[0.5\]"),
 )
 
 
