@@ -58,6 +58,16 @@ def outputs_of_compiled_steps(law, u, **time):
     return y, compiled.state
 
 
+def commanded(controller, sample_time, references, measurements, u0=0.0, y0=0.0):
+    """The commands of a controller, one sample at a time, and its state at the end."""
+    state, commands = controller.initial(sample_time, u0, y0), []
+    with np.errstate(all="ignore"):
+        for reference, measurement in zip(references, measurements, strict=True):
+            u, state = controller.step(state, float(reference), float(measurement))
+            commands.append(u)
+    return np.array(commands), state
+
+
 def printed(program, inputs):
     """The numbers that a program prints for these, which it reads line by line."""
     lines = "\n".join(map(repr, inputs.tolist()))

@@ -93,7 +93,7 @@ def test_a_hysteresis_assessment_is_counted_by_hand(plant):
     t = 0.05 * np.arange(2001)
     run = hs.close_loop(plant, pid, t, reference)
     assert found.closed.y.tolist() == run.y.tolist()
-    open_y = hs.close_loop(plant, feedforward(1.0 / found.secant_gain), t, reference).y
+    open_y = hs.close_loop(plant, Feedforward(1.0 / found.secant_gain), t, reference).y
     assert found.open_y == pytest.approx(open_y, abs=1e-12)
     assert np.array_equal(found.open_u, reference / found.secant_gain)
     last = slice(-201, None)
@@ -111,7 +111,7 @@ def test_a_hysteresis_assessment_is_counted_by_hand(plant):
     assert found.lag_width == pytest.approx(width(reference[last], lagging))
 
 
-class _Feedforward:
+class Feedforward:
     """Applies gain times reference, whatever is measured: what a PID with a setpoint weight does without feedback."""
 
     def __init__(self, gain):
@@ -123,10 +123,6 @@ class _Feedforward:
         # kp (b r - y) needs kp -> 0 with kp b = gain: 2^-900 of y is nothing beside it
         tiny = 2.0**-900
         return pid, np.array([tiny, 0.0, 0.0, 0.0, self.gain / tiny, 0.0, -np.inf, np.inf, 0.0]), np.zeros(4)
-
-
-def feedforward(gain):
-    return _Feedforward(gain)
 
 
 def test_the_open_loop_has_the_stroke_of_the_reference():
@@ -210,7 +206,7 @@ def test_a_square_wave_is_measured_over_its_last_period():
     reference = np.tile(np.repeat([0.0, 1.0], 600), 3)
     t = 0.05 * np.arange(3600)
     closed = hs.close_loop(MODE, pid, t, reference).y
-    opened = hs.close_loop(MODE, feedforward(0.5), t, reference).y
+    opened = hs.close_loop(MODE, Feedforward(0.5), t, reference).y
     assert found.closed.y.tolist() == closed.tolist()
     assert found.open_y == pytest.approx(opened, abs=1e-12)
     for rms, excess, y in (
@@ -264,9 +260,9 @@ def test_a_half_period_of_a_few_samples_has_no_step():
 @pytest.mark.parametrize(
     "assess",
     [
-        lambda plant: assess_hysteresis(plant, feedforward(1.0), **TRIANGLE),
-        lambda plant: assess_step(plant, feedforward(1.0), step=1.0, duration=10.0, sample_time=0.05),
-        lambda plant: assess_square_wave(plant, feedforward(1.0), **WAVE),
+        lambda plant: assess_hysteresis(plant, Feedforward(1.0), **TRIANGLE),
+        lambda plant: assess_step(plant, Feedforward(1.0), step=1.0, duration=10.0, sample_time=0.05),
+        lambda plant: assess_square_wave(plant, Feedforward(1.0), **WAVE),
     ],
     ids=["hysteresis", "step", "square wave"],
 )
@@ -277,7 +273,7 @@ def test_the_open_loop_is_read_when_the_closed_one_is(assess, sample):
     if "secant_gain" in dir(found):
         gain = found.secant_gain
         t, reference = found.closed.t, found.closed.reference
-        closed = hs.close_loop(PROPER, feedforward(1.0 / gain), t, reference).y
+        closed = hs.close_loop(PROPER, Feedforward(1.0 / gain), t, reference).y
     else:
         closed = found.closed.y
     assert found.open_y == pytest.approx(closed, abs=1e-12)

@@ -12,7 +12,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.testing import assert_array_equal
-from strategies import refused
+from strategies import commanded, refused
 
 import hysim as hs
 from hysim.kernels.controllers import through
@@ -197,10 +197,7 @@ CONTROLLERS = {
 def test_a_controller_of_parts_gives_what_it_gives_in_a_loop(controller):
     rng = np.random.default_rng(4)
     r, m = 0.5 * np.sin(T), 0.4 * np.sin(T) + 0.05 * rng.standard_normal(T.size)
-    state, expected = controller.initial(H), []
-    for reference, measurement in zip(r, m, strict=True):
-        u, state = controller.step(state, reference, measurement)
-        expected.append(u)
+    expected, _ = commanded(controller, H, r, m)
     assert response(hs.to_control(controller, H), [r, m])[0] == pytest.approx(expected, abs=ROUNDING)
 
 
