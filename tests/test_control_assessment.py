@@ -56,20 +56,13 @@ def test_slopes_bracket_the_secant_gain():
     assert slopes(hs.Actuator(vibration=MODE), cycle) == (1.0, 1.0)
 
 
-def test_the_line_without_memory_passes_through_the_ends_of_the_loop():
+@pytest.mark.parametrize(("law", "ends"), [(LAW, (np.min, np.max)), (NEGATIVE, (np.max, np.min))], ids=["up", "down"])
+def test_the_line_without_memory_passes_through_the_ends_of_the_loop(law, ends):
     u = hs.signals.triangle(-1.0, 2.0, cycles=1, samples_per_cycle=60)
-    line = without_memory(hs.Actuator(hysteresis=LAW, vibration=MODE), u)
-    y = steady_cycle(hs.Actuator(hysteresis=LAW), u, None)
-    ends = line.hysteresis.response([-1.0, 2.0])
-    assert ends == pytest.approx([y.min(), y.max()], abs=1e-12)
+    line = without_memory(hs.Actuator(hysteresis=law, vibration=MODE), u)
+    y = steady_cycle(hs.Actuator(hysteresis=law), u, None)
+    assert line.hysteresis.response([-1.0, 2.0]) == pytest.approx([end(y) for end in ends], abs=1e-12)
     assert line.vibration == MODE
-
-
-def test_the_line_without_memory_of_a_falling_law_falls():
-    u = hs.signals.triangle(-1.0, 2.0, cycles=1, samples_per_cycle=60)
-    y = steady_cycle(hs.Actuator(hysteresis=NEGATIVE), u, None)
-    ends = without_memory(hs.Actuator(hysteresis=NEGATIVE), u).hysteresis.response([-1.0, 2.0])
-    assert ends == pytest.approx([y.max(), y.min()], abs=1e-12)
 
 
 def test_a_law_of_negative_gain_is_assessed_as_its_mirror_image():
