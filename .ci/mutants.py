@@ -61,7 +61,7 @@ MAPPED = {
     "kernels/clamps.py": "clamp_operators extended_plays",
     "kernels/stepping.py": "composed more_samples own_laws static_models close_loop",
     "kernels/controllers.py": "pid close_loop tracking_controller",
-    "kernels/duhem.py": "duhem_offset duhem duhem_memory branch",
+    "kernels/duhem.py": "duhem duhem_memory branch",
     "kernels/elementary.py": "boucwen_closed_forms boucwen_far boucwen_invariants boucwen_reference oscillator",
     "kernels/generalized.py": "asymmetric",
     "kernels/memory_terms.py": "hidden_memory discovery_refinement",

@@ -10,18 +10,17 @@ than 1e-11.
 
 import statistics
 import sys
-import time
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import numpy as np
 from scipy.integrate import solve_ivp
 
-from hysim.plot import Figure, figure
+from hysim.plot import Figure
 
 sys.path.insert(0, str(Path(__file__).parent))
 from peers.driven import BETA, EXPONENTS, GAMMA, law, reference
-from results_folder import write_results
+from results_folder import cpu_timed, one_panel, write_results
 
 RESULTS = Path(__file__).parent / "results" / "exact_step"
 STARTS = tuple(k * 1e-13 for k in range(-12, 13))  # of the memory, whose range is about 1
@@ -82,12 +81,8 @@ METHODS: dict[str, Callable[[np.ndarray, float], np.ndarray]] = {
 
 def timed(method: Callable[[], np.ndarray], repeats: int) -> tuple[np.ndarray, float]:
     """Result and median processor time [s], the first call not counted."""
-    result, times = method(), []
-    for _ in range(repeats):
-        begin = time.process_time()
-        method()
-        times.append(time.process_time() - begin)
-    return result, statistics.median(times)
+    result = method()
+    return result, statistics.median(cpu_timed(method)[1] for _ in range(repeats))
 
 
 def main(smoke: bool = False) -> list[dict[str, float | str]]:
@@ -106,10 +101,8 @@ def main(smoke: bool = False) -> list[dict[str, float | str]]:
         for row in rows[-len(METHODS) :]:
             row["time_ratio"] = row["ns_per_sample"] / own
         lsoda.append(spread(u, n, exact, STARTS[:1] if smoke else STARTS))
-    if not smoke:
-        numbers = {"samples": n_samples, "beta": BETA, "gamma": GAMMA, "lsoda_from_near_starts": lsoda}
-        write_results(RESULTS, rows, draw, numbers)
-    return rows
+    numbers = {"samples": n_samples, "beta": BETA, "gamma": GAMMA, "lsoda_from_near_starts": lsoda}
+    return write_results(RESULTS, rows, draw, numbers, smoke=smoke)
 
 
 def spread(u: np.ndarray, n: float, exact: np.ndarray, starts: Sequence[float]) -> dict[str, float]:
@@ -126,8 +119,7 @@ def spread(u: np.ndarray, n: float, exact: np.ndarray, starts: Sequence[float]) 
 
 def draw(rows: list[dict[str, float | str]]) -> Figure:
     """Error against time, log-log."""
-    canvas = figure(height=4.4)
-    ax = canvas.add_subplot()
+    canvas, ax = one_panel(4.4)
     for name, marker in zip(METHODS, "*osv^D", strict=True):
         points = [(row["ns_per_sample"], row["error"]) for row in rows if row["method"] == name]
         ax.loglog(*zip(*points, strict=True), marker, label=name, markersize=11 if name == "hysim" else 6)

@@ -16,10 +16,10 @@ import hysim as hs
 from hysim.paper.equations import EQUATION_1
 from hysim.paper.loops import HIGH, PERIOD, SAMPLE_TIME, SUPPLY
 from hysim.paper.search import search, triangle_task
-from hysim.plot import Figure, figure
+from hysim.plot import Figure
 
 sys.path.insert(0, str(Path(__file__).parent))
-from results_folder import loop_columns, write_results
+from results_folder import loop_columns, one_panel, write_results
 
 RESULTS = Path(__file__).parent / "results" / "lag_of_equation_1"
 SEEDS = (1, 2, 3)
@@ -67,15 +67,12 @@ def main(smoke: bool = False) -> list[dict[str, Any]]:
             f"limit in {line['limited_percent']:.1f} % of the samples   (Kp {line['Kp']:.3g}, Ti {line['Ti']:.3g}, "
             f"Td {line['Td']:.3g}, filter {line['derivative_filter']:.2g})"
         )
-    if not smoke:
-        write_results(RESULTS, rows, draw, {})
-    return rows
+    return write_results(RESULTS, rows, draw, {}, smoke=smoke)
 
 
 def draw(rows: list[dict[str, Any]]) -> Figure:
     """Reduction against the bound."""
-    canvas = figure(height=3.6)
-    ax = canvas.add_subplot()
+    canvas, ax = one_panel(3.6)
     ax.plot([r["max_sensitivity"] for r in rows], [r["lag_reduction_percent"] for r in rows], "o-", color="#0072B2")
     ax.axhline(90.0, color="#777777", linestyle="--")
     ax.annotate("the paper's 90 %", xy=(rows[0]["bound"], 90.0), xytext=(0, 4), textcoords="offset points")

@@ -12,10 +12,10 @@ import sys
 import tempfile
 from pathlib import Path
 
-from hysim.plot import Figure, figure
+from hysim.plot import Figure
 
 sys.path.insert(0, str(Path(__file__).parent))
-from results_folder import write_results
+from results_folder import one_panel, write_results
 
 ROOT = Path(__file__).resolve().parent.parent
 RESULTS = ROOT / "experiments" / "results" / "cold_start"
@@ -62,15 +62,12 @@ def main(smoke: bool = False) -> list[Row]:
         for name, call in list(CALLS.items())[: 1 if smoke else None]:
             seconds = {how: first_call(call, f"{folder}/{name}/{each.name}", each) for how, each in packages.items()}
             rows.append({"function": name, **seconds})
-    if not smoke:
-        write_results(RESULTS, rows, draw, {})
-    return rows
+    return write_results(RESULTS, rows, draw, {}, smoke=smoke)
 
 
 def draw(rows: list[Row]) -> Figure:
     """One bar for each function and cache."""
-    canvas = figure(height=3.6)
-    ax = canvas.add_subplot()
+    canvas, ax = one_panel(3.6)
     places = range(len(rows), 0, -1)
     for cache, shift in zip(CACHES, (0.27, 0.0, -0.27), strict=True):
         ax.barh([place + shift for place in places], [row[cache] for row in rows], 0.27, label=cache)

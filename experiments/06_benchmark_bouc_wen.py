@@ -18,11 +18,11 @@ from pathlib import Path
 import numpy as np
 
 import hysim as hs
-from hysim.plot import Figure, figure
+from hysim.plot import Figure
 
 sys.path.insert(0, str(Path(__file__).parent))
 from benchmark_records import NOISE, PERIOD, TEST_SEED, errors_on_tests, recipe, sweep
-from results_folder import write_results
+from results_folder import name_rows, one_panel, write_results
 
 RESULTS = Path(__file__).parent / "results" / "benchmark_bouc_wen"
 Row = dict[str, float | str | bool]
@@ -105,8 +105,7 @@ def main(smoke: bool = False) -> list[Row]:
     rows = [run(seed, known, False, told) for known, told in cases for seed in range(1, 6)]
     asked = {"error_percent": ASKED, "rmse": ASKED_RMSE, "seconds": ASKED_SECONDS}
     numbers = {"asked": asked, "summary": summary(rows), "published": PUBLISHED, "white_box": WHITE_BOX}
-    write_results(RESULTS, rows, draw, numbers)
-    return rows
+    return write_results(RESULTS, rows, draw, numbers)
 
 
 def summary(rows: list[Row]) -> list[Row]:
@@ -133,14 +132,12 @@ def summary(rows: list[Row]) -> list[Row]:
 def draw(rows: list[Row]) -> Figure:
     """Test errors of the published methods and of hysim, on a log scale."""
     lines = PUBLISHED + summary(rows)
-    canvas = figure(height=4.4)
-    ax = canvas.add_subplot()
+    canvas, ax = one_panel(4.4)
     for kind, marker in (("multisine", "o"), ("sweep", "D")):
         shown = [(float(line[kind]), place) for place, line in enumerate(lines) if kind in line]
         ax.plot(*zip(*shown, strict=True), marker, fillstyle="full" if kind == "multisine" else "none", label=kind)
     ax.axvline(ASKED_RMSE, ls=":", lw=0.8, color="#777777", label="asked")
-    ax.set_yticks(range(len(lines)), [str(line["method"]) for line in lines])
-    ax.invert_yaxis()
+    name_rows(ax, [str(line["method"]) for line in lines])
     ax.set(xscale="log", xlabel="Root mean square error on the test [m]", title="Bouc-Wen benchmark: clean test data")
     ax.legend(loc="lower right")
     return canvas

@@ -8,17 +8,18 @@ of Cramer and Rao leave chi-squared of 6 degrees times the noise's variance in t
     fit = 100 (1 - sqrt(chi2_6 / (N SNR)))    with the ratio SNR of the variances of output and noise
 """
 
-import csv
-import json
 import math
-import time
+import sys
 from pathlib import Path
 
 import numpy as np
 from scipy.stats import chi2
 
 import hysim as hs
-from hysim.plot import Figure, figure, house_style, save_svg
+from hysim.plot import Figure, figure
+
+sys.path.insert(0, str(Path(__file__).parent))
+from results_folder import wall_timed, write_files
 
 RESULTS = Path(__file__).parent / "results" / "transfer_functions"
 TRUE = hs.TransferFunction(num=(-6400.0, 1600.0), den=(1.0, 5.0, 408.0, 416.0, 1600.0))
@@ -40,7 +41,8 @@ def main(smoke: bool = False) -> list[Row]:
         fits[snr], row = study(u, clean, snr, 1 if math.isinf(snr) else draws)
         rows.append(row)
     if not smoke:
-        write(rows, fits)
+        plain = {f"{snr:g}": np.round(each, 4).tolist() for snr, each in fits.items()}
+        write_files(RESULTS, rows, lambda _: draw(fits), {"fits": plain})
     return rows
 
 
@@ -51,9 +53,8 @@ def study(u: np.ndarray, clean: np.ndarray, snr: float, draws: int) -> tuple[np.
     for seed in range(draws):
         y = clean + sigma * np.random.default_rng(seed).standard_normal(u.size)
         record = hs.Record(u=u, y=y, t=t)
-        begin = time.perf_counter()
-        fit = hs.identify(STRUCTURE, record)
-        seconds.append(time.perf_counter() - begin)
+        fit, lasted = wall_timed(hs.identify, STRUCTURE, record)
+        seconds.append(lasted)
         fits.append(hs.metrics.fit_percent(clean, fit.model.response(u, SAMPLE_TIME)))
         found.append([fit.estimates[name] for name in fit.free_names])
         stderr.append([fit.stderr[name] for name in fit.free_names])
@@ -86,20 +87,6 @@ def bound(chi_squared: float | np.ndarray, n: int, snr: float) -> float | np.nda
     return 100.0 * (1.0 - np.sqrt(chi_squared / (n * snr)))
 
 
-def write(rows: list[Row], fits: dict[float, np.ndarray]) -> None:
-    """Table, figure and JSON."""
-    RESULTS.mkdir(parents=True, exist_ok=True)
-    with (RESULTS / "table.csv").open("w", newline="", encoding="utf-8") as file:
-        table = csv.DictWriter(file, rows[0], lineterminator="\n")
-        table.writeheader()
-        table.writerows(rows)
-    plain = {f"{snr:g}": np.round(each, 4).tolist() for snr, each in fits.items()}
-    text = json.dumps({"rows": rows, "fits": plain}, indent=2, allow_nan=False)
-    (RESULTS / "result.json").write_text(text + "\n", encoding="utf-8")
-    save_svg(draw(fits), RESULTS / "figure.svg", name="transfer_functions")
-
-
-@house_style()
 def draw(fits: dict[float, np.ndarray]) -> Figure:
     """For each level of noise the share of draws below a fit, the bound's, and the medians of 20 draws."""
     canvas = figure(height=3.4)

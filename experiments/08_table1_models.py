@@ -9,7 +9,6 @@ same 52 points, so that the winner's lead is partly that choice.
 """
 
 import sys
-import time
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -20,7 +19,7 @@ import hysim as hs
 from hysim.plot import Figure, figure
 
 sys.path.insert(0, str(Path(__file__).parent))
-from results_folder import draw_models, write_results
+from results_folder import draw_models, wall_timed, write_results
 
 RESULTS = Path(__file__).parent / "results" / "table1_models"
 RECORD = hs.datasets.table1(dwell=1.0)
@@ -83,9 +82,8 @@ def same_from_seeds(start: Any, fixed: dict[str, float], seeds: int) -> dict[str
     """How much the sum of squares and the estimates scatter over the seeds of the search, and its time."""
     seconds, costs, estimates = [], [], []
     for seed in range(seeds):
-        begin = time.perf_counter()
-        fit = hs.identify(start, RECORD, fixed=fixed, admissible=False, seed=seed)
-        seconds.append(time.perf_counter() - begin)
+        fit, lasted = wall_timed(hs.identify, start, RECORD, fixed=fixed, admissible=False, seed=seed)
+        seconds.append(lasted)
         costs.append(fit.rmse**2)
         estimates.append([fit.estimates[name] / fit.stderr[name] for name in fit.free_names])
     return {
@@ -127,9 +125,9 @@ def main(smoke: bool = False) -> list[Row]:
     tables = {} if smoke else intervals(*chosen[best])
     close = [line["model"] for line in rows if line["bic"] - rows[0]["bic"] <= CLOSE]
     show(rows, seeds, tables, close)
-    if not smoke:
-        write_results(RESULTS, rows, draw, {"preferred": best, "close": close, **seeds, "intervals": tables})
-    return rows
+    return write_results(
+        RESULTS, rows, draw, {"preferred": best, "close": close, **seeds, "intervals": tables}, smoke=smoke
+    )
 
 
 def show(rows: list[Row], seeds: dict[str, Any], tables: dict[str, Any], close: list[str]) -> None:

@@ -146,9 +146,7 @@ def main(smoke: bool = False) -> list[Row]:
             f"bias {row['median_error_in_stderr']:+.2f} stderr"
         )
     print(f"A and gain both free: {message}")
-    if not smoke:
-        write_results(RESULTS, rows, draw, {"redundant_pair": message})
-    return rows
+    return write_results(RESULTS, rows, draw, {"redundant_pair": message}, smoke=smoke)
 
 
 def draw(rows: list[Row]) -> Figure:

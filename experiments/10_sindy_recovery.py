@@ -17,7 +17,6 @@ any choice that only the records decide. `discover` takes the fewest numbers of 
 """
 
 import sys
-import time
 import warnings
 from collections.abc import Callable
 from concurrent.futures import ProcessPoolExecutor
@@ -29,10 +28,10 @@ import numpy as np
 import pysindy
 
 import hysim as hs
-from hysim.plot import Figure, figure
+from hysim.plot import Figure
 
 sys.path.insert(0, str(Path(__file__).parent))
-from results_folder import stored_result, write_results
+from results_folder import name_rows, one_panel, stored_result, wall_timed, write_results
 
 RESULTS = Path(__file__).parent / "results" / "sindy_recovery"
 SEEDS = 20
@@ -116,9 +115,7 @@ def measured(condition: Condition, seed: int) -> tuple[hs.Record, np.ndarray]:
 
 def ours(record: hs.Record, condition: Condition) -> Row:
     """What `discover` finds."""
-    start = time.perf_counter()
-    found = hs.discover(record, route="output" if condition.hidden else "memory")
-    seconds = time.perf_counter() - start
+    found, seconds = wall_timed(hs.discover, record, route="output" if condition.hidden else "memory")
     row: Row = {"seconds": seconds, "wrong": float(len(set(found.coefficients) ^ set(TRUTH)))}
     if condition.shape in SHAPES:
         told = found if row["wrong"] == 0.0 else hs.discover(record, route="memory", library=list(TRUTH))
@@ -232,13 +229,11 @@ def _line(row: Row) -> str:
 def draw(rows: list[Row]) -> Figure:
     """Shares of exact structures, by condition."""
     names = list(dict.fromkeys(row["condition"] for row in rows))
-    canvas = figure(height=1.2 + 0.25 * len(names))
-    ax = canvas.add_subplot()
+    canvas, ax = one_panel(1.2 + 0.25 * len(names))
     for k, (method, colour) in enumerate((("hysim", "C0"), ("PySINDy", "0.7"))):
         shares = [100.0 * row["exact"] / row["seeds"] for row in rows if row["method"] == method]
         ax.barh(np.arange(len(names)) + 0.2 * (2 * k - 1), shares, height=0.36, color=colour, label=method)
-    ax.set_yticks(np.arange(len(names)), names)
-    ax.invert_yaxis()
+    name_rows(ax, names)
     ax.set(xlabel="Exact structure found [% of seeds]", xlim=(0.0, 100.0))
     canvas.legend(loc="outside lower center", ncols=2)
     return canvas

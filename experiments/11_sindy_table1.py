@@ -7,16 +7,15 @@ Errors at points that the whole search has not seen are experiment 33's.
 """
 
 import sys
-import time
 from pathlib import Path
 
 import numpy as np
 
 import hysim as hs
-from hysim.plot import Figure, figure, loop
+from hysim.plot import Figure, loop
 
 sys.path.insert(0, str(Path(__file__).parent))
-from results_folder import write_results
+from results_folder import cpu_timed, one_panel, write_results
 
 RESULTS = Path(__file__).parent / "results" / "sindy_table1"
 MEASURED_WIDTH = 0.232  # um, of Table 1
@@ -29,12 +28,7 @@ Row = dict[str, float | str | None]
 def discovered(record: hs.Record) -> tuple[hs.Discovery, float]:
     """The law, and the processor seconds of a warm call."""
     found = hs.discover(record)
-    times = []
-    for _ in range(REPEATS):
-        start = time.process_time()
-        hs.discover(record)
-        times.append(time.process_time() - start)
-    return found, float(np.median(times))
+    return found, float(np.median([cpu_timed(hs.discover, record)[1] for _ in range(REPEATS)]))
 
 
 def row_of(name: str, result: hs.Discovery | hs.Identification, record: hs.Record, seconds: float | None) -> Row:
@@ -99,14 +93,12 @@ def main(smoke: bool = False) -> list[Row]:
         "found_again": shares,
         "cpu_seconds": seconds,
     }
-    write_results(RESULTS, rows, lambda _: draw(found, record), numbers)
-    return rows
+    return write_results(RESULTS, rows, lambda _: draw(found, record), numbers)
 
 
 def draw(found: hs.Discovery, record: hs.Record) -> Figure:
     """The measured loop and the discovered one."""
-    canvas = figure(height=3.0)
-    axes = canvas.add_subplot()
+    canvas, axes = one_panel(3.0)
     loop(record, hs.simulate(found.model, record.t, record.u), ax=axes)
     return canvas
 

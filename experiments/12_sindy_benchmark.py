@@ -15,7 +15,6 @@ relaxes instead, a sweep from rest with noise of 1 %, and everything but the law
 """
 
 import sys
-import time
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -24,11 +23,11 @@ import numpy as np
 import pysindy
 
 import hysim as hs
-from hysim.plot import Figure, figure
+from hysim.plot import Figure
 
 sys.path.insert(0, str(Path(__file__).parent))
 from benchmark_records import NOISE, PERIOD, TEST_SEED, errors_on_tests, recipe, sweep
-from results_folder import write_results
+from results_folder import one_panel, wall_timed, write_results
 
 RESULTS = Path(__file__).parent / "results" / "sindy_benchmark"
 TRUTH = {"u'": 5e4, "|u'| z": -800.0, "u' |z|": 1100.0}
@@ -53,9 +52,8 @@ def at_rest(plant: hs.BoucWenOscillator) -> hs.BoucWenOscillator:
 def of_seed(seed: int, told: bool) -> Row:
     """One discovery on the benchmark, told how the record was made or not, and its tests."""
     record = hs.benchmarks.noel_schoukens(seed=seed, periods=4, noise=NOISE)
-    begin = time.perf_counter()
-    found = hs.discover_oscillator(record, structure=recipe(PERIOD) if told else None)
-    row = described("benchmark" if told else "benchmark, recipe not told", seed, found, time.perf_counter() - begin)
+    found, seconds = wall_timed(hs.discover_oscillator, record, structure=recipe(PERIOD) if told else None)
+    row = described("benchmark" if told else "benchmark, recipe not told", seed, found, seconds)
     row |= tested(at_rest(found.model))
     errors = [100.0 * (found.coefficients.get(name, 0.0) / value - 1.0) for name, value in TRUTH.items()]
     before = [100.0 * (found.regressed.get(name, 0.0) / value - 1.0) for name, value in TRUTH.items()]
@@ -150,9 +148,8 @@ def other_plants(n_samples: int) -> list[Row]:
     rows = []
     for name, force, y, given in cases:
         noisy = y + 0.01 * y.std() * np.random.default_rng(1).standard_normal(y.size)
-        begin = time.perf_counter()
-        found = hs.discover_oscillator(hs.Record(u=force, y=noisy, t=t), **given)
-        rows.append(described(name, 1, found, time.perf_counter() - begin))
+        found, seconds = wall_timed(hs.discover_oscillator, hs.Record(u=force, y=noisy, t=t), **given)
+        rows.append(described(name, 1, found, seconds))
     return rows
 
 
@@ -182,8 +179,7 @@ def main(smoke: bool = False) -> list[Row]:
     rows += other_plants(4096)
     names = dict.fromkeys(name for row in rows for name in row)
     rows = [{name: row.get(name) for name in names} for row in rows]
-    write_results(RESULTS, rows, draw, summary(rows))
-    return rows
+    return write_results(RESULTS, rows, draw, summary(rows))
 
 
 def summary(rows: list[Row]) -> Row:
@@ -209,8 +205,7 @@ def draw(rows: list[Row]) -> Figure:
         "plain PySINDy, m, c, k given": "plain sparse regression of z', m, c, k given",
         "benchmark": "hysim, input and output only",
     }
-    canvas = figure(height=3.0)
-    ax = canvas.add_subplot()
+    canvas, ax = one_panel(3.0)
     for (case, label), marker in zip(cases.items(), ("s", "o"), strict=True):
         own = [row for row in rows if row["case"] == case]
         ax.plot([row["seed"] for row in own], [row["worst_percent"] for row in own], marker, label=label)

@@ -86,16 +86,14 @@ def main(smoke: bool = False) -> list[Row]:
                 f"held out: law {held_out['law']:.4f}, rival {held_out['rival']:.4f}; widths at 0.1, 1, 10 Hz: law "
                 f"{_percent(found, 'law')}, rival {_percent(found, 'rival')} %; {found.equation}"
             )
-    if not smoke:
-        numbers = {
-            "zero_time": lag.num[0],
-            "pole_time": lag.den[0],
-            "published_widths": list(PUBLISHED.values()),
-            "lag_widths": [width(lag, frequency) for frequency in PUBLISHED],
-            "bouc_wen_widths": [width(plants["Bouc-Wen"], frequency) for frequency in PUBLISHED],
-        }
-        write_results(RESULTS, rows, draw, numbers)
-    return rows
+    numbers = {
+        "zero_time": lag.num[0],
+        "pole_time": lag.den[0],
+        "published_widths": list(PUBLISHED.values()),
+        "lag_widths": [width(lag, frequency) for frequency in PUBLISHED],
+        "bouc_wen_widths": [width(plants["Bouc-Wen"], frequency) for frequency in PUBLISHED],
+    }
+    return write_results(RESULTS, rows, draw, numbers, smoke=smoke)
 
 
 def _percent(found: hs.Discovery, who: str) -> str:

@@ -18,10 +18,10 @@ from pathlib import Path
 import numpy as np
 
 import hysim as hs
-from hysim.plot import Figure, figure
+from hysim.plot import Figure
 
 sys.path.insert(0, str(Path(__file__).parent))
-from results_folder import loop_columns, open_loop_columns, words, write_results
+from results_folder import loop_columns, name_rows, one_panel, open_loop_columns, words, write_results
 from table1_actuator import (
     CREEP,
     DAMPING,
@@ -37,6 +37,7 @@ from table1_actuator import (
     extreme_slopes,
     reference_plant,
     resting_voltage,
+    triangle,
 )
 
 RESULTS = Path(__file__).parent / "results" / "compensation_matrix"
@@ -147,8 +148,7 @@ def uncertain(
     The exponent n, which the identification holds at one, is held or drawn too; then also in the `normalised` form.
     """
     quiet = replace(plant, sensor=None)
-    samples = round(period / H)
-    reference = hs.signals.triangle(LOW, HIGH, cycles=cycles, samples_per_cycle=samples)
+    reference, samples = triangle(period, cycles)
     t, last = H * np.arange(reference.size), slice(-samples - 1, None)
     wave = {"low": LOW, "high": HIGH, "period": period, "sample_time": H, "cycles": cycles}
     known = hs.control.assess_hysteresis(quiet, controllers(plant)["inverse + creep inverse"], **wave)
@@ -200,15 +200,12 @@ def main(smoke: bool = False) -> list[Row]:
             f"{shown['bandwidth_hz']:.0f} Hz; {words(row)}"
         )
     print(*draws, sep="\n")
-    if not smoke:
-        write_results(RESULTS, rows, draw, {"parameters_within_5_percent": draws})
-    return rows
+    return write_results(RESULTS, rows, draw, {"parameters_within_5_percent": draws}, smoke=smoke)
 
 
 def draw(rows: list[Row]) -> Figure:
     """What is left of the hysteresis and of the residual vibration, by controller."""
-    canvas = figure(height=4.5)
-    ax = canvas.add_subplot()
+    canvas, ax = one_panel(4.5)
     places = np.arange(len(rows))
     for key, mark, label in (
         ("hysteresis_reduction_percent", "o", "width of the loop"),
@@ -219,8 +216,7 @@ def draw(rows: list[Row]) -> Figure:
         left = [math.nan if row[key] is None else 100.0 - float(row[key]) for row in rows]
         ax.plot(left, places, mark, markersize=5, label=label, fillstyle="none" if "worst" in key else "full")
     ax.set_xscale("log")
-    ax.set_yticks(places, [str(row["controller"]) for row in rows])
-    ax.invert_yaxis()
+    name_rows(ax, [str(row["controller"]) for row in rows])
     ax.set_xlabel("Left of the open loop's [%]")
     canvas.legend(loc="outside lower center", ncols=2)
     return canvas

@@ -19,13 +19,11 @@ from pathlib import Path
 import numpy as np
 
 import hysim as hs
-from hysim.plot import Figure, figure
+from hysim.plot import Figure
 
 sys.path.insert(0, str(Path(__file__).parent))
-from results_folder import loop_columns, write_results
+from results_folder import loop_columns, name_rows, one_panel, write_results
 from table1_actuator import (
-    HIGH,
-    LOW,
     REST,
     H,
     controllers,
@@ -33,6 +31,7 @@ from table1_actuator import (
     reference_plant,
     resting_voltage,
     robust_controllers,
+    triangle,
 )
 
 RESULTS = Path(__file__).parent / "results" / "robustness"
@@ -50,8 +49,7 @@ def measured(
     plant: hs.Actuator, chosen: list[hs.TrackingController], period: float, cycles: int, duration: float
 ) -> np.ndarray:
     """The measures of each controller on one plant; nan where the loop is not stable."""
-    samples = round(period / H)
-    reference = hs.signals.triangle(LOW, HIGH, cycles=cycles, samples_per_cycle=samples)
+    reference, samples = triangle(period, cycles)
     opened = hs.control.open_loop(plant, reference, H, samples)
     step = {"step": 1.0, "duration": duration, "sample_time": H, "u0": resting_voltage(plant, REST), "hold": 0.3}
 
@@ -77,8 +75,7 @@ def rows_of(names: list[str], draws: int, exponent: bool, period: float, cycles:
     factors = np.random.default_rng(SEED).uniform(1.0 - SPREAD, 1.0 + SPREAD, (draws, 11 if exponent else 10))
     with ThreadPoolExecutor() as pool:
         found = list(pool.map(lambda each: measured(drawn(nominal, each), chosen, period, cycles, duration), factors))
-    samples = round(period / H)
-    reference = hs.signals.triangle(LOW, HIGH, cycles=cycles, samples_per_cycle=samples)
+    reference, _ = triangle(period, cycles)
     t = H * np.arange(reference.size)
     loops = [hs.control.assess_loop(nominal, controller, t, reference, period=period) for controller in chosen]
     return [
@@ -121,15 +118,12 @@ def main(smoke: bool = False) -> list[Row]:
         for measure in MEASURES:
             low, median, high = (each[f"{measure}_p{percentile}"] for percentile in PERCENTILES)
             print(f"  {measure:<46} {low:9.4f} {median:9.4f} {high:9.4f}")
-    if not smoke:
-        write_results(RESULTS, rows, draw, {"spread_percent": 100.0 * SPREAD})
-    return rows
+    return write_results(RESULTS, rows, draw, {"spread_percent": 100.0 * SPREAD}, smoke=smoke)
 
 
 def draw(rows: list[Row]) -> Figure:
     """Fifth to ninety-fifth percentile of what is left of hysteresis and residual vibration."""
-    canvas = figure(height=4.5)
-    ax = canvas.add_subplot()
+    canvas, ax = one_panel(4.5)
     places = np.arange(len(rows))
     for shift, mark, measure, label in (
         (-0.2, "o", "hysteresis_reduction_percent", "width of the loop"),
@@ -144,8 +138,7 @@ def draw(rows: list[Row]) -> Figure:
     ax.axvline(5.0, color="0.6", linewidth=0.8)
     ax.set_xscale("log")
     names = [f"{each['controller']}{', n drawn' if each['exponent'] == 'drawn' else ''}" for each in rows]
-    ax.set_yticks(places, names)
-    ax.invert_yaxis()
+    name_rows(ax, names)
     ax.set_xlabel("Left of the open loop's, 5th to 95th percentile [%]")
     canvas.legend(loc="outside lower center", ncols=1)
     return canvas

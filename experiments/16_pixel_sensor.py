@@ -16,18 +16,8 @@ import hysim as hs
 from hysim.plot import Figure, figure
 
 sys.path.insert(0, str(Path(__file__).parent))
-from results_folder import PIXEL, loop_columns, words, write_results
-from table1_actuator import (
-    DAMPING,
-    FREQUENCY,
-    HIGH,
-    LOW,
-    REST,
-    H,
-    controllers,
-    reference_plant,
-    resting_voltage,
-)
+from results_folder import PIXEL, loop_columns, name_rows, words, write_results
+from table1_actuator import DAMPING, FREQUENCY, REST, H, controllers, reference_plant, resting_voltage, triangle
 
 RESULTS = Path(__file__).parent / "results" / "pixel_sensor"
 STEP = ("overshoot_reduction_percent", "residual_rms_reduction_percent", "settling_time_reduction_percent")
@@ -44,8 +34,7 @@ def seen(y: np.ndarray) -> np.ndarray:
 def rows_of(chosen: dict[str, hs.TrackingController], period: float, cycles: int, duration: float) -> list[Row]:
     """True and measured figures of every controller."""
     plant = replace(reference_plant(), sensor=hs.Sensor(quantum=PIXEL, delay=H))
-    samples = round(period / H)
-    reference = hs.signals.triangle(LOW, HIGH, cycles=cycles, samples_per_cycle=samples)
+    reference, samples = triangle(period, cycles)
     opened = hs.control.open_loop(plant, reference, H, samples)
     measured = replace(opened, y=seen(opened.y))
     step = {"step": 1.0, "duration": duration, "sample_time": H, "u0": resting_voltage(plant, REST)}
@@ -83,9 +72,7 @@ def main(smoke: bool = False) -> list[Row]:
         print(f"{shown['controller']}: {words(row)}")
         for measure in ("hysteresis_reduction_percent", "tracking_rms_um", *STEP):
             print(f"  {measure:<34} true {shown[measure]:9.4f}, measured {shown[f'measured_{measure}']:9.4f}")
-    if not smoke:
-        write_results(RESULTS, rows, draw, {"pixel_um": PIXEL})
-    return rows
+    return write_results(RESULTS, rows, draw, {"pixel_um": PIXEL}, smoke=smoke)
 
 
 def draw(rows: list[Row]) -> Figure:
@@ -103,8 +90,7 @@ def draw(rows: list[Row]) -> Figure:
             ax.plot(remains, places, "o", color="#0072B2", markersize=5, fillstyle=style, label=name)
         ax.set(xscale="log", xlim=(1.0, 200.0), xlabel=label)
         ax.tick_params(axis="x", which="minor", labelbottom=False)
-    left.set_yticks(places, [str(row["controller"]) for row in rows])
-    left.invert_yaxis()
+    name_rows(left, [str(row["controller"]) for row in rows])
     canvas.legend(*right.get_legend_handles_labels(), loc="outside lower center", ncols=2)
     return canvas
 

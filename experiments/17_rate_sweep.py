@@ -71,9 +71,7 @@ def main(smoke: bool = False) -> list[Row]:
             f"{each['frequency_hz']:6.1f} Hz {each['controller']:<36} {shown(each):>8} %, "
             f"rms {1e3 * float(each['tracking_rms_um']):8.2f} nm, {each['peak_voltage']:6.1f} V; {words(each)}"
         )
-    if not smoke:
-        write_results(RESULTS, rows, draw, {"low_um": LOW, "high_um": HIGH})
-    return rows
+    return write_results(RESULTS, rows, draw, {"low_um": LOW, "high_um": HIGH}, smoke=smoke)
 
 
 def draw(rows: list[Row]) -> Figure:

@@ -111,9 +111,7 @@ def main(smoke: bool = False) -> list[Row]:
             f"{as_number(row['hysteresis_reduction_percent']):7.2f} %, of the rest {row['lag_share_percent']:5.1f} % "
             f"lag; kp {row['kp']:.3g}, ki {row['ki']:.3g}, kd {row['kd']:.3g}; {words(row)}"
         )
-    if not smoke:
-        write_results(RESULTS, rows, draw, {"derivative_filter_s": FILTER})
-    return rows
+    return write_results(RESULTS, rows, draw, {"derivative_filter_s": FILTER}, smoke=smoke)
 
 
 def draw(rows: list[Row]) -> Figure:

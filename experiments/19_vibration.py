@@ -88,9 +88,7 @@ def main(smoke: bool = False) -> list[Row]:
             f"residual {residual:7.2f} %, settling {settling:7.2f} %; {each['highest_voltage']:6.1f} V, "
             f"{words(each)}"
         )
-    if not smoke:
-        write_results(RESULTS, rows, draw, {})
-    return rows
+    return write_results(RESULTS, rows, draw, {}, smoke=smoke)
 
 
 def draw(rows: list[Row]) -> Figure:

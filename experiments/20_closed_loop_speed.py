@@ -13,7 +13,6 @@ controllers of the matrix and its noisy sensor, as a user calls it: every loop i
 
 import math
 import sys
-import time
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -27,7 +26,7 @@ from hysim.plot import Figure, figure
 
 sys.path.insert(0, str(Path(__file__).parent))
 from peers.contest import spread
-from results_folder import write_results
+from results_folder import wall_timed, write_results
 from table1_actuator import H, controllers, reference_plant, resting_voltage
 
 RESULTS = Path(__file__).parent / "results" / "closed_loop_speed"
@@ -153,13 +152,7 @@ def reference(samples: int) -> np.ndarray:
 
 def in_turns(works: list[Callable[[], object]], repeats: int) -> np.ndarray:
     """Times [s], shape (repeats, n_works), the first turn not counted."""
-    times = np.empty((repeats + 1, len(works)))
-    for turn in times:
-        for k, work in enumerate(works):
-            begin = time.perf_counter()
-            work()
-            turn[k] = time.perf_counter() - begin
-    return times[1:]
+    return np.array([[wall_timed(work)[1] for work in works] for _ in range(repeats + 1)])[1:]
 
 
 def loops(plant: hs.Actuator, samples: int, fewer: int, repeats: int) -> list[Row]:
@@ -227,9 +220,7 @@ def main(smoke: bool = False) -> list[Row]:
         print()
     seconds = {"controller": slowest["name"], "seconds": 0.2 * float(slowest["microseconds_per_sample"])}
     print("10 s at 20 kHz, the slowest:", seconds)
-    if not smoke:
-        write_results(RESULTS, rows, draw, {"at_least_times": 300, "slowest_10_s": seconds})
-    return rows
+    return write_results(RESULTS, rows, draw, {"at_least_times": 300, "slowest_10_s": seconds}, smoke=smoke)
 
 
 def draw(rows: list[Row]) -> Figure:

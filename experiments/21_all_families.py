@@ -62,9 +62,7 @@ def main(smoke: bool = False) -> list[Row]:
         "in_time": time.perf_counter() - begin < MOST,
     }
     print(table.to_text())
-    if not smoke:
-        write_results(RESULTS, rows_of(table), draw, numbers)
-    return rows_of(table)
+    return write_results(RESULTS, rows_of(table), draw, numbers, smoke=smoke)
 
 
 def draw(rows: list[Row]) -> Figure:

@@ -81,10 +81,8 @@ def main(smoke: bool = False) -> list[Row]:
             f"{line['law']:<14} stroke {line['stroke']:6.3f}, width at the middle {line['mid_width']:.3f}, odd within "
             f"{100.0 * line['odd_within']:4.1f} % of it, undone by its inverse to {line['inverse_error']:.0e}"
         )
-    if not smoke:
-        loops = {line["law"]: (line.pop("u"), line.pop("y")) for line in rows}
-        write_results(RESULTS, rows, lambda _: draw(loops), {"half_period_samples": HALF})
-    return rows
+    loops = {line["law"]: (line.pop("u"), line.pop("y")) for line in rows}
+    return write_results(RESULTS, rows, lambda _: draw(loops), {"half_period_samples": HALF}, smoke=smoke)
 
 
 def draw(loops: dict[str, tuple[list[float], list[float]]]) -> Figure:

@@ -13,7 +13,6 @@ that of the best strength of `STRENGTHS`, chosen by this error itself, which no 
 
 import itertools
 import sys
-import time
 from pathlib import Path
 from typing import Any
 
@@ -24,7 +23,7 @@ import hysim as hs
 from hysim.plot import Figure, figure
 
 sys.path.insert(0, str(Path(__file__).parent))
-from results_folder import write_results
+from results_folder import cpu_timed, write_results
 
 RESULTS = Path(__file__).parent / "results" / "preisach"
 CURVES = (4, 6, 8, 10, 12)
@@ -94,9 +93,7 @@ def smoothness(seed: int, strengths: NDArray[np.float64] = STRENGTHS) -> Row:
     def error(law: hs.Preisach) -> float:
         return float(np.std(law.response(walk) - wanted) / np.ptp(wanted))
 
-    began = time.process_time()
-    chosen = hs.Preisach.smoothed(records)
-    seconds = time.process_time() - began
+    chosen, seconds = cpu_timed(hs.Preisach.smoothed, records)
     own = error(chosen)
     best = min(own, *(error(hs.Preisach.smoothed(records, strength=float(each))) for each in strengths))
     return {"seed": seed, "width": width, "noise": noise, "seconds": seconds, "error_percent": 100.0 * own,
@@ -117,9 +114,7 @@ def main(smoke: bool = False) -> list[Row]:
             f"ridge {line['width']:.2f} wide, noise {100 * line['noise']:.1f} %: chosen in {line['seconds']:.2f} s, "
             f"{line['error_percent']:.3f} % wrong, {line['over_best_strength']:.2f} times the best strength"
         )
-    if not smoke:
-        write_results(RESULTS, rows, draw, {"noise": NOISE, "smoothness": chosen})
-    return rows
+    return write_results(RESULTS, rows, draw, {"noise": NOISE, "smoothness": chosen}, smoke=smoke)
 
 
 def draw(_: list[Row]) -> Figure:

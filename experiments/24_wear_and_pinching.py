@@ -75,9 +75,7 @@ def main(smoke: bool = False) -> list[Row]:
             f"{line['law']:>16}, {line['steps']:>4} steps a cycle: backward Euler "
             f"{line['backward_euler_percent']:.2g} %, the law {line['law_percent']:.1g} %"
         )
-    if not smoke:
-        write_results(RESULTS, rows, draw, {"amplitude": AMPLITUDE, "cycles": CYCLES})
-    return rows
+    return write_results(RESULTS, rows, draw, {"amplitude": AMPLITUDE, "cycles": CYCLES}, smoke=smoke)
 
 
 def draw(rows: list[Row]) -> Figure:

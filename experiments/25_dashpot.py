@@ -73,9 +73,9 @@ def main(smoke: bool = False) -> list[Row]:
     rows = [row(name, fit, rate) for name, fit in found.items() for rate in (RATES[:1] if smoke else RATES)]
     for line in rows:
         print(f"{line['model']:>24} at {line['rate_hz']:g} Hz: {line['error_percent']:.2f} % of the range")
-    if not smoke:
-        write_results(RESULTS, rows, lambda _: draw(record, found), {"noise": NOISE, "fitted_at_hz": FITTED_AT})
-    return rows
+    return write_results(
+        RESULTS, rows, lambda _: draw(record, found), {"noise": NOISE, "fitted_at_hz": FITTED_AT}, smoke=smoke
+    )
 
 
 def draw(record: hs.Record, found: dict[str, hs.Identification]) -> Figure:

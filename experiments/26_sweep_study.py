@@ -62,8 +62,7 @@ def main(smoke: bool = False) -> list[Row]:
     with tempfile.TemporaryDirectory() as folder:
         table = computed(Path(folder))
     rows = correlations(table)
-    write_results(RESULTS, rows, lambda _: draw(table), {"n_tasks": len(table)})
-    return rows
+    return write_results(RESULTS, rows, lambda _: draw(table), {"n_tasks": len(table)})
 
 
 def draw(table: hs.Sweep) -> Figure:

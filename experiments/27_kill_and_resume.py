@@ -16,10 +16,10 @@ from pathlib import Path
 import numpy as np
 
 import hysim as hs
-from hysim.plot import Figure, figure
+from hysim.plot import Figure
 
 sys.path.insert(0, str(Path(__file__).parent))
-from results_folder import write_results
+from results_folder import one_panel, write_results
 
 RESULTS = Path(__file__).parent / "results" / "kill_and_resume"
 N_TASKS = 1500
@@ -91,8 +91,7 @@ def main(smoke: bool = False) -> list[Row]:
 
 def draw(rows: list[Row]) -> Figure:
     """Rows kept and tasks computed again, after each kill."""
-    canvas = figure(height=3.4)
-    ax = canvas.add_subplot()
+    canvas, ax = one_panel(3.4)
     for name, label in (("kept", "rows kept"), ("computed_twice", "tasks computed again, all kills so far")):
         ax.step([row["kill"] for row in rows], [row[name] for row in rows], where="mid", label=label)
     ax.set(xlabel="Kill", ylabel="Tasks")

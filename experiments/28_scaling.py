@@ -198,8 +198,7 @@ def main(smoke: bool = False) -> list[Row]:
         with cluster(workers) as client:
             rows += on(client, workers, REPEATS) if client is not None else []
     rows += [stored(100_000, REPEATS), *(laws_on_table1(1_000_000, n, REPEATS) for n in (1.0, 1.5))]
-    write_results(RESULTS, rows, draw, {"cores": os.cpu_count(), **models_of(rows)})
-    return rows
+    return write_results(RESULTS, rows, draw, {"cores": os.cpu_count(), **models_of(rows)})
 
 
 def models_of(rows: list[Row]) -> dict[str, Any]:

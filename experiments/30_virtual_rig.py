@@ -136,8 +136,7 @@ def main(smoke: bool = False) -> list[Row]:
                 print(f"  {key:<30} {found['median']:10.5g}  [{found['least']:.5g}, {found['most']:.5g}]")
     true_width = hs.loop_metrics(truth.u, truth.y).max_width
     numbers = {"true_width_um": true_width, "true_law_reduction_percent": best, "summary": lines}
-    write_results(RESULTS, rows, lambda rows: draw(rows, true_width, best), numbers)
-    return rows
+    return write_results(RESULTS, rows, lambda rows: draw(rows, true_width, best), numbers)
 
 
 def draw(rows: list[Row], true_width: float, best: float) -> Figure:

@@ -28,11 +28,11 @@ from hysim.cli import Command
 from hysim.cli import main as hysim_command
 from hysim.cli.options import Parameter
 from hysim.models.storage import to_json
-from hysim.plot import Figure, figure
+from hysim.plot import Figure
 
 sys.path.insert(0, str(Path(__file__).parent))
 from malformed_files import corrupt
-from results_folder import write_results
+from results_folder import one_panel, write_results
 
 RESULTS = Path(__file__).parent / "results" / "fuzz"
 N_CASES, N_SMOKE = 10_000, 100
@@ -225,8 +225,7 @@ def main(smoke: bool = False) -> list[Row]:
 
 def draw(rows: list[Row]) -> Figure:
     """Inputs by command, and how they end."""
-    canvas = figure(height=3.6)
-    ax = canvas.add_subplot()
+    canvas, ax = one_panel(3.6)
     commands = sorted({str(row["command"]) for row in rows}, reverse=True)
     left = [0.0] * len(commands)
     for end, shade in zip(ENDS, ("#0072B2", "#56B4E9", "#dddddd", "#D55E00"), strict=True):

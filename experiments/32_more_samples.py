@@ -37,9 +37,9 @@ from more_samples_batch import (
     standing_changes_nothing,
 )
 from more_samples_inverse import INVERTED, STEPPED, inputs_for, inverse_verdict, stepped_inputs_for, wanted_case
-from results_folder import write_results
+from results_folder import one_panel, write_results
 
-from hysim.plot import Figure, figure
+from hysim.plot import Figure
 
 RESULTS = Path(__file__).parent / "results" / "more_samples"
 N_CASES, N_SMOKE, BATCH = 10_000, 1, 100
@@ -171,17 +171,14 @@ def main(smoke: bool = False, n_cases: int = N_CASES, folder: str | None = None)
             "  ".join(f"{name} {value:.2g}" if isinstance(value, float) else f"{value}" for name, value in row.items())
         )
     numbers = {name: sum(int(row[name]) for row in rows) for name in ("cases", "violations")}
-    if not smoke:
-        write_results(RESULTS, rows, draw, {"cases_per_family": n_cases, **numbers})
-    return rows
+    return write_results(RESULTS, rows, draw, {"cases_per_family": n_cases, **numbers}, smoke=smoke)
 
 
 def draw(rows: list[Row]) -> Figure:
     """The worst distance of each family and path, over what is allowed."""
     paths = {"response": "o", "batch": "s", "compiled step": "x", "inverse": "^", "inverse step": "v"}
     families = list(DRAWS)[::-1]
-    canvas = figure(height=5.4)
-    ax = canvas.add_subplot()
+    canvas, ax = one_panel(5.4)
     for path, marker in paths.items():
         own = [row for row in rows if row["path"] == path]
         worst = [min(max(float(row["worst"]), 1e-4), 1e2) for row in own]

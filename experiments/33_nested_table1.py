@@ -28,10 +28,10 @@ import numpy as np
 from matplotlib.patches import Patch
 
 import hysim as hs
-from hysim.plot import Figure, figure
+from hysim.plot import Figure
 
 sys.path.insert(0, str(Path(__file__).parent))
-from results_folder import stored_result, write_results
+from results_folder import name_rows, one_panel, stored_result, write_results
 
 RESULTS = Path(__file__).parent / "results" / "nested_table1"
 STORED = Path(hs.__file__).parent / "data" / "table1_nested.csv"
@@ -197,13 +197,11 @@ def _line(row: Row) -> str:
 
 def draw(rows: list[Row]) -> Figure:
     """Left-out errors, the least on top."""
-    canvas = figure(height=0.7 + 0.24 * len(rows))
-    axes = canvas.add_subplot()
+    canvas, axes = one_panel(0.7 + 0.24 * len(rows))
     places = np.arange(len(rows))
     colours = ["C0" if row["model"] == "discovered" else "0.85" if row["terms_kept"] else "0.6" for row in rows]
     axes.barh(places, [1e3 * row["left_out_rmse_um"] for row in rows], color=colours)
-    axes.set_yticks(places, [", ".join(filter(None, (row["model"], row["start"]))) for row in rows])
-    axes.invert_yaxis()
+    name_rows(axes, [", ".join(filter(None, (row["model"], row["start"]))) for row in rows])
     axes.set(xlabel="Left-out rmse [nm]")
     meanings = {"C0": "terms searched anew", "0.85": "terms kept", "0.6": "family fixed"}
     axes.legend(handles=[Patch(color=colour, label=words) for colour, words in meanings.items()], loc="upper right")

@@ -12,7 +12,6 @@ in every record, other rates and other samplings; it was run once, after the lim
 """
 
 import sys
-import time
 from collections.abc import Callable, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
@@ -28,7 +27,7 @@ import hysim as hs
 from hysim.plot import Figure, figure
 
 sys.path.insert(0, str(Path(__file__).parent))
-from results_folder import write_results
+from results_folder import cpu_timed, write_results
 
 RESULTS = Path(__file__).parent / "results" / "adversarial_records"
 HYSTERESIS, LAG, ONE_RATE, NONE = (
@@ -266,9 +265,7 @@ def cases() -> list[Case]:
 def row(case: Case, chosen: Set) -> Row:
     """One line of the table."""
     records = case.records(chosen)
-    start = time.process_time()  # of this process, whatever else the machine does
-    found = hs.discover(records)
-    seconds = time.process_time() - start
+    found, seconds = cpu_timed(hs.discover, records)  # of this process, whatever else the machine does
     return {
         "set": chosen.name,
         "kind": case.kind,
@@ -304,9 +301,7 @@ def main(smoke: bool = False) -> list[Row]:
     numbers = summary(rows)
     if smoke and wrong:
         raise AssertionError(f"{len(wrong)} of {len(rows)} verdicts are wrong")
-    if not smoke:
-        write_results(RESULTS, rows, draw, {"sets": numbers})
-    return rows
+    return write_results(RESULTS, rows, draw, {"sets": numbers}, smoke=smoke)
 
 
 def summary(rows: Sequence[Row]) -> dict[str, dict[str, float]]:

@@ -17,7 +17,6 @@ as it is done, and `python experiments/35_simulated_twins.py resume` goes on aft
 """
 
 import sys
-import time
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -31,7 +30,7 @@ from hysim.plot import Figure
 sys.path.insert(0, str(Path(__file__).parent))
 import random_starts as starts
 from random_starts import Box
-from results_folder import append_lines, median_and_worst, stored_lines, write_results
+from results_folder import append_lines, median_and_worst, stored_lines, wall_timed, write_results
 
 RESULTS = Path(__file__).parent / "results" / "simulated_twins"
 N_SEEDS = 19
@@ -239,9 +238,7 @@ def case(device: str, seed: int) -> Row:
     few = slice(None, None, max(1, y.size // 60))
     subject = twin.subject or type(twin.law)
     hs.identify(subject, hs.Record(u=record.u[few], y=record.y[few]))  # which compiles what the clock is not for
-    begin = time.perf_counter()
-    fit = hs.identify(subject, record, admissible=False)
-    seconds = time.perf_counter() - begin
+    fit, seconds = wall_timed(hs.identify, subject, record, admissible=False)
     cost = float(np.sum((fit.residual / unit_y) ** 2))
 
     peer = starts.Peer(twin.law, twin.box, twin.u, measured)

@@ -16,10 +16,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 import hysim as hs
-from hysim.plot import Figure, figure
+from hysim.plot import Figure
 
 sys.path.insert(0, str(Path(__file__).parent))
-from results_folder import write_results
+from results_folder import one_panel, write_results
 from step_runners import program_output
 
 RESULTS = Path(__file__).parent / "results" / "controllers_in_c"
@@ -116,23 +116,20 @@ def main(smoke: bool = False) -> list[Row]:
             "{law:34s} at limits {at_limits_percent:5.1f} %  worst difference {worst_difference:.1e}  "
             "equal bits {equal_bits_percent:6.2f} %  {lines:5d} lines  state {state_bytes:6d} bytes".format(**rows[-1])
         )
-    if not smoke:
-        differences = [each["worst_difference"] for each in rows]
-        numbers = {
-            "laws": len(rows),
-            "samples": SAMPLES,
-            "worst_difference": max(differences),
-            "median_difference": float(np.median(differences)),
-            "least_at_limits_percent": min(each["at_limits_percent"] for each in rows),
-        }
-        write_results(RESULTS, rows, draw, numbers)
-    return rows
+    differences = [each["worst_difference"] for each in rows]
+    numbers = {
+        "laws": len(rows),
+        "samples": SAMPLES,
+        "worst_difference": max(differences),
+        "median_difference": float(np.median(differences)),
+        "least_at_limits_percent": min(each["at_limits_percent"] for each in rows),
+    }
+    return write_results(RESULTS, rows, draw, numbers, smoke=smoke)
 
 
 def draw(rows: list[Row]) -> Figure:
     """Worst difference of each law."""
-    canvas = figure(height=0.22 * len(rows) + 0.8)
-    ax = canvas.add_subplot()
+    canvas, ax = one_panel(0.22 * len(rows) + 0.8)
     places = np.arange(len(rows))[::-1]
     ax.plot([max(each["worst_difference"], 1e-17) for each in rows], places, "o")
     ax.axvline(1e-12, color="black", linestyle=":")

@@ -12,7 +12,6 @@ others, are compared with those of the true frame.
 """
 
 import sys
-import time
 from pathlib import Path
 from typing import Any
 
@@ -23,7 +22,7 @@ import hysim as hs
 from hysim.plot import Figure, figure
 
 sys.path.insert(0, str(Path(__file__).parent))
-from results_folder import median_and_worst, write_results
+from results_folder import median_and_worst, wall_timed, write_results
 
 RESULTS = Path(__file__).parent / "results" / "identified_frame"
 N_SEEDS = 20
@@ -89,9 +88,7 @@ def case(seed: int, free: tuple[str, ...] = FREE, duration: float = DURATION) ->
     truth = {name: {**frame.scalars, EXPONENT: 2.0}[name] for name in free}
     begun = frame.assemble({name: value * (1.0 + AWAY * rng.choice([-1.0, 1.0])) for name, value in truth.items()})
 
-    begin = time.perf_counter()
-    fit = hs.identify(begun, records, free=free)
-    seconds = time.perf_counter() - begin
+    fit, seconds = wall_timed(hs.identify, begun, records, free=free)
 
     true_peaks = peak_drifts(frame, quakes[2])
     errors = 100.0 * np.abs(peak_drifts(fit.model, quakes[2]) / true_peaks - 1.0)
@@ -126,8 +123,7 @@ def main(smoke: bool = False) -> list[Row]:
     for seed in range(N_SEEDS):
         rows.append(case(seed))
         print(line_of(rows[-1]), flush=True)
-    write_results(RESULTS, rows, draw, summary(rows))
-    return rows
+    return write_results(RESULTS, rows, draw, summary(rows))
 
 
 def line_of(row: Row) -> str:

@@ -19,10 +19,10 @@ import numpy as np
 from numba import njit
 
 import hysim as hs
-from hysim.plot import Figure, figure
+from hysim.plot import Figure
 
 sys.path.insert(0, str(Path(__file__).parent))
-from results_folder import write_results
+from results_folder import one_panel, write_results
 
 RESULTS = Path(__file__).parent / "results" / "structure_ensembles"
 SAMPLE_TIME, N_SAMPLES, N_SETS = 0.02, 4000, 20_000
@@ -189,8 +189,7 @@ def main(smoke: bool = False) -> list[Row]:
 
 def draw(rows: list[Row]) -> Figure:
     """Error over cost."""
-    canvas = figure(height=3.6)
-    ax = canvas.add_subplot()
+    canvas, ax = one_panel(3.6)
     for method, marker in (("hysim", "o"), ("Newmark", "s")):
         chosen = [line for line in rows if str(line["method"]).startswith(method)]
         for name, style in (("median_error", "-"), ("worst_error", "--")):

@@ -18,7 +18,6 @@ cost        Nanoseconds a sample of hysim, of Euler's rule and of the classical 
 """
 
 import sys
-import time
 from concurrent.futures import ProcessPoolExecutor
 from pathlib import Path
 from typing import Any
@@ -30,7 +29,7 @@ import magnetic_reference as reference
 from magnetic_reference import Circuit, Core, JAmodel, of_circuit, of_jamodel
 from more_samples import draw_case, judged, response_run, runs, spread
 from more_samples_inverse import inputs_for, inverse_verdict, wanted_case
-from results_folder import write_results
+from results_folder import cpu_timed, write_results
 
 import hysim as hs
 from hysim.plot import Figure, figure
@@ -156,9 +155,7 @@ def cost_rows(smoke: bool) -> list[Row]:
 def seconds(run: Any, inputs: Array) -> float:
     """Processor time of a call that is not the first."""
     run(inputs[:10])
-    start = time.process_time()
-    run(inputs)
-    return time.process_time() - start
+    return cpu_timed(run, inputs)[1]
 
 
 # ---------------------------------------------------------------------------------- results

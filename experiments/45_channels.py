@@ -15,7 +15,6 @@
 
 import dataclasses
 import sys
-import time
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -26,7 +25,7 @@ import hysim as hs
 from hysim.plot import Figure, figure, panels
 
 sys.path.insert(0, str(Path(__file__).parent))
-from results_folder import median_and_worst, write_results
+from results_folder import cpu_timed, median_and_worst, write_results
 
 RESULTS = Path(__file__).parent / "results" / "channels"
 SUPPLIES, LEFT_OUT = (0.0, 0.5, 1.0, 1.5, 2.0), 1.5
@@ -73,12 +72,6 @@ def structure() -> Any:
     return hs.Sum.structure(hs.BoucWen, hs.Dashpot)
 
 
-def timed(work: Callable[[], Any]) -> tuple[Any, float]:
-    """A result and its processor time [s]."""
-    begin = time.process_time()
-    return work(), time.process_time() - begin
-
-
 def error_percent(model: Any) -> float:
     """Error of a law of the left-out supply against the truth there, of its range [%]."""
     u = motion()
@@ -111,7 +104,7 @@ def held(fit: hs.Identification, law: Callable[[float], Any]) -> list[bool]:
 def one_seed(seed: int, supplies: tuple[float, ...]) -> dict[str, Any]:
     """All fits to one draw of the noise."""
     records = [measured(supply, seed) for supply in supplies]
-    jointly, seconds = timed(lambda: hs.identify(structure(), records, depends=DEPENDS, fixed=FIXED))
+    jointly, seconds = cpu_timed(hs.identify, structure(), records, depends=DEPENDS, fixed=FIXED)
     alone = [hs.identify(structure(), each, fixed=FIXED) for each in records]
     one_law = hs.identify(structure(), records, fixed=FIXED)
     above = int(np.searchsorted(supplies, LEFT_OUT))
@@ -201,7 +194,7 @@ def along(seeds: range, n: int) -> list[Row]:
     holds, seconds, n_parameters = [], [], {}
     for seed in seeds:
         rec = drifting(seed, n)
-        fit, cost = timed(lambda rec=rec: hs.identify(hs.BoucWen, rec, depends=ON_TEMPERATURE, fixed=FIXED_OF_STACK))
+        fit, cost = cpu_timed(hs.identify, hs.BoucWen, rec, depends=ON_TEMPERATURE, fixed=FIXED_OF_STACK)
         plain = hs.identify(hs.BoucWen, rec, fixed=FIXED_OF_STACK)
         holds.append(held(fit, stack))
         seconds.append(cost)
@@ -230,8 +223,8 @@ def recorded(folder: Path, name: str) -> hs.Record:
 def of_folder(folder: Path) -> tuple[list[Row], dict[str, Any]]:
     """Rows of the measured damper: errors of the range of the force, median and worst of both records."""
     records = [recorded(folder, name) for name in ("4.1", "4.2")]
-    alone, seconds = timed(lambda: [hs.identify(structure(), each) for each in records])
-    jointly, joint_seconds = timed(lambda: hs.identify(structure(), records, depends=MEASURED))
+    alone, seconds = cpu_timed(lambda: [hs.identify(structure(), each) for each in records])
+    jointly, joint_seconds = cpu_timed(hs.identify, structure(), records, depends=MEASURED)
     residuals = np.split(jointly.residual, [len(records[0])])
     rms = {
         "in the supply": [float(np.sqrt(np.mean(each**2))) for each in residuals],

@@ -18,7 +18,6 @@ Nothing of it is stored here but errors and parameters.
 """
 
 import sys
-import time
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
@@ -30,7 +29,7 @@ from hysim.models.storage import from_json, to_json
 from hysim.plot import Figure, figure
 
 sys.path.insert(0, str(Path(__file__).parent))
-from results_folder import append_lines, stored_lines, write_results
+from results_folder import append_lines, cpu_timed, stored_lines, write_results
 
 RESULTS = Path(__file__).parent / "results" / "mirror"
 INPUTS = ("u", "u2", "u3")
@@ -125,9 +124,7 @@ def case(folder: Path, output: str, name: str, start: Any) -> Row:
     """One model of one output."""
     records = measured(folder, output)
     learnt = [rec for level, rec in records["train"].items() if name not in ALONE or f"lines at {level} mV" == name]
-    begin = time.process_time()
-    fit = identified(LINES if name in ALONE else name, learnt, start or first_guess(learnt[-1]))
-    seconds = time.process_time() - begin
+    fit, seconds = cpu_timed(identified, LINES if name in ALONE else name, learnt, start or first_guess(learnt[-1]))
     model = fit.model
     return {
         "output": output,

@@ -23,10 +23,10 @@ import numpy as np
 from scipy.special import log_ndtr
 
 import hysim as hs
-from hysim.plot import Figure, figure
+from hysim.plot import Figure
 
 sys.path.insert(0, str(Path(__file__).parent))
-from results_folder import PIXEL, stored_result, write_results
+from results_folder import PIXEL, cpu_timed, one_panel, stored_result, write_results
 
 RESULTS = Path(__file__).parent / "results" / "posterior"
 N_DRAWS, EFFECTIVE, MOST_STEPS = 400, 400, 6000
@@ -50,9 +50,8 @@ def fitted() -> tuple[hs.Record, hs.Identification]:
 
 def own_speed(rec: hs.Record, fit: hs.Identification, samples: int) -> Row:
     """Effective samples of hysim, and the processor time for them."""
-    began = time.process_time()
-    post = hs.sample_posterior(fit, rec, samples=samples)
-    return _speed("hysim", time.process_time() - began, post.n_evaluations, min(post.effective_samples.values()),
+    post, seconds = cpu_timed(hs.sample_posterior, fit, rec, samples=samples)
+    return _speed("hysim", seconds, post.n_evaluations, min(post.effective_samples.values()),
                   max(post.rhat.values()))  # fmt: skip
 
 
@@ -80,9 +79,7 @@ def plain_speed(rec: hs.Record, fit: hs.Identification, steps: int) -> Row:
     rng = np.random.default_rng(0)
     begin = start + 1e-2 * scale * rng.standard_normal((walkers, start.size))
     sampler = emcee.EnsembleSampler(walkers, start.size, log_probability)
-    began = time.process_time()
-    sampler.run_mcmc(begin, steps)
-    seconds = time.process_time() - began
+    _, seconds = cpu_timed(sampler.run_mcmc, begin, steps)
     tau = float(np.max(sampler.get_autocorr_time(tol=0)))
     return _speed("plain emcee, a loop over walkers", seconds, count, steps * walkers / tau, None)
 
@@ -201,8 +198,7 @@ def _write(speeds: list[Row], draws: list[dict[str, Any]]) -> list[Row]:
         "fewest_effective_samples": min(each["effective_samples"] for each in draws),
         "largest_rhat": max(each["rhat"] for each in draws),
     }
-    write_results(RESULTS, rows, draw, document)
-    return rows
+    return write_results(RESULTS, rows, draw, document)
 
 
 def _pooled(draws: list[dict[str, Any]]) -> float:
@@ -212,8 +208,7 @@ def _pooled(draws: list[dict[str, Any]]) -> float:
 
 def draw(rows: list[Row]) -> Figure:
     """Coverage of each parameter beside 95 %, with two standard errors of a coverage of 95 %."""
-    canvas = figure(height=2.6)
-    axes = canvas.add_subplot()
+    canvas, axes = one_panel(2.6)
     places = np.arange(len(rows))
     shares = [row["intervals_that_hold_percent"] for row in rows]
     reach = 2.0 * math.sqrt(95.0 * 5.0 / rows[0]["draws"])

@@ -19,7 +19,6 @@ import csv
 import json
 import math
 import sys
-import time
 from pathlib import Path
 from typing import Any
 
@@ -28,7 +27,7 @@ from hysim.plot import Figure, figure
 from hysim.posterior import FACTORS, Evidence, EvidenceRow, log_evidence
 
 sys.path.insert(0, str(Path(__file__).parent))
-from results_folder import stored_result, write_results
+from results_folder import cpu_timed, stored_result, write_results
 
 RESULTS = Path(__file__).parent / "results" / "evidence"
 FIVE_TERMS = {"u'": 0.024, "u' y^2": -0.0013, "|u'|": -0.007, "|u'| u": 0.00024, "|u'| y^2": -0.003}
@@ -58,8 +57,8 @@ def measured(name: str, factor: float, method: str, live_points: int = LIVE_POIN
     rec = hs.datasets.table1()
     family, held = models()[name]
     fit = hs.identify(family, rec, fixed=held, admissible=False)
-    began = time.process_time()
-    found = log_evidence(fit, rec, noise="quantised", factor=factor, method=method, live_points=live_points)
+    options = {"factor": factor, "method": method, "live_points": live_points}
+    found, seconds = cpu_timed(log_evidence, fit, rec, noise="quantised", **options)
     return {
         "model": name,
         "n_parameters": fit.n_parameters,
@@ -69,7 +68,7 @@ def measured(name: str, factor: float, method: str, live_points: int = LIVE_POIN
         "log_evidence": found.value,
         "error": found.error if math.isfinite(found.error) else None,
         "evaluations": found.evaluations,
-        "cpu_seconds": time.process_time() - began,
+        "cpu_seconds": seconds,
     }
 
 

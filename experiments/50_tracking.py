@@ -217,8 +217,7 @@ def main(smoke: bool = False) -> list[Row]:
     loops = [row for seed in seeds for jumps in (False, True) for row in in_loop(cycles, seed, jumps)]
     columns = dict.fromkeys([*rows[0], *loops[0]])
     rows = [{**columns, **row} for row in (*rows, *walking, *loops)]
-    if not smoke:
-        write_results(RESULTS, rows, lambda _: draw(results[0][1]), {"noise_percent": NOISE_PERCENT})
+    write_results(RESULTS, rows, lambda _: draw(results[0][1]), {"noise_percent": NOISE_PERCENT}, smoke=smoke)
     for row in rows:
         print({name: value for name, value in row.items() if value is not None})
     return rows

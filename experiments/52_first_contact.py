@@ -260,8 +260,7 @@ def main(smoke: bool = False, folder: Path | None = None) -> list[Row]:
                 print(line_of(rows[-1]), flush=True)
     if smoke:
         return rows
-    write_results(RESULTS, rows, draw, summary(rows))
-    return rows
+    return write_results(RESULTS, rows, draw, summary(rows))
 
 
 def line_of(row: Row) -> str:

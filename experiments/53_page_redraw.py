@@ -26,7 +26,7 @@ from hysim.plot import Figure, figure
 
 sys.path.insert(0, str(Path(__file__).parent))
 from browser import Browser, started
-from results_folder import write_results
+from results_folder import one_panel, write_results
 
 RESULTS = Path(__file__).parent / "results" / "page_redraw"
 KEYS, SMOKE_KEYS, NOTEBOOK_DRAWS = 40, 2, 10
@@ -88,14 +88,12 @@ def main(smoke: bool = False) -> list[Row]:
     if smoke:
         return measured(SMOKE_KEYS, 1, 1)
     rows = measured(KEYS, NOTEBOOK_DRAWS, None)
-    write_results(RESULTS, rows, draw, {"keys": KEYS, "promised_ms": PROMISED})
-    return rows
+    return write_results(RESULTS, rows, draw, {"keys": KEYS, "promised_ms": PROMISED})
 
 
 def draw(rows: list[Row]) -> Figure:
     """Median and slowest redraw of each model in the page, and the median in Python."""
-    canvas = figure(height=0.19 * len(rows) + 0.9)
-    axes = canvas.add_subplot()
+    canvas, axes = one_panel(0.19 * len(rows) + 0.9)
     ordered = sorted(rows, key=lambda row: -row["median_ms"])
     places = np.arange(len(ordered))
     medians, worst, peers = ([row[key] for row in ordered] for key in ("median_ms", "worst_ms", "notebook_median_ms"))

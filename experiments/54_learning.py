@@ -23,10 +23,10 @@ from typing import Any
 import numpy as np
 
 import hysim as hs
-from hysim.plot import Figure, figure
+from hysim.plot import Figure
 
 sys.path.insert(0, str(Path(__file__).parent))
-from results_folder import write_results
+from results_folder import one_panel, write_results
 from table1_actuator import (
     FREQUENCY,
     HIGH,
@@ -187,17 +187,14 @@ def main(smoke: bool = False) -> list[Row]:
     rows += limited(plant, plants[:50])
     for row in rows:
         print(row)
-    if not smoke:
-        every = {key: None for row in rows for key in row}
-        numbers = {"draws": count, "spread_percent": 100.0 * SPREAD, "noise_um": NOISE, "stroke_um": HIGH - LOW}
-        write_results(RESULTS, [every | row for row in rows], draw, numbers)
-    return rows
+    every = {key: None for row in rows for key in row}
+    numbers = {"draws": count, "spread_percent": 100.0 * SPREAD, "noise_um": NOISE, "stroke_um": HIGH - LOW}
+    return write_results(RESULTS, [every | row for row in rows], draw, numbers, smoke=smoke)
 
 
 def draw(rows: list[Row]) -> Figure:
     """Median error of each trial, a curve for each reference."""
-    canvas = figure(height=3.6)
-    ax = canvas.add_subplot()
+    canvas, ax = one_panel(3.6)
     trials = np.arange(1, TRIALS + 1)
     learning = [row for row in rows if row["kind"] == "iterative learning"]
     curves = {row["reference"]: [1e3 * row[f"median_um_{k}"] for k in trials] for row in learning}

@@ -57,12 +57,10 @@ def npy(values: np.ndarray, **options: bool) -> bytes:
 
 def npz(arrays: dict[str, np.ndarray | bytes], compression: int = zipfile.ZIP_STORED) -> bytes:
     """An archive of arrays, or of what stands in their place."""
-    buffer = io.BytesIO()
-    with zipfile.ZipFile(buffer, "w", compression) as archive:
-        for name, values in arrays.items():
-            content = values if isinstance(values, bytes) else npy(values, allow_pickle=True)
-            archive.writestr(zipfile.ZipInfo(f"{name}.npy"), content, compression)
-    return buffer.getvalue()
+    contents = {
+        name: each if isinstance(each, bytes) else npy(each, allow_pickle=True) for name, each in arrays.items()
+    }
+    return archive({f"{name}.npy": content for name, content in contents.items()}, compression)
 
 
 def mat(variables: dict[str, object], **options: object) -> bytes:
@@ -234,12 +232,12 @@ def corpus() -> dict[str, tuple[bytes, str]]:
     return files | (_hdf5_corpus() if HAS_H5PY else {})
 
 
-def archive(entries: dict[str, bytes], *, twice: bool = False) -> bytes:
+def archive(entries: dict[str, bytes], compression: int = zipfile.ZIP_STORED, *, twice: bool = False) -> bytes:
     """A zip archive, with its first entry in it once more if asked."""
     buffer = io.BytesIO()
-    with zipfile.ZipFile(buffer, "w") as file:
+    with zipfile.ZipFile(buffer, "w", compression) as file:
         for name, content in entries.items():
-            file.writestr(zipfile.ZipInfo(name), content)
+            file.writestr(zipfile.ZipInfo(name), content, compression)
     if not twice:
         return buffer.getvalue()
     first, second = entries

@@ -2,29 +2,57 @@
 
 import csv
 import json
+import time
 from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
 from typing import Any, TypeVar
 
 import numpy as np
+from matplotlib.axes import Axes
 
 import hysim as hs
-from hysim.plot import Figure, house_style, save_svg
+from hysim.plot import Figure, figure, house_style, save_svg
 
 PIXEL = hs.datasets.PIXEL  # um, of the paper's camera
 
 Row = TypeVar("Row", bound=Mapping[str, Any])
+T = TypeVar("T")
+
+
+def cpu_timed(work: Callable[..., T], *arguments: Any, **options: Any) -> tuple[T, float]:
+    """What a call returns, and its processor time [s]."""
+    begin = time.process_time()
+    return work(*arguments, **options), time.process_time() - begin
+
+
+def wall_timed(work: Callable[..., T], *arguments: Any, **options: Any) -> tuple[T, float]:
+    """What a call returns, and the time that went by [s]."""
+    begin = time.perf_counter()
+    return work(*arguments, **options), time.perf_counter() - begin
 
 
 def write_results(
-    folder: Path, rows: list[Row], draw: Callable[[list[Row]], Figure], numbers: Mapping[str, Any]
-) -> None:
+    folder: Path,
+    rows: list[Row],
+    draw: Callable[[list[Row]], Figure],
+    numbers: Mapping[str, Any],
+    *,
+    smoke: bool = False,
+) -> list[Row]:
     """Print `numbers`, and write table.csv, figure.svg, and result.json with them before the rows, into `folder`.
 
-    Cells of the table are empty where a row lacks a column.
+    Cells of the table are empty where a row lacks a column. Nothing is done in a smoke run. Returns the rows.
     """
+    if smoke:
+        return rows
     for name, value in numbers.items():
         print(name, value)
+    write_files(folder, rows, draw, numbers)
+    return rows
+
+
+def write_files(folder: Path, rows: list[Row], draw: Callable[[list[Row]], Figure], numbers: Mapping[str, Any]) -> None:
+    """Write the three files alone."""
     folder.mkdir(parents=True, exist_ok=True)
     columns = dict.fromkeys(name for row in rows for name in row)
     with (folder / "table.csv").open("w", newline="", encoding="utf-8") as file:
@@ -63,6 +91,18 @@ def median_and_worst(name: str, values: Iterable[float]) -> dict[str, float]:
     return {f"median_{name}": float(np.median(collected)), f"worst_{name}": float(collected.max())}
 
 
+def one_panel(height: float) -> tuple[Figure, Axes]:
+    """A figure of this height [in], and its Axes."""
+    canvas = figure(height=height)
+    return canvas, canvas.add_subplot()
+
+
+def name_rows(ax: Axes, names: Iterable[str]) -> None:
+    """Write names beside the rows of a panel, the first one at its top."""
+    ax.set_yticks(*zip(*enumerate(names), strict=True))
+    ax.invert_yaxis()
+
+
 def label_grid(canvas: Figure, axes: np.ndarray, xlabel: str, ylabel: str, names: Iterable[str]) -> None:
     """Label a grid of panels at its lower and left side, with one legend of these names, where they are drawn."""
     for ax in axes[-1]:
@@ -83,8 +123,7 @@ def draw_models(
         for place, (row, full) in enumerate(zip(rows, filled, strict=True)):
             ax.plot(scale * row[column], place, "o", color="#0072B2", markerfacecolor="#0072B2" if full else "white")
         ax.set_xlabel(label)
-    axes[0].set_yticks(range(len(rows)), [row["model"] for row in rows])
-    axes[0].invert_yaxis()
+    name_rows(axes[0], [row["model"] for row in rows])
     return axes
 
 

@@ -25,6 +25,12 @@ LAW = ("beta", "gamma", "gain", "offset", "z0")
 """Parameters of the law that the identification is free to choose, but for those of its input."""
 
 
+def triangle(period: float, cycles: int) -> tuple[np.ndarray, int]:
+    """The triangle that is followed [um], and its samples in a cycle."""
+    samples = round(period / H)
+    return hs.signals.triangle(LOW, HIGH, cycles=cycles, samples_per_cycle=samples), samples
+
+
 @cache
 def reference_plant() -> hs.Actuator:
     """The actuator as the controllers know it."""

@@ -1,7 +1,10 @@
 """What several tests share: conditions, random laws and inputs for the invariants, and tests of what is refused."""
 
+import json
 import re
 import shutil
+import subprocess
+import tracemalloc
 
 import numba
 import numpy as np
@@ -13,6 +16,7 @@ import hysim as hs
 COMPILED = not numba.config.DISABLE_JIT
 COMPILER = shutil.which("gcc") or shutil.which("clang") or shutil.which("cc")
 needs_compiled = pytest.mark.skipif(not COMPILED, reason="takes minutes without compiled code")
+STRICT = ["-std=c99", "-O2", "-ffp-contract=off", "-Wall", "-Wextra", "-Werror", "-pedantic"]
 needs_compiler = pytest.mark.skipif(COMPILER is None, reason="there is no C compiler here")
 EXPONENTS = st.sampled_from([0.5, 0.8, 1.0, 1.3, 1.5, 2.0, 2.7, 5.0, 12.0])
 
@@ -41,6 +45,7 @@ def assert_cut_and_continued_gives_the_same_bits(law, u, cut, **time) -> None:
     tail, end = law.advance(u[cut:], state, **time)
     whole, whole_end = law.advance(u, **time)
     assert np.array_equal(np.concatenate([head, tail]), whole)
+    assert np.array_equal(law.response(u, **time), whole)
     assert end == whole_end
 
 
@@ -51,6 +56,57 @@ def outputs_of_compiled_steps(law, u, **time):
     compiled, y = law.compiled(u0=u[0], **time), np.empty(u.size)
     assert drive(compiled.step, compiled.parameters, compiled.state, u, y) == -1
     return y, compiled.state
+
+
+def commanded(controller, sample_time, references, measurements, u0=0.0, y0=0.0):
+    """The commands of a controller, one sample at a time, and its state at the end."""
+    state, commands = controller.initial(sample_time, u0, y0), []
+    with np.errstate(all="ignore"):
+        for reference, measurement in zip(references, measurements, strict=True):
+            u, state = controller.step(state, float(reference), float(measurement))
+            commands.append(u)
+    return np.array(commands), state
+
+
+def printed(program, inputs):
+    """The numbers that a program prints for these, which it reads line by line."""
+    lines = "\n".join(map(repr, inputs.tolist()))
+    out = subprocess.run([program], input=lines, capture_output=True, text=True, check=True).stdout
+    return np.array(out.split(), dtype=float)
+
+
+def printed_by_main(source, folder, inputs, flags=STRICT):
+    """The numbers that the worked main function of a model in C prints for these."""
+    source.write(folder)
+    command = [COMPILER, *flags, f"{source.name}_main.c", f"{source.name}.c", "-o", "main", "-lm"]
+    subprocess.run(command, cwd=folder, check=True)
+    return printed(folder / "main", inputs)
+
+
+def rao_garnier(snr, seed):
+    """The stiff plant of Rao and Garnier under a binary input held for 0.2 s, with noise; and its clean output."""
+    true = hs.TransferFunction(num=(-6400.0, 1600.0), den=(1.0, 5.0, 408.0, 416.0, 1600.0))
+    rng = np.random.default_rng(seed)
+    u = np.repeat(rng.choice([-1.0, 1.0], 60), 20)
+    clean = true.response(u, 0.01)
+    noise = rng.standard_normal(u.size) * np.sqrt(np.var(clean) / snr)
+    return hs.Record(u=u, y=clean + noise, t=0.01 * np.arange(u.size)), clean, true
+
+
+def with_peak_memory(call):
+    """What a call returns, and the most bytes that it held at once."""
+    tracemalloc.start()
+    try:
+        return call(), tracemalloc.get_traced_memory()[1]
+    finally:
+        tracemalloc.stop()
+
+
+def document_of(run, *words, **options):
+    """The JSON that a command prints, with nothing on the standard error; `run` is a fixture."""
+    code, out, err = run(*words, "--json", **options)
+    assert (code, err) == (0, "")
+    return json.loads(out)
 
 
 def refused(*cases, call=lambda make: make(), error=ValueError):

@@ -134,20 +134,19 @@ test_wrong_arguments_are_named = refused(
     (lambda: hs.Actuator(hysteresis=hs.PID(kp=1.0)), TypeError, "hysteresis must be a law"),
     (lambda: hs.Actuator(hysteresis=MODE), TypeError, "hysteresis must be a law .* got TransferFunction"),
     (lambda: hs.Actuator(vibration=LAW), TypeError, "vibration must be a TransferFunction, a .*, got BoucWen"),
-    (lambda: hs.Actuator(vibration=dataclasses.replace(MODE, hold="foh")), ValueError, 'hold must be "zoh"'),
+    (lambda: hs.Actuator(vibration=dataclasses.replace(MODE, hold="foh")), 'hold must be "zoh"'),
     (
         lambda: hs.Actuator(vibration=dataclasses.replace(MODE, initial_state=(0.0, 1.0))),
-        ValueError,
         "must not hold an initial state",
     ),
     (lambda: hs.Actuator(LAW), TypeError, "positional"),
     (lambda: hs.Actuator(creep=LAW), TypeError, "creep must be of Creep, got BoucWen"),
     (lambda: hs.Actuator(amplifier=2.0), TypeError, "amplifier must be of Amplifier, got float"),
     (lambda: hs.Actuator(sensor=LAW), TypeError, "sensor must be of Sensor, got BoucWen"),
-    (lambda: hs.Actuator(vibration=MODE).response([0.0, 1.0]), ValueError, "needs sample_time"),
-    (lambda: hs.Actuator(vibration=MODE).response([0.0, 1.0], 0.0), ValueError, "sample_time must be positive"),
-    (lambda: hs.Actuator().response([0.0, np.nan]), ValueError, "u must be finite, got nan at index 1"),
-    (lambda: hs.Actuator().response([[0.0]]), ValueError, "u must have 1 axis"),
+    (lambda: hs.Actuator(vibration=MODE).response([0.0, 1.0]), "needs sample_time"),
+    (lambda: hs.Actuator(vibration=MODE).response([0.0, 1.0], 0.0), "sample_time must be positive"),
+    (lambda: hs.Actuator().response([0.0, np.nan]), "u must be finite, got nan at index 1"),
+    (lambda: hs.Actuator().response([[0.0]]), "u must have 1 axis"),
 )
 
 

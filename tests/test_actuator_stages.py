@@ -1,5 +1,6 @@
 """Each stage of an actuator alone: its closed form, its literal transcription, and what it refuses."""
 
+import functools
 import math
 
 import control
@@ -59,9 +60,6 @@ def test_a_sine_up_to_the_full_power_bandwidth_is_not_slewed():
 def test_a_capacitance_charges_exponentially():
     y = amplified(np.ones(30) * np.append(0.0, np.ones(29)), hs.Amplifier(time_constant=0.4), substeps=3)
     assert y[1:] == pytest.approx(-np.expm1(-np.arange(29) * H / 0.4), abs=EXACT)
-
-
-voltages = st.lists(st.floats(-2.0, 2.0), min_size=2, max_size=6)
 
 
 voltages = st.lists(st.floats(-2.0, 2.0), min_size=2, max_size=6)
@@ -188,75 +186,48 @@ def test_readings_are_steps_of_noisy_displacements():
     assert np.array_equal(hs.Sensor().measure(y), y)
 
 
+non_inverting = functools.partial(hs.Amplifier.non_inverting, feedback_resistance=1.0)
+
+
+def one_mode(**changed):
+    return hs.Modes(**{"natural_frequencies": (1.0,), "damping_ratios": (0.1,), "gains": (1.0,), **changed})
+
+
 test_wrong_arguments_are_named = refused(
-    (lambda: hs.Amplifier(limits=(1.0, 0.0)), ValueError, r"limits must be \(lowest, highest\)"),
-    (lambda: hs.Amplifier(slew_rate=0.0), ValueError, "slew_rate must be positive"),
-    (lambda: hs.Amplifier(time_constant=-1.0), ValueError, "time_constant must not be negative"),
-    (lambda: hs.Amplifier().full_power_bandwidth(0.0), ValueError, "amplitude must be positive"),
-    (
-        lambda: hs.Amplifier.non_inverting(feedback_resistance=1.0, input_resistance=0.0),
-        ValueError,
-        "input_resistance must be positive",
-    ),
-    (
-        lambda: hs.Amplifier.non_inverting(feedback_resistance=1.0, input_resistance=1.0, capacitance=-1.0),
-        ValueError,
-        "capacitance must not be negative",
-    ),
-    (lambda: hs.Creep(time_constants=(1.0,), weights=()), ValueError, "equally long, got 1 and 0"),
-    (lambda: hs.Creep(time_constants=(0.0,), weights=(1.0,)), ValueError, "time_constants must be positive"),
-    (lambda: hs.Creep.per_decade(1.0, (1.0, 0.1)), ValueError, "band must rise"),
-    (lambda: hs.Creep.per_decade(1.0, reference_time=0.0), ValueError, "reference_time must be positive"),
-    (lambda: hs.Creep.per_decade(1.0, per_decade_elements=0), ValueError, "per_decade_elements must be"),
-    (lambda: hs.mode(0.0, 0.1), ValueError, "natural_frequency must be positive"),
-    (lambda: hs.mode(1.0, -0.1), ValueError, "damping_ratio must not be negative"),
-    (
-        lambda: hs.Modes(natural_frequencies=(1.0, 2.0), damping_ratios=(0.1,), gains=(1.0, 1.0)),
-        ValueError,
-        "equally long",
-    ),
-    (
-        lambda: hs.Modes(natural_frequencies=(-1.0,), damping_ratios=(0.1,), gains=(1.0,)),
-        ValueError,
-        "natural_frequencies must be positive",
-    ),
-    (
-        lambda: hs.Modes(natural_frequencies=(1.0,), damping_ratios=(-0.1,), gains=(1.0,)),
-        ValueError,
-        "damping_ratios must not be negative",
-    ),
-    (
-        lambda: hs.Modes(natural_frequencies=(1.0,), damping_ratios=(0.1,), gains=(1.0,), delay=-1.0),
-        ValueError,
-        "delay must not be negative",
-    ),
-    (lambda: hs.StateSpace(A=[[1.0]], B=[1.0, 2.0], C=[1.0]), ValueError, "A, B and C must have the shapes"),
-    (lambda: hs.StateSpace(A=[[1.0]], B=[1.0], C=[1.0], delay=-1.0), ValueError, "delay must not be negative"),
-    (lambda: hs.Sensor(noise=-1.0), ValueError, "noise must not be negative"),
-    (lambda: hs.Sensor(seed=-1), ValueError, "seed must not be negative"),
+    (lambda: hs.Amplifier(limits=(1.0, 0.0)), r"limits must be \(lowest, highest\)"),
+    (lambda: hs.Amplifier(slew_rate=0.0), "slew_rate must be positive"),
+    (lambda: hs.Amplifier(time_constant=-1.0), "time_constant must not be negative"),
+    (lambda: hs.Amplifier().full_power_bandwidth(0.0), "amplitude must be positive"),
+    (lambda: non_inverting(input_resistance=0.0), "input_resistance must be positive"),
+    (lambda: non_inverting(input_resistance=1.0, capacitance=-1.0), "capacitance must not be negative"),
+    (lambda: hs.Creep(time_constants=(1.0,), weights=()), "equally long, got 1 and 0"),
+    (lambda: hs.Creep(time_constants=(0.0,), weights=(1.0,)), "time_constants must be positive"),
+    (lambda: hs.Creep.per_decade(1.0, (1.0, 0.1)), "band must rise"),
+    (lambda: hs.Creep.per_decade(1.0, reference_time=0.0), "reference_time must be positive"),
+    (lambda: hs.Creep.per_decade(1.0, per_decade_elements=0), "per_decade_elements must be"),
+    (lambda: hs.mode(0.0, 0.1), "natural_frequency must be positive"),
+    (lambda: hs.mode(1.0, -0.1), "damping_ratio must not be negative"),
+    (lambda: one_mode(natural_frequencies=(1.0, 2.0), gains=(1.0, 1.0)), "equally long"),
+    (lambda: one_mode(natural_frequencies=(-1.0,)), "natural_frequencies must be positive"),
+    (lambda: one_mode(damping_ratios=(-0.1,)), "damping_ratios must not be negative"),
+    (lambda: one_mode(delay=-1.0), "delay must not be negative"),
+    (lambda: hs.StateSpace(A=[[1.0]], B=[1.0, 2.0], C=[1.0]), "A, B and C must have the shapes"),
+    (lambda: hs.StateSpace(A=[[1.0]], B=[1.0], C=[1.0], delay=-1.0), "delay must not be negative"),
+    (lambda: hs.Sensor(noise=-1.0), "noise must not be negative"),
+    (lambda: hs.Sensor(seed=-1), "seed must not be negative"),
     (lambda: hs.Sensor(seed=0.5), TypeError, "seed must be a whole number"),
-    (
-        lambda: hs.Actuator(vibration=control.tf([1.0], [1.0, 0.5], 0.1)),
-        ValueError,
-        "continuous time, got .* dt = 0.1",
-    ),
-    (
-        lambda: hs.Actuator(vibration=control.ss(np.eye(2), np.eye(2), np.eye(2), 0.0)),
-        ValueError,
-        "one input and one",
-    ),
+    (lambda: hs.Actuator(vibration=control.tf([1.0], [1.0, 0.5], 0.1)), "continuous time, got .* dt = 0.1"),
+    (lambda: hs.Actuator(vibration=control.ss(np.eye(2), np.eye(2), np.eye(2), 0.0)), "one input and one"),
     (
         lambda: hs.Actuator(vibration=control.tf([[[1.0], [2.0]]], [[[1.0, 1.0], [1.0, 2.0]]])),
-        ValueError,
         "one input and one output, got a matrix",
     ),
-    (lambda: hs.Actuator(creep=hs.Creep.per_decade(1.0)).response([0.0, 1.0]), ValueError, "needs sample_time"),
+    (lambda: hs.Actuator(creep=hs.Creep.per_decade(1.0)).response([0.0, 1.0]), "needs sample_time"),
     (
         lambda: hs.Actuator(amplifier=hs.Amplifier(slew_rate=1.0)).response([0.0], 0.1, substeps=0),
-        ValueError,
         "substeps must be an integer of at least 1, got 0",
     ),
-    (lambda: hs.Actuator().advance([], sample_time=0.1), ValueError, "u must hold a sample"),
+    (lambda: hs.Actuator().advance([], sample_time=0.1), "u must hold a sample"),
 )
 
 

@@ -2,11 +2,11 @@
 
 import os
 import sys
-import tracemalloc
 from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 import pytest
+from strategies import with_peak_memory
 from threadpoolctl import threadpool_info, threadpool_limits
 
 import hysim as hs
@@ -84,8 +84,5 @@ def test_a_search_on_a_small_record_keeps_its_arrays_small():
         return hs.identify(hs.BoucWen(n=1.0), record, free=("beta", "gamma"), fixed=held)
 
     fit()
-    tracemalloc.start()
-    fit()
-    peak = tracemalloc.get_traced_memory()[1]
-    tracemalloc.stop()
+    _, peak = with_peak_memory(fit)
     assert peak < 6e6  # from some ten megabytes on a C library may return them to the system after each evaluation

@@ -7,7 +7,7 @@ import sys
 
 import numpy as np
 import pytest
-from strategies import COMPILED, COMPILER, needs_compiler, refused
+from strategies import COMPILED, COMPILER, STRICT, needs_compiler, printed, printed_by_main, refused
 from test_inverse_of_every_law import LAWS
 
 import hysim as hs
@@ -116,7 +116,6 @@ CONTROLLERS = {  # functions: a controller compiles its law, which no collection
         ),
     ),
 }
-STRICT = ["-std=c99", "-O2", "-ffp-contract=off", "-Wall", "-Wextra", "-Werror", "-pedantic"]
 DRIVER = """
 #include <stdio.h>
 #include "{name}.h"
@@ -228,15 +227,10 @@ def test_the_worked_main_prints_the_response(name, tmp_path):
     model = MODELS[name]()
     u = 0.3 + np.sin(0.05 * np.arange(200)) * np.linspace(0.5, 2.0, 200)
     timed = name in ("plant", "law_and_mode", "actuator")
-    source = hs.to_c(model, H if timed else None, name=name)
-    source.write(tmp_path)
-    command = [COMPILER, *STRICT, f"{name}_main.c", f"{name}.c", "-o", "main", "-lm"]
-    subprocess.run(command, cwd=tmp_path, check=True)
-    lines = "\n".join(map(repr, u.tolist()))
-    out = subprocess.run([tmp_path / "main"], input=lines, capture_output=True, text=True, check=True).stdout
+    in_c = printed_by_main(hs.to_c(model, H if timed else None, name=name), tmp_path, u)
     law = model.startable(H).started(u[0]) if timed else None
     y = model.response(u) if law is None else np.array([law.step(law.parameters, law.state, v) for v in u])
-    assert np.abs(np.array(out.split(), dtype=float) - y).max() <= 1e-12 * np.ptp(y)
+    assert np.abs(in_c - y).max() <= 1e-12 * np.ptp(y)
 
 
 @needs_compiler
@@ -253,10 +247,8 @@ def test_the_user_s_name_meets_none_of_ours(law, tmp_path):
 @needs_compiler
 @pytest.mark.parametrize(("law", "name"), [(hs.BoucWen(n=1.5), "boucwen"), (PLAYS, "clamps"), (hs.Play(), "play")])
 def test_a_law_of_its_natural_name_is_built(law, name, tmp_path):
-    hs.to_c(law, name=name).write(tmp_path)
-    subprocess.run([COMPILER, *STRICT, f"{name}.c", f"{name}_main.c", "-o", "a", "-lm"], cwd=tmp_path, check=True)
-    out = subprocess.run([tmp_path / "a"], input="0.5\n-0.2\n", capture_output=True, text=True, check=True).stdout
-    assert np.array(out.split(), dtype=float) == pytest.approx(law.response([0.5, -0.2]), abs=1e-14)
+    u = np.array([0.5, -0.2])
+    assert printed_by_main(hs.to_c(law, name=name), tmp_path, u) == pytest.approx(law.response(u), abs=1e-14)
 
 
 def test_equal_settings_have_equal_texts():
@@ -303,9 +295,7 @@ def test_an_inverse_from_a_file_by_the_command_line_alone(tmp_path):
     ):
         subprocess.run(command, cwd=tmp_path, check=True, capture_output=True)
     law, wanted = hs.load_model(tmp_path / "law.json"), 2.5 + 2.4 * np.sin(0.1 * np.arange(300))
-    text = "\n".join(map(repr, wanted.tolist()))
-    out = subprocess.run([tmp_path / "inverse"], input=text, capture_output=True, text=True, check=True).stdout
-    voltages = np.array(out.split(), dtype=float)
+    voltages = printed(tmp_path / "inverse", wanted)
     assert np.abs(law.response(np.append(0.0, voltages))[1:] - wanted).max() < 1e-12 * np.ptp(wanted)
     in_python = law.compiled_inverse(0.0)
     expected = [in_python.step(in_python.parameters, in_python.state, y) for y in wanted]

@@ -14,7 +14,7 @@ from typing import Annotated, Literal
 import click
 import numpy as np
 import pytest
-from strategies import refused_in_one_line
+from strategies import document_of, refused_in_one_line
 
 import hysim as hs
 from hysim._basics.atomic import write_all
@@ -170,16 +170,13 @@ def test_nobody_has_to_read_all_of_the_output(folder):
     ids=lambda arguments: arguments[0],
 )
 def test_machines_get_json_and_the_units(run, arguments):
-    code, out, err = run(*arguments, "--json")
-    document = json.loads(out)
-    assert (code, err) == (0, "")
-    assert document.get("units", {"y": "um"})["y"] == "um"
+    assert document_of(run, *arguments).get("units", {"y": "um"})["y"] == "um"
 
 
 def test_a_comparison_is_whole_in_json_and_its_best_model_is_written(run, tmp_path):
     models = ("--model", "line", "--model", "law.json")
     arguments = ("compare", "loop.csv", *COLUMNS, *models, "--cross-validate", "4", "--out", tmp_path / "best.json")
-    document = json.loads(run(*arguments, "--json")[1])
+    document = document_of(run, *arguments)
     assert document["winner"] == "law"
     assert [row["name"] for row in document["rows"]] == ["line", "law"]
     assert document["rows"][1]["fit_percent"] == pytest.approx(100.0)
@@ -207,9 +204,7 @@ def test_a_posterior_is_printed_and_a_folder_of_files_written(run, tmp_path):
 
 def test_a_study_is_told_as_json_and_drawn(run, tmp_path):
     picture = tmp_path / "study.svg"
-    code, out, err = run("sweep", "study.toml", "--out", tmp_path / "rows.sqlite", "--plot", picture, "--json")
-    assert (code, err) == (0, "")
-    document = json.loads(out)
+    document = document_of(run, "sweep", "study.toml", "--out", tmp_path / "rows.sqlite", "--plot", picture)
     assert document["outputs"]["width"] == {
         "lowest": 0.1, "median": pytest.approx(0.2), "highest": 0.4, "not_finite": 0,
     }  # fmt: skip
@@ -341,12 +336,10 @@ def test_a_controller_goes_from_model_to_files_and_does_what_is_printed(run, tmp
 
 def test_gains_are_tuned_within_the_bounds(run):
     plant = ("--mode", "2,0.3", "--noise", "1e-3", "--quantum", "1e-3", "--delay", "0.02", "--creep", "1")
-    code, out, err = run(
-        "control", "law.json", "--sample-time", "0.02", "--range", "0.5,2", *plant, "--frequency", "0.2", "--duration",
-        "5", "--controller", "tracking", "--max-sensitivity", "1.5", "--max-voltage-noise", "1", "--json",
+    document = document_of(
+        run, "control", "law.json", "--sample-time", "0.02", "--range", "0.5,2", *plant, "--frequency", "0.2",
+        "--duration", "5", "--controller", "tracking", "--max-sensitivity", "1.5", "--max-voltage-noise", "1",
     )  # fmt: skip
-    assert (code, err) == (0, "")
-    document = json.loads(out)
     assert document["tuning"]["max_sensitivity"] <= 1.5
     assert document["tuning"]["voltage_noise"] <= 1.0
     assert document["triangle"]["hysteresis_reduction_percent"] is not None
@@ -384,7 +377,7 @@ def test_a_reference_is_a_step_or_a_file_and_the_loop_of_a_linear_plant_is_lag(r
     assert float(re.search(r"reference .* tracking rms ([\d.]+)", out)[1]) < 0.5
     assert "lag reduction" in out
     assert "without the memory" not in out
-    step = json.loads(run(*design, "--reference", "step", "--step", "-0.25", "--json")[1])
+    step = document_of(run, *design, "--reference", "step", "--step", "-0.25")
     assert step["reference_tracking_rms"] is None
     assert step["step"]["height"] == -0.25
     assert step["step"]["u0"] == pytest.approx(0.375)  # three quarters of the range, over the gain of 2

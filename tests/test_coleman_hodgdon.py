@@ -121,13 +121,12 @@ def test_the_steady_force_of_dahl_is_used_in_the_fit():
 
 
 test_wrong_arguments_are_named = refused(
-    (lambda: hs.ColemanHodgdon(alpha=0.0), ValueError, "alpha must be positive, got 0"),
-    (lambda: hs.ColemanHodgdon.responses({"alpha": [1.0, -1.0]}, PATH), ValueError, "alpha must be positive"),
+    (lambda: hs.ColemanHodgdon(alpha=0.0), "alpha must be positive, got 0"),
+    (lambda: hs.ColemanHodgdon.responses({"alpha": [1.0, -1.0]}, PATH), "alpha must be positive"),
     (lambda: hs.ColemanHodgdon.responses({"b": 1.0}, PATH), TypeError, "unknown parameter 'b'"),
-    (lambda: SU.search_space(hs.Record(u=[1.0, 1.0], y=[0.0, 0.0])), ValueError, "input is constant"),
+    (lambda: SU.search_space(hs.Record(u=[1.0, 1.0], y=[0.0, 0.0])), "input is constant"),
     (
         lambda: hs.identify(SU, hs.Record(u=PATH, y=PATH), bounds={"alpha": (0.0, 1.0)}),
-        ValueError,
         "bounds of 'alpha' must be positive",
     ),
 )

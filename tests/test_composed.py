@@ -126,18 +126,15 @@ def test_a_guess_that_is_short_by_rounding_is_not_doubled_away():
     assert law.inverse_response(law.response(u)) == pytest.approx(u, abs=1e-13)  # a few roundings of 12
 
 
-def test_what_has_no_inverse_says_so():
-    u = [0.0, 1.0, 0.5]
-    with pytest.raises(ValueError, match="moves in time"):
-        (hs.BoucWen() + hs.Dashpot()).inverse_response(u)
-    with pytest.raises(ValueError, match="does not rise or fall"):
-        (hs.Play(threshold=0.2) + hs.Line()).inverse_response(u, u0=0.0)
-    with pytest.raises(ValueError, match="give u0"):
-        (hs.BoucWen() + hs.Dahl()).inverse_response([0.5, 0.7])
-    with pytest.raises(hs.SimulationError, match="at sample 2"):
-        (hs.Dahl(coulomb=0.5) + hs.Dahl(coulomb=0.4)).inverse_response([0.0, 0.5, 1.0], u0=0.0)
-    with pytest.raises(TypeError, match="SingleValued cannot be stepped"):
-        (hs.Line(slope=1.0) + hs.SingleValued(u=[0.0, 1.0], y=[0.0, 2.0])).inverse_response(u)
+CURVE = hs.SingleValued(u=[0.0, 1.0], y=[0.0, 2.0])
+test_what_has_no_inverse_says_so = refused(
+    (hs.BoucWen() + hs.Dashpot(), [0.0, 1.0, 0.5], {}, "moves in time"),
+    (hs.Play(threshold=0.2) + hs.Line(), [0.0, 1.0, 0.5], {"u0": 0.0}, "does not rise or fall"),
+    (hs.BoucWen() + hs.Dahl(), [0.5, 0.7], {}, "give u0"),
+    (hs.Dahl(coulomb=0.5) + hs.Dahl(coulomb=0.4), [0.0, 0.5, 1.0], {"u0": 0.0}, hs.SimulationError, "at sample 2"),
+    (hs.Line(slope=1.0) + CURVE, [0.0, 1.0, 0.5], {}, TypeError, "SingleValued cannot be stepped"),
+    call=lambda law, y, options: law.inverse_response(y, **options),
+)
 
 
 def test_a_dashpot_is_the_slope_of_the_stretch_before():

@@ -56,20 +56,13 @@ def test_slopes_bracket_the_secant_gain():
     assert slopes(hs.Actuator(vibration=MODE), cycle) == (1.0, 1.0)
 
 
-def test_the_line_without_memory_passes_through_the_ends_of_the_loop():
+@pytest.mark.parametrize(("law", "ends"), [(LAW, (np.min, np.max)), (NEGATIVE, (np.max, np.min))], ids=["up", "down"])
+def test_the_line_without_memory_passes_through_the_ends_of_the_loop(law, ends):
     u = hs.signals.triangle(-1.0, 2.0, cycles=1, samples_per_cycle=60)
-    line = without_memory(hs.Actuator(hysteresis=LAW, vibration=MODE), u)
-    y = steady_cycle(hs.Actuator(hysteresis=LAW), u, None)
-    ends = line.hysteresis.response([-1.0, 2.0])
-    assert ends == pytest.approx([y.min(), y.max()], abs=1e-12)
+    line = without_memory(hs.Actuator(hysteresis=law, vibration=MODE), u)
+    y = steady_cycle(hs.Actuator(hysteresis=law), u, None)
+    assert line.hysteresis.response([-1.0, 2.0]) == pytest.approx([end(y) for end in ends], abs=1e-12)
     assert line.vibration == MODE
-
-
-def test_the_line_without_memory_of_a_falling_law_falls():
-    u = hs.signals.triangle(-1.0, 2.0, cycles=1, samples_per_cycle=60)
-    y = steady_cycle(hs.Actuator(hysteresis=NEGATIVE), u, None)
-    ends = without_memory(hs.Actuator(hysteresis=NEGATIVE), u).hysteresis.response([-1.0, 2.0])
-    assert ends == pytest.approx([y.max(), y.min()], abs=1e-12)
 
 
 def test_a_law_of_negative_gain_is_assessed_as_its_mirror_image():
@@ -93,7 +86,7 @@ def test_a_hysteresis_assessment_is_counted_by_hand(plant):
     t = 0.05 * np.arange(2001)
     run = hs.close_loop(plant, pid, t, reference)
     assert found.closed.y.tolist() == run.y.tolist()
-    open_y = hs.close_loop(plant, feedforward(1.0 / found.secant_gain), t, reference).y
+    open_y = hs.close_loop(plant, Feedforward(1.0 / found.secant_gain), t, reference).y
     assert found.open_y == pytest.approx(open_y, abs=1e-12)
     assert np.array_equal(found.open_u, reference / found.secant_gain)
     last = slice(-201, None)
@@ -111,7 +104,7 @@ def test_a_hysteresis_assessment_is_counted_by_hand(plant):
     assert found.lag_width == pytest.approx(width(reference[last], lagging))
 
 
-class _Feedforward:
+class Feedforward:
     """Applies gain times reference, whatever is measured: what a PID with a setpoint weight does without feedback."""
 
     def __init__(self, gain):
@@ -123,10 +116,6 @@ class _Feedforward:
         # kp (b r - y) needs kp -> 0 with kp b = gain: 2^-900 of y is nothing beside it
         tiny = 2.0**-900
         return pid, np.array([tiny, 0.0, 0.0, 0.0, self.gain / tiny, 0.0, -np.inf, np.inf, 0.0]), np.zeros(4)
-
-
-def feedforward(gain):
-    return _Feedforward(gain)
 
 
 def test_the_open_loop_has_the_stroke_of_the_reference():
@@ -210,7 +199,7 @@ def test_a_square_wave_is_measured_over_its_last_period():
     reference = np.tile(np.repeat([0.0, 1.0], 600), 3)
     t = 0.05 * np.arange(3600)
     closed = hs.close_loop(MODE, pid, t, reference).y
-    opened = hs.close_loop(MODE, feedforward(0.5), t, reference).y
+    opened = hs.close_loop(MODE, Feedforward(0.5), t, reference).y
     assert found.closed.y.tolist() == closed.tolist()
     assert found.open_y == pytest.approx(opened, abs=1e-12)
     for rms, excess, y in (
@@ -264,9 +253,9 @@ def test_a_half_period_of_a_few_samples_has_no_step():
 @pytest.mark.parametrize(
     "assess",
     [
-        lambda plant: assess_hysteresis(plant, feedforward(1.0), **TRIANGLE),
-        lambda plant: assess_step(plant, feedforward(1.0), step=1.0, duration=10.0, sample_time=0.05),
-        lambda plant: assess_square_wave(plant, feedforward(1.0), **WAVE),
+        lambda plant: assess_hysteresis(plant, Feedforward(1.0), **TRIANGLE),
+        lambda plant: assess_step(plant, Feedforward(1.0), step=1.0, duration=10.0, sample_time=0.05),
+        lambda plant: assess_square_wave(plant, Feedforward(1.0), **WAVE),
     ],
     ids=["hysteresis", "step", "square wave"],
 )
@@ -277,37 +266,26 @@ def test_the_open_loop_is_read_when_the_closed_one_is(assess, sample):
     if "secant_gain" in dir(found):
         gain = found.secant_gain
         t, reference = found.closed.t, found.closed.reference
-        closed = hs.close_loop(PROPER, feedforward(1.0 / gain), t, reference).y
+        closed = hs.close_loop(PROPER, Feedforward(1.0 / gain), t, reference).y
     else:
         closed = found.closed.y
     assert found.open_y == pytest.approx(closed, abs=1e-12)
 
 
+ONE_STEP = {"step": 1.0, "duration": 9.0, "sample_time": 0.1}
+INTEGRATOR = hs.TransferFunction(num=(1.0,), den=(1.0, 0.0))
 test_wrong_arguments_are_named = refused(
-    (lambda: assess_hysteresis(3, hs.PID(), **TRIANGLE), TypeError, "got int"),
-    (
-        lambda: assess_hysteresis(LAW, hs.PID(), **TRIANGLE | {"high": -1.0}),
-        "high must be above low, .* got low 0.0 and high -1.0",
-    ),
-    (
-        lambda: assess_hysteresis(LAW, hs.PID(), **TRIANGLE | {"sample_time": 0.4}),
-        "samples_per_cycle must be even, .* got 25",
-    ),
-    (lambda: assess_hysteresis(LAW, hs.PID(), **TRIANGLE, cycles=0), "at least 1, got 0"),
-    (lambda: assess_hysteresis(hs.Line(slope=0.0), hs.PID(), **TRIANGLE), "gain is 0.0: no voltage drives it"),
-    (
-        lambda: assess_step(
-            hs.TransferFunction(num=(1.0,), den=(1.0, 0.0)), hs.PID(), step=1.0, duration=9.0, sample_time=0.1
-        ),
-        "gain is inf",
-    ),
-    (lambda: assess_square_wave(LAG, hs.PID(), **WAVE | {"period": 1.03}), "whole number of samples"),
-    (lambda: assess_square_wave(LAG, hs.PID(), **WAVE | {"high": 0.0}), "high (must be )?above low"),
-    (
-        lambda: assess_square_wave(LAG, hs.PID(), **WAVE | {"low": 1.0, "high": 0.0}),
-        r"high must be above low.* got .*1.* and .*0",
-    ),
-    (lambda: assess_hysteresis(LAG, hs.PID(ki=1.0), **TRIANGLE | {"period": 10.02}), "period"),
+    (assess_hysteresis, 3, TRIANGLE, TypeError, "got int"),
+    (assess_hysteresis, LAW, TRIANGLE | {"high": -1.0}, "high must be above low, .* got low 0.0 and high -1.0"),
+    (assess_hysteresis, LAW, TRIANGLE | {"sample_time": 0.4}, "samples_per_cycle must be even, .* got 25"),
+    (assess_hysteresis, LAW, TRIANGLE | {"cycles": 0}, "at least 1, got 0"),
+    (assess_hysteresis, hs.Line(slope=0.0), TRIANGLE, "gain is 0.0: no voltage drives it"),
+    (assess_step, INTEGRATOR, ONE_STEP, "gain is inf"),
+    (assess_square_wave, LAG, WAVE | {"period": 1.03}, "whole number of samples"),
+    (assess_square_wave, LAG, WAVE | {"high": 0.0}, "high (must be )?above low"),
+    (assess_square_wave, LAG, WAVE | {"low": 1.0, "high": 0.0}, r"high must be above low.* got .*1.* and .*0"),
+    (assess_hysteresis, LAG, TRIANGLE | {"period": 10.02}, "period"),
+    call=lambda assess, plant, task: assess(plant, hs.PID(), **task),
 )
 
 

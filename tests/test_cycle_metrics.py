@@ -222,16 +222,6 @@ def test_branches_end_at_the_largest_input_of_a_half_cycle_with_minor_loops():
     assert loop.loading[0] == loop.unloading[0] == -3.0 + 0.01 * 240
 
 
-@pytest.mark.parametrize("n_peak", [1, 2, 3, 4, 7])
-def test_a_plateau_at_the_peak_of_a_cycle_about_a_level_is_divided_in_its_middle(n_peak):
-    creep = np.linspace(2.0, 3.0, n_peak) if n_peak > 1 else np.array([2.0])
-    u = np.concatenate([[0, 1], np.full(n_peak, 2), [1, 0, -2, 0]])
-    y = np.concatenate([[0, 1], creep, [2.5, 0, -2, 0]])
-    loop = hs.loop_metrics(u, y)
-    assert loop.loading[-1] == creep[(n_peak - 1) // 2]
-    assert loop.unloading[-1] == creep[-1]
-
-
 def test_the_level_can_be_given():
     u = path(0.0, 2.0, -2.0, 2.0, -2.0, 0.0)
     table = hs.cycle_metrics(u, slip(u), level=1.0)

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from strategies import refused
 
 import hysim as hs
 
@@ -106,23 +107,20 @@ def test_a_rounding_sensor_has_the_noise_of_its_rounding():
     assert rounded.noise == pytest.approx(np.sqrt(9e-6 + 16e-6 / 12.0))
 
 
-def test_arguments_are_checked():
-    design = {"limits": LIMITS, **FEW}
-    with pytest.raises(ValueError, match=r"values must give vibration.natural_frequencies\[0\] \[rad/s\]"):
-        hs.design_input(STRUCTURE, **design)
-    with pytest.raises(ValueError, match=r"values has 'creep\.growth'"):
-        hs.design_input(STRUCTURE, values={**VALUES, "creep.growth": 1.0}, **design)
-    with pytest.raises(ValueError, match=r"free has 'creep\.growth'"):
-        hs.design_input(STRUCTURE, values=VALUES, free=("creep.growth",), **design)
-    with pytest.raises(ValueError, match=r"damping_ratios.* = 5 is outside the range that identify searches"):
-        hs.design_input(STRUCTURE, values={**VALUES, DAMPING: 5.0}, **design)
-    with pytest.raises(ValueError, match="highest_frequency must be positive and at most 500 Hz"):
-        hs.design_input(STRUCTURE, values=VALUES, highest_frequency=600.0, **design)
-    with pytest.raises(ValueError, match=r"beside\['mine'\] must hold 401 samples, got 3"):
-        hs.design_input(STRUCTURE, values=VALUES, beside={"mine": np.zeros(3)}, **design)
-    with pytest.raises(TypeError, match="hysteresis must be a law with its numbers"):
-        hs.design_input(hs.Actuator.structure(hs.PrandtlIshlinskii.structure(plays=3)), values=VALUES, **design)
-    with pytest.raises(ValueError, match="values are for the structure of an actuator"):
-        hs.design_input(LAW, free=("threshold",), values=VALUES, **design)
-    with pytest.raises(ValueError, match="noise must be positive"):
-        hs.design_input(STRUCTURE, values=VALUES, noise=0.0, **design)
+WITHOUT_NUMBERS = hs.Actuator.structure(hs.PrandtlIshlinskii.structure(plays=3))
+test_arguments_are_checked = refused(
+    (STRUCTURE, {"values": None}, r"values must give vibration.natural_frequencies\[0\] \[rad/s\]"),
+    (STRUCTURE, {"values": VALUES | {"creep.growth": 1.0}}, r"values has 'creep\.growth'"),
+    (STRUCTURE, {"free": ("creep.growth",)}, r"free has 'creep\.growth'"),
+    (
+        STRUCTURE,
+        {"values": VALUES | {DAMPING: 5.0}},
+        r"damping_ratios.* = 5 is outside the range that identify searches",
+    ),
+    (STRUCTURE, {"highest_frequency": 600.0}, "highest_frequency must be positive and at most 500 Hz"),
+    (STRUCTURE, {"beside": {"mine": np.zeros(3)}}, r"beside\['mine'\] must hold 401 samples, got 3"),
+    (WITHOUT_NUMBERS, {}, TypeError, "hysteresis must be a law with its numbers"),
+    (LAW, {"free": ("threshold",)}, "values are for the structure of an actuator"),
+    (STRUCTURE, {"noise": 0.0}, "noise must be positive"),
+    call=lambda subject, options: hs.design_input(subject, **{"limits": LIMITS, "values": VALUES, **FEW, **options}),
+)

@@ -184,8 +184,9 @@ def test_a_lag_at_one_rate_is_not_no_structure_where_the_law_is_a_line():
     [
         (lag().response, as_duhem, "linear lag"),
         (lambda u, _: LAW.response(u), as_bouc_wen, "rate-independent hysteresis"),
+        (lambda u, step: lag(0.04).response(LAW.response(u), step), as_bouc_wen, "no structure found"),
     ],
-    ids=["lag", "law"],
+    ids=["lag", "law", "law before a lag"],
 )
 def test_a_decaying_sine_of_one_frequency_shows_several_rates(plant, refit, verdict):
     t = np.arange(400) / 100.0
@@ -195,13 +196,6 @@ def test_a_decaying_sine_of_one_frequency_shows_several_rates(plant, refit, verd
     assert found.verdict == verdict
     assert found.held_out_by == "block"
     assert all(np.isnan(found.widths[name]).all() for name in ("law", "rival"))  # there is no complete cycle
-
-
-def test_hysteresis_before_a_lag_is_neither_under_a_decaying_sine():
-    t = np.arange(400) / 100.0
-    u = np.exp(-t / 2.0) * np.sin(2.0 * np.pi * 2.0 * t)
-    found = judged([measured(u, lag(0.04).response(LAW.response(u), 0.01), t)], as_bouc_wen)
-    assert found.verdict == "no structure found"
 
 
 def test_a_short_record_has_a_rival_of_few_parameters():

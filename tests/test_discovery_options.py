@@ -86,16 +86,12 @@ def test_cross_validation_repeats_the_whole_search(monkeypatch):
     assert done[-4:] == [(20, 80), (40, 80), (60, 80), (80, 80)]  # the search, and each fold
 
 
-@pytest.mark.parametrize("optimizer", ["SR3", "SSR", "FROLS"])
-def test_every_optimizer_leads_to_the_law(optimizer):
-    found = hs.discover(RECORD, route="memory", optimizer=optimizer, degree=1)
-    assert list(found.coefficients) == NAMES
+OPTIMIZERS = [{"optimizer": name, "degree": 1} for name in ("SR3", "SSR", "FROLS")]
 
 
-@pytest.mark.parametrize("derivative", ["smoothed", "weak"])
-def test_both_forms_of_the_slope_lead_to_the_law(derivative):
-    found = hs.discover(RECORD, route="memory", derivative=derivative)
-    assert list(found.coefficients) == NAMES
+@pytest.mark.parametrize("options", [*OPTIMIZERS, {"derivative": "smoothed"}, {"derivative": "weak"}], ids=str)
+def test_every_optimizer_and_both_forms_of_the_slope_lead_to_the_law(options):
+    assert list(hs.discover(RECORD, route="memory", **options).coefficients) == NAMES
 
 
 def test_a_library_is_a_list_of_names():
@@ -204,6 +200,10 @@ test_options_are_checked = refused(
     ({"signs": {"u' z^9": 1}}, "'u' y\\^9' is not in the library|\"u' y\\^9\" is not in the library"),
     ({"signs": {"u'": 2}}, "must be 1 or -1, got 2"),
     ({"optimizer": "lasso"}, "optimizer must be one of STLSQ, SR3, SSR, FROLS, got 'lasso'"),
+    *(
+        ({"optimizer": name}, ImportError, rf"{name} needs its extra: pip install 'pysindy\[")
+        for name in ("ConstrainedSR3", "MIOSR", "SBR")
+    ),
     ({"derivative": "spline"}, "derivative must be one of auto, smoothed, weak, got 'spline'"),
     ({"initial": "periodic"}, "initial must be one of auto, free, rest, got 'periodic'"),
     ({"cross_validate": 1}, 'cross_validate must be "loo"'),
@@ -224,22 +224,14 @@ def test_an_oscillators_records_are_pointed_to_their_own_verb():
     assert "discover_oscillator" not in " ".join(hs.discover(uneven, library=NAMES).warnings)
 
 
-@pytest.mark.parametrize("given", [CYCLES, [CYCLES], None, {"u": CYCLES, "y": CYCLES}])
-def test_only_records_are_taken(given):
-    with pytest.raises(TypeError, match="discover takes"):
-        hs.discover(given)
-
-
-@pytest.mark.parametrize("verb", [hs.discover, hs.discover_oscillator])
-def test_at_least_one_record_is_needed(verb):
-    with pytest.raises(ValueError, match="no record was given"):
-        verb([])
-
-
-@pytest.mark.parametrize("optimizer", ["ConstrainedSR3", "MIOSR", "SBR"])
-def test_an_optimizer_that_needs_an_extra_says_so(optimizer):
-    with pytest.raises(ImportError, match=rf"{optimizer} needs its extra: pip install 'pysindy\["):
-        hs.discover(RECORD, optimizer=optimizer)
+test_only_records_are_taken_and_at_least_one_is_needed = refused(
+    *(
+        (hs.discover, given, TypeError, "discover takes")
+        for given in (CYCLES, [CYCLES], None, {"u": CYCLES, "y": CYCLES})
+    ),
+    *((verb, [], "no record was given") for verb in (hs.discover, hs.discover_oscillator)),
+    call=lambda verb, given: verb(given),
+)
 
 
 def test_a_gap_is_refused_where_the_record_is_made():

@@ -1,13 +1,14 @@
 """The polynomial Duhem law with terms in |z| and a feedthrough: against Bouc-Wen's, a literal ODE solver, itself."""
 
 import itertools
+from dataclasses import replace
 
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
-from strategies import assert_cut_and_continued_gives_the_same_bits
+from strategies import assert_cut_and_continued_gives_the_same_bits, outputs_of_compiled_steps
 
 import hysim as hs
 from hysim.errors import SimulationError
@@ -24,6 +25,7 @@ MIXED = hs.Duhem(
     p=[[0.5, -0.3], [0.9, 0.0]], q=[[0.1, -0.5]], p_abs=[[-0.4], [0.3]], q_abs=[[0.2, -0.3]], feedthrough=1.5, y0=-0.2
 )
 WITH_OFFSET = hs.Duhem.from_terms({"u'": 1.0, "|u'| z": -0.6, "u' |z|": -0.3}, feedthrough=2.0, offset=7.0, y0=7.25)
+CYCLE = np.concatenate([np.linspace(0.0, 2.0, 40), np.linspace(2.0, -2.0, 80), np.linspace(-2.0, 2.0, 80)])
 PATH = np.array([0.0, 0.3, -1.4, 1.1, 1.1, -0.2, 0.4, -1.0, 1.5, -1.5])
 
 TIGHT = {"method": "DOP853", "rtol": 1e-13, "atol": 1e-15, "max_step": 0.05}  # an event is seen between steps only
@@ -140,8 +142,7 @@ def test_cut_at_a_sample_and_continued_is_the_same_bits(law, cut):
 
 @pytest.mark.parametrize("law", [MIXED, WITH_OFFSET], ids=["mixed", "offset"])
 def test_the_compiled_step_is_the_path_to_the_bit(law):
-    one = law.compiled(PATH[0])
-    assert np.array_equal([one.step(one.parameters, one.state, u) for u in PATH], law.response(PATH))
+    assert np.array_equal(outputs_of_compiled_steps(law, PATH)[0], law.response(PATH))
 
 
 def test_batches_are_the_path_to_the_bit():
@@ -273,9 +274,8 @@ def test_a_law_that_turns_has_no_inverse_and_says_where():
 
 
 def test_the_feedthrough_is_searched_where_the_polynomials_do_not_hold_it():
-    u = np.concatenate([np.linspace(0.0, 2.0, 40), np.linspace(2.0, -2.0, 80), np.linspace(-2.0, 2.0, 80)])
     _, law = bouc_wen_and_duhem(1, 1.0, 0.6, 0.3, 3.0)
-    record = hs.Record(u=u, y=law.response(u))
+    record = hs.Record(u=CYCLE, y=law.response(CYCLE))
     assert MIXED.search_space(record).names == (*MIXED.terms, "feedthrough", "offset", "y0")
     start = hs.Duhem.from_terms({"u'": 0.8, "|u'| z": -0.4, "u' |z|": -0.4}, feedthrough=2.5)
     fit = hs.identify(start, record, fixed={"offset": 0.0})
@@ -284,3 +284,70 @@ def test_the_feedthrough_is_searched_where_the_polynomials_do_not_hold_it():
     plain = hs.Duhem.from_terms({"u'": 1.0, "|u'| y": -1.0})
     assert plain.search_space(record).held == {"feedthrough": 0.0, "offset": 0.0}
     assert "feedthrough" in plain.search_space(record, Freedom(free=("feedthrough",))).names
+
+
+# ---------------------------------------------------------------------------------- the offset shifts the output alone
+
+
+@given(offset=st.floats(-100.0, 100.0))
+def test_an_offset_shifts_the_output_and_leaves_the_memory(offset):
+    plain = replace(WITH_OFFSET, offset=0.0, y0=0.25)
+    shifted = replace(WITH_OFFSET, offset=offset, y0=0.25 + offset)
+    room = 1e-14 * (1.0 + abs(offset))  # y0 less the offset is rounded
+    assert shifted.memory(PATH) == pytest.approx(plain.memory(PATH), abs=room)
+    assert shifted.response(PATH) == pytest.approx(offset + plain.response(PATH), abs=room)
+
+
+def test_the_output_begins_at_y0():
+    assert WITH_OFFSET.response(PATH)[0] == 7.25
+    assert WITH_OFFSET.memory(PATH)[0] == 0.25
+
+
+def test_bouc_wen_with_an_offset_is_a_duhem_law():
+    bouc_wen = hs.BoucWen(A=1.0, beta=0.6, gamma=0.3, feedthrough=2.0, offset=7.0, z0=0.25)
+    expected = bouc_wen.response(PATH)
+    assert np.abs(WITH_OFFSET.response(PATH) - expected).max() < 1e-10 * np.ptp(expected)  # an integrated law's promise
+
+
+def test_batches_of_offsets_are_the_path_to_the_bit():
+    offsets = np.array([0.0, 7.0, -1.0 / 3.0])
+    arrays = {name: getattr(WITH_OFFSET, name) for name in ("p", "q", "p_abs", "q_abs")}
+    together = hs.Duhem.responses({**arrays, "feedthrough": 2.0, "offset": offsets, "y0": 7.25}, PATH)
+    for row, offset in zip(together, offsets.tolist(), strict=True):
+        assert np.array_equal(row, replace(WITH_OFFSET, offset=offset).response(PATH))
+
+
+def test_the_inverse_takes_the_offset_away():
+    assert WITH_OFFSET.inverse_response(WITH_OFFSET.response(PATH)) == pytest.approx(
+        PATH, abs=1e-9
+    )  # 1e-10 of the output's range
+
+
+def test_an_offset_makes_the_memory_another_thing_than_the_output():
+    law = hs.Duhem.from_terms({"u'": 1.0, "|u'| z": -1.0}, offset=-2.0)
+    assert list(law.terms) == ["u'", "|u'| z"]
+    assert law.equation == "z' = u' (1) + |u'| (-1 z), y = -2 + z"
+    assert WITH_OFFSET.equation == "z' = u' (1 - 0.3 |z|) + |u'| (-0.6 z), y = 7 + 2 u + z"
+    assert WITH_OFFSET.latex.endswith(r", \quad y = 7 + 2 u + z")
+
+
+def test_an_offset_is_identified():
+    record = hs.Record(u=CYCLE, y=WITH_OFFSET.response(CYCLE))
+    start = hs.Duhem.from_terms({"u'": 0.9, "|u'| z": -0.5, "u' |z|": -0.4}, feedthrough=2.1, offset=7.1, y0=7.2)
+    fit = hs.identify(start, record)
+    truth = {**WITH_OFFSET.terms, "feedthrough": 2.0, "offset": 7.0, "y0": 7.25}
+    assert fit.estimates == pytest.approx(truth, abs=1e-6)  # the search's xtol
+    assert fit.model.response(CYCLE) == pytest.approx(record.y, abs=1e-6)
+
+
+def test_an_offset_is_searched_where_there_is_one_or_it_is_asked_for():
+    record = hs.Record(u=PATH, y=WITH_OFFSET.response(PATH))
+    plain = hs.Duhem.from_terms({"u'": 1.0, "|u'| y": -1.0})
+    assert "offset" in replace(plain, offset=1.0).search_space(record).names
+    assert "offset" not in plain.search_space(record).names
+    assert "offset" in plain.search_space(record, Freedom(free=("offset",))).names
+
+
+def test_a_law_with_an_offset_comes_back_from_json(tmp_path):
+    hs.save(WITH_OFFSET, tmp_path / "law.json")
+    assert hs.load_model(tmp_path / "law.json") == WITH_OFFSET

@@ -340,11 +340,12 @@ def compiled(tmp_path_factory):
 
 @pytest.fixture
 def slave(tmp_path, compiled):
-    """A function that makes an instance of a unit; it is closed afterwards."""
+    """A function that makes and starts an instance of a unit; it is closed afterwards."""
     made = []
 
-    def make(version, program="law"):
+    def make(version, program="law", **values):
         made.append(Slave(compiled[program, version], tmp_path / str(len(made))))
+        made[-1].start(**values)
         return made[-1]
 
     yield make
@@ -465,16 +466,14 @@ def test_fmpy_builds_a_unit_from_its_sources(tmp_path, version):
 
 @of_each_version
 def test_a_saved_state_continues_with_the_same_bits(slave, version):
-    friction = slave(version)
-    friction.start(u0=0.2)
+    friction = slave(version, u0=0.2)
     friction.outputs(U[:50])
     state = friction.save()
     data = friction.to_bytes(state)
     rest = friction.outputs(U[50:], 50)
     friction.load(state)
     assert friction.outputs(U[50:], 50).tolist() == rest.tolist()
-    other = slave(version)
-    other.start(u0=9.0, stiffness=7.0)
+    other = slave(version, u0=9.0, stiffness=7.0)
     other.load(other.from_bytes(data))
     assert other.get("stiffness") == 2.0
     assert other.outputs(U[50:], 50).tolist() == rest.tolist()
@@ -483,7 +482,6 @@ def test_a_saved_state_continues_with_the_same_bits(slave, version):
 @of_each_version
 def test_a_state_of_another_model_is_refused(slave, version):
     friction, integrator = slave(version), slave(version, "controller")
-    friction.start()
     data = friction.to_bytes(friction.save())
     with pytest.raises(Exception, match="status 3"):
         integrator.from_bytes(data)
@@ -492,7 +490,6 @@ def test_a_state_of_another_model_is_refused(slave, version):
 @of_each_version
 def test_reset_forgets_parameters_and_memory(slave, version):
     friction = slave(version)
-    friction.start()
     first = friction.outputs(U)
     friction.unit.reset()
     assert friction.get("stiffness") == 2.0
@@ -505,8 +502,7 @@ def test_reset_forgets_parameters_and_memory(slave, version):
 
 @of_each_version
 def test_a_parameter_that_is_tuned_in_the_course_of_a_simulation_keeps_the_memory(slave, version):
-    friction = slave(version)
-    friction.start(u0=U[0])
+    friction = slave(version, u0=U[0])
     friction.outputs(U[:60])
     friction.set(stiffness=6.0, offset=1.0)
     _, state = LAW.advance(U[:60])
@@ -522,7 +518,6 @@ def test_a_parameter_that_is_tuned_in_the_course_of_a_simulation_keeps_the_memor
 @pytest.mark.parametrize("u", [math.nan, math.inf])
 def test_an_input_that_is_not_finite_is_refused_and_changes_nothing(slave, version, u):
     friction = slave(version)
-    friction.start()
     before = friction.to_bytes(friction.save())
     friction.set(u=u)
     with pytest.raises(Exception, match="status 3"):
@@ -535,8 +530,7 @@ def test_an_input_that_is_not_finite_is_refused_and_changes_nothing(slave, versi
 @pytest.mark.parametrize(("step", "per_step"), [(0.01, 1), (0.03, 3), (0.0025, 0.25)])
 def test_a_sampled_model_runs_at_its_own_sample_time(slave, version, step, per_step):
     """1 + 0.5 k after k samples of a unit error, whatever the communication step."""
-    integrator = slave(version, "controller")
-    integrator.start(reference=1.0)
+    integrator = slave(version, "controller", reference=1.0)
     assert integrator.get("sample_time") == 0.01
     assert integrator.get("command") == 1.5  # at the first sample, which is computed, but not yet done
     for k in range(40):

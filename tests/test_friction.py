@@ -1,15 +1,13 @@
 """Friction laws: closed forms against obvious transcriptions, invariants, and what is derived from declarations."""
 
-import ctypes
 import math
-import subprocess
 from dataclasses import replace
 
 import numpy as np
 import pytest
 from friction_laws import FAMILIES, backlash, decades, drawn, lugre, maxwell, walk
 from scipy.integrate import solve_ivp
-from strategies import COMPILER, needs_compiler, refused
+from strategies import needs_compiler, printed_by_main, refused
 
 import hysim as hs
 from hysim.models.model import candidates
@@ -308,26 +306,13 @@ def test_laws_are_stored_composed_and_simulated(family, tmp_path):
 
 
 @needs_compiler
-def test_c_computes_the_same(tmp_path):
-    """In one program for each law, by a shared library."""
-    for number, family in enumerate(FAMILIES):
-        law, length, time = drawn(family, np.random.default_rng(11))
-        u = walk(np.random.default_rng(12), length, 200)
-        program = hs.to_c(law, sample_time=time)
-        (tmp_path / "model.h").write_text(program.header)
-        (tmp_path / f"{number}.c").write_text(program.source)
-        library = tmp_path / f"{number}.so"
-        subprocess.run(
-            [COMPILER, "-std=c99", "-ffp-contract=off", "-Wall", "-Wextra", "-Werror", "-O2", "-shared", "-fPIC", "-o",
-             str(library), f"{number}.c", "-lm"], cwd=tmp_path, check=True,
-        )  # fmt: skip
-        c = ctypes.CDLL(str(library))
-        c.model_step.restype = ctypes.c_double
-        state = (ctypes.c_double * 64)()
-        c.model_init(state, ctypes.c_double(u[0]))
-        y = np.array([c.model_step(state, ctypes.c_double(each)) for each in u])
-        # the same operations; exponentials of another library
-        np.testing.assert_allclose(y, law.response(u, time), rtol=0, atol=1e-13 * size(y))
+@every_family
+def test_c_computes_the_same(family, tmp_path):
+    law, length, time = drawn(family, np.random.default_rng(11))
+    u = walk(np.random.default_rng(12), length, 200)
+    in_c = printed_by_main(hs.to_c(law, sample_time=time), tmp_path, u)
+    # the same operations; exponentials of another library
+    np.testing.assert_allclose(in_c, law.response(u, time), rtol=0, atol=1e-13 * size(law.response(u, time)))
 
 
 test_what_is_no_friction_is_refused = refused(

@@ -229,6 +229,9 @@ def test_a_decimal_comma_is_seen_where_it_can_be_nothing_else():
         read("0,5\n0,25\n", sample_time=1.0)
 
 
+SQUARES = "time,x,y\n" + "".join(f"{k**2},5,6\n" for k in range(8))
+
+
 @pytest.mark.parametrize(
     ("text", "options", "message"),
     [
@@ -255,16 +258,8 @@ def test_a_decimal_comma_is_seen_where_it_can_be_nothing_else():
         (TABLE.replace("[s]", "[h]"), {}, "the time must be in s or ms, got the unit 'h'"),
         (TABLE.replace("acceleration [g]", "acc_g"), {}, "column 'acc_g' may be in g: pass units="),
         (TABLE, {"sample_time": 0.01}, "the first of 2 columns increases from line to line"),
-        (
-            "0 1\n0.01 2\n0.02 3\n",
-            {"sample_time": 0.01},
-            "the first of 2 columns increases from line to line",
-        ),
-        (
-            "time,x,y\n" + "".join(f"{k**2},5,6\n" for k in range(8)),
-            {"sample_time": 1.0},
-            "the first of 3 columns increases from line to line, as times do",
-        ),
+        ("0 1\n0.01 2\n0.02 3\n", {"sample_time": 0.01}, "the first of 2 columns increases from line to line"),
+        (SQUARES, {"sample_time": 1.0}, "the first of 3 columns increases from line to line, as times do"),
         ("t,acc,accel\n0,1,2\n1,2,3\n", {}, "t, acc, accel; pass one as acceleration="),
         ("t,time,a\n0,1,2\n1,2,3\n", {}, "several columns may be the time: pass one of t, time as t="),
         (".1\n.2\n", {}, "if these are 2 accelerations in reading order, pass their sample_time="),

@@ -1,10 +1,8 @@
 """`identify` finds the global optimum, says what the data tell, and refuses what it cannot do."""
 
-import tracemalloc
-
 import numpy as np
 import pytest
-from strategies import refused
+from strategies import refused, with_peak_memory
 
 import hysim as hs
 from hysim.models.search_space import SearchSpace
@@ -37,10 +35,8 @@ def test_a_long_record_takes_little_memory():
     t = np.linspace(0.0, 20.0, 8_001)
     law = hs.BoucWen(beta=0.8, gamma=-0.3, feedthrough=0.7, gain=-0.5)
     u = np.sin(2.1 * t) + 0.6 * np.sin(7.3 * t)
-    tracemalloc.start()
-    fit = hs.identify(hs.BoucWen, hs.Record(u=u, y=law.response(u)), fixed={"n": 1.0})
-    peak = tracemalloc.get_traced_memory()[1]
-    tracemalloc.stop()
+    record = hs.Record(u=u, y=law.response(u))
+    fit, peak = with_peak_memory(lambda: hs.identify(hs.BoucWen, record, fixed={"n": 1.0}))
     assert fit.model.beta == pytest.approx(0.8, abs=1e-5)
     assert peak < 80e6
 

@@ -183,11 +183,11 @@ def test_what_cannot_be_reached_is_refused():
 
 
 test_wrong_arguments_are_named = refused(
-    (lambda: STACK.inverse_response([0.0, np.nan]), ValueError, "y must be finite, got nan at index 1"),
-    (lambda: STACK.inverse_response([[0.0]]), ValueError, "1 axis"),
-    (lambda: STACK.inverse_response([0.0], u0=0.0, state=(0.0, 0.0)), ValueError, "not both"),
-    (lambda: hs.BoucWen(feedthrough=-1.0).inverse(), ValueError, "slope is zero"),
-    (lambda: ASYMMETRIC.inverse().advance([[1.0]]), ValueError, "shape"),
+    (lambda: STACK.inverse_response([0.0, np.nan]), "y must be finite, got nan at index 1"),
+    (lambda: STACK.inverse_response([[0.0]]), "1 axis"),
+    (lambda: STACK.inverse_response([0.0], u0=0.0, state=(0.0, 0.0)), "not both"),
+    (lambda: hs.BoucWen(feedthrough=-1.0).inverse(), "slope is zero"),
+    (lambda: ASYMMETRIC.inverse().advance([[1.0]]), "shape"),
 )
 
 

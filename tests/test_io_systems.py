@@ -12,6 +12,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.testing import assert_array_equal
+from strategies import commanded, refused
 
 import hysim as hs
 from hysim.kernels.controllers import through
@@ -196,10 +197,7 @@ CONTROLLERS = {
 def test_a_controller_of_parts_gives_what_it_gives_in_a_loop(controller):
     rng = np.random.default_rng(4)
     r, m = 0.5 * np.sin(T), 0.4 * np.sin(T) + 0.05 * rng.standard_normal(T.size)
-    state, expected = controller.initial(H), []
-    for reference, measurement in zip(r, m, strict=True):
-        u, state = controller.step(state, reference, measurement)
-        expected.append(u)
+    expected, _ = commanded(controller, H, r, m)
     assert response(hs.to_control(controller, H), [r, m])[0] == pytest.approx(expected, abs=ROUNDING)
 
 
@@ -289,25 +287,16 @@ def test_the_noise_is_left_out():
     assert_array_equal(response(hs.to_control(noisy, H), u), response(hs.to_control(quiet, H), u))
 
 
-@pytest.mark.parametrize(
-    "stepped",
-    [*AT_ZERO, STACK, replace(STACK, hysteresis=hs.Line()), CONTROLLERS["feedback"]],
-    ids=family,
+SAMPLED = (*AT_ZERO, STACK, replace(STACK, hysteresis=hs.Line()), CONTROLLERS["feedback"])
+test_what_makes_no_system_is_refused = refused(
+    *((each, (), "moves from sample to sample: give a sample_time") for each in SAMPLED),
+    *(
+        (each, (-0.1,), r"sample_time must be positive and finite, got -0.1")
+        for each in (AT_ZERO[0], STACK, CONTROLLERS["feedback"], OSCILLATOR)
+    ),
+    (hs.BoucWen(feedthrough=1.0).inverse(), (H,), TypeError, "part of a controller: give it as InverseFeedforward"),
+    call=lambda part, time: hs.to_control(part, *time),
 )
-def test_what_moves_from_sample_to_sample_needs_a_sample_time(stepped):
-    with pytest.raises(ValueError, match="moves from sample to sample: give a sample_time"):
-        hs.to_control(stepped)
-
-
-@pytest.mark.parametrize("stepped", [AT_ZERO[0], STACK, CONTROLLERS["feedback"], OSCILLATOR], ids=family)
-def test_a_sample_time_that_is_none_is_named(stepped):
-    with pytest.raises(ValueError, match=r"sample_time must be positive and finite, got -0.1"):
-        hs.to_control(stepped, -0.1)
-
-
-def test_the_inverse_of_a_law_is_sent_to_the_controller():
-    with pytest.raises(TypeError, match="part of a controller: give it as InverseFeedforward"):
-        hs.to_control(hs.BoucWen(feedthrough=1.0).inverse(), H)
 
 
 def test_a_plant_that_is_lost_says_when():

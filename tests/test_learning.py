@@ -6,6 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from scipy.optimize import lsq_linear
+from strategies import refused
 
 import hysim as hs
 from hysim.control._learning import _filters
@@ -295,30 +296,26 @@ def test_a_law_that_is_flat_at_its_reversals_is_driven_to_its_place():
     assert np.abs(y[60:] - 30.0).max() < 1e-6
 
 
-def test_what_does_not_fit_is_refused():
-    with pytest.raises(ValueError, match=r"at most 200 samples, got 300"):
-        hs.PredictiveControl(model=STAGE, horizon=0.3).ahead(H)
-    slow = replace(STAGE, amplifier=hs.Amplifier(slew_rate=100.0))
-    with pytest.raises(ValueError, match=r"the amplifier must act at once"):
-        hs.PredictiveControl(model=slow, horizon=0.02)
-    with pytest.raises(TypeError, match=r"controller must be an InverseFeedforward, or a TrackingController with one"):
-        hs.RepetitiveControl(controller=hs.PID(ki=1.0), model=STAGE, stroke=STROKE, period=0.1)
-    integral = hs.TransferFunction(num=(1.0,), den=(1.0, 0.0))
-    late = hs.TransferFunction(num=(1.0,), den=(1.0, 1.0), delay=0.01)
-    with pytest.raises(ValueError, match=r"must come to rest"):
-        hs.PredictiveControl(model=integral, horizon=0.02).compiled(H)
-    with pytest.raises(ValueError, match=r"longer than the plant's dead time"):
-        hs.PredictiveControl(model=late, horizon=0.005).compiled(H)
-    with pytest.raises(ValueError, match=r"needs their duration="):
-        learner().compiled(H)
-    with pytest.raises(ValueError, match=r"a trial needs more than \d+ samples"):
-        learner(duration=0.05).compiled(H)
-    with pytest.raises(ValueError, match=r"no low pass of 32768 samples"):
-        learner(uncertainty=0.9).condition(H)
-    with pytest.raises(ValueError, match=r"the model integrates"):
-        hs.IterativeLearning(controller=inverse_of(STAGE), model=integral, stroke=STROKE)
-    with pytest.raises(ValueError, match=r"amplifier has limits"):
-        replace(learner(), model=replace(STAGE, amplifier=hs.Amplifier(limits=(0.0, 9.0))))
+SLOW = replace(STAGE, amplifier=hs.Amplifier(slew_rate=100.0))
+LIMITED = replace(STAGE, amplifier=hs.Amplifier(limits=(0.0, 9.0)))
+INTEGRAL = hs.TransferFunction(num=(1.0,), den=(1.0, 0.0))
+LATE = hs.TransferFunction(num=(1.0,), den=(1.0, 1.0), delay=0.01)
+test_what_does_not_fit_is_refused = refused(
+    (lambda: hs.PredictiveControl(model=STAGE, horizon=0.3).ahead(H), "at most 200 samples, got 300"),
+    (lambda: hs.PredictiveControl(model=SLOW, horizon=0.02), "the amplifier must act at once"),
+    (
+        lambda: hs.RepetitiveControl(controller=hs.PID(ki=1.0), model=STAGE, stroke=STROKE, period=0.1),
+        TypeError,
+        "controller must be an InverseFeedforward, or a TrackingController with one",
+    ),
+    (lambda: hs.PredictiveControl(model=INTEGRAL, horizon=0.02).compiled(H), "must come to rest"),
+    (lambda: hs.PredictiveControl(model=LATE, horizon=0.005).compiled(H), "longer than the plant's dead time"),
+    (lambda: learner().compiled(H), "needs their duration="),
+    (lambda: learner(duration=0.05).compiled(H), r"a trial needs more than \d+ samples"),
+    (lambda: learner(uncertainty=0.9).condition(H), "no low pass of 32768 samples"),
+    (lambda: replace(learner(), model=INTEGRAL), "the model integrates"),
+    (lambda: replace(learner(), model=LIMITED), "amplifier has limits"),
+)
 
 
 # ------------------------------------------------------------------------------------ norms

@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 import pytest
-from strategies import needs_compiler
+from strategies import commanded, needs_compiler
 from test_c_export import AMPLIFIED, CONTROLLERS, MODE, STACK, compiled, replayed
 from test_inverse_of_every_law import LAWS, reversing
 
@@ -105,11 +105,7 @@ def test_the_inverse_of_every_law_recovers_from_a_spike(law):
     spiked = reference.copy()
     spiked[[50, 120]] = 1e300, math.nan
     controller = hs.TrackingController(feedforward=hs.InverseFeedforward(law=law), limits=(-9.0, 9.0))
-    state, u = controller.initial(1.0), []
-    with np.errstate(all="ignore"):
-        for r in spiked.tolist():
-            command, state = controller.step(state, r, 0.0)
-            u.append(command)
+    u, state = commanded(controller, 1.0, spiked, np.zeros(spiked.size))
     assert hs.control.held_samples(state) == 2
     timed = {"sample_time": 1.0} if isinstance(law, hs.RateDependentPrandtlIshlinskii) else {}
     y, wanted = law.response(np.append(0.0, u), **timed)[1:], reference.copy()
@@ -171,11 +167,7 @@ def test_a_loop_holds_and_counts(monkeypatch):
         gone = hs.close_loop(sensed, controller, t, r)
         assert gone.conditions["held_samples"] == len(GAPS)
         assert np.isfinite(gone.u).all()
-        replayed, state = [], controller.initial(0.01, 0.0, gone.y[0])
-        for each, m in zip(r.tolist(), gone.measurement.tolist(), strict=True):
-            u, state = controller.step(state, each, m)
-            replayed.append(u)
-        assert np.array_equal(replayed, gone.drive)
+        assert np.array_equal(commanded(controller, 0.01, r, gone.measurement, y0=gone.y[0])[0], gone.drive)
 
 
 def test_a_loop_around_a_structure_holds_and_counts():

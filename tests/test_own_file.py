@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from strategies import refused_in_one_line
+from strategies import document_of, refused_in_one_line
 
 import hysim as hs
 from hysim.cli import main, models
@@ -77,7 +77,7 @@ def test_metrics_have_units_and_are_those_of_loop_metrics(run, folder):
     assert code == 0
     assert f"largest width  {loop.max_width:.4g} um at u = {loop.max_width_at:.6g} V" in out
     assert f"area           {loop.area:.4g} um V" in out
-    document = json.loads(run("metrics", "loop.csv", *COLUMNS, "--json", "--unit", "y=nm")[1])
+    document = document_of(run, "metrics", "loop.csv", *COLUMNS, "--unit", "y=nm")
     assert document["area"] == loop.area
     assert document["units"] == {"u": "V", "y": "nm"}
 
@@ -102,12 +102,11 @@ def test_every_cycle_has_a_row_in_text_csv_and_json(run, tmp_path):
     assert (tmp_path / "cycles.txt").read_text() == out
     assert (tmp_path / "cycles.csv").read_text() == table.to_csv(rec.units)
     assert run(*command, "--csv", "-", stdin=text)[1] == table.to_csv(rec.units)
-    document = json.loads(run(*command, "--json", stdin=text)[1])
+    document = document_of(run, *command, stdin=text)
     assert [row["energy"] for row in document["cycles"]] == table.energy.tolist()
     assert (document["level"], document["units"]) == (0.0, {"u": "mm", "y": "kN"})
     assert document["sign_convention"] == table.sign_convention
-    one = json.loads(run(*command[:-1], "--json", stdin=text)[1])
-    assert one["energy"] == table.energy[-1]
+    assert document_of(run, *command[:-1], stdin=text)["energy"] == table.energy[-1]
     assert len(run(*command, "--tolerance", "0.3", stdin=text)[1].splitlines()) == len(out.splitlines()) - 1
 
 
@@ -134,12 +133,9 @@ def test_a_piezos_damping_is_printed_without_a_sign_and_the_sign_is_explained(ru
 
 def test_numbers_that_do_not_exist_are_null(run):
     constant = "u,y\n0,1\n1,1\n0,1\n"
-    code, out, _ = run("metrics", "-", "--u", "u", "--y", "y", "--json", stdin=constant)
-    assert code == 0
-    assert json.loads(out)["relative_width"] is None
-    code, out, _ = run("identify", "loop.csv", *COLUMNS, "--model", "line", "--json")
-    assert json.loads(out)["cv_rmse"] is None
-    assert json.loads(out)["family"] == "Line"
+    assert document_of(run, "metrics", "-", "--u", "u", "--y", "y", stdin=constant)["relative_width"] is None
+    line = document_of(run, "identify", "loop.csv", *COLUMNS, "--model", "line")
+    assert (line["cv_rmse"], line["family"]) == (None, "Line")
 
 
 def test_standard_streams_join_the_commands(run, folder):

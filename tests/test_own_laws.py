@@ -135,23 +135,15 @@ def test_a_lost_law_names_the_sample():
 test_wrong_arguments_are_named = refused(
     (lambda: hs.CustomLaw(step=lambda u: u, parameters={"a": 1.0}), TypeError, r"takes \(u\)"),
     (lambda: hs.CustomLaw(step="dahl", parameters={"a": 1.0}), TypeError, "must be a function"),
-    (lambda: hs.CustomLaw(step=dahl), ValueError, "at least one parameter"),
-    (lambda: hs.CustomLaw(step=dahl, parameters={"a": np.nan}), ValueError, "a'] must be finite"),
+    (lambda: hs.CustomLaw(step=dahl), "at least one parameter"),
+    (lambda: hs.CustomLaw(step=dahl, parameters={"a": np.nan}), "a'] must be finite"),
     (lambda: hs.CustomLaw(step=dahl, parameters={"a": "b"}), TypeError, "a'] must be numbers"),
-    (
-        lambda: hs.CustomLaw(step=dahl, parameters={"a": 1.0}, state={"a": 1.0}),
-        ValueError,
-        "'a' names a parameter and",
-    ),
-    (lambda: hs.CustomLaw(step=dahl, parameters={"a": 1.0}, linear=("b",)), ValueError, "linear names 'b'"),
-    (lambda: hs.CustomLaw(step=dahl, parameters={"a": 1.0}, bounds={"b": (0, 1)}), ValueError, "bounds names 'b'"),
-    (lambda: DAHL.advance([0.0], (0.0,)), ValueError, "must hold 2 numbers, got 1"),
-    (lambda: hs.identify(DAHL, hs.Record(u=U, y=U), free=("z0",)), ValueError, "'z0' is free, but has no bounds"),
-    (
-        lambda: hs.identify(DAHL, hs.Record(u=U, y=U), bounds={"rate": (1.0, np.inf)}),
-        ValueError,
-        "must be positive and finite",
-    ),
+    (lambda: hs.CustomLaw(step=dahl, parameters={"a": 1.0}, state={"a": 1.0}), "'a' names a parameter and"),
+    (lambda: hs.CustomLaw(step=dahl, parameters={"a": 1.0}, linear=("b",)), "linear names 'b'"),
+    (lambda: hs.CustomLaw(step=dahl, parameters={"a": 1.0}, bounds={"b": (0, 1)}), "bounds names 'b'"),
+    (lambda: DAHL.advance([0.0], (0.0,)), "must hold 2 numbers, got 1"),
+    (lambda: hs.identify(DAHL, hs.Record(u=U, y=U), free=("z0",)), "'z0' is free, but has no bounds"),
+    (lambda: hs.identify(DAHL, hs.Record(u=U, y=U), bounds={"rate": (1.0, np.inf)}), "must be positive and finite"),
 )
 
 

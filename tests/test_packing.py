@@ -7,6 +7,7 @@ import subprocess
 
 import numpy as np
 import pytest
+from strategies import refused
 
 import hysim as hs
 from hysim.export._packing import packing
@@ -106,15 +107,13 @@ def test_numbers_that_are_not_free_are_constants():
     assert "(void)fields;" in packing(law, free=()).to_c("pack")
 
 
-def test_what_cannot_be_traced_is_named():
-    with pytest.raises(ValueError, match="plays of this ParametricPrandtlIshlinskii decides"):
-        packing(LAWS["ParametricPrandtlIshlinskii"], free=("plays",))
-    with pytest.raises(ValueError, match="n of this BoucWen decides"):
-        packing(hs.BoucWen(), free=("n",))
-    with pytest.raises(ValueError, match=r"no expressions of z0\[0\]: leave"):
-        packing(hs.Preisach(**RELAYS, z0=(1.5,)), free=("z0[0]",))
-    with pytest.raises(ValueError, match="a Play has threshold, gain, offset, z0"):
-        packing(hs.Play(), free=("slope",))
+test_what_cannot_be_traced_is_named = refused(
+    (LAWS["ParametricPrandtlIshlinskii"], "plays", "plays of this ParametricPrandtlIshlinskii decides"),
+    (hs.BoucWen(), "n", "n of this BoucWen decides"),
+    (hs.Preisach(**RELAYS, z0=(1.5,)), "z0[0]", r"no expressions of z0\[0\]: leave"),
+    (hs.Play(), "slope", "a Play has threshold, gain, offset, z0"),
+    call=lambda law, name: packing(law, free=(name,)),
+)
 
 
 def cases():

@@ -10,6 +10,7 @@ import hysim as hs
 from hysim.paper import claim_values, printed
 from hysim.paper.claim_values import FUNCTIONS, Value
 from hysim.paper.claims import RULES, VERDICTS, Claim, Entry, claims, evidence, judged, table
+from hysim.paper.equations import pid_standard
 from hysim.paper.rounding import Spread, exactly, half_unit, spread, stands_for
 
 MISSED, NO, CONTRADICTION, UNKNOWN, REACHED, YES = VERDICTS
@@ -277,6 +278,7 @@ def test_claims_are_values():
         ("SLEW_RATE_V_PER_US", "0.5000", "bandwidth-input", YES),
         ("SLEW_RATE_V_PER_US", "0.50000", "bandwidth-input", NO),  # 15.91 is cut off, not rounded
         ("LOW_V", "20", "table2-square-wave", NO),
+        ("LAST_DIGIT_UM", "0.1", "table1-resolution", YES),  # of a finer camera
         ("LAST_DIGIT_UM", "1.0", "table2-resolution", NO),
         ("LAST_DIGIT_UM", "1e1", "table2-resolution", YES),
         ("NUM_6", ("-0.0700",), "eq6-static-gain-of-eq4", NO),
@@ -311,12 +313,6 @@ def test_another_print_is_judged_otherwise(monkeypatch, of, name, text, claim, v
 def test_another_model_of_table_1_is_judged_otherwise(monkeypatch, of, name, text, changed):
     monkeypatch.setattr(printed, name, text)
     assert verdicts(of, *changed) == changed
-
-
-def test_a_model_with_memory_would_be_one_of_hysteresis(monkeypatch, of):
-    slow = hs.TransferFunction(num=(0.022 / 500.0,), den=(1.0, 1.0 / 500.0))
-    monkeypatch.setattr(claim_values, "EQUATION_1", slow)
-    assert verdicts(of, "eq1-has-hysteresis") == {"eq1-has-hysteresis": YES}
 
 
 def test_a_better_estimate_would_be_similar(of):
@@ -376,11 +372,6 @@ def test_another_table_1_is_judged_otherwise(of, record, changed):
     assert verdicts(replace(of, table1=record), *changed) == changed
 
 
-def test_a_finer_camera_would_give_the_digits(monkeypatch, of):
-    monkeypatch.setattr(printed, "LAST_DIGIT_UM", "0.1")
-    assert verdicts(of, "table1-resolution") == {"table1-resolution": YES}
-
-
 def test_proportional_displacements_would_agree(of):
     proportional = replace(of.table2, y=0.1 * of.table2.u)
     assert verdicts(replace(of, table2=proportional), "table2-proportional") == {"table2-proportional": YES}
@@ -393,9 +384,11 @@ def test_a_program_of_table_2_s_period_would_agree(monkeypatch, of):
     assert verdicts(of, "program-frequency") == {"program-frequency": YES}
 
 
-def test_a_part_for_50_v_would_deliver_them(monkeypatch, of):
-    monkeypatch.setattr(claim_values, "UA741_SUPPLY_SPAN", 60.0)
-    assert verdicts(of, "amplifier-supply") == {"amplifier-supply": YES}
+WITH_MEMORY = hs.TransferFunction(num=(0.022 / 500.0,), den=(1.0, 1.0 / 500.0))
+
+
+def of_twice_the_integral_time(Kp, Ti, Td, **rest):
+    return pid_standard(Kp, 2.0 * Ti, Td, **rest)
 
 
 @pytest.mark.parametrize(
@@ -404,9 +397,12 @@ def test_a_part_for_50_v_would_deliver_them(monkeypatch, of):
         ("DERIVATIVE_TIME", 0.5, {"derivative-overshoot": NO}),
         ("INTEGRAL_TIME", np.inf, {"integral-error": NO}),
         ("TRACKS_WITHIN", 0.9, {"proportional-error": NO}),
+        ("EQUATION_1", WITH_MEMORY, {"eq1-has-hysteresis": YES}),
+        ("UA741_SUPPLY_SPAN", 60.0, {"amplifier-supply": YES}),  # of a part for 50 V
+        ("pid_standard", of_twice_the_integral_time, {"eq17-three-terms": NO}),
     ],
 )
-def test_other_loops_are_judged_otherwise(monkeypatch, of, name, value, changed):
+def test_other_loops_models_and_parts_are_judged_otherwise(monkeypatch, of, name, value, changed):
     monkeypatch.setattr(claim_values, name, value)
     assert verdicts(of, *changed) == changed
 
@@ -415,13 +411,6 @@ def test_a_loop_that_is_slower_than_the_plant_is_said_to_be(monkeypatch, of):
     faster = replace(claim_values._open_step(), rise_time=0.1)
     monkeypatch.setattr(claim_values, "_open_step", lambda: faster)
     assert verdicts(of, "proportional-rise-time") == {"proportional-rise-time": NO}
-
-
-def test_a_controller_with_another_integral_is_not_17(monkeypatch, of):
-    from hysim.paper.equations import pid_standard
-
-    monkeypatch.setattr(claim_values, "pid_standard", lambda Kp, Ti, Td, **rest: pid_standard(Kp, 2.0 * Ti, Td, **rest))
-    assert verdicts(of, "eq17-three-terms") == {"eq17-three-terms": NO}
 
 
 # -- claims about controllers -----------------------------------------------------------------------------------

@@ -34,6 +34,12 @@ def cubic_record(seed=0, n=40, noise=SIGMA):
     return hs.Record(u=u, y=CUBIC.response(u) + noise * np.random.default_rng(seed).standard_normal(n))
 
 
+def fitted_line(n):
+    """The polynomial at n points, and the line through them."""
+    rec = cubic_record(n=n)
+    return rec, hs.identify(hs.Line, rec)
+
+
 @pytest.fixture(scope="module")
 def cubic():
     """The record, its fit and the matrix of the regression in the order of the free names."""
@@ -86,8 +92,7 @@ def test_the_posterior_of_a_polynomial_is_the_normal_one_everywhere(cubic):
 
 def test_the_mean_likelihood_over_the_cube_is_that_over_the_priors():
     """Brute force over a line's two parameters, against the density that the sampler has."""
-    rec = cubic_record(n=6)
-    fit = hs.identify(hs.Line, rec)
+    rec, fit = fitted_line(6)
     priors = {"slope": (0.0, 1.0), "offset": stats.norm(0.5, 0.3), "sigma": (0.3, 0.6)}
     posterior = posed(fit, (rec,), "gaussian", given(priors), None)
     rng = np.random.default_rng(3)
@@ -237,8 +242,7 @@ def test_rhat_sees_a_walker_that_stays_apart_and_one_that_drifts():
 @pytest.mark.extra("emcee")
 def test_samples_of_a_line_have_its_distribution():
     """With unknown sigma and a flat ln sigma the slope has Student's distribution with n - d degrees of freedom."""
-    rec = cubic_record(n=9)
-    fit = hs.identify(hs.Line, rec)
+    rec, fit = fitted_line(9)
     post = hs.sample_posterior(fit, rec, samples=1000, walkers=32)
     assert min(post.effective_samples.values()) >= 1000
     assert max(post.rhat.values()) < 1.05
@@ -253,8 +257,7 @@ def test_samples_of_a_line_have_its_distribution():
 
 @pytest.mark.extra("emcee")
 def test_the_share_of_accepted_moves_does_not_depend_on_how_many_draws_are_kept(monkeypatch):
-    rec = cubic_record(n=9)
-    fit = hs.identify(hs.Line, rec)
+    rec, fit = fitted_line(9)
     every = hs.sample_posterior(fit, rec, samples=200, walkers=32).acceptance
     monkeypatch.setattr(_sampler, "_DRAWS_PER_TIME", 0.2)
     assert hs.sample_posterior(fit, rec, samples=200, walkers=32).acceptance == pytest.approx(every, abs=0.15)
@@ -263,8 +266,7 @@ def test_the_share_of_accepted_moves_does_not_depend_on_how_many_draws_are_kept(
 
 @pytest.mark.extra("emcee")
 def test_a_prior_that_is_narrower_than_the_data_is_respected():
-    rec = cubic_record(n=9)
-    fit = hs.identify(hs.Line, rec)
+    rec, fit = fitted_line(9)
     centre, spread = fit.estimates["slope"] + fit.stderr["slope"], 0.1 * fit.stderr["slope"]
     priors = {"slope": stats.norm(centre, spread), "offset": (0.0, 0.55)}
     post = hs.sample_posterior(fit, rec, priors=priors, samples=500, walkers=32)
@@ -284,8 +286,7 @@ def of_table1():
 
 @pytest.mark.extra("emcee")
 def test_the_same_seed_gives_the_same_bits():
-    rec = cubic_record(n=9)
-    fit = hs.identify(hs.Line, rec)
+    rec, fit = fitted_line(9)
     first, second, other = (hs.sample_posterior(fit, rec, walkers=8, most_steps=10, seed=seed) for seed in (3, 3, 4))
     assert first == second
     assert first.samples["slope"][0] != other.samples["slope"][0]
@@ -361,8 +362,7 @@ def test_bridge_sampling_has_the_closed_form(cubic):
 @pytest.mark.extra("dynesty")
 def test_nested_sampling_has_the_closed_form(monkeypatch):
     monkeypatch.setattr(_log_evidence, "_WALK", 6)  # enough for a normal posterior of three numbers
-    rec = cubic_record(n=12)
-    fit = hs.identify(hs.Line, rec)
+    rec, fit = fitted_line(12)
     found = log_evidence(fit, rec, priors=KNOWN, factor=2.0, live_points=20)
     truth = log_evidence_of_cubic(rec, np.column_stack([np.ones(12), rec.u])) - 2 * math.log(2.0)  # two boxes, doubled
     assert abs(found.value - truth) < 4.0 * found.error

@@ -1,19 +1,14 @@
 """`select` finds the order behind the noise, and ranks by what it is asked."""
 
 import numpy as np
-from strategies import refused
+from strategies import rao_garnier, refused
 
 import hysim as hs
 from hysim.identification import _search
 
 
 def test_the_order_of_a_stiff_plant_is_found_in_noise():
-    true = hs.TransferFunction(num=(-6400.0, 1600.0), den=(1.0, 5.0, 408.0, 416.0, 1600.0))
-    rng = np.random.default_rng(1)
-    u = np.repeat(rng.choice([-1.0, 1.0], 60), 20)
-    clean = true.response(u, 0.01)
-    y = clean + rng.standard_normal(u.size) * np.sqrt(np.var(clean) / 10.0)
-    record = hs.Record(u=u, y=y, t=0.01 * np.arange(u.size))
+    record, *_ = rao_garnier(10.0, 1)
     done = []
     choice = hs.select(
         hs.TransferFunction.structures(poles=range(2, 6), zeros=(1,)), record, progress=lambda *at: done.append(at)

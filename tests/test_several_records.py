@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from strategies import refused
 
 import hysim as hs
 
@@ -53,18 +54,15 @@ def test_records_may_begin_differently():
     assert fit.models[2].response(CYCLE)[-1] == pytest.approx(fit.models[2].response(CYCLE)[0], abs=1e-12)
 
 
-def test_initial_must_fit_the_records():
-    for initial in (("free",), ("free",) * 3, []):
-        with pytest.raises(ValueError, match="one for each of the 2 records"):
-            hs.identify(LAW, [record(), record()], initial=initial)
-    with pytest.raises(ValueError, match='"free", "rest", "still" or "periodic", got \'warm\''):
-        hs.identify(LAW, [record(), record()], initial=("free", "warm"))
-    with pytest.raises(ValueError, match="got 3"):
-        hs.identify(LAW, record(), initial=3)
-    with pytest.raises(ValueError, match="no record"):
-        hs.identify(LAW, [])
-    with pytest.raises(TypeError, match="takes a Record or several"):
-        hs.identify(LAW, [record(), None])
+TWO = [record(), record()]
+test_initial_must_fit_the_records = refused(
+    *((TWO, {"initial": wrong}, "one for each of the 2 records") for wrong in (("free",), ("free",) * 3, [])),
+    (TWO, {"initial": ("free", "warm")}, '"free", "rest", "still" or "periodic", got \'warm\''),
+    (record(), {"initial": 3}, "got 3"),
+    ([], {}, "no record"),
+    ([record(), None], {}, TypeError, "takes a Record or several"),
+    call=lambda records, options: hs.identify(LAW, records, **options),
+)
 
 
 def test_records_are_left_out_one_at_a_time():

@@ -2,11 +2,10 @@
 
 import csv
 import io
-import json
 
 import numpy as np
 import pytest
-from strategies import refused_in_one_line
+from strategies import document_of, refused_in_one_line
 
 import hysim as hs
 
@@ -106,9 +105,7 @@ def test_a_ground_motion_moves_a_plant(run, file, options):
 def test_a_ground_motion_moves_an_oscillator_as_in_python(run):
     plant = hs.load_model("base.json")
     t, a = hs.load_ground_motion("quake.AT2")
-    code, out, _ = run("simulate", "base.json", "quake.AT2", "--json")
-    document = json.loads(out)
-    assert code == 0
+    document = document_of(run, "simulate", "base.json", "quake.AT2")
     assert document["units"] == {"t": "s", "u": "m/s^2", "y": "m"}
     assert document["columns"]["y"] == hs.simulate(plant, t, a).y.tolist()
 
@@ -190,9 +187,7 @@ def frame(run, tmp_path):
 @pytest.mark.parametrize("file", ["quake.AT2", "quake.csv"])
 def test_a_frame_is_moved_by_a_ground_motion_and_all_its_signals_are_written(run, frame, file):
     simulation = hs.simulate(frame, *hs.load_ground_motion(file))
-    code, out, err = run("simulate", "frame.json", file, "--json")
-    document = json.loads(out)
-    assert (code, err) == (0, "")
+    document = document_of(run, "simulate", "frame.json", file)
     assert document["units"]["u"] == "m/s^2"
     assert document["units"]["drift_1"] == "m"
     assert document["columns"].keys() == simulation.columns.keys()

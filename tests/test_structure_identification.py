@@ -154,16 +154,14 @@ test_a_mistaken_call_says_what_to_do = refused(
 )
 
 
-def test_a_record_must_fit_the_structure():
-    two = record(frame(2))
-    with pytest.raises(ValueError, match="a column for each of the 1 masses, got 2"):
-        hs.identify(frame(), two, free=["damping"])
-    with pytest.raises(TypeError, match="takes a Record or several"):
-        hs.identify(hs.BoucWen, two)
-    with pytest.raises(ValueError, match="no time"):
-        hs.identify(frame(), hs.Record(u=two.u, y=two.u), free=["damping"])
-    with pytest.raises(ValueError, match="constant"):
-        hs.identify(frame(2), replace(two, u=0.0 * two.u), free=["damping"])
+FREE = {"free": ["damping"]}
+test_a_record_must_fit_the_structure = refused(
+    (frame(), lambda two: two, FREE, "a column for each of the 1 masses, got 2"),
+    (hs.BoucWen, lambda two: two, {}, TypeError, "takes a Record or several"),
+    (frame(), lambda two: hs.Record(u=two.u, y=two.u), FREE, "no time"),
+    (frame(2), lambda two: replace(two, u=0.0 * two.u), FREE, "constant"),
+    call=lambda model, of, options: hs.identify(model, of(record(frame(2))), **options),
+)
 
 
 test_a_record_is_checked = refused(

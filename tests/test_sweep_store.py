@@ -307,9 +307,7 @@ def command(*arguments):
     return [sys.executable, "-m", "hysim", "sweep", *map(str, arguments)]
 
 
-def test_the_command_is_interrupted_and_goes_on(study, path, capsys):
-    from hysim.cli import main
-
+def test_the_command_is_interrupted_and_goes_on(study, path, shell):
     with subprocess.Popen(
         command(study, "--out", path, "--workers", 1), stderr=subprocess.PIPE, start_new_session=True, text=True
     ) as child:
@@ -320,17 +318,16 @@ def test_the_command_is_interrupted_and_goes_on(study, path, capsys):
     assert child.returncode == 130
     n_kept = rows(path)
     assert 5 < n_kept < 100
-    assert main(["sweep", str(study), "--out", str(path)]) == 2
-    assert "continue it with --resume" in capsys.readouterr().err
-    assert main(["sweep", str(study), "--out", str(path), "--resume", "--processes"]) == 1
-    out, err = capsys.readouterr()
+    code, _, err = shell("sweep", study, "--out", path)
+    assert (code, "continue it with --resume" in err) == (2, True)
+    code, out, err = shell("sweep", study, "--out", path, "--resume", "--processes")
+    assert (code, err) == (1, "")  # no terminal, no progress
     assert out.startswith("100 of 100 tasks: 99 succeeded, 1 failed\n  1 x ValueError: seven\n")
-    assert not err  # no terminal, no progress
-    assert main(["sweep", "--show", str(path), "--csv", "-"]) == 0
-    assert capsys.readouterr().out.count("\n") == 101
+    code, out, _ = shell("sweep", "--show", path, "--csv", "-")
+    assert (code, out.count("\n")) == (0, 101)
     (study.parent / "task.py").write_text(TASK.replace("seven", "sieben"))
-    assert main(["sweep", str(study), "--out", str(path), "--resume"]) == 2
-    assert "the task's source" in capsys.readouterr().err
+    code, _, err = shell("sweep", study, "--out", path, "--resume")
+    assert (code, "the task's source" in err) == (2, True)
 
 
 def rows(path):
@@ -352,26 +349,21 @@ def rows(path):
         ("task = ", "study.toml"),
     ],
 )
-def test_a_wrong_study_is_one_line(text, words, study, path, capsys):
-    from hysim.cli import main
-
+def test_a_wrong_study_is_one_line(text, words, study, path, shell):
     study.write_text(text)
-    assert main(["sweep", str(study), "--out", str(path)]) == 2
-    err = capsys.readouterr().err
+    code, _, err = shell("sweep", study, "--out", path)
+    assert (code, err.count("\n")) == (2, 1)
     assert words in err
-    assert err.count("\n") == 1
     assert not path.exists()
 
 
-def test_a_study_of_a_law_on_a_record(study, path, capsys):
-    from hysim.cli import main
-
+def test_a_study_of_a_law_on_a_record(study, path, shell):
     study.write_text(
         "[response]\nlaw = 'bouc-wen'\nrecord = 'table1'\nmeasure = 'rmse'\n[sample]\nn = 8\n"
         "distributions.beta = [0.1, 0.5]\ndistributions.n = {name = 'norm', loc = 2.0, scale = 0.1}"
     )
-    assert main(["sweep", str(study), "--out", str(path)]) == 0
-    assert "8 of 8 tasks" in capsys.readouterr().out
+    code, out, _ = shell("sweep", study, "--out", path)
+    assert (code, "8 of 8 tasks" in out) == (0, True)
     assert len(hs.load_sweep(path)["rmse"]) == 8
 
 

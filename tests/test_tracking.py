@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from strategies import refused
 
 import hysim as hs
 
@@ -140,22 +141,17 @@ def test_noise_is_estimated_from_the_record(record):
     assert track.noise == pytest.approx(NOISE, rel=0.2)
 
 
-def test_arguments_are_checked(record):
-    with pytest.raises(ValueError, match="free has 'slope': a BoucWen has A, beta"):
-        hs.track_parameters(LAW, record, ["slope"])
-    with pytest.raises(ValueError, match="z0 is the memory at the first sample"):
-        hs.track_parameters(LAW, record, ["z0"])
-    with pytest.raises(ValueError, match="drift has 'n', which is not free"):
-        hs.track_parameters(LAW, record, ["gain"], drift={"n": 1.0})
-    with pytest.raises(ValueError, match="method must be one of sigma-point, particle, got 'kalman'"):
-        hs.track_parameters(LAW, record, ["gain"], method="kalman")
-    plays = hs.PrandtlIshlinskii(thresholds=tuple(0.1 * k for k in range(50)), weights=(0.02,) * 50)
-    with pytest.raises(ValueError, match='remembers 51 numbers: use method="particle"'):
-        hs.track_parameters(plays, record, ["offset"])
-    with pytest.raises(TypeError, match="law must be a law that a step describes"):
-        hs.track_parameters(hs.PID(kp=1.0), record, ["kp"])
-    with pytest.raises(KeyError, match="'n' is not tracked: gain"):
-        hs.track_parameters(LAW, record, ["gain"], drift={"gain": 0.1}, noise=NOISE)["n"]
+PLAYS = hs.PrandtlIshlinskii(thresholds=tuple(0.1 * k for k in range(50)), weights=(0.02,) * 50)
+test_arguments_are_checked = refused(
+    (LAW, "slope", {}, "free has 'slope': a BoucWen has A, beta"),
+    (LAW, "z0", {}, "z0 is the memory at the first sample"),
+    (LAW, "gain", {"drift": {"n": 1.0}}, "drift has 'n', which is not free"),
+    (LAW, "gain", {"method": "kalman"}, "method must be one of sigma-point, particle, got 'kalman'"),
+    (PLAYS, "offset", {}, 'remembers 51 numbers: use method="particle"'),
+    (hs.PID(kp=1.0), "kp", {}, TypeError, "law must be a law that a step describes"),
+    (LAW, "gain", {"drift": {"gain": 0.1}, "noise": NOISE}, KeyError, "'n' is not tracked: gain"),
+    call=lambda law, name, options: hs.track_parameters(law, hs.Record(u=U, y=U), [name], **options)["n"],
+)
 
 
 # ---------------------------------------------------------------------------------- an inverse that adapts
@@ -195,14 +191,13 @@ def test_an_adaptive_inverse_follows_gain_and_shape():
     np.testing.assert_allclose(state.state[1:3], [0.14, 0.1], atol=0.03)  # where both have gone
 
 
-def test_numbers_that_the_step_does_not_take_as_they_are_are_refused():
-    with pytest.raises(ValueError, match="does not take coulomb as it is"):
-        hs.AdaptiveInverse(law=hs.Dahl(), free=("coulomb",), drift=(0.1,), noise=0.1)
-    with pytest.raises(ValueError, match="free and drift must name as many numbers, got 1 and 2"):
-        hs.AdaptiveInverse(law=LOOP_LAW, free=("gain",), drift=(0.1, 0.1), noise=0.1)
-    with pytest.raises(ValueError, match="does not drift"):
-        hs.AdaptiveInverse(law=LOOP_LAW, free=("z0",), drift=(0.1,), noise=0.1)
-    with pytest.raises(ValueError, match="drift and noise must be positive"):
-        hs.AdaptiveInverse(law=LOOP_LAW, free=("gain",), drift=(0.1,), noise=0.0)
-    with pytest.raises(TypeError, match="law must be a law that a step describes"):
-        hs.AdaptiveInverse(law=hs.PID(kp=1.0), free=("kp",), drift=(0.1,), noise=0.1)
+test_numbers_that_the_step_does_not_take_as_they_are_are_refused = refused(
+    ({"law": hs.Dahl(), "free": ("coulomb",)}, "does not take coulomb as it is"),
+    ({"drift": (0.1, 0.1)}, "free and drift must name as many numbers, got 1 and 2"),
+    ({"free": ("z0",)}, "does not drift"),
+    ({"noise": 0.0}, "drift and noise must be positive"),
+    ({"law": hs.PID(kp=1.0), "free": ("kp",)}, TypeError, "law must be a law that a step describes"),
+    call=lambda options: hs.AdaptiveInverse(
+        **{"law": LOOP_LAW, "free": ("gain",), "drift": (0.1,), "noise": 0.1} | options
+    ),
+)

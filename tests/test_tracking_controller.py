@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from strategies import refused
+from strategies import commanded, refused
 
 import hysim as hs
 from hysim.models.storage import from_json, to_json
@@ -95,14 +95,6 @@ def literal(controller, h, u0, y0, reference, measurement):
     return np.array(out)
 
 
-def replayed(controller, h, u0, y0, reference, measurement):
-    state, out = controller.initial(h, u0, y0), []
-    for r, m in zip(reference, measurement, strict=True):
-        u, state = controller.step(state, r, m)
-        out.append(u)
-    return np.array(out)
-
-
 pids = st.builds(
     hs.PID,
     kp=st.floats(0.0, 20.0),
@@ -131,7 +123,7 @@ def test_the_kernel_is_its_equations(pid, law, shaper, filters, inverted, seed):
     rng = np.random.default_rng(seed)
     reference = np.repeat(rng.uniform(-1.0, 4.0, 12), 10)
     measurement = reference + 0.01 * rng.standard_normal(reference.size)
-    u = replayed(controller, H, 30.0, 0.7, reference, measurement)
+    u, _ = commanded(controller, H, reference, measurement, 30.0, 0.7)
     # rounding, of 120, in the steps of an inverse whose slope is some hundredths
     assert np.abs(u - literal(controller, H, 30.0, 0.7, reference, measurement)).max() < 1e-9
 
@@ -277,7 +269,7 @@ def test_the_linear_feedback_is_what_the_kernel_does_to_the_measurement(pid, not
     for m in measurement:
         u.append(C @ x + D * m)
         x = A @ x + B * m
-    assert np.abs(replayed(controller, H, 0.0, 0.0, np.zeros(60), measurement) - u).max() < 1e-9
+    assert np.abs(commanded(controller, H, np.zeros(60), measurement)[0] - u).max() < 1e-9
     z = np.exp(1j * 700.0 * H)
     transfer = C @ np.linalg.solve(z * np.eye(B.size) - A, B) + D
     assert controller.frequency_response(700.0, H) == pytest.approx(-transfer, abs=1e-9)
@@ -312,7 +304,7 @@ def test_steps_from_python_are_those_of_the_loop_and_leave_their_state():
     reference = np.linspace(0.0, 1.0, 100)
     run = hs.close_loop(plant, controller, H * np.arange(100), reference)
     ahead = np.append(reference, np.full(50, 1.0))[controller.ahead(H) :][:100]
-    assert np.array_equal(replayed(controller, H, 0.0, run.y[0], ahead, run.measurement), run.drive)
+    assert np.array_equal(commanded(controller, H, ahead, run.measurement, y0=run.y[0])[0], run.drive)
     state = controller.initial(H)
     assert controller.step(state, 1.0, 0.0)[0] == controller.step(state, 1.0, 0.0)[0]
 

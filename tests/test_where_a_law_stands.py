@@ -1,12 +1,11 @@
 """A state is a point: an input and a memory. A law begins where its memory holds, in every use."""
 
 import dataclasses
-import shutil
-import subprocess
 import warnings
 
 import numpy as np
 import pytest
+from strategies import needs_compiler, printed_by_main
 
 import hysim as hs
 from hysim.errors import warn_beyond
@@ -119,19 +118,14 @@ def test_parts_stand_where_their_inputs_are():
     assert (stage.hysteresis.u0, stage.u0, stage.u_range) == (pytest.approx(0.7), pytest.approx(0.07), (0.0, 10.0))
 
 
-@pytest.mark.skipif(shutil.which("cc") is None, reason="no C compiler is installed")
+@needs_compiler
 @pytest.mark.parametrize("name", ["BoucWen", "BoucWen, any exponent", "PrandtlIshlinskii", "Preisach"])
 def test_c_and_python_begin_alike(name, tmp_path):
     law = LAWS[name].placed(0.7)
     y = law.response(U)
     for thing, inputs, expected in ((law, U, y), (hs.InverseFeedforward(law=law), y, law.inverse_response(y))):
-        code = hs.to_c(thing, name="stack")
-        code.write(tmp_path)
-        command = ["cc", "-std=c99", "-ffp-contract=off", "stack.c", "stack_main.c", "-lm", "-o", "stack"]
-        subprocess.run(command, check=True, cwd=tmp_path)
-        lines = "\n".join(map(repr, inputs.tolist()))
-        text = subprocess.run([tmp_path / "stack"], input=lines, capture_output=True, text=True, check=True).stdout
-        np.testing.assert_allclose([float(line) for line in text.split()], expected, rtol=0, atol=1e-9)
+        in_c = printed_by_main(hs.to_c(thing, name="stack"), tmp_path, inputs)
+        np.testing.assert_allclose(in_c, expected, rtol=0, atol=1e-9)
 
 
 def test_a_loop_begins_where_the_law_stands():
