@@ -43,12 +43,13 @@ class Choice:
     ----------
     family : str
         The chosen one.
-    left_out, continued : mapping
+    left_out, continued, beyond : mapping
         By family, the rms error of parts that the fits leave out, and of the rest of the record after fits to its
-        beginning [unit of y]; nan where there is none of a kind, inf where a fit failed or diverged.
+        beginning, within the inputs of that and beyond them [unit of y]; nan where there is none of a kind, inf where a
+        fit failed or diverged.
     score : mapping
-        By family, the mean of both errors over the least of each; the best first. A family that was clearly worse in
-        the first round has the errors of that.
+        By family, the geometric mean of these errors over the least of each; the best first. A family that was clearly
+        worse in the first round has the errors of that.
     bic : mapping
         The BIC of the families whose scores are within a tenth of the best; the lowest one is chosen.
     untried : tuple of str
@@ -64,6 +65,7 @@ class Choice:
     family: str
     left_out: Mapping[str, float]
     continued: Mapping[str, float]
+    beyond: Mapping[str, float]
     score: Mapping[str, float]
     bic: Mapping[str, float]
     untried: tuple[str, ...]
@@ -99,19 +101,20 @@ class Choice:
 
     def to_text(self) -> str:
         """The table for a terminal, the best first."""
-        columns = self.left_out, self.continued, self.score
+        columns = self.left_out, self.continued, self.beyond, self.score
         rows = [
             [name, *(f"{each[name]:.3g}" for each in columns), f"{self.bic[name]:.5g}" if name in self.bic else ""]
             for name in self.score
         ]
-        header, *lines = aligned([["family", "left out", "continued", "over the best", "BIC"], *rows])
+        header, *lines = aligned([["family", "left out", "continued", "beyond", "over the best", "BIC"], *rows])
         return "\n".join([header, "-" * len(header), *lines])
 
     def to_frame(self) -> Any:
         """The families as a `pandas.DataFrame`, one row each, the best first; ImportError without pandas."""
-        columns = {"left_out": self.left_out, "continued": self.continued, "score": self.score}
+        names = ("left_out", "continued", "beyond", "score", "bic")
+        columns = {name: vars(self)[name] for name in names}
         return frame(
-            {name: [each[family] for family in self.score] for name, each in columns.items()},
+            {name: [each.get(family, math.nan) for family in self.score] for name, each in columns.items()},
             index=("family", [*self.score]),
             notes={"family": self.family, "seconds": self.seconds},
         )

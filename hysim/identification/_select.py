@@ -6,13 +6,14 @@ search for first, in two ways:
     left out     cycles beyond the first of each record, in three folds; each is predicted by a fit to the others.
                  Without cycles to leave out, every fourth sample.
     continued    of one record, the rest by fits to its first half and to its first three quarters, where these
-                 have a complete cycle. Left-out cycles alone are too kind where amplitudes grow, or a material fades.
+                 have a complete cycle: left-out cycles alone are too kind where a material fades.
+    beyond       likewise, where the input leaves the range of the beginning.
 
 The errors are those of free runs on the inputs as measured. Each kind is taken over the least error of any family, and
-the score of a family is the mean of both. Among those within a tenth of the best, where the noise of the outputs hides
-what is wrong with a family, the BIC decides. The fits of this comparison are short searches; the search of the best one
-is complete. In a first round each family has one fold of each kind, and those that are clearly worse than the best have
-no second one (as in successive halving: K. Jamieson, A. Talwalkar, AISTATS 2016).
+the score of a family is the geometric mean over the kinds. Among those within a tenth of the best, where the noise of
+the outputs hides what is wrong with a family, the BIC decides. The fits of this comparison are short searches; the
+search of the best one is complete. In a first round each family has one fold of each kind, and those that are clearly
+worse than the best have no second one (as in successive halving: K. Jamieson, A. Talwalkar, AISTATS 2016).
 """
 
 import math
@@ -51,6 +52,7 @@ _COMPLETE = 3  # complete searches at most, until one succeeds
 _EQUAL = 1.1  # times the best score: noise of the outputs may hide the difference
 _MOST_TIED = 6
 _LAST = 1000
+_BEYOND = 0.02  # of the range of a beginning: inputs that leave it by more are beyond
 _ROUNDING = 1e-9  # of the outputs' range
 
 Samples = npt.NDArray[np.intp]
@@ -249,6 +251,7 @@ def of_any_family(
         family=name,
         left_out={each: float(errors[each][0]) for each in ranked},
         continued={each: float(errors[each][1]) for each in ranked},
+        beyond={each: float(errors[each][2]) for each in ranked},
         score={each: score[each] for each in ranked},
         bic=bic,
         untried=tuple(each for each in names if each not in errors),
@@ -282,13 +285,13 @@ class _Trials:
             return _LAST
 
     def of(self, subject: Any, which: slice) -> FloatArray:
-        """Errors of parts that are left out, and of continuations; inf where a fit fails, nan without parts."""
+        """Errors of parts left out, of continuations and beyond; inf where a fit fails, nan without such parts."""
         for sampled in (self.short, self.whole):  # a family that depends on time needs all samples
             try:
-                return np.array([self._left_out(subject, sampled, which), self._continued(subject, sampled, which)])
+                return np.array([self._left_out(subject, sampled, which), *self._continued(subject, sampled, which)])
             except (TypeError, ValueError, SimulationError):
                 pass
-        return np.array([np.inf, np.inf if self.cuts else np.nan])
+        return np.full(3, np.inf)
 
     def bic(self, subject: Any) -> float:
         """The BIC of a fit to all samples."""
@@ -306,13 +309,16 @@ class _Trials:
             errors.append(self._fit(subject, sampled.records, np.split(weights, begins[1:-1])).residual[fold])
         return _rms(errors)
 
-    def _continued(self, subject: Any, sampled: "_Sampled", which: slice) -> float:
+    def _continued(self, subject: Any, sampled: "_Sampled", which: slice) -> tuple[float, float]:
         record, kept = sampled.records[0], sampled.kept[0]
-        errors = []
+        within, beyond = [np.empty(0)], [np.empty(0)]
         for cut in np.searchsorted(kept, self.cuts[which]).tolist():
             model = placed(self._fit(subject, [record[:cut]], None).model, float(record.u[0]))
-            errors.append((record.y - free_run(model, record).y)[cut:])
-        return _rms(errors) if errors else math.nan
+            rest, u, begin = (record.y - free_run(model, record).y)[cut:], record.u[cut:], record.u[:cut]
+            slack = _BEYOND * float(np.ptp(begin))
+            is_known = (u >= begin.min() - slack) & (u <= begin.max() + slack)
+            within, beyond = [*within, rest[is_known]], [*beyond, rest[~is_known]]
+        return _rms(within), _rms(beyond)
 
     def _fit(self, subject: Any, records: Sequence[Record], weights: Any) -> Identification:
         return identify(subject, records, weights=weights, max_evaluations=_EVALUATIONS, **self.options)
@@ -353,14 +359,16 @@ def _folds(records: Sequence[Record]) -> list[Samples]:
 
 
 def _rms(errors: Sequence[FloatArray]) -> float:
+    every = np.concatenate(errors)
     with np.errstate(over="ignore"):
-        return float(np.sqrt(np.mean(np.concatenate(errors) ** 2)))
+        return float(np.sqrt(np.mean(every**2))) if every.size else math.nan
 
 
 def _scores(errors: Mapping[str, FloatArray], size: float) -> dict[str, float]:
-    """The mean of both errors over the least of each; errors below rounding are equal."""
-    table = np.array([*errors.values()]) + _ROUNDING * size
-    least = np.where(np.isfinite(table), table, np.inf).min(axis=0)
-    known = ~np.isnan(table).all(axis=0)
-    relative = np.where(np.isnan(table), np.inf, table)[:, known] / least[known]
-    return dict(zip(errors, relative.mean(axis=1).tolist(), strict=True))
+    """The geometric mean, over the kinds of parts that there are, of the errors over the least of each."""
+    table = np.array([*errors.values()]) + _ROUNDING * size  # errors below rounding are equal
+    is_kind = (np.isfinite(table)).any(axis=0)
+    known = np.where(np.isnan(table), np.inf, table)[:, is_kind]
+    with np.errstate(over="ignore"):
+        means = np.exp(np.mean(np.log(known / known.min(axis=0)), axis=1))
+    return dict(zip(errors, means.tolist(), strict=True))
