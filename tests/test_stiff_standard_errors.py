@@ -45,7 +45,7 @@ def test_a_wide_box_has_the_standard_errors_of_the_exact_derivatives(record, is_
     expected = np.sqrt(np.diag(np.linalg.inv(jacobian.information()) * variance))
     stderr = [fit.stderr[name] for name in names]
     np.testing.assert_allclose(stderr, expected, rtol=1e-6 if is_short else 1e-3)
-    monkeypatch.setattr(_uncertainty, "_apart", lambda *_: False)
+    monkeypatch.setattr(_uncertainty, "_bends", lambda *_: False)
     before = hs.identify(LAW, record, fixed={"z0": 0.0}).stderr["rate"]
     assert abs(before / expected[0] - 1.0) > 0.01  # what the step of the box alone gives
 
@@ -55,7 +55,7 @@ def test_two_records_with_states_of_their_own(monkeypatch):
     rng, laws = np.random.default_rng(1), [hs.Dahl(stiffness=2.0, coulomb=0.5, z0=z0) for z0 in (0.1, -0.2)]
     records = [hs.Record(u=U[:40], y=law.response(U[:40]) + 1e-3 * rng.normal(size=40)) for law in laws]
     by_differences = hs.identify(hs.Dahl, records, initial="free")
-    monkeypatch.setattr(_uncertainty, "_apart", lambda *_: True)
+    monkeypatch.setattr(_uncertainty, "_bends", lambda *_: True)
     exact = hs.identify(hs.Dahl, records, initial="free")
     assert exact.stderr.keys() == by_differences.stderr.keys()
     for name, value in by_differences.stderr.items():
