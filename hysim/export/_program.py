@@ -12,6 +12,7 @@ writes to the state.
 
 import ast
 import math
+import re
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from types import MappingProxyType
@@ -71,7 +72,8 @@ class Translation:
             for each in sorted(self._structs, key=lambda each: each.c_type)
         ]
         helpers = [text for name, text in _c.HELPERS.items() if name in self.helpers]
-        tables = [_c.table(name, values) for name, values in self._tables.values()]
+        used = set(re.findall(r"table_\w+", "".join(self._texts)))  # a table may stand in a branch that was left out
+        tables = [_c.table(name, values) for name, values in self._tables.values() if name in used]
         parts = ["\n".join(each) for each in (structs, helpers, tables) if each]
         return "\n\n".join([*parts, *self._texts]) + "\n"
 
