@@ -6,8 +6,9 @@ search for first, in two ways:
     left out     cycles beyond the first of each record, in three folds; each is predicted by a fit to the others.
                  Without cycles to leave out, every fourth sample.
     continued    of one record, the rest by fits to its first half and to its first three quarters, where these
-                 have a complete cycle: left-out cycles alone are too kind where a material fades.
-    beyond       likewise, where the input leaves the range of the beginning.
+                 have a complete cycle, until the input leaves the range of the beginning: left-out cycles alone are
+                 too kind where a material fades.
+    beyond       likewise, from there on. This counts half, for a law warns beyond the inputs of its record.
 
 The errors are those of free runs on the inputs as measured. Each kind is taken over the least error of any family, and
 the score of a family is the geometric mean over the kinds. Among those within a tenth of the best, where the noise of
@@ -52,6 +53,7 @@ _COMPLETE = 3  # complete searches at most, until one succeeds
 _EQUAL = 1.1  # times the best score: noise of the outputs may hide the difference
 _MOST_TIED = 6
 _LAST = 1000
+_WEIGHTS = np.array([1.0, 1.0, 0.5])  # of parts left out, continued and beyond
 _BEYOND = 0.02  # of the range of a beginning: inputs that leave it by more are beyond
 _ROUNDING = 1e-9  # of the outputs' range
 
@@ -316,8 +318,9 @@ class _Trials:
             model = placed(self._fit(subject, [record[:cut]], None).model, float(record.u[0]))
             rest, u, begin = (record.y - free_run(model, record).y)[cut:], record.u[cut:], record.u[:cut]
             slack = _BEYOND * float(np.ptp(begin))
-            is_known = (u >= begin.min() - slack) & (u <= begin.max() + slack)
-            within, beyond = [*within, rest[is_known]], [*beyond, rest[~is_known]]
+            leaves = np.flatnonzero((u < begin.min() - slack) | (u > begin.max() + slack))
+            end = leaves[0] if leaves.size else u.size
+            within, beyond = [*within, rest[:end]], [*beyond, rest[end:]]
         return _rms(within), _rms(beyond)
 
     def _fit(self, subject: Any, records: Sequence[Record], weights: Any) -> Identification:
@@ -367,8 +370,8 @@ def _rms(errors: Sequence[FloatArray]) -> float:
 def _scores(errors: Mapping[str, FloatArray], size: float) -> dict[str, float]:
     """The geometric mean, over the kinds of parts that there are, of the errors over the least of each."""
     table = np.array([*errors.values()]) + _ROUNDING * size  # errors below rounding are equal
-    is_kind = (np.isfinite(table)).any(axis=0)
+    is_kind = np.isfinite(table).any(axis=0)
     known = np.where(np.isnan(table), np.inf, table)[:, is_kind]
     with np.errstate(over="ignore"):
-        means = np.exp(np.mean(np.log(known / known.min(axis=0)), axis=1))
+        means = np.exp(np.average(np.log(known / known.min(axis=0)), axis=1, weights=_WEIGHTS[is_kind]))
     return dict(zip(errors, means.tolist(), strict=True))
