@@ -45,11 +45,11 @@ class Choice:
         The chosen one.
     left_out, continued, beyond : mapping
         By family, the rms error of parts that the fits leave out, and of the rest of the record after fits to its
-        beginning, until it leaves the inputs of that and from there on [unit of y]; nan where there is none of a kind, inf where a
-        fit failed or diverged.
+        beginning, until it leaves the inputs of that and from there on [unit of y]; nan where there is none of a kind,
+        inf where a fit failed or diverged.
     score : mapping
-        By family, the geometric mean of these errors over the least of each, where the last counts half; the best first. A family that was clearly
-        worse in the first round has the errors of that.
+        By family, the geometric mean of these errors over the least of each, of which the last counts half; the best
+        first. A family that was clearly worse in the first round has the errors of that.
     bic : mapping
         The BIC of the families whose scores are within a tenth of the best; the lowest one is chosen.
     untried : tuple of str
