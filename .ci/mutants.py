@@ -108,6 +108,7 @@ MAPPED = {
     "identification/_admissible.py": "admissible warnings",
     "identification/_assumptions.py": "nested_search noisy_inputs",
     "identification/_channel.py": "channels",
+    "identification/_choice.py": "choice smooth_density static_models",
     "identification/_identify.py": "identification identification_result several_records bad_data static_models",
     "identification/_descent.py": "descent identification several_records",
     "identification/_diagnostics.py": "identification_parts identification_result warnings bad_data intervals",

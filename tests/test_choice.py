@@ -6,8 +6,7 @@ import pytest
 import hysim as hs
 from hysim._columns.turning import TOLERANCE
 from hysim.cli import main
-from hysim.identification import _select
-from hysim.identification._identify import identify as plain
+from hysim.identification import _choice
 
 CYCLE = np.sin(np.linspace(0.0, 2.0 * np.pi, 40, endpoint=False))
 GROWING = np.concatenate([size * CYCLE for size in (0.3, 0.5, 0.7, 0.6, 1.0, 0.8)])
@@ -24,7 +23,7 @@ def few(monkeypatch):
     """Only some families are candidates."""
 
     def only(**subjects):
-        monkeypatch.setattr(_select, "candidates", lambda: subjects)
+        monkeypatch.setattr(_choice, "candidates", lambda: subjects)
 
     return only
 
@@ -83,12 +82,14 @@ def test_a_continuation_tells_what_fades(few):
 def test_a_family_that_fails_or_diverges_is_last(few, monkeypatch):
     few(Line=hs.Line, BoucWen=hs.BoucWen)
 
-    def failing(subject, *arguments, **options):
+    plain = _choice._Trials._fit
+
+    def failing(trials, subject, *arguments):
         if subject is hs.BoucWen:
             raise hs.SimulationError("it diverged")
-        return plain(subject, *arguments, **options)
+        return plain(trials, subject, *arguments)
 
-    monkeypatch.setattr(_select, "identify", failing)
+    monkeypatch.setattr(_choice._Trials, "_fit", failing)
     choice = hs.identify(record_of(LAW)).choice
     assert choice.family == "Line"
     assert choice.score["BoucWen"] == np.inf

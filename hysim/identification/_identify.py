@@ -19,10 +19,10 @@ from hysim._basics.progress import Progress, Reports, reports
 from hysim._basics.results import model_of
 from hysim.identification._admissible import choose, danger, excursion, implausible
 from hysim.identification._assumptions import Treated, decided, in_units_of_noise, quiet_rmse, treated
+from hysim.identification._choice import better, in_one_step, of_any_family, refuse
 from hysim.identification._diagnostics import left_out, left_out_errors, rate_noise_warning, rms_of_known
 from hysim.identification._measured import as_measured, said_of_noise
 from hysim.identification._noise import Quantised, density
-from hysim.identification._one_step import better, in_one_step, refuse
 from hysim.identification._problem import Problem, Setting
 from hysim.identification._result import Identification
 from hysim.identification._search import PERFECT, chosen, stages_in_words, widened
@@ -159,8 +159,6 @@ def identify(
     (0.7, 2.0)
     """
     if record_or_records is None:
-        from hysim.identification._select import of_any_family  # which calls this function
-
         for_one: dict[str, Any] = {
             "fixed": fixed,
             "free": free or None,
@@ -173,7 +171,7 @@ def identify(
         _refuse_for_any(model_or_class, for_one)
         ways: dict[str, Any] = {"input": input, "admissible": admissible, "intervals": intervals}
         ways |= {"seed": seed, "workers": workers}
-        return of_any_family(several(model_or_class, "identify"), ways, seconds, progress or None)
+        return of_any_family(identify, several(model_or_class, "identify"), ways, seconds, progress or None)
     if isinstance(model_or_class, str):
         model_or_class = family_named(model_or_class)
     model_or_class = model_of(model_or_class)

@@ -1,0 +1,380 @@
+"""Choices by what is predicted: between a search and a fit in one step, and among families.
+
+**A fit in one step**, of families that are not searched for, has many numbers without names and standard errors. It is
+returned in place of a search of few where its rms error in parts that are left out is lower by a clear part. It is made
+smoother until it is safe on cycles that the record does not have.
+
+**Without a family** every one that can be compared without further arguments is tried, those with fewer numbers to
+search for first, in two ways:
+
+    left out     cycles beyond the first of each record, in three folds; each is predicted by a fit to the others.
+                 Without cycles to leave out, every fourth sample.
+    continued    of one record, the rest by fits to its first half and to its first three quarters, where these
+                 have a complete cycle, until the input leaves the range of the beginning: left-out cycles alone are
+                 too kind where a material fades.
+    beyond       likewise, from there on. This counts half, for a law warns beyond the inputs of its record.
+
+The errors are those of free runs on the inputs as measured. Each kind is taken over the least error of any family, and
+the score of a family is the geometric mean over the kinds. Among those within a tenth of the best, where the noise of
+the outputs hides what is wrong with a family, the BIC decides. The fits of this comparison are short searches; the
+search of the best one is complete. In a first round each family has one fold of each kind, and those that are clearly
+worse than the best have no second one (as in successive halving: K. Jamieson, A. Talwalkar, AISTATS 2016).
+"""
+
+import math
+import time
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
+from typing import Any, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from hysim import metrics
+from hysim._basics.frozen import FloatArray
+from hysim._basics.progress import Progress
+from hysim.errors import SimulationError
+from hysim.identification._admissible import excursion
+from hysim.identification._diagnostics import fit_measures, left_out, left_out_errors, rms_of_known
+from hysim.identification._noise import Noise
+from hysim.identification._problem import Problem
+from hysim.identification._result import Choice, Identification, Width
+from hysim.identification.forms import CONSTANT
+from hysim.metrics.rows import LoopRows
+from hysim.models.by_structure import searched
+from hysim.models.model import candidates
+from hysim.models.protocols import Direct, DirectFit, placed
+from hysim.models.search_space import Freedom
+from hysim.records import Record
+from hysim.simulation import free_run
+
+_CLEARLY = 0.9  # of the left-out error of the search: a law without names and standard errors must gain more than that
+_NORMAL = 1.959964  # standard errors on either side of an interval at 95 %
+_FOLDS = 3  # of cycles
+_EVERY = 4  # samples, of which one is left out where there are no cycles
+_CUTS = (0.5, 0.75)  # of a record, from where it is continued
+_CYCLE = 2  # reversals at least before a cut
+_TURN = 0.01  # of the span: smaller reversals do not count
+_EVALUATIONS = 3000  # of a short search: within some per cent of the complete one's error in a tenth of its time
+_SAMPLES = 3000  # of all records that a short search has, beside their reversals
+_WORSE = 2.0  # times the best of the first round: a family has no second one
+_COMPLETE = 3  # complete searches at most, until one succeeds
+_EQUAL = 1.1  # times the best score: noise of the outputs may hide the difference
+_MOST_TIED = 6
+_LAST = 1000
+_WEIGHTS = np.array([1.0, 1.0, 0.5])  # of parts left out, continued and beyond
+_BEYOND = 0.02  # of the range of a beginning: inputs that leave it by more are beyond
+_ROUNDING = 1e-9  # of the outputs' range
+
+Samples = npt.NDArray[np.intp]
+
+Folds = Sequence[Samples]
+Identify = Callable[..., Identification]
+
+
+def refuse(family: Direct, freedom: Freedom, noise: str, intervals: str) -> None:
+    """Refuse options that such a fit does not have."""
+    name = family.__name__ if isinstance(family, type) else type(family).__name__
+    if freedom.fixed or freedom.free or freedom.bounds:
+        raise ValueError(f"{name} has no parameters by name: leave out fixed=, free= and bounds=")
+    if noise != "gaussian":
+        raise ValueError(f'{name} is fitted by least squares: noise must be "gaussian", got {noise!r}')
+    if intervals != "linear":
+        raise ValueError(f'{name} has no parameters by name: intervals must be "linear", got {intervals!r}')
+
+
+def in_one_step(
+    family: Direct,
+    records: Sequence[Record],
+    weights: Sequence[FloatArray] | None,
+    folds: Folds,
+    seed: int,
+    admissible: bool | None,
+) -> Identification:
+    """The fit, and its errors at samples that are left out."""
+    return _described(family, _fitted(family, records, weights, admissible), records, weights, folds, seed)
+
+
+def better(
+    fit: Identification,
+    search: Problem,
+    noise: Noise,
+    optima: FloatArray,
+    rival: Any,
+    folds: Folds,
+    admissible: bool | None,
+) -> Identification:
+    """The `fit` of a search from its `optima`, or that of the `rival` where it predicts left-out parts better."""
+    records, weights = [part.record for part in search.parts], [part.weights for part in search.parts]
+    shares = [each for each in weights if each is not None] or None
+    smooth = _fitted(rival, records, shares, admissible)
+    if (smoother := smooth.smoother) is None:
+        raise TypeError(f"{rival!r} does not say how its fit depends on the outputs")
+    samples, residual = smoother.samples, _residual(smooth, records)
+    short = search.at(samples)
+    kinds = rival.parts([part.record for part in short.parts])
+    own = np.concatenate([left_out_errors(short, noise, optima, kind) for kind in kinds])
+    others = np.concatenate([smoother.left_out(residual, [samples[each] for each in kind]) for kind in kinds])
+    of_search, of_rival = rms_of_known(own), rms_of_known(others)
+    told = f"{of_rival:.3g} against {of_search:.3g}"
+    if not of_rival < _CLEARLY * of_search:
+        return replace(
+            fit, message=f"{fit.message}; a smooth density predicts parts left out not clearly better, {told}"
+        )
+    result = _described(rival, smooth, records, shares, folds, fit.seed)
+    return replace(result, message=f"{result.message}; it predicts parts left out better than a grid, {told}")
+
+
+def _fitted(
+    family: Direct, records: Sequence[Record], weights: Sequence[FloatArray] | None, admissible: bool | None
+) -> DirectFit:
+    """The fit, the next smoother one as long as it is not safe on smaller cycles."""
+    shares = None if weights is None else np.concatenate(weights)
+    fit = family.fitted(records, shares)
+    while admissible is not False and fit.smoother_family is not None:
+        off = excursion(fit.models, records)
+        if off is None or off.is_safe:
+            break
+        fit = fit.smoother_family.fitted(records, shares)
+    return fit
+
+
+def _described(
+    family: Direct,
+    fit: DirectFit,
+    records: Sequence[Record],
+    weights: Sequence[FloatArray] | None,
+    folds: Folds,
+    seed: int,
+) -> Identification:
+    y, residual = np.concatenate([record.y for record in records]), _residual(fit, records)
+    kept = np.ones(y.size, dtype=bool) if weights is None else np.concatenate(weights) > 0.0
+    n_parameters = max(1, round(fit.degrees_of_freedom))
+    freedom = np.count_nonzero(kept) - fit.degrees_of_freedom
+    sigma = float(np.sqrt(np.sum(residual[kept] ** 2) / freedom)) if freedom > 0.5 else float("nan")
+    if fit.smoother is None:
+        errors = _fitted_again(family, records, weights, folds)
+    else:
+        errors = fit.smoother.left_out(residual, folds)
+    measures = fit_measures(y[kept], residual[kept], n_parameters)
+    return Identification(
+        model=fit.models[0],
+        models=fit.models,
+        n_parameters=n_parameters,
+        **measures,
+        sigma=measures["rmse"],
+        log_likelihood=-0.5 * metrics.aic(residual[kept], 0) - 0.5 * np.count_nonzero(kept),
+        residual=residual,
+        resolution=records[0].resolution,
+        response_stderr=sigma * fit.spread,
+        loop_width=_width(fit, records[0], sigma),
+        success=True,
+        message="; ".join(filter(None, ("fitted in one step", fit.words))),
+        cv_residual=errors,
+        cv_rmse=rms_of_known(errors),
+        seed=seed,
+        warnings=() if np.ptp(y) else (CONSTANT,),
+    )
+
+
+def _residual(fit: DirectFit, records: Sequence[Record]) -> FloatArray:
+    pairs = zip(fit.models, records, strict=True)
+    return np.concatenate([record.y - free_run(model, record).y for model, record in pairs])
+
+
+def _fitted_again(
+    family: Direct, records: Sequence[Record], weights: Sequence[FloatArray] | None, folds: Folds
+) -> FloatArray:
+    """Errors at samples that are left out, by fits to the rest; nan elsewhere."""
+    shares = np.ones(sum(map(len, records))) if weights is None else np.concatenate(weights)
+    errors = np.full(shares.size, np.nan)
+    for fold in folds:
+        rest = shares.copy()
+        rest[fold] = 0.0
+        errors[fold] = _residual(family.fitted(records, rest), records)[fold]
+    return errors
+
+
+def _width(fit: DirectFit, record: Record, sigma: float) -> Width | None:
+    """The largest width of the loop, zero of a law without memory; None without a loop."""
+    rows, output = LoopRows(record.u), free_run(fit.models[0], record).y
+    try:
+        value = float(rows.max_width(output[np.newaxis])[0])
+    except ValueError:  # there is no complete cycle
+        return None
+    if fit.smoother is None:
+        return Width(value=0.0, lower=0.0, upper=0.0)
+    own = fit.smoother.samples < len(record)
+    places, every = fit.smoother.samples[own], np.arange(len(record))
+    slope = rows.max_width_slopes(
+        output, np.array([np.interp(every, places, each) for each in fit.smoother.rows[own].T])
+    )
+    reach = _NORMAL * sigma * float(np.sqrt(np.maximum(slope @ fit.smoother.gram @ slope, 0.0)))
+    return Width(value=value, lower=value - reach, upper=value + reach)
+
+
+def of_any_family(
+    identify: Identify, records: Sequence[Record], options: Mapping[str, Any], seconds: float, progress: Progress | None
+) -> Identification:
+    """The complete search of the family with the best score, with its `choice`."""
+    begin, trials, subjects = time.process_time(), _Trials(identify, records, options), candidates()
+    size = max(float(np.ptp(record.y)) for record in records)
+    names = sorted(subjects, key=lambda name: trials.unknowns(subjects[name]))
+
+    def errors_of(every: Sequence[str], which: slice, done: int) -> dict[str, FloatArray]:
+        errors: dict[str, FloatArray] = {}
+        for name in every:
+            if errors and time.process_time() - begin > seconds:
+                break
+            errors[name] = trials.of(subjects[name], which)
+            if progress:
+                progress(done + len(errors), 2 * len(names))
+        return errors
+
+    first = errors_of(names, slice(0, 1), 0)
+    rounds = _scores(first, size)
+    close = [
+        name for name in sorted(rounds, key=lambda name: rounds[name]) if rounds[name] <= _WORSE * min(rounds.values())
+    ]
+    second = errors_of(close, slice(None), len(names))
+    if len(second) < len(close):  # not all have had all parts: the errors of the first round are of the same ones
+        errors, compared = first, [*first]
+    else:
+        errors, compared = first | second, close
+    score = _scores(errors, size)
+    ranked = sorted(score, key=lambda name: (name not in compared, score[name]))
+    tied = [name for name in ranked if name in compared and score[name] <= _EQUAL * score[ranked[0]]][:_MOST_TIED]
+    bic = {name: trials.bic(subjects[name]) for name in tied} if len(tied) > 1 else {}
+    ranked = [*sorted(bic, key=lambda name: bic[name]), *(name for name in ranked if name not in bic)]
+    fits = {}
+    for name in ranked[:_COMPLETE]:
+        fits[name] = identify(subjects[name], records, **options)
+        if fits[name].success:
+            break
+    name = next((name for name, fit in fits.items() if fit.success), ranked[0])
+    choice = Choice(
+        family=name,
+        left_out={each: float(errors[each][0]) for each in ranked},
+        continued={each: float(errors[each][1]) for each in ranked},
+        beyond={each: float(errors[each][2]) for each in ranked},
+        score={each: score[each] for each in ranked},
+        bic=bic,
+        untried=tuple(each for each in names if each not in errors),
+        amplitude=trials.amplitude,
+        span=(min(float(each.u.min()) for each in records), max(float(each.u.max()) for each in records)),
+        seconds=time.process_time() - begin,
+    )
+    return replace(fits[name], choice=choice)
+
+
+class _Trials:
+    """Short searches on parts of records, and the errors of what they predict."""
+
+    def __init__(self, identify: Identify, records: Sequence[Record], options: Mapping[str, Any]) -> None:
+        self.identify, self.options, (first, *others) = identify, options, records
+        every = [np.arange(len(record)) for record in records]
+        kept = [_kept(record, _SAMPLES // len(records)) for record in records]
+        self.whole = _Sampled(records, every)
+        self.short = _Sampled([_at(*each) for each in zip(records, kept, strict=True)], kept)
+        self.cuts = [] if others else [cut for cut in (round(x * len(first)) for x in _CUTS) if _is_cycle(first[:cut])]
+        self.amplitude = max((float(np.ptp(first.u) / np.ptp(first.u[:cut])) for cut in self.cuts), default=math.nan)
+
+    def unknowns(self, subject: Any) -> int:
+        """How many numbers a search moves; families that cannot be searched here come last."""
+        if isinstance(subject, Direct):
+            return 0
+        try:
+            start = subject() if isinstance(subject, type) else subject
+            return len(searched(start).search_space(self.whole.records[0]).coordinates)
+        except (TypeError, ValueError):
+            return _LAST
+
+    def of(self, subject: Any, which: slice) -> FloatArray:
+        """Errors of parts left out, of continuations and beyond; inf where a fit fails, nan without such parts."""
+        for sampled in (self.short, self.whole):  # a family that depends on time needs all samples
+            try:
+                return np.array([self._left_out(subject, sampled, which), *self._continued(subject, sampled, which)])
+            except (TypeError, ValueError, SimulationError):
+                pass
+        return np.full(3, np.inf)
+
+    def bic(self, subject: Any) -> float:
+        """The BIC of a fit to all samples."""
+        try:
+            return float(self._fit(subject, self.short.records, None).bic)
+        except (TypeError, ValueError, SimulationError):
+            return float(self._fit(subject, self.whole.records, None).bic)
+
+    def _left_out(self, subject: Any, sampled: "_Sampled", which: slice) -> float:
+        begins = np.cumsum([0, *(len(record) for record in sampled.records)])
+        errors = []
+        for fold in _folds(sampled.records)[which]:
+            weights = np.ones(begins[-1])
+            weights[fold] = 0.0
+            errors.append(self._fit(subject, sampled.records, np.split(weights, begins[1:-1])).residual[fold])
+        return _rms(errors)
+
+    def _continued(self, subject: Any, sampled: "_Sampled", which: slice) -> tuple[float, float]:
+        record, kept = sampled.records[0], sampled.kept[0]
+        within, beyond = [np.empty(0)], [np.empty(0)]
+        for cut in np.searchsorted(kept, self.cuts[which]).tolist():
+            model = placed(self._fit(subject, [record[:cut]], None).model, float(record.u[0]))
+            rest, u, begin = (record.y - free_run(model, record).y)[cut:], record.u[cut:], record.u[:cut]
+            slack = _BEYOND * float(np.ptp(begin))
+            leaves = np.flatnonzero((u < begin.min() - slack) | (u > begin.max() + slack))
+            end = leaves[0] if leaves.size else u.size
+            within, beyond = [*within, rest[:end]], [*beyond, rest[end:]]
+        return _rms(within), _rms(beyond)
+
+    def _fit(self, subject: Any, records: Sequence[Record], weights: Any) -> Identification:
+        return self.identify(subject, records, weights=weights, max_evaluations=_EVALUATIONS, **self.options)
+
+
+class _Sampled(NamedTuple):
+    """Records, and the places of their samples in the whole ones."""
+
+    records: Sequence[Record]
+    kept: Sequence[Samples]
+
+
+def _kept(record: Record, most: int) -> Samples:
+    if len(record) <= most:
+        return np.arange(len(record))
+    evenly = np.linspace(0, len(record) - 1, most).round().astype(np.intp)
+    return np.union1d(evenly, record.reversals(_TURN))
+
+
+def _at(record: Record, kept: Samples) -> Record:
+    return (
+        record if kept.size == len(record) else Record(u=record.u[kept], y=record.y[kept], resolution=record.resolution)
+    )
+
+
+def _is_cycle(record: Record) -> bool:
+    return record.reversals(_TURN).size >= _CYCLE
+
+
+def _folds(records: Sequence[Record]) -> list[Samples]:
+    """Every third cycle but the first of each record, which shows where a memory begins; else every fourth sample."""
+    try:
+        cycles = left_out("cycles", records)
+    except ValueError:
+        samples = np.arange(sum(map(len, records)))
+        return [samples[k::_EVERY] for k in range(_EVERY)]
+    return [np.concatenate(cycles[k::_FOLDS]) for k in range(min(_FOLDS, len(cycles)))]
+
+
+def _rms(errors: Sequence[FloatArray]) -> float:
+    every = np.concatenate(errors)
+    with np.errstate(over="ignore"):
+        return float(np.sqrt(np.mean(every**2))) if every.size else math.nan
+
+
+def _scores(errors: Mapping[str, FloatArray], size: float) -> dict[str, float]:
+    """The geometric mean, over the kinds of parts that there are, of the errors over the least of each."""
+    table = np.array([*errors.values()]) + _ROUNDING * size  # errors below rounding are equal
+    is_kind = np.isfinite(table).any(axis=0)
+    known = np.where(np.isnan(table), np.inf, table)[:, is_kind]
+    with np.errstate(over="ignore"):
+        means = np.exp(np.average(np.log(known / known.min(axis=0)), axis=1, weights=_WEIGHTS[is_kind]))
+    return dict(zip(errors, means.tolist(), strict=True))
