@@ -639,33 +639,6 @@ def robustness(result: Result) -> list[str]:
     ]
 
 
-def choice(result: Result) -> list[str]:
-    """The family that is chosen for a record, against every one."""
-    simulated, measured, rows = result["simulated"], result["measured"], result["rows"]
-    require(not simulated["diverged"] + measured["diverged"], "no chosen law diverges on its own record")
-    kinds = {kind: [row for row in rows if row["kind"] == kind] for kind in dict.fromkeys(row["kind"] for row in rows)}
-    share = lambda part, most: percent(100.0 * part[f"within_{most}"], 0)  # noqa: E731
-    cells = [
-        (
-            kind,
-            str(len(own)),
-            number(100.0 * median(column(own, "error")), 2),
-            number(100.0 * median(column(own, "best_error")), 2),
-            number(max(column(own, "ratio")), 3),
-        )
-        for kind, own in kinds.items()
-    ]
-    return [
-        f"In {share(simulated, '1.3')} of {simulated['records']} simulated devices the chosen family predicts later "
-        f"cycles within 1.3 times the best family's error. It is within twice in {share(simulated, '2')}. Of "
-        f"{measured['records']} measured records these are {share(measured, '1.3')} and {share(measured, '2')}. No "
-        "chosen law diverges. Which family is the best is known only afterwards.",
-        tabled(("device", "records", "median error in %", "of the best family", "largest ratio"), *cells),
-        f"A choice takes {number(simulated['median_seconds'], 2)} CPU seconds in the median, the complete search "
-        f"included, and at most {number(max(part['longest_seconds'] for part in (simulated, measured)), 2)}.",
-    ]
-
-
 def learning(result: Result) -> list[str]:
     """Repetition and prediction on actuators that are not quite the model."""
     rows, spread = result["rows"], result["spread_percent"]
@@ -1422,7 +1395,6 @@ GROUPS: dict[str, tuple[Finding, ...]] = {
         nested_table1,
         simulated_twins,
         measured_records,
-        choice,
         identified_frame,
         channels,
         posterior,
