@@ -31,7 +31,7 @@ def test_a_stored_identification_comes_back():
     assert fit.model == hs.BoucWen(**fit.estimates)
     assert fit.estimates["beta"] == pytest.approx(0.7, rel=0.01)
     stored = json.loads((FOLDER / "identification.json").read_text())
-    stored["identification"]["fields"]["unsafe"] = ""  # which 0.1 did not look for
+    stored["identification"]["fields"] |= {"unsafe": "", "choice": None}  # for which 0.1 did not look
     assert json.loads(fit.to_json()) == stored | {"hysim": hs.__version__}
 
 

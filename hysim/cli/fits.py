@@ -27,10 +27,10 @@ class IdentifyOptions(models.FitOptions):
 
     Parameters
     ----------
-    model : by default that which predicts best what is left out of the record
+    model :
     bounds : bounds of a parameter: beta=0:2 [unit of the parameter]
     depends : parameter that is a polynomial in a channel: gain=T:1
-    seconds : time of the processor within which families are tried without --model
+    seconds : time of the processor for the families that are tried without --model [s]
     intervals : method of the 95 % intervals
     cross_validate : leave out one sample at a time, one cycle, or one of K blocks
     max_evaluations : most parameter sets that the search simulates; a fit that ends by it is partial
