@@ -378,6 +378,12 @@ class Record:
         raise TypeError(f"a place must be a sample's number or a fraction between 0 and 1, got {place!r}")
 
 
+def few_places(record: Record, most: int) -> npt.NDArray[np.intp]:
+    """Places of at most so many even samples of a record, and of its reversals beyond noise."""
+    evenly = np.linspace(0, len(record) - 1, min(most, len(record))).round().astype(np.intp)
+    return np.union1d(evenly, record.reversals(TOLERANCE))
+
+
 def several(records: Any, verb: str) -> tuple[Record, ...]:
     """One record or a sequence of them as a tuple; other arguments are errors that name the `verb`.
 

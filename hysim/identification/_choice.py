@@ -33,6 +33,7 @@ import numpy.typing as npt
 from hysim import metrics
 from hysim._basics.frozen import FloatArray
 from hysim._basics.progress import Progress
+from hysim._columns.turning import TOLERANCE
 from hysim.errors import SimulationError
 from hysim.identification._admissible import excursion
 from hysim.identification._diagnostics import fit_measures, left_out, left_out_errors, rms_of_known
@@ -45,7 +46,7 @@ from hysim.models.by_structure import searched
 from hysim.models.model import candidates
 from hysim.models.protocols import Direct, DirectFit, placed
 from hysim.models.search_space import Freedom
-from hysim.records import Record
+from hysim.records import Record, few_places
 from hysim.simulation import free_run
 
 _CLEARLY = 0.9  # of the left-out error of the search: a law without names and standard errors must gain more than that
@@ -54,7 +55,6 @@ _FOLDS = 3  # of cycles
 _EVERY = 4  # samples, of which one is left out where there are no cycles
 _CUTS = (0.5, 0.75)  # of a record, from where it is continued
 _CYCLE = 2  # reversals at least before a cut
-_TURN = 0.01  # of the span: smaller reversals do not count
 _EVALUATIONS = 3000  # of a short search: within some per cent of the complete one's error in a tenth of its time
 _SAMPLES = 3000  # of all records that a short search has, beside their reversals
 _WORSE = 2.0  # times the best of the first round: a family has no second one
@@ -273,7 +273,7 @@ class _Trials:
     def __init__(self, identify: Identify, records: Sequence[Record], options: Mapping[str, Any]) -> None:
         self.identify, self.options, (first, *others) = identify, options, records
         every = [np.arange(len(record)) for record in records]
-        kept = [_kept(record, _SAMPLES // len(records)) for record in records]
+        kept = [few_places(record, _SAMPLES // len(records)) for record in records]
         self.whole = _Sampled(records, every)
         self.short = _Sampled([_at(*each) for each in zip(records, kept, strict=True)], kept)
         self.cuts = [] if others else [cut for cut in (round(x * len(first)) for x in _CUTS) if _is_cycle(first[:cut])]
@@ -337,13 +337,6 @@ class _Sampled(NamedTuple):
     kept: Sequence[Samples]
 
 
-def _kept(record: Record, most: int) -> Samples:
-    if len(record) <= most:
-        return np.arange(len(record))
-    evenly = np.linspace(0, len(record) - 1, most).round().astype(np.intp)
-    return np.union1d(evenly, record.reversals(_TURN))
-
-
 def _at(record: Record, kept: Samples) -> Record:
     return (
         record if kept.size == len(record) else Record(u=record.u[kept], y=record.y[kept], resolution=record.resolution)
@@ -351,7 +344,7 @@ def _at(record: Record, kept: Samples) -> Record:
 
 
 def _is_cycle(record: Record) -> bool:
-    return record.reversals(_TURN).size >= _CYCLE
+    return record.reversals(TOLERANCE).size >= _CYCLE
 
 
 def _folds(records: Sequence[Record]) -> list[Samples]:

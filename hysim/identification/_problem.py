@@ -26,7 +26,7 @@ from hysim.models.by_structure import searched
 from hysim.models.protocols import Identifiable, placed
 from hysim.models.search_space import STATES, STATES_IN_WORDS, Freedom, Parameters, SearchSpace
 from hysim.models.stages import BASE, Stage
-from hysim.records import Record
+from hysim.records import Record, few_places
 
 _LEAST = 64  # sets that are always compared
 _SHARE = 0.5  # of what remains, for one stage of the search
@@ -61,7 +61,6 @@ _CHUNK = 50_000
 _LARGEST = 1e150  # beyond it squares overflow: such a set counts as one that has diverged
 _FEWEST = 2  # samples of a record
 _MOST_OF_SPAN = 0.8
-_TURN = 0.01  # of the span: smaller reversals are noise, or change little
 _ROUGH, _CLOSE = 1e-4, 1e-8  # of the range: of differences over 1e-6 of the box only the second leaves slopes
 _DIFFERENCE = 1e-6  # step of a central difference in units of the box: truncation and rounding both ~1e-10
 
@@ -138,7 +137,7 @@ class Problem:
         It is None where that saves less than half, or where the family depends on time. A rate-independent law passes
         through the same memories at the samples that remain, except for reversals of less than 1 % of the span.
         """
-        return self._shortened(lambda part: _thinned(part, samples))
+        return self._shortened(lambda part: _at(part, few_places(part.record, samples)))
 
     def beginning(self, samples: int) -> "Problem | None":
         """This problem on so many first samples of each record, or up to where the input has had most of its span.
@@ -383,13 +382,6 @@ class Problem:
         limits = [self.space.bounds.get(name, (-np.inf, np.inf)) for name in self.space.linear]
         lower, upper = np.array(limits).reshape(-1, 2).T
         return lower, upper
-
-
-def _thinned(part: Part, samples: int) -> Part:
-    """Ends, reversals and about `samples` others."""
-    record = part.record
-    evenly = np.linspace(0, len(record) - 1, min(samples, len(record))).round().astype(np.intp)
-    return _at(part, np.union1d(evenly, record.reversals(tolerance=_TURN)))
 
 
 def _beginning(part: Part, samples: int) -> Part:

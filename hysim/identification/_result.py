@@ -82,7 +82,7 @@ class Choice:
         return "\n".join([*folded(self.in_words()), self.to_text()])
 
     def in_words(self) -> str:
-        """What was chosen, what comes next, what is not decided, and how far the choice reaches."""
+        """The choice, the next family, those that only the BIC tells from it, and the inputs for which it holds."""
         others = [name for name in self.score if name != self.family]
         words = [f"{self.family} is the best of {len(self.score)} families by what they predict"]
         if others:

@@ -55,7 +55,7 @@ from hysim._basics.frozen import FloatArray, read_only
 from hysim._columns.turning import TOLERANCE
 from hysim.models.protocols import DirectFit, Smoother
 from hysim.models.tables import Tables
-from hysim.records import Record
+from hysim.records import Record, few_places
 
 STRENGTHS = np.logspace(-10.0, 4.0, 43)
 _SMALLEST = 1e-280  # a smaller incomplete gamma function is its first term
@@ -64,7 +64,7 @@ _MOST_CURVES = 8
 _FOLDS = 64  # of single samples, or of every 64th
 _MOST_INTERVALS = 64
 _MOST_CELLS = 24  # along a threshold; of 16, 24 and 32 those with the best predictions for their time
-_MOST_SAMPLES, _TURN = 2000, 0.01  # of a record, beside reversals by more than this part of the span
+_MOST_SAMPLES = 2000  # of a record, with its reversals
 _LEAST = 1e-14  # strength, below which rounding decides what the record does not determine
 _EXACT = 1e-6  # of the outputs' standard deviation: smaller errors are all equally good
 _COVERED = 0.02  # of its span, by which a record left out may reach beyond the others
@@ -279,10 +279,10 @@ def smooth(
     low, high = min(float(each.u.min()) for each in records), max(float(each.u.max()) for each in records)
     n = _supported(high - low, records) if intervals is None else intervals
     levels = tuple(np.linspace(low, high, n + 1).tolist())
-    short = [thinned(record, _MOST_SAMPLES) for record in records]
+    places = [few_places(record, _MOST_SAMPLES) for record in records]
     begins = np.cumsum([0, *(len(record) for record in records)]).tolist()
-    kept = np.concatenate([k + samples for k, (_, samples) in zip(begins, short, strict=False)])
-    of_records = [record for record, _ in short]
+    kept = np.concatenate([k + own for k, own in zip(begins, places, strict=False)])
+    of_records = [Record(u=record.u[own], y=record.y[own]) for record, own in zip(records, places, strict=True)]
     u, y = (np.concatenate([vars(record)[name] for record in of_records]) for name in "uy")
     shares = np.ones(y.size) if weights is None else weights[kept]
     cells = min(n, _MOST_CELLS)
@@ -329,13 +329,6 @@ def _supported(span: float, records: Sequence[Record]) -> int:
     if span == 0.0:
         raise ValueError("the input is constant: nothing can be identified from it")
     return int(np.clip(span / np.median(steps[steps > 0.0]), 2, _MOST_INTERVALS))
-
-
-def thinned(record: Record, most: int) -> tuple[Record, npt.NDArray[np.intp]]:
-    """At most so many even samples of a record and its reversals beyond noise, and their places."""
-    evenly = np.linspace(0, len(record) - 1, min(most, len(record))).round().astype(np.intp)
-    kept = np.union1d(evenly, record.reversals(_TURN))
-    return Record(u=record.u[kept], y=record.y[kept]), kept
 
 
 def parts_of(records: Sequence[Record]) -> list[Parts]:

@@ -18,13 +18,13 @@ import numpy.typing as npt
 from hysim._basics.frozen import FloatArray
 from hysim.kernels import clamps as kernels
 from hysim.laws.operators._bank_search import conditioned, dominant_extremes, moved, named, table_of
-from hysim.laws.operators._densities import gamma_plays, thinned
+from hysim.laws.operators._densities import gamma_plays
 from hysim.models.law import Law, Packed
 from hysim.models.model import Example, family
 from hysim.models.parameters import Parameter, declared_space, spans
 from hysim.models.search_space import ALL_FREE, Freedom, Parameters, SearchSpace
 from hysim.models.tables import Tables
-from hysim.records import Record
+from hysim.records import Record, few_places
 
 _DENSITIES = ((-0.5, 0.3), (0.0, 0.15), (1.0, 0.15), (0.0, 1.0))  # exponent, and decay in half spans of the input
 _TURNS = (-2.0, -1.0, 0.0, 1.0, 2.0)  # of a free memory, in half spans from the first input
@@ -181,7 +181,8 @@ class ParametricPrandtlIshlinskii(Law):
 
         What counts is the residual of the best of the densities from which a search begins.
         """
-        short, first, (exponent, decay) = thinned(record, _SAMPLES)[0], float(record.u[0]), np.array(_DENSITIES).T
+        places, first, (exponent, decay) = few_places(record, _SAMPLES), float(record.u[0]), np.array(_DENSITIES).T
+        short = Record(u=record.u[places], y=record.y[places])
         density = {"exponent": exponent, "decay": spans(short)["h"] * decay}
         best, criterion = conditioned(record.u), np.inf
         for past in (best, (0.0, 0.0), (first, first)):
