@@ -19,7 +19,11 @@ from hysim.models.protocols import Invertible, StepwiseInvertible
 
 GROUPS = {
     "Records and files": ("records", "files"),
-    "Simulation and measures": ("simulation", "metrics"),
+    "Simulation and measures": (
+        "simulation",
+        "metrics",
+        "laws.operators.reversal_curves",
+    ),
     "Identification": ("identification",),
     "Comparison": ("comparison",),
     "Discovery": ("discovery",),

@@ -79,6 +79,8 @@ from hysim.metrics import loop_metrics as loop_metrics
 from hysim.metrics import LoopMetrics as LoopMetrics
 from hysim.metrics import cycle_metrics as cycle_metrics
 from hysim.metrics import CycleMetrics as CycleMetrics
+from hysim.laws.operators.reversal_curves import forc as forc
+from hysim.laws.operators.reversal_curves import Forc as Forc
 from hysim.metrics import magnetic_metrics as magnetic_metrics
 from hysim.metrics import MagneticMetrics as MagneticMetrics
 from hysim.models.law import Law as Law

@@ -49,6 +49,7 @@ def metrics(
     *,
     settings: records.RecordOptions,
     cycles: options.Cycles = 1,
+    forc: bool = False,
     tolerance: float = 0.01,
     out: options.Copy | None = None,
     csv: options.Result | None = None,
@@ -58,11 +59,12 @@ def metrics(
     """Measure the loop in a file of your own.
 
     Measure the loop of the input's last complete cycle, the average loop of the last few, or every cycle. The table of
-    every cycle is of growing protocols, and of 0, max, min, 0.
+    every cycle is of growing protocols, and of 0, max, min, 0. First-order reversal curves have a density.
 
     Parameters
     ----------
     cycles : print a table with one row a cycle; with a number, the average loop of so many last cycles
+    forc : measure the density of first-order reversal curves, and their drift
     tolerance : reversals smaller than this fraction of the input's span are noise [1]
     out : write the printed result into a file too
     csv : with --cycles, write the table; - writes it to the standard output
@@ -73,15 +75,24 @@ def metrics(
     hysim metrics loop.csv --u voltage --y displacement
     hysim metrics damper.csv --cycles --csv cycles.csv
     hysim metrics loop.csv --from 2s --to 4s --plot loop.svg
+    hysim metrics sample.forc --forc --plot density.svg
     """
     from hysim._basics.printing import quantity
 
+    if forc and not cycles:
+        raise ValueError("--forc measures curves, and --cycles every cycle: give one of them")
     if csv is not None and cycles:
         raise ValueError("--csv writes the table of every cycle: give --cycles without a number too")
     record = records.read(settings, file)
     files: dict[str | None, Any] = {plot: lambda: outputs.loop(record)}
     measured: Any
-    if cycles:
+    if forc:
+        measured = hs.forc(record, tolerance=tolerance)
+        document = outputs.scalars(measured) | {"peak": list(measured.peak), "ridge": measured.ridge.tolist()}
+        files[plot] = lambda: outputs.drawn(
+            lambda canvas: hs.plot.forc(measured, canvas.add_subplot(), units=record.units)
+        )
+    elif cycles:
         measured = hs.loop_metrics(record.u, record.y, cycles=cycles, tolerance=tolerance)
         lobes = [lobe._asdict() for lobe in measured.lobes]
         document = outputs.scalars(measured) | {"crossings": list(measured.crossings), "lobes": lobes}
@@ -89,7 +100,8 @@ def metrics(
         measured = hs.cycle_metrics(record.u, record.y, tolerance=tolerance)
         document = {"cycles": measured.rows(), "level": measured.level, "energy_outside": measured.energy_outside}
         files[csv] = lambda: measured.to_csv(record.units)
-    document |= {"sign_convention": measured.sign_convention, "units": record.units}
+    document |= {} if forc else {"sign_convention": measured.sign_convention}
+    document |= {"units": record.units}
 
     def text() -> str:
         step = record.detect_resolution() if record.resolution is None else None

@@ -15,6 +15,8 @@ from hysim._basics.frozen import FloatArray
 from hysim._basics.prefixes import in_unit, label
 from hysim._columns.turning import TOLERANCE, turns
 from hysim.laws.operators.preisach import Preisach, PreisachRelays
+from hysim.laws.operators.reversal_curves import FEWEST, Forc
+from hysim.laws.operators.reversal_curves import forc as measured_density
 from hysim.plot._style import DIVERGING, GUIDE, MEASURED, POINTS, AxesArray, line, one, several
 from hysim.records import Record
 from hysim.simulation import Simulation, free_run
@@ -268,24 +270,27 @@ def residual_map(
 
 
 def forc(
-    source: PreisachRelays | Preisach | Record,
+    source: PreisachRelays | Preisach | Record | Forc,
     ax: Axes | None = None,
     *,
     coordinates: Literal["thresholds", "centre"] = "thresholds",
+    smoothing: float | Literal["auto"] | None = "auto",
     units: Mapping[str, str] | None = None,
     tolerance: float = TOLERANCE,
 ) -> Axes:
     """Draw the density of relays over their thresholds: the diagram of first-order reversal curves.
 
-    The density is the weight of the relays in a cell over its area; from reversal curves, half the mixed second
-    difference of the output, as `hysim.Preisach.from_reversal_curves` computes it on the turning points, without
-    smoothing; a picture finer than the curves is that of ``hysim.Preisach.smoothed(record)``. Grey is zero, lighter is
-    more, darker is less. The cells along the diagonal, whose relays switch at one input, are triangles.
+    Grey is zero, lighter is more, darker is less. Of a law the density is the weight of the relays in a cell over its
+    area; the cells along the diagonal, whose relays switch at one input, are triangles. Of a record of curves it is
+    that of `hysim.forc`: lines are the ridge, where at each half distance the density is largest, and the
+    central line, middle 0. Without smoothing, and of fewer than ten curves, it is the law of
+    `hysim.Preisach.from_reversal_curves` on the turning points.
 
-    `source` is a Preisach, a PreisachRelays, or a Record of curves such as `hysim.signals.reversal_curves`, whose
-    reversals up to the fraction `tolerance` of its span are ignored. `coordinates` are ``"thresholds"``, the upper one
-    a over the lower one b; or ``"centre"``, the middle (a + b) / 2, known as bias or interaction field, over half the
-    distance (a - b) / 2, known as coercivity. `units` are labels of the units of ``"u"`` and ``"y"``.
+    `source` is a Preisach, a PreisachRelays, the result of `hysim.forc`, or a Record of curves such as
+    `hysim.signals.reversal_curves`, whose reversals up to the fraction `tolerance` of its span are ignored; `smoothing`
+    is that of `hysim.forc`, or None. `coordinates` are ``"thresholds"``, the upper one a over the lower one b; or
+    ``"centre"``, the middle (a + b) / 2, known as bias or interaction field, over half the distance (a - b) / 2, known
+    as coercivity. `units` are labels of the units of ``"u"`` and ``"y"``.
 
     Raises
     ------
@@ -301,24 +306,18 @@ def forc(
     """
     if coordinates not in _COORDINATES:
         raise ValueError(f'coordinates must be "thresholds" or "centre", got {coordinates!r}')
-    if isinstance(source, Record):
-        turning_points = [branch.u[0] for branch in source.branches(tolerance) if branch.u[-1] < branch.u[0]]
-        levels = np.unique([source.u.min(), *turning_points])
-        if levels.size <= _FEWEST_CURVES:
-            raise ValueError(
-                f"a density needs at least {_FEWEST_CURVES} reversal curves from different levels, the record has "
-                f"{levels.size - 1}: measure along hysim.signals.reversal_curves"
-            )
-        law: PreisachRelays | Preisach = Preisach.from_reversal_curves(source, levels=levels, tolerance=tolerance)
-        labels = source.units if units is None else units
-    else:
-        law, labels = source, units or {}
-    if not law.levels:
-        raise ValueError("the law has no relays: give it levels and weights, or a record of reversal curves")
-    levels = np.array(law.levels)
-    density = _density(levels, np.array(law.weights))
-    reach = float(np.nanmax(np.abs(density))) or 1.0
+    labels: Mapping[str, str] = source.units if units is None and isinstance(source, Record) else units or {}
+    law = _measured(source, smoothing, tolerance) if isinstance(source, Record) else source
     place, names = _COORDINATES[coordinates]
+    if isinstance(law, Forc):
+        step = float(law.levels[1] - law.levels[0])
+        levels, density = np.append(law.levels - step / 2.0, law.levels[-1] + step / 2.0), law.density
+    elif not law.levels:
+        raise ValueError("the law has no relays: give it levels and weights, or a record of reversal curves")
+    else:
+        levels = np.array(law.levels)
+        density = _density(levels, np.array(law.weights))
+    reach = float(np.nanmax(np.abs(density))) or 1.0
     with one(ax, height=4.8) as axes:
         axes.grid(visible=False)
         b, a = np.meshgrid(levels, levels)
@@ -326,11 +325,37 @@ def forc(
         corners = np.column_stack(place(levels[[0, -1, -1]], levels[[0, 0, -1]]))
         half = axes.add_patch(Polygon(corners, fill=False, edgecolor=GUIDE, linewidth=0.8))
         cells.set_clip_path(half)
+        if isinstance(law, Forc):
+            _draw_ridge(axes, law, place)
         axes.set(**{f"{axis}label": in_unit(name, labels.get("u", "")) for axis, name in zip("xy", names, strict=True)})
         axes.set(xlim=(corners[:, 0].min(), corners[:, 0].max()), ylim=(corners[:, 1].min(), corners[:, 1].max()))
         unit = f"{labels['y']}/{labels['u']}²" if {"u", "y"} <= labels.keys() else ""
         axes.figure.colorbar(cells, ax=axes, label=in_unit("Density of relays", unit))
     return axes
+
+
+def _measured(record: Record, smoothing: float | Literal["auto"] | None, tolerance: float) -> Forc | Preisach:
+    """The smoothed density of a record's curves, or a law between few of them."""
+    falls = [branch.u[0] for branch in record.branches(tolerance) if branch.u[-1] < branch.u[0]]
+    levels = np.unique([record.u.min(), *falls])
+    if levels.size <= _FEWEST_CURVES:
+        raise ValueError(
+            f"a density needs at least {_FEWEST_CURVES} reversal curves from different levels, the record has "
+            f"{levels.size - 1}: measure along hysim.signals.reversal_curves"
+        )
+    if smoothing is None or (smoothing == "auto" and levels.size <= FEWEST):
+        return Preisach.from_reversal_curves(record, levels=levels, tolerance=tolerance)
+    return measured_density(record, smoothing=smoothing, tolerance=tolerance)
+
+
+def _draw_ridge(axes: Axes, diagram: Forc, place: Callable[..., tuple[Any, Any]]) -> None:
+    distance, middle = diagram.ridge[:, :2].T
+    end = min(diagram.levels[-1], -diagram.levels[0])
+    axes.plot(*place(middle + distance, middle - distance), color=MEASURED, linewidth=1.0, label="ridge")
+    if end > 0.0:
+        ends = np.array([0.0, end])
+        axes.plot(*place(ends, -ends), color=GUIDE, linewidth=0.8, linestyle="--", label="central line")
+    axes.legend(loc="best")
 
 
 def _means(u: FloatArray, values: FloatArray, edges: FloatArray) -> FloatArray:

@@ -1,13 +1,13 @@
 """Periodic signals, whose cycles have the same bits, and signals with nested loops."""
 
 import math
+import operator
 from collections.abc import Sequence
 
 import numpy as np
 import numpy.typing as npt
 
 from hysim._basics.frozen import FloatArray, read_only
-from hysim.signals._parts import checked_count, checked_span, unit_sine
 
 
 def staircase(low: float, high: float, step: float, *, cycles: int = 1, samples_per_step: int = 1) -> FloatArray:
@@ -269,3 +269,22 @@ def _samples_of_lines(turns: FloatArray, samples: int | Sequence[int] | None, ma
     if len(counts) != turns.size - 1:
         raise ValueError(f"samples_per_line must be one for each of {turns.size - 1} lines, got {len(counts)}")
     return [checked_count("samples_per_line", m) for m in counts]
+
+
+def unit_sine(n: int) -> FloatArray:
+    """One period from 0, n samples; symmetric to the bit."""
+    from_zero = n / 4 - np.abs((np.arange(n) + n / 4) % n - n / 2)  # the phase, mapped to the middle half turn
+    return np.asarray(np.sin(2 * np.pi * from_zero / n))
+
+
+def checked_span(low: float, high: float) -> float:
+    """The span between two extremes, which must be finite and in order."""
+    if not (math.isfinite(high - low) and high > low):
+        raise ValueError(f"high must be above low, and both finite, got low {low} and high {high}")
+    return high - low
+
+
+def checked_count(name: str, value: int) -> int:
+    if operator.index(value) < 1:
+        raise ValueError(f"{name} must be at least 1, got {value}")
+    return value

@@ -7,7 +7,7 @@ import numpy as np
 import numpy.typing as npt
 
 from hysim._basics.frozen import FloatArray
-from hysim.signals._parts import checked_count
+from hysim.signals._cycles import checked_count
 
 
 def multisine(

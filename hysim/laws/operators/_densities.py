@@ -1,20 +1,4 @@
-"""Densities of relays and of plays: from a function, from first-order reversal curves, and smooth ones from records.
-
-Reversal curves tell the Everett function, between the turning points as well.
-
-A curve turns at a_m on its way up from the lowest input L and falls back, to L or less far. On its way down it measures
-
-    E(a_m, b) = (y(a_m) - y(b)) / 2
-
-at each of its samples b. Between two curves, with t = (a - a_m) / (a_(m+1) - a_m),
-
-    E(a, b) = (1 - t) E(a_m, b) + t E(a_(m+1), b) + r(a) c(b)     for b up to a_m
-    E(a, b) = t E(a_(m+1), b') + r(a) c(b')                       for b from a_m to a, b' stretched to end at a_(m+1)
-
-r(a) is half of what the output on the rise to a_(m+1) is above a straight line from a_m. The relays between the curves
-have it in proportion to their weights' sizes: c(b) is the total variation of E(a_(m+1), .) - E(a_m, .) above b over
-that above the lowest input. So the rise is met as well as the curves, and a law whose density is even between the
-turning points is returned exactly, whatever the levels.
+"""Densities of relays and of plays: from a function, and smooth ones from records.
 
 A smooth density is as smooth as predicts best what was left out.
 
@@ -46,12 +30,12 @@ import itertools
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
-from hysim._basics.frozen import FloatArray, read_only
+from hysim._basics.frozen import FloatArray
 from hysim._columns.turning import TOLERANCE
 from hysim.models.protocols import DirectFit, Smoother
 from hysim.models.tables import Tables
@@ -75,114 +59,9 @@ Parts = Sequence[npt.NDArray[np.intp]]
 """Samples that are left out together."""
 
 
-_MOST_LEVELS = 100  # beside turning points
-_CLOSEST = 1e-3  # distance of levels, as a fraction of the span
 Density = Callable[[FloatArray, FloatArray], npt.ArrayLike]
 """Weight of relays per area at arrays of upper and lower thresholds of one shape."""
 _POINTS = 8  # of Gauss's rule on an interval
-
-
-class ReversalCurve(NamedTuple):
-    """A way down, and the rise before it; None if the record begins at the turning point."""
-
-    fall: Record
-    rise: Record | None
-
-    @property
-    def turn(self) -> float:
-        """Input at which the curve turns."""
-        return float(self.fall.u[0])
-
-    def everett(self, b: FloatArray) -> FloatArray:
-        """E(turn, b) at inputs from the lowest to the turning point."""
-        return np.asarray(0.5 * (self.fall.y[0] - _at(b, self.fall)))
-
-    def above_line(self, turn: float, levels: FloatArray, reached: FloatArray) -> FloatArray:
-        """Half of what the rise to the curve is above a straight line from the turning point before."""
-        if self.rise is None:
-            return np.zeros(levels.size)
-        start, end = _at(np.array([turn, self.turn]), self.rise)
-        return np.asarray(0.5 * (_at(levels, self.rise) - start - reached * (end - start)))
-
-
-def everett_from_curves(
-    record: Record, levels: npt.ArrayLike | None, tolerance: float
-) -> tuple[FloatArray, FloatArray, float]:
-    """Levels, E at the pairs of them (upper, lower), and the output at the lowest input.
-
-    E is zero above the diagonal, and beyond the curves as at their ends. Curves that rise are those of a record turned
-    by 180 degrees, of which E(a, b) is E(-b, -a).
-    """
-    if _begins_at_the_top(record, tolerance):
-        turned = Record(u=-record.u, y=-record.y)
-        own = None if levels is None else -read_only(levels, "levels", ndim=1)[::-1]
-        grid, table, lowest = everett_from_curves(turned, own, tolerance)
-        return np.asarray(-grid[::-1]), table[::-1, ::-1].T, -lowest - 2.0 * float(table[-1, 0])
-    low, slack, curves = float(record.u.min()), tolerance * float(np.ptp(record.u)), _curves_of(record, tolerance)
-    grid = _levels_of(low, curves) if levels is None else read_only(levels, "levels", ndim=1)
-    if not grid.size or grid[0] > low + slack:
-        raise ValueError(f"levels must begin at the lowest input {low:g} or below, got {grid[:1].tolist()}")
-    table = np.zeros((grid.size, grid.size))
-    turn, below = low, np.zeros(grid.size)
-    for curve in curves:
-        above = np.where(grid < curve.turn, curve.everett(grid), 0.0)
-        end = float(curve.fall.u[-1])
-        if end > low + slack:  # beyond its end it runs as the curve below it
-            above += np.where(grid < end, below - np.interp(end, grid, below), 0.0)
-        between = np.flatnonzero((grid > turn) & (grid <= curve.turn))
-        reached = (grid[between] - turn) / (curve.turn - turn)
-        share = np.append(
-            np.cumsum(np.abs(np.diff(above - below))[::-1])[::-1], 0.0
-        )  # total variation above each level
-        share = share / (share[0] or 1.0)
-        for k, t, r in zip(between, reached, curve.above_line(turn, grid[between], reached), strict=True):
-            table[k] = np.where(grid <= turn, (1.0 - t) * below + t * above + r * share, 0.0)
-            inner = (grid > turn) & (grid < grid[k])
-            stretched = turn + (grid[inner] - turn) / t
-            table[k, inner] = t * curve.everett(stretched) + r * np.interp(stretched, grid, share)
-        turn, below = curve.turn, above
-    table[grid > turn] = below
-    ends = [float(curve.fall.y[-1]) for curve in curves if curve.fall.u[-1] <= low + slack]
-    return grid, table, float(np.mean(ends or record.y[record.u.argmin()]))
-
-
-def _begins_at_the_top(record: Record, tolerance: float) -> bool:
-    """Whether more ways down begin at the highest input than ways up at the lowest one."""
-    slack = tolerance * float(np.ptp(record.u))
-    begins = [(branch.u[0], branch.u[-1]) for branch in record.branches(tolerance)]
-    falls = sum(first > last and first >= record.u.max() - slack for first, last in begins)
-    rises = sum(first < last and first <= record.u.min() + slack for first, last in begins)
-    return bool(falls > rises)
-
-
-def _curves_of(record: Record, tolerance: float) -> list[ReversalCurve]:
-    """The curves of a record by their turning points, of equal ones the last; a ValueError without a curve."""
-    branches = record.branches(tolerance)
-    pairs = zip((None, *branches), branches, strict=False)
-    every = [ReversalCurve(fall, rise) for rise, fall in pairs if fall.u[-1] < fall.u[0]]
-    if not every:
-        raise ValueError("the input never falls: a reversal curve is a way up and the way down after it")
-    curves = {each.turn: each for each in every}
-    return [curves[turn] for turn in sorted(curves)]
-
-
-def _levels_of(low: float, curves: list[ReversalCurve]) -> FloatArray:
-    """The turning points and all inputs of the curves; even steps between turning points if these are too many."""
-    turns = np.array([low, *(curve.turn for curve in curves)])
-    span = float(turns[-1] - low)
-    every = np.unique(np.concatenate([turns, *(curve.fall.u for curve in curves)]))
-    every = every[(every >= low) & (every <= turns[-1])]
-    if every.size <= _MOST_LEVELS and np.diff(every).min() >= _CLOSEST * span:
-        return np.asarray(every)
-    parts = np.maximum(np.round(np.diff(turns) * _MOST_LEVELS / span), 1).astype(int)
-    steps = [np.linspace(a, b, n + 1)[:-1] for a, b, n in zip(turns[:-1], turns[1:], parts, strict=True)]
-    return np.append(np.concatenate(steps), turns[-1])
-
-
-def _at(inputs: FloatArray, branch: Record) -> FloatArray:
-    """Outputs of a branch where its input passes the inputs."""
-    order = np.argsort(branch.u, kind="stable")
-    return np.interp(inputs, branch.u[order], branch.y[order])
 
 
 def relay_weights(grid: FloatArray, density: Density) -> tuple[float, ...]:

@@ -19,7 +19,7 @@ Mathematical Models of Hysteresis, 1991, for first-order reversal curves and the
 import math
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import ClassVar, Self
+from typing import ClassVar, Literal, Self
 
 import numpy as np
 import numpy.typing as npt
@@ -28,9 +28,10 @@ from hysim._basics.blas import one_blas_thread
 from hysim._basics.frozen import FloatArray, check_whole, read_only
 from hysim._columns.turning import TOLERANCE
 from hysim.kernels import preisach as kernels
-from hysim.laws.operators._densities import Density, check_strength, everett_from_curves, relay_weights, smooth
+from hysim.laws.operators._densities import Density, check_strength, relay_weights, smooth
 from hysim.laws.operators._relays import RelayLaw, everett_of, weights_of
 from hysim.laws.operators.prandtl_ishlinskii import PrandtlIshlinskii
+from hysim.laws.operators.reversal_curves import everett_from_curves
 from hysim.models.law import State
 from hysim.models.model import Example, family
 from hysim.models.protocols import UNLIMITED, CompiledLaw, Limits
@@ -192,7 +193,12 @@ class Preisach(RelayLaw):
 
     @classmethod
     def from_reversal_curves(
-        cls, record: Record, *, levels: npt.ArrayLike | None = None, tolerance: float = TOLERANCE
+        cls,
+        record: Record,
+        *,
+        levels: npt.ArrayLike | None = None,
+        smoothing: float | Literal["auto"] | None = None,
+        tolerance: float = TOLERANCE,
     ) -> Self:
         """The law whose Everett function is read from first-order reversal curves, ``E(a, b) = (y_a - y_ab) / 2``.
 
@@ -209,14 +215,16 @@ class Preisach(RelayLaw):
         levels : array, shape (n_levels,), optional
             Levels of the law [unit of u]; by default the turning points and all inputs of the curves, or, if these are
             more than 100, the turning points and about 100 even steps between them.
+        smoothing : float or "auto", optional
+            By default the law meets every sample. With a number the curves are those of a local regression, and their
+            drift is subtracted, as in `hysim.forc`; ``"auto"`` takes the number that predicts left-out curves best.
         tolerance : float
             Retreats of the input up to this fraction of its span are ignored: noise.
 
         Returns
         -------
         Preisach
-            Noise of the standard deviation s leaves some s in each weight, of either sign; ``hs.identify`` on the same
-            record and few levels fits all samples at once with weights of one sign.
+            Without smoothing, noise of the standard deviation s leaves some s in each weight, of either sign.
 
         Raises
         ------
@@ -233,7 +241,7 @@ class Preisach(RelayLaw):
         >>> [round(weight, 12) for weight in curves.weights], round(curves.offset, 12)
         ([1.0, 0.5, 1.0], 3.0)
         """
-        grid, everett, lowest = everett_from_curves(record, levels, tolerance)
+        grid, everett, lowest = everett_from_curves(record, levels, tolerance, smoothing)
         return cls.from_everett(grid, everett, offset=lowest + float(everett[-1, 0]))
 
     @classmethod
