@@ -175,6 +175,13 @@ def test_a_structure_of_degree_1_fits_the_measured_loop():
     assert fit.fit_percent == pytest.approx(96.09, abs=0.01)  # as printed
 
 
+def test_the_class_stands_for_the_second_degree():
+    u = hs.signals.triangle(-1.0, 1.0, cycles=2, samples_per_cycle=40)
+    record = hs.Record(u=u, y=hs.Duhem.from_terms({"u'": 0.3, "|u'| u": 1.0, "|u'| y": -1.0}).response(u))
+    by_class, by_degree = (hs.identify(each, record) for each in (hs.Duhem, hs.Duhem.structure(degree=2)))
+    assert by_class.estimates == by_degree.estimates
+
+
 test_a_structure_is_checked = refused(
     ({}, "give degree or terms"),
     ({"degree": 1, "terms": ["u'"]}, "give degree or terms"),

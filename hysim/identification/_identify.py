@@ -33,7 +33,7 @@ from hysim.models.by_structure import searched
 from hysim.models.dependent import Dependent, on_record
 from hysim.models.dependent_structure import DependentStructure
 from hysim.models.model import family_named, is_identifiable
-from hysim.models.protocols import Direct, Identifiable, PartByPart, Placeable, Recorded, needs_time, placed
+from hysim.models.protocols import Direct, Identifiable, Offering, PartByPart, Placeable, Recorded, needs_time, placed
 from hysim.models.search_space import Freedom
 from hysim.records import Record, several
 
@@ -311,7 +311,7 @@ def _freedom(fixed: Mapping[str, float], free: Sequence[str], bounds: Mapping[st
 
 
 def _family(model_or_class: Any, depends: Mapping[str, tuple[str, int]] | None) -> Identifiable:
-    """The object that declares the search; a class stands for the model with its defaults."""
+    """The object that declares the search; a class stands for its defaults, or for the last that it offers."""
     family: Any = model_or_class
     if isinstance(family, Direct) and depends is not None:
         raise TypeError(f"depends is for laws and sums of them, got {family!r}")
@@ -320,6 +320,9 @@ def _family(model_or_class: Any, depends: Mapping[str, tuple[str, int]] | None) 
     belongs_to_the_class = inspect.ismethod(family.search_space)
     if isinstance(model_or_class, type) and not belongs_to_the_class:
         required = [f.name for f in fields(model_or_class) if f.default is MISSING and f.default_factory is MISSING]
+        offered = [*family.candidates().values()] if required and isinstance(family, Offering) else []
+        if offered:
+            return _family(offered[-1], depends)
         if required:
             raise TypeError(
                 f"{model_or_class.__name__} has no defaults for {', '.join(required)}: pass an instance as the start, "

@@ -241,7 +241,7 @@ class Offering(Protocol):
 
     @classmethod
     def candidates(cls) -> Mapping[str, Any]:
-        """Names to classes, models or structures; empty by default."""
+        """Names to classes, models or structures; empty by default. The last stands for a class without defaults."""
 
 
 class Variant(NamedTuple):
