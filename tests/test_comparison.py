@@ -207,7 +207,7 @@ def test_what_cannot_be_identified_is_a_row_with_its_reason(quick):
     assert r"untold & \multicolumn" in quick.to_latex()
     last = list(csv.DictReader(io.StringIO(quick.to_csv())))[-1]
     assert (last["model"], last["fit [%]"], last["converged"]) == ("untold", "", "no")
-    with pytest.raises(KeyError, match="could not be compared: Duhem"):
+    with pytest.raises(KeyError, match="could not be compared: Sum"):
         quick["untold"]
 
 

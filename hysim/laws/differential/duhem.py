@@ -292,9 +292,10 @@ class Duhem(Law):
     def structure(cls, *, degree: int | None = None, terms: Sequence[str] | None = None) -> DuhemStructure:
         """Terms of a law between u and y for `hysim.identify`, whose search begins at a regression on the record.
 
-        ``hysim.identify(hysim.Duhem, ...)`` takes degree 2. Give either `degree`, for every monomial of u and y up to it, with u' and with ``|u'|``, (degree + 1)(degree +
-        2) terms; or `terms`, names as in `from_terms` without ``|z|``. Raises ValueError or TypeError if not one of the
-        two is given, the degree is not a whole number of at least zero, or a name is not in the vocabulary.
+        ``hysim.identify(hysim.Duhem, ...)`` takes degree 2. Give either `degree`, for every monomial of u and y up to
+        it, with u' and with ``|u'|``, (degree + 1)(degree + 2) terms; or `terms`, names as in `from_terms` without
+        ``|z|``. Raises ValueError or TypeError if not one of the two is given, the degree is not a whole number of at
+        least zero, or a name is not in the vocabulary.
 
         Examples
         --------
