@@ -55,6 +55,7 @@ class Bank(Elements, ByStructure):
     weights_name: ClassVar[str] = "weights"
     ordered: ClassVar[bool] = True  # whether the thresholds must increase
     by_input: ClassVar[bool] = True  # whether the input itself pushes
+    is_curved: ClassVar[bool] = False  # whether an element's output is a curve of its position
     axes: ClassVar[tuple[Axis, ...]] = ()  # fields that are searched beside the thresholds
     positive: ClassVar[tuple[str, ...]] = ()
     not_negative: ClassVar[tuple[str, ...]] = ()

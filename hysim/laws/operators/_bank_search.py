@@ -6,7 +6,9 @@ neighbours, so that their order stays.
 
 One-signed weights are those of the classical operator, of one density: all elements past the threshold zero turn the
 loop in one sense. Without it least squares fit noise by weights of alternating sign, and such a law may have no
-inverse; a loop that crosses itself or bends the other way needs both signs. By default the record decides.
+inverse; a loop that crosses itself or bends the other way needs both signs. By default the record decides. Where each
+element is a curve, that of threshold zero and the feedthrough have this sign, too, and the feedthrough has a least
+size: without one the law would stand still after a reversal, and would have no inverse.
 
 The memory of many plays is as many unknowns, which no record determines. With ``initial="rest"`` the plays stand at
 zero before the first sample, with ``"still"`` at the first input. With ``"free"`` the memory is that of former turning
@@ -53,6 +55,7 @@ IDENTITY = (0.0, 0.0, 0.0, 0.0, 1.0)
 TURN = "turn"
 _LEVELS = 33, 9  # of a single former turning point, and of one beside others, from which the search begins
 _SIZES = (0.2, 0.4, 0.6, 0.8, 1.0, 1.3)  # of several about the middle of the input, in half spans, likewise
+_LEAST_SLOPE = 1e-4  # of the feedthrough beside curves, in spans of the output over that of the input
 _MOST_TURNS = 4  # more are seldom determined
 _ROUNDING = 1e-9  # of a threshold
 _LARGEST = 4.0  # of a weight before dead zones, in slopes of the record, unless the plain law has a larger one
@@ -179,7 +182,14 @@ class BankStructure(SignedStructure):
         free = [[{name: value} for value in begins] for name, begins in starts.items() if name not in held]
         points = [dict(ChainMap(*each)) for each in itertools.product(pasts, *free)]
         side = self.side(record, clockwise=self.law.stops)
-        bounds = {name: side for name, r in weights.items() if side is not None and r > 0.0 and name not in held}
+        bounds = {
+            name: side
+            for name, r in weights.items()
+            if side is not None and (r > 0.0 or self.law.is_curved) and name not in held
+        }
+        if side is not None and self.law.is_curved and "feedthrough" not in held:
+            least = _LEAST_SLOPE * float(np.ptp(record.y)) / (2.0 * half or 1.0)
+            bounds["feedthrough"] = (least, np.inf) if side[0] == 0.0 else (-np.inf, -least)
         bounds |= {name: pair for name, pair in limits.items() if name in columns}
         searched = {each.name for each in box} - set(held)
         few = 0 if searched <= {*turns} else 64 if searched <= {*turns, *starts} else 256

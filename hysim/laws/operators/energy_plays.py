@@ -66,6 +66,7 @@ class EnergyPlays(Bank, Law):
 
     units: ClassVar = {"thresholds": "u", "weights": "y", "field": "u", "feedthrough": "y/u", "offset": "y", "z0": "u"}
     positive = ("field",)
+    is_curved = True
     axes = (Axis(Parameter("field", 3e-3, 3.0, unit="h", physical=(True, False)), (0.1, 0.03, 0.01, 0.3, 1.0)),)
     example = Example(
         {"thresholds": (0.0, 0.2, 0.5), "weights": (0.2, 0.6, 0.4), "field": 0.15},
@@ -93,7 +94,7 @@ class EnergyPlays(Bank, Law):
     def structure(  # type: ignore[override]  # its weights have one sign
         cls, *, plays: int = 20, thresholds: npt.ArrayLike = ()
     ) -> BankStructure:
-        """Cells for `hysim.identify`, whose weights have one sign: how many, or where.
+        """Cells for `hysim.identify`, whose weights and feedthrough have one sign: how many, or where.
 
         Parameters
         ----------
