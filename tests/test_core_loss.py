@@ -28,6 +28,22 @@ def test_measures_of_a_parallelogram():
     assert np.isnan([loop.initial_permeability, loop.maximum_permeability]).all()
 
 
+@pytest.mark.parametrize(
+    ("reach", "drift", "noise", "closure"),
+    [(10.0, 0.0, 1e-3, "closed"), (10.0, 0.05, 1e-3, "drift"), (10.0, 0.05, 0.03, "closed"), (1.5, 0.0, 1e-3, "open")],
+)
+def test_a_loop_is_closed_drifts_or_is_open(reach, drift, noise, closure):
+    """Two branches of a hyperbolic tangent, at fields of ten coercivities and of 1.5, with a line of slope 0.02."""
+    H = hs.signals.triangle(-reach, reach, cycles=1, samples_per_cycle=800)
+    B = np.tanh(H - np.sign(np.gradient(H))) + 0.02 * H + drift * np.arange(H.size) / H.size
+    loop = magnetic_metrics(H, B + noise * np.random.default_rng(0).standard_normal(H.size))
+    assert loop.closure == closure
+    assert f"closure        {closure}: " in str(loop)
+    if reach == 10.0:
+        assert loop.noise == pytest.approx(noise, rel=0.2)
+        assert loop.saturated_slope == pytest.approx(0.02, abs=3.0 * noise)
+
+
 def test_a_clockwise_loop_has_a_negative_energy_and_remanence():
     H, B = parallelogram()
     assert magnetic_metrics(H, -B).energy == pytest.approx(-192.0, rel=1e-13)

@@ -50,6 +50,7 @@ def metrics(
     settings: records.RecordOptions,
     cycles: options.Cycles = 1,
     forc: bool = False,
+    magnetic: bool = False,
     tolerance: float = 0.01,
     out: options.Copy | None = None,
     csv: options.Result | None = None,
@@ -64,6 +65,7 @@ def metrics(
     Parameters
     ----------
     cycles : print a table with one row a cycle; with a number, the average loop of so many last cycles
+    magnetic : measure coercivity, remanence, permeability, and whether the loop is open, drifts or closes
     forc : measure the density of first-order reversal curves, and their drift
     tolerance : reversals smaller than this fraction of the input's span are noise [1]
     out : write the printed result into a file too
@@ -76,11 +78,12 @@ def metrics(
     hysim metrics damper.csv --cycles --csv cycles.csv
     hysim metrics loop.csv --from 2s --to 4s --plot loop.svg
     hysim metrics sample.forc --forc --plot density.svg
+    hysim metrics core.hys --magnetic
     """
     from hysim._basics.printing import quantity
 
-    if forc and not cycles:
-        raise ValueError("--forc measures curves, and --cycles every cycle: give one of them")
+    if forc + magnetic + (not cycles) > 1:
+        raise ValueError("--forc measures curves, --magnetic a loop, and --cycles every cycle: give one of them")
     if csv is not None and cycles:
         raise ValueError("--csv writes the table of every cycle: give --cycles without a number too")
     record = records.read(settings, file)
@@ -92,6 +95,9 @@ def metrics(
         files[plot] = lambda: outputs.drawn(
             lambda canvas: hs.plot.forc(measured, canvas.add_subplot(), units=record.units)
         )
+    elif magnetic:
+        measured = hs.magnetic_metrics(record.u, record.y, cycles=cycles, tolerance=tolerance)
+        document = measured.to_dict() | {"closure": measured.closure}
     elif cycles:
         measured = hs.loop_metrics(record.u, record.y, cycles=cycles, tolerance=tolerance)
         lobes = [lobe._asdict() for lobe in measured.lobes]
@@ -100,7 +106,7 @@ def metrics(
         measured = hs.cycle_metrics(record.u, record.y, tolerance=tolerance)
         document = {"cycles": measured.rows(), "level": measured.level, "energy_outside": measured.energy_outside}
         files[csv] = lambda: measured.to_csv(record.units)
-    document |= {} if forc else {"sign_convention": measured.sign_convention}
+    document |= {} if forc or magnetic else {"sign_convention": measured.sign_convention}
     document |= {"units": record.units}
 
     def text() -> str:

@@ -64,6 +64,9 @@ FORCE = "Energy is the integral of y du: what a force y on a displacement u diss
 
 Orientation = Literal["counterclockwise", "clockwise", "none"]
 _SMALLEST_LOBE = 0.02  # of the area of all lobes: where the branches meet at the ends they cross by less
+_END = 0.1  # of the span of the field
+_DEGREE = 3  # of the width there, without noise
+_OPEN = 0.01  # of the width of a loop
 _CLEAR = 4.0  # standard deviations by which the mean width of a lobe is above the noise of the width
 
 
@@ -412,6 +415,16 @@ class MagneticMetrics:
         Relative permeability from end to end, and where a branch is steepest [1]. The latter takes all noise of B.
     initial_permeability, maximum_permeability : float
         Relative permeabilities of the initial curve [1]; nan if the record does not begin demagnetised.
+    saturated_slope : float
+        Mean slope of the branches in the outer tenths of the span of the field [T m / A]. Where the loop is saturated,
+        ``B - saturated_slope * H`` is without what the sample's holder, or a para- or diamagnetic part, adds.
+    end_width : float
+        Mean width in the outer tenth where it is smaller [T]: zero where the loop is saturated.
+    closure_gap : float
+        Flux density at the end of the cycle less that at its beginning [T].
+    noise : float
+        Standard deviation of a single flux density, from the width in the outer tenths about a cubic [T]; 0 of
+        few samples.
     n_cycles : int
         Number of averaged cycles.
     """
@@ -425,18 +438,46 @@ class MagneticMetrics:
     largest_permeability: float
     initial_permeability: float
     maximum_permeability: float
+    saturated_slope: float
+    end_width: float
+    closure_gap: float
+    noise: float
     n_cycles: int
 
+    @property
+    def closure(self) -> Literal["closed", "drift", "open"]:
+        """Whether the loop is open, since the field does not saturate it, or does not end where it began.
+
+        Neither is said of widths and gaps within four times the noise, or 1 % of the width of the loop.
+        """
+        least = max(_CLEAR * self.noise, _OPEN * 2.0 * abs(self.remanence))
+        if abs(self.end_width) > least:
+            return "open"
+        return "drift" if abs(self.closure_gap) > least else "closed"
+
     def __str__(self) -> str:
-        initial, largest = self.initial_permeability, self.maximum_permeability
+        return self.to_text()
+
+    def to_text(self, units: Mapping[str, str] | None = None) -> str:
+        """The text of ``str``, with the units of ``"u"`` and ``"y"``, A/m and T unless given."""
+        u, y = ((units or {}).get(signal, own) for signal, own in (("u", "A/m"), ("y", "T")))
+        is_si, initial, largest = (u, y) == ("A/m", "T"), self.initial_permeability, self.maximum_permeability
+        density = "J/m^3" if is_si else f"{y} {u}"
         return summary_text(
-            [f"MagneticMetrics: {self.energy:.4g} J/m^3 a cycle at {self.peak_induction:.4g} T"],
+            [f"MagneticMetrics: {self.energy:.4g} {density} a cycle at {self.peak_induction:.4g} {y}"],
             {
-                "coercivity": f"{self.coercivity:.4g} A/m",
-                "remanence": f"{self.remanence:.4g} T",
-                "peak": f"{self.peak_field:.4g} A/m",
-                "permeability": f"amplitude {self.amplitude_permeability:.4g}, largest {self.largest_permeability:.4g}",
-                "initial curve": "" if math.isnan(initial) else f"from {initial:.4g}, at most {largest:.4g}",
+                "coercivity": f"{self.coercivity:.4g} {u}",
+                "remanence": f"{self.remanence:.4g} {y}",
+                "peak": f"{self.peak_field:.4g} {u}",
+                "permeability": f"amplitude {self.amplitude_permeability:.4g}, largest {self.largest_permeability:.4g}"
+                if is_si
+                else "",
+                "initial curve": f"from {initial:.4g}, at most {largest:.4g}"
+                if is_si and not math.isnan(initial)
+                else "",
+                "slope": f"{self.saturated_slope:.4g} {y}/{f'({u})' if '/' in u else u} near the ends",
+                "closure": f"{self.closure}: {self.end_width:.2g} {y} wide near the ends, gap {self.closure_gap:.2g} "
+                f"{y}, noise {self.noise:.2g} {y}",
             },
         )
 
@@ -496,8 +537,31 @@ def magnetic_metrics(
         largest_permeability=float(slopes.max()) / mu0,
         initial_permeability=initial / mu0,
         maximum_permeability=maximum / mu0,
+        **_ends(loop),
+        closure_gap=loop.closure_gap,
         n_cycles=loop.n_cycles,
     )
+
+
+def _ends(loop: LoopMetrics) -> dict[str, float]:
+    """Slope, least width and noise of the branches in the outer tenths of the span."""
+    place = (loop.u - loop.u[0]) / np.ptp(loop.u)
+    mean = 0.5 * (loop.loading + loop.unloading)
+    slopes, widths, squares, freedom = [], [], 0.0, 0
+    first, last = (max(2, int(end.sum())) for end in (place < _END, place > 1.0 - _END))
+    for end in (slice(first), slice(-last, None)):
+        u, width = loop.u[end], loop.width[end]
+        slopes.append(np.polynomial.Polynomial.fit(u, mean[end], 1).convert().coef[-1])
+        widths.append(float(np.mean(width)))
+        degree = min(_DEGREE, u.size - 1)
+        smooth = np.polynomial.Polynomial.fit(u, width, degree)
+        squares += float(np.sum((width - smooth(u)) ** 2)) / 2.0  # of the difference of two values
+        freedom += u.size - 1 - degree
+    return {
+        "saturated_slope": float(np.mean(slopes)),
+        "end_width": min(widths, key=abs),
+        "noise": math.sqrt(squares / freedom) if freedom else 0.0,
+    }
 
 
 def _zero(u: FloatArray, y: FloatArray) -> float:
