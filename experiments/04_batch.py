@@ -171,7 +171,7 @@ def slopes(rows: list[Row]) -> dict[str, float]:
 def main(smoke: bool = False) -> list[Row]:
     """Measure, and unless it is a smoke run write table, figure and JSON."""
     if smoke:
-        long_fit(10_000)
+        long_fit(25_000)
         return throughput(500, 1) + growth(1000, 10, 1) + many_plays(100, 1)
     fitted = alone(10**6)  # before this process is large: its largest memory would count
     rows = throughput(100_000, 7) + growth(10**7, 10**6, 5) + many_plays(100_000, 7)

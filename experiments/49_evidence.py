@@ -52,11 +52,11 @@ def models() -> dict[str, tuple[Any, dict[str, float]]]:
     }
 
 
-def measured(name: str, factor: float, method: str, live_points: int = LIVE_POINTS) -> Row:
-    """One evidence."""
+def measured(name: str, factor: float, method: str, live_points: int = LIVE_POINTS, **fixed: float) -> Row:
+    """One evidence, with further parameters held."""
     rec = hs.datasets.table1()
     family, held = models()[name]
-    fit = hs.identify(family, rec, fixed=held, admissible=False)
+    fit = hs.identify(family, rec, fixed=held | fixed, admissible=False)
     options = {"factor": factor, "method": method, "live_points": live_points}
     found, seconds = cpu_timed(log_evidence, fit, rec, noise="quantised", **options)
     return {
@@ -103,7 +103,7 @@ def as_evidence(rows: list[Row]) -> Evidence:
 def main(smoke: bool = False, resume: bool = False) -> list[Row]:
     """Measure, print and write table, figure and result."""
     if smoke:
-        return [measured("line", 1.0, "bridge"), measured("line", 1.0, "nested", live_points=40)]
+        return [measured("line", 1.0, method, live_points=6, offset=0.0) for method in ("bridge", "nested")]
     rows = stored_result(RESULTS).get("rows", []) if resume else []
     done = {(row["model"], row["factor"], row["method"]) for row in rows}
     for task in tasks():

@@ -152,7 +152,7 @@ def test_it_is_drawn(law):
 def test_the_command_line_takes_it_by_its_import_path(law, tmp_path):
     hs.save_record(record_of(law), tmp_path / "record.csv")
     model = f"{type(law).__module__}:{type(law).__name__}"
-    command = [sys.executable, "-m", "hysim", "identify", "record.csv", "--model", model, "--json"]
+    command = [sys.executable, "-m", "hysim", "identify", "record.csv", "--model", model, "--json", "--fix", "k=3"]
     path = os.pathsep.join([os.path.dirname(__file__), *filter(None, sys.path)])
     done = subprocess.run(command, cwd=tmp_path, env={**os.environ, "PYTHONPATH": path}, capture_output=True, text=True)
     assert done.returncode == 0, done.stderr

@@ -13,7 +13,7 @@ import hysim as hs
 from hysim._basics.blas import one_blas_thread
 from hysim._basics.parallel import processes
 
-U = hs.signals.triangle(-1.0, 1.0, cycles=2, samples_per_cycle=40)
+U = hs.signals.triangle(-1.0, 1.0, cycles=2, samples_per_cycle=10)
 RECORD = hs.Record(u=U, y=hs.Play(threshold=0.3).response(U))
 
 

@@ -186,17 +186,19 @@ def test_another_process_writes_the_same_bytes(reproduction, again):
 
 
 def test_full_searches_come_to_the_same_verdicts(reproduction, summary, tmp_path, monkeypatch, capsys):
-    """What does not depend on the searches is taken as it was computed."""
+    """What does not depend on the searches is taken as it was computed; for a camera any controller will do here."""
     of = reproduction.findings
     computed = {
-        "study": lambda **_: of.study,
-        "bouc_wen": lambda name, _: of.study.fits[name],
-        "reidentify": lambda _: of.reidentification,
-        "learned_cameras": lambda _: of.learned,
-        "second_process": lambda: contextlib.nullcontext(_AtOnce()),
+        "findings.study": lambda **_: of.study,
+        "findings.bouc_wen": lambda name, _: of.study.fits[name],
+        "findings.reidentify": lambda _: of.reidentification,
+        "findings.learned_cameras": lambda _: of.learned,
+        "findings.second_process": lambda: contextlib.nullcontext(_AtOnce()),
+        **dict.fromkeys(("camera._FIRST", "camera._NEXT", "camera._FAST"), (1, 1, 0)),
+        **dict.fromkeys(("camera._AGAIN", "camera._FEW", "camera.NOISES"), 1),
     }
     for name, known in computed.items():
-        monkeypatch.setattr(f"hysim.paper.findings.{name}", known)
+        monkeypatch.setattr(f"hysim.paper.{name}", known)
     monkeypatch.setattr("hysim.paper.reproduction._as_svg", lambda drawings: dict.fromkeys(drawings, "<svg></svg>"))
     assert main(["reproduce", "--thorough", "--quick", "--json", "--out", str(tmp_path)]) == 0
     thorough = json.loads(capsys.readouterr().out)

@@ -215,7 +215,7 @@ test_options_are_checked = refused(
 
 
 def test_an_oscillators_records_are_pointed_to_their_own_verb():
-    t = np.arange(300) / 750.0
+    t = np.arange(100) / 250.0
     u = 60.0 * np.sin(2.0 * np.pi * (20.0 + 40.0 * t) * t)
     plant = hs.BoucWenOscillator(mass=2.0, damping=10.0, stiffness=5e4, law=hs.BoucWen(A=5e4, beta=800.0, gamma=-300.0))
     record = hs.Record(u=u, y=plant.response(u, t[1]), t=t)

@@ -69,11 +69,9 @@ def test_table1_with_a_quadratic_input(table1):
     assert np.abs(fit.residual).max() < table1.resolution
 
 
-@pytest.mark.parametrize("seed", [1, 2])
-def test_the_optimum_does_not_depend_on_the_seed(table1, seed):
-    reference = hs.identify(hs.PolynomialBoucWen, table1, fixed={"n": 1.0}, seed=0)
-    other = hs.identify(hs.PolynomialBoucWen, table1, fixed={"n": 1.0}, seed=seed)
-    assert other.rmse == pytest.approx(reference.rmse, rel=5e-7)  # the cost within 1e-6
+def test_the_optimum_does_not_depend_on_the_seed(table1):
+    fits = [hs.identify(hs.PolynomialBoucWen, table1, fixed={"n": 1.0}, seed=seed) for seed in range(3)]
+    assert [fit.rmse for fit in fits[1:]] == pytest.approx([fits[0].rmse] * 2, rel=5e-7)  # the cost within 1e-6
 
 
 def test_fixed_free_and_the_redundant_pair(table1):

@@ -59,7 +59,7 @@ def test_what_candidates_have_in_common_is_searched_once_and_is_what_each_finds_
         return found(problem, *arguments)
 
     monkeypatch.setattr(_search, "_found", counted)
-    u = hs.signals.triangle(-1.0, 1.0, cycles=2, samples_per_cycle=40)
+    u = hs.signals.triangle(-1.0, 1.0, cycles=2, samples_per_cycle=16)
     noise = 0.01 * np.random.default_rng(0).standard_normal(u.size)
     record = hs.Record(u=u, y=u - 0.5 * hs.BoucWen(beta=2.0, gamma=0.5, n=1.5).memory(u) + noise)
     families = {"plain": hs.BoucWen, "polynomial": hs.PolynomialBoucWen, "generalised": hs.GeneralizedBoucWen}

@@ -120,14 +120,14 @@ def loops_of(law, amplitudes, noise):
 @pytest.mark.parametrize("density", [positive, butterfly])
 def test_the_density_is_returned_where_it_predicts_better_than_the_grid(density):
     law = hs.Preisach.from_density(LEVELS, density)
-    records, between = loops_of(law, (0.4, 0.6, 0.9, 1.2), 5e-3), steady(law, 0.75)
+    records, between = [each[::3] for each in loops_of(law, (0.4, 0.6, 0.9, 1.2), 5e-3)], steady(law, 0.75)
     fit, grid = hs.identify(hs.Preisach, records), hs.identify(hs.Preisach.structure(intervals=4), records)
     assert "predicts parts left out better than a grid" in fit.message
     assert fit.success
     assert relative_error(fit.model, between) < 0.5 * relative_error(grid.model, between)
     for record, model, residual in zip(records, fit.models, np.split(fit.residual, len(records)), strict=True):
         assert record.y - model.response(record.u) == pytest.approx(residual, abs=0.0)
-    truth = np.concatenate([steady(law, amplitude).y for amplitude in (0.4, 0.6, 0.9, 1.2)])
+    truth = np.concatenate([steady(law, amplitude).y[::3] for amplitude in (0.4, 0.6, 0.9, 1.2)])
     output = np.concatenate([record.y for record in records]) - fit.residual
     assert np.mean(np.abs(output - truth) < 2.0 * fit.response_stderr) > 0.7
 

@@ -168,9 +168,9 @@ def test_an_identified_law_stands_at_the_first_input_of_its_record():
     u = hs.signals.triangle(20.0, 120.0, cycles=2, samples_per_cycle=80)[17:]
     rec = hs.Record(u=u, y=hs.BoucWen(beta=0.03, gamma=0.01, gain=-1.0, feedthrough=1.5).response(u))
     for family in (hs.BoucWen, hs.PrandtlIshlinskii, hs.Dahl):
-        fit = hs.identify(family, rec)
+        fit = hs.identify(family, rec, max_evaluations=50)
         assert (fit.model.u0, fit.model.u_range) == (u[0], (20.0, 120.0))
-        again = hs.identify(fit.model, rec[40:])  # its own place is that of the new record
+        again = hs.identify(fit.model, rec[40:], max_evaluations=50)  # its own place is that of the new record
         assert again.model.u0 == rec.u[40]
 
 

@@ -229,7 +229,7 @@ class Actuator:
         --------
         >>> import numpy as np, hysim as hs
         >>> stage = hs.Actuator(hysteresis=hs.Play(threshold=0.2), vibration=hs.mode(300.0, 0.05, delay=0.4e-3))
-        >>> slow, fast = np.sin(np.linspace(0.0, 9.0, 90)), np.repeat([0.0, 1.0, -0.5, 0.5], 40)
+        >>> slow, fast = np.sin(np.linspace(0.0, 9.0, 90)), np.repeat([0.0, 1.0, -0.5, 0.5], 20)
         >>> recs = [
         ...     hs.Record(u=u, y=stage.response(u, h), t=h * np.arange(u.size)) for u, h in ((slow, 0.1), (fast, 1e-3))
         ... ]

@@ -236,7 +236,7 @@ def compare_evidence(
     >>> import hysim as hs
     >>> rec = hs.datasets.table1()
     >>> at_zero = hs.identify(hs.Line, rec, fixed={"offset": 0.0})
-    >>> result = hs.compare_evidence({"through zero": at_zero}, rec, method="nested", live_points=6)
+    >>> result = hs.compare_evidence({"through zero": at_zero}, rec)
     >>> result.sentence
     'through zero is the only model'
     """
