@@ -185,7 +185,7 @@ test_wrong_arguments_are_named = refused(
 test_records_that_say_nothing_are_refused = refused(
     (1.0, hs.datasets.table1(), "takes a model"),
     (hs.BoucWen, hs.datasets.table1().y, "takes a Record"),
-    (hs.Duhem, hs.datasets.table1(), "no defaults for p, q"),
+    (hs.Sum, hs.datasets.table1(), "no defaults for parts"),
     call=hs.identify,
     error=TypeError,
 )

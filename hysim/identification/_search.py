@@ -38,7 +38,8 @@ N_BRIEF_DESCENDING = 12  # by hand: about a fifth of a full search
 N_BRIEF_WHOLE = 4  # by hand: steps on all samples
 _LONG = 512  # by hand: samples beyond which fewer points are tried; each costs more, and there are fewer optima
 _SHORT = 250  # by hand: samples of a thinned record beside its reversals; less than half of `_LONG`, so that it pays
-_MIDDLE = 2000  # by hand: samples on which the BIC chooses among stages, and beyond which a polish has fewer steps
+_DEAR = 5000  # by hand: samples beyond which each step costs much
+_MIDDLE = 2000  # by hand: samples of such a record on which the BIC chooses among stages
 _FIRST = 1000  # by hand: samples of the beginning of a record that turns at most of its samples
 _APART = 0.05  # by hand: distance of two starts in units of the box, under which the better one stands for both
 _SAME = 0.01  # by hand: likewise of two points after the descent, which are nearer to their optimum
@@ -71,7 +72,7 @@ def chosen(
     Also its optima, as `optima` returns them. Problems with more parameters than samples take no part. Of several the
     criterion chooses on fewer samples of a long record, and only the chosen one is searched on all of them.
     """
-    if len(problems) > 1 and problems[0].y.size > 2 * _MIDDLE:
+    if len(problems) > 1 and problems[0].y.size > _DEAR:
         fewer = [problem.thinned(_MIDDLE) for problem in problems]
         if None not in fewer:
             short, likely = chosen([each for each in fewer if each is not None], seed=seed, progress=progress)
@@ -245,7 +246,7 @@ def polish(problem: Problem, starts: FloatArray) -> list[Optimum]:
 
 
 def _polished(problem: Problem, starts: FloatArray) -> Reached:
-    share = min(1.0, _MIDDLE / problem.y.size)
+    share = 1.0 if problem.y.size <= _DEAR else _MIDDLE / problem.y.size
     reached = descended(problem, starts, exact=True, steps=max(N_STEPS, round(N_POLISHING * share)))
     if len(starts) and not reached.at_rest[best := int(reached.loss.argmin())]:
         steps = max(N_STEPS, round(N_POLISHING_ALONE * share**2))
