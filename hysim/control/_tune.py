@@ -449,7 +449,8 @@ class _Search:
                 )
             best = min(simulated, key=lambda each: self.rank(each[1]))
             trade_off = front(trial for _, trial in simulated if trial.voltage_noise <= self.max_voltage_noise)
-            doubtful = [k for k, trial in simulated if k not in resting and (k == best[0] or trial in trade_off)]
+            chosen = {id(trial) for trial in (best[1], *trade_off)}
+            doubtful = [k for k, trial in simulated if k not in resting and id(trial) in chosen]
             if not doubtful:
                 return best[1], trade_off
             for k in doubtful:

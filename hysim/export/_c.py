@@ -14,7 +14,7 @@ from collections import Counter
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from enum import IntEnum
-from functools import lru_cache
+from functools import cache, lru_cache
 from pathlib import Path
 from types import FunctionType, MappingProxyType
 from typing import Any, NamedTuple, Protocol
@@ -251,11 +251,13 @@ class Scope:
 
 def homes(body: list[ast.stmt], arguments: Iterable[str]) -> Mapping[Place, list[str]]:
     """Names that are declared at each statement, in the order in which they appear."""
+    _mentioned.cache_clear()
     local = stored(body).keys() - set(arguments)
     names = {name: None for statement in body for name in _mentioned(statement) if name in local}
     placed: dict[Place, list[str]] = {}
     for name in names:
         placed.setdefault(_home(body, name), []).append(name)
+    _mentioned.cache_clear()
     return placed
 
 
@@ -268,6 +270,7 @@ def stored(nodes: Iterable[ast.AST]) -> Counter[str]:
 def counters_used_elsewhere(body: list[ast.stmt]) -> list[ast.For]:
     """Loops whose counting name is assigned within them, or has another use outside such loops."""
     loops = [node for statement in body for node in ast.walk(statement) if isinstance(node, ast.For)]
+    _mentioned.cache_clear()
     outside = {name for statement in body for name in _mentioned(statement)}
     return [
         loop
@@ -308,8 +311,9 @@ def _only_block(statement: ast.stmt, name: str) -> list[ast.stmt] | None:
     return within[0] if len(within) == 1 and name not in _mentioned(head) else None
 
 
-def _mentioned(node: ast.AST) -> dict[str, None]:
-    """Names in a statement in their order, without those that a `for` in it counts with."""
+@cache
+def _mentioned(node: ast.AST) -> Mapping[str, None]:
+    """Names in a statement in their order, without those that a `for` in it counts with; kept while a tree stays."""
     if isinstance(node, ast.For):
         assert isinstance(node.target, ast.Name)
         inner = {name: None for statement in node.body for name in _mentioned(statement) if name != node.target.id}
