@@ -226,3 +226,8 @@ def test_a_verb_that_drives_a_device_warns_of_an_unsafe_law(only_unsafe):
     for drive in (hs.InverseFeedforward.of, hs.to_c, lambda fit: hs.Actuator.of(fit)):
         with pytest.warns(hs.HysimWarning, match="UNSAFE on smaller cycles"):
             drive(only_unsafe)
+
+
+def test_a_law_of_which_all_coordinates_are_held_is_judged_too(record, unrestricted):
+    fixed = {name: unrestricted.estimates[name] for name in ("A", "beta", "gamma", "n", "z0")}
+    assert "UNSAFE" in str(hs.identify(hs.BoucWen, record, fixed=fixed)).splitlines()[0]

@@ -251,7 +251,8 @@ def _safe_points(search: Search, likely: Sequence[LocalOptimum]) -> FloatArray:
     costs = problem.costs(every)
     ranked = (k for k in np.argsort(costs, kind="stable")[:_N_TRIED] if np.isfinite(costs[k]))
     safe = (every[k] for k in ranked if _is_safe(search, problem.completed(every[[k]])[0]))
-    return np.reshape([*itertools.islice(safe, _N_BEGUN)], (-1, problem.n_x))
+    points = [*itertools.islice(safe, _N_BEGUN)]
+    return np.reshape(points, (len(points), problem.n_x))
 
 
 def _approached(search: Search, x: FloatArray) -> tuple[Search, list[LocalOptimum]] | None:
