@@ -12,11 +12,12 @@ search for first, in two ways:
     continued    of one record, the rest by fits to its first half and to its first three quarters, where these
                  have a complete cycle, until the input leaves the range of the beginning: left-out cycles alone are
                  too kind where a material fades.
-    beyond       likewise, from there on. This counts half, for a law warns beyond the inputs of its record.
+    beyond       likewise, from there on. This counts half, for a law warns beyond the inputs of its record; where the
+                 amplitudes grow throughout, there is no other continuation, and it stands for that, too.
 
 The errors are those of free runs on the inputs as measured. Each kind is taken over the least error of any family, and
-the score of a family is the geometric mean over the kinds. Among those within a tenth of the best, where the noise of
-the outputs hides what is wrong with a family, the BIC decides. The fits of this comparison are short searches; the
+the score of a family is the geometric mean over the kinds. Among those within a twentieth of the best, where the noise
+of the outputs hides what is wrong with a family, the BIC decides. The fits of this comparison are short searches; the
 search of the best one is complete. In a first round each family has one fold of each kind, and those that are clearly
 worse than the best have no second one (as in successive halving: K. Jamieson, A. Talwalkar, AISTATS 2016).
 """
@@ -59,10 +60,11 @@ _EVALUATIONS = 3000  # of a short search: within some per cent of the complete o
 _SAMPLES = 3000  # of all records that a short search has, beside their reversals
 _WORSE = 2.0  # times the best of the first round: a family has no second one
 _COMPLETE = 3  # complete searches at most, until one succeeds
-_EQUAL = 1.1  # times the best score: noise of the outputs may hide the difference
+_EQUAL = 1.05  # times the best score: noise of the outputs may hide the difference
 _MOST_TIED = 6
 _LAST = 1000
 _WEIGHTS = np.array([1.0, 1.0, 0.5])  # of parts left out, continued and beyond
+_ALL_BEYOND = np.array([1.0, 0.0, 1.5])
 _BEYOND = 0.02  # of the range of a beginning: inputs that leave it by more are beyond
 _ROUNDING = 1e-9  # of the outputs' range
 
@@ -366,8 +368,9 @@ def _rms(errors: Sequence[FloatArray]) -> float:
 def _scores(errors: Mapping[str, FloatArray], size: float) -> dict[str, float]:
     """The geometric mean, over the kinds of parts that there are, of the errors over the least of each."""
     table = np.array([*errors.values()]) + _ROUNDING * size  # errors below rounding are equal
-    is_kind = np.isfinite(table).any(axis=0)
+    is_kind = np.any(np.isfinite(table), axis=0, keepdims=True)[0]
     known = np.where(np.isnan(table), np.inf, table)[:, is_kind]
+    weights = _WEIGHTS if is_kind[1] else _ALL_BEYOND
     with np.errstate(over="ignore"):
-        means = np.exp(np.average(np.log(known / known.min(axis=0)), axis=1, weights=_WEIGHTS[is_kind]))
+        means = np.exp(np.average(np.log(known / known.min(axis=0)), axis=1, weights=weights[is_kind]))
     return dict(zip(errors, means.tolist(), strict=True))

@@ -51,7 +51,7 @@ class Choice:
         By family, the geometric mean of these errors over the least of each, of which the last counts half; the best
         first. A family that was clearly worse in the first round has the errors of that.
     bic : mapping
-        The BIC of the families whose scores are within a tenth of the best; the lowest one is chosen.
+        The BIC of the families whose scores are within a twentieth of the best; the lowest one is chosen.
     untried : tuple of str
         Families for which there was no time.
     amplitude : float
@@ -75,7 +75,7 @@ class Choice:
 
     @property
     def undecided(self) -> tuple[str, ...]:
-        """Further families whose scores are within a tenth of the best: parts left out do not tell them apart."""
+        """Further families whose scores are within a twentieth of the best: parts left out do not tell them apart."""
         return tuple(name for name in self.bic if name != self.family)
 
     def __str__(self) -> str:
