@@ -18,7 +18,7 @@ HERE = Path(__file__).parent
 RESULTS = HERE.parent / "experiments" / "results"
 sys.path[:0] = [str(HERE), str(HERE.parent / "experiments")]
 
-from findings import lag_of_equation_1, learning, preisach  # noqa: E402  from experiments
+from findings import lag_of_equation_1, learning, preisach, reversal_curves  # noqa: E402  from experiments
 from front_door import families, write_reference  # noqa: E402  from beside this file
 from gallery import (  # noqa: E402
     EXPLORER,
@@ -190,6 +190,7 @@ myst_substitutions = {
     "found_in_lag_of_equation_1": "\n".join(stored(lag_of_equation_1)),
     "found_in_learning": "\n".join(stored(learning)),
     "found_in_preisach": "\n".join(stored(preisach)),
+    "found_in_reversal_curves": "\n".join(stored(reversal_curves)),
     "benchmark_figure": shown(
         {
             "benchmark_bouc_wen": "Root mean square error on the clean test data "

@@ -816,6 +816,32 @@ def preisach(result: Result) -> list[str]:
     ]
 
 
+def reversal_curves(result: Result) -> list[str]:
+    """Reversal curves that were left out, and their density."""
+    rows = result["rows"]
+    told, measured = ([row for row in rows if ("best_correlation" in row) is known] for known in (True, False))
+    beside = f", against {min(column(measured, 'correlation')):.3f} or more with the polynomial's" if measured else ""
+    return [
+        f"Every fifth curve is predicted with at most {number(result['worst_ratio'], 2)} times the error of a local "
+        "polynomial with a smoothing factor of 3. Simulated curves have two ridges; measured ones are files of a "
+        "magnetometer.",
+        tabled(
+            ("record", "smoothing", "law's error", "polynomial's", "drift"),
+            *(
+                [
+                    row["record"],
+                    f"{row['smoothing']:g}",
+                    *(f"{number(row[f'{kind}_error_percent'], 2)} %" for kind in ("law", "regression")),
+                    f"{number(row['drift_percent'], 2)} %",
+                ]
+                for row in rows
+            ),
+        ),
+        f"The density has a correlation of {min(column(told, 'correlation')):.3f} or more with the true one"
+        f"{beside}. It takes {number(max(column(rows, 'seconds')), 2)} CPU s at most.",
+    ]
+
+
 def dashpot(result: Result) -> list[str]:
     """A damper with and without its dashpot."""
     rows, key = result["rows"], "error_percent"
@@ -1417,7 +1443,7 @@ GROUPS: dict[str, tuple[Finding, ...]] = {
         closed_loop_speed,
         tracking,
     ),
-    "Other families": (extended_plays, preisach, dashpot, friction),
+    "Other families": (extended_plays, preisach, reversal_curves, dashpot, friction),
     "Studies and files": (sweep_study, kill_and_resume, scaling, fuzz),
     "Camera": (registration, virtual_rig),
     "Outside Python": (one_law_everywhere, controllers_in_c, page_redraw),

@@ -260,9 +260,9 @@ def everett_from_curves(
     low, slack, curves = float(record.u.min()), tolerance * float(np.ptp(record.u)), _curves_of(record, tolerance)
     if smoothing is not None:
         points = _Points.of(curves, low)
-        curves = _smooth_curves(points, low, smoothing)
-        top = curves[-1].turn
-        levels = _even(low, top, max(points.spacing, (top - low) / _MOST_SMOOTH)) if levels is None else levels
+        step = max(0.5 * points.spacing, (float(points.a[-1]) - low) / _MOST_SMOOTH)
+        curves = _smooth_curves(points, low, step, smoothing)
+        levels = _even(low, curves[-1].turn, step) if levels is None else levels
     grid = _levels_of(low, curves) if levels is None else read_only(levels, "levels", ndim=1)
     if not grid.size or grid[0] > low + slack:
         raise ValueError(f"levels must begin at the lowest input {low:g} or below, got {grid[:1].tolist()}")
@@ -439,19 +439,20 @@ class _Points(NamedTuple):
         counts = np.bincount(which[known])
         sums = np.array([np.bincount(which[known], each) for each in squares[:, known]])[:, counts > 0]
         means = sums / counts[counts > 0]  # of each curve
-        more = means - means[means.mean(axis=1).argmin()]
+        logs = np.log(means + np.spacing(np.ptp(self.y)) ** 2)
+        more = logs - logs[logs.mean(axis=1).argmin()]
         is_close = more.mean(axis=1) <= more.std(axis=1) / math.sqrt(means.shape[1])
         best = max(np.flatnonzero(is_close), key=lambda k: (_SMOOTHINGS[k][0], _SMOOTHINGS[k][1]))
         return *_SMOOTHINGS[best], float(np.sqrt(means[best].mean()))
 
 
-def _smooth_curves(points: _Points, low: float, smoothing: float | Literal["auto"]) -> list[ReversalCurve]:
-    """Curves of local regression, as close as the measured ones and reaching as far."""
+def _smooth_curves(points: _Points, low: float, step: float, smoothing: float | Literal["auto"]) -> list[ReversalCurve]:
+    """Curves of local regression, so far apart and with such steps, which reach as far as the measured ones."""
     s, g, _ = points.setting(smoothing)
     last, curves = np.flatnonzero(np.diff(points.curve, append=-1)), []
-    for turn in _even(float(points.a[0]), float(points.a[-1]), points.spacing).tolist():
+    for turn in _even(float(points.a[0]), float(points.a[-1]), step).tolist():
         lowest = float(np.interp(turn, points.a[last], points.b[last]))
-        u = _even(min(lowest, turn), turn, points.spacing)[::-1]
+        u = _even(min(lowest, turn), turn, step)[::-1]
         y = points.local(np.full(u.size, turn), u, s, g)[:, 0]
         known = np.isfinite(y)
         if known.sum() > 1 and known[0]:
