@@ -76,9 +76,9 @@ def chosen(
         fewer = [problem.thinned(_MIDDLE) for problem in problems]
         if None not in fewer:
             short, likely = chosen([each for each in fewer if each is not None], seed=seed, progress=progress)
-            whole = next(p for p, few in zip(problems, fewer, strict=True) if few is short)
+            problem = next(p for p, few in zip(problems, fewer, strict=True) if few is short)
             ends = np.array([each.x for each in likely[:N_POLISHED_WHOLE]])
-            return whole, _distinct(polish(whole, ends)) if likely else []
+            return problem, _distinct(polish(problem, ends)) if likely else []
     best: tuple[float, Problem, list[Optimum]] = (math.inf, problems[0], [])
     known: list[Optimum] | None = None
     for problem in problems:
