@@ -50,6 +50,7 @@ FEWEST = 10
 _MOST_LEVELS = 100  # beside turning points
 _MOST_SMOOTH = 240  # levels of smooth curves
 _CLOSEST = 1e-3  # distance of levels, as a fraction of the span
+_TOO_FEW = "the curves are too few or too short for a local regression over the distance of neighbours"
 _EVERY = 5  # curves, of which one is left out
 _TARGETS = 200  # samples of left-out curves at most, of each fifth
 _SMOOTHINGS = [(s, g) for g in (0.0, 0.1) for s in (1.5, 2.0, 3.0, 4.0, 5.0, 7.0, 10.0)]
@@ -131,7 +132,7 @@ class Forc:
         u, y = ((units or {}).get(signal, "") for signal in "uy")
         a, b = self.peak
         smooth = f"{self.smoothing:g}, growing by {self.growth:g}" if self.growth else f"{self.smoothing:g}"
-        share = "" if math.isnan(self.left_out) else f", {100.0 * self.left_out / self.stroke:.2g} % of the stroke"
+        share = f", {100.0 * self.left_out / self.stroke:.2g} % of the stroke" if self.left_out > 0.0 else ""
         return summary_text(
             [f"Forc: {self.n_curves} reversal curves, u of {extent(self.levels, u)}"],
             {
@@ -206,6 +207,8 @@ def forc(record: Record, *, smoothing: float | Literal["auto"] = "auto", toleran
     rows, columns = np.nonzero(np.tril(levels >= reaches[:, np.newaxis] - slack))
     tables = np.full((2, levels.size, levels.size), np.nan)
     tables[:, rows, columns] = points.local(levels[rows], levels[columns], s, g)[:, 1:].T
+    if not np.isfinite(tables[0]).any():
+        raise ValueError(_TOO_FEW)
     if rises:
         levels, tables = -levels[::-1], tables[:, ::-1, ::-1].transpose(0, 2, 1)
     return Forc(
@@ -383,7 +386,8 @@ class _Points(NamedTuple):
     def local(self, a: FloatArray, b: FloatArray, smoothing: float, growth: float) -> FloatArray:
         """Outputs, densities and their standard errors (n, 3) at thresholds (n,); nan where samples are too few."""
         reaches = (smoothing + 1.0 + growth * (a - b) / (2.0 * self.spacing)) * self.spacing
-        return np.array([self._around(*each) for each in zip(a.tolist(), b.tolist(), reaches.tolist(), strict=True)])
+        found = [self._around(*each) for each in zip(a.tolist(), b.tolist(), reaches.tolist(), strict=True)]
+        return np.reshape(found, (len(found), 3))
 
     def _around(self, a: float, b: float, reach: float) -> tuple[float, float, float]:
         """As `local`, at one point; with a larger reach where the samples around do not determine the regression."""
@@ -423,7 +427,10 @@ class _Points(NamedTuple):
         """Smoothing, growth, and the rms error at curves left out; nan where it was not asked for."""
         if smoothing == "auto":
             return self._chosen()
-        check_positive(smoothing=smoothing)
+        try:
+            check_positive(smoothing=smoothing)
+        except TypeError:
+            raise ValueError(f'smoothing must be a number or "auto", got {smoothing!r}') from None
         return smoothing, 0.0, math.nan
 
     def _chosen(self) -> tuple[float, float, float]:
@@ -439,7 +446,7 @@ class _Points(NamedTuple):
         counts = np.bincount(which[known])
         sums = np.array([np.bincount(which[known], each) for each in squares[:, known]])[:, counts > 0]
         means = sums / counts[counts > 0]  # of each curve
-        logs = np.log(means + np.spacing(np.ptp(self.y)) ** 2)
+        logs = np.log(means + max(np.spacing(np.ptp(self.y)) ** 2, np.finfo(float).tiny))
         more = logs - logs[logs.mean(axis=1).argmin()]
         is_close = more.mean(axis=1) <= more.std(axis=1) / math.sqrt(means.shape[1])
         best = max(np.flatnonzero(is_close), key=lambda k: (_SMOOTHINGS[k][0], _SMOOTHINGS[k][1]))
@@ -460,7 +467,7 @@ def _smooth_curves(points: _Points, low: float, step: float, smoothing: float | 
             u, y = np.append(u[known], [] if has_end else low), np.append(y[known], [] if has_end else points.base)
             curves.append(ReversalCurve(Record(u=u, y=y), None))
     if not curves:
-        raise ValueError("the curves are too few for a local regression: leave out smoothing")
+        raise ValueError(_TOO_FEW)
     return curves
 
 
