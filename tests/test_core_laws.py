@@ -340,7 +340,7 @@ def test_cells_are_found_with_their_field():
 @pytest.mark.parametrize("sign", [1.0, -1.0])
 def test_cells_that_are_identified_on_a_core_driven_by_its_flux_have_an_inverse(sign):
     """Weights of both signs fit the corners of the noisy loop a little better."""
-    core, flux = hs.JilesAtherton(), 0.3 * np.sin(np.linspace(0.0, 6.0 * np.pi, 301))
+    core, flux = hs.JilesAtherton(), 0.3 * np.sin(np.linspace(0.0, 6.0 * np.pi, 151))
     field = core.inverse_response(flux)
     u = field + 1e-3 * np.ptp(field) * np.random.default_rng(0).standard_normal(field.size)
     cells = hs.identify(hs.EnergyPlays.structure(plays=8), hs.Record(u=u, y=sign * flux)).model

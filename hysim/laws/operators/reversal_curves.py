@@ -386,8 +386,8 @@ class _Points(NamedTuple):
     def local(self, a: FloatArray, b: FloatArray, smoothing: float, growth: float) -> FloatArray:
         """Outputs, densities and their standard errors (n, 3) at thresholds (n,); nan where samples are too few."""
         reaches = (smoothing + 1.0 + growth * (a - b) / (2.0 * self.spacing)) * self.spacing
-        found = [self._around(*each) for each in zip(a.tolist(), b.tolist(), reaches.tolist(), strict=True)]
-        return np.reshape(found, (len(found), 3))
+        rows = [self._around(*each) for each in zip(a.tolist(), b.tolist(), reaches.tolist(), strict=True)]
+        return np.reshape(rows, (len(rows), 3))
 
     def _around(self, a: float, b: float, reach: float) -> tuple[float, float, float]:
         """As `local`, at one point; with a larger reach where the samples around do not determine the regression."""
