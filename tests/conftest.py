@@ -32,6 +32,7 @@ compiled = [path for room in ("kernels", "laws") for path in sorted((ROOT / "hys
 kernels = b"".join(path.read_bytes() for path in [*compiled, ROOT / "hysim" / "models" / "slope.py"])
 os.environ.setdefault("NUMBA_CACHE_DIR", str(ROOT / ".numba_cache" / hashlib.sha256(kernels).hexdigest()[:16]))
 os.environ.setdefault("MPLBACKEND", "agg")
+os.environ.setdefault("NUMBA_OPT", "1")  # the same bits and speed; the first circle takes a twentieth less, to compile
 # Workers of the tests share the cores: threads of a BLAS that wait for each other would take most of the time.
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 # Some thirty tests start a Python of their own, which without bytecode would compile every module anew.
