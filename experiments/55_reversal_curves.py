@@ -125,7 +125,7 @@ def main(smoke: bool = False, folder: Path | None = None) -> list[Row]:
         "worst_ratio": max(each["ratio"] for each in rows),
         "least_correlation": min(each["correlation"] for each in rows),
     }
-    return write_results(RESULTS, rows, lambda _: draw(simulated(NOISES[-1], CURVES)), worst)
+    return write_results(RESULTS, rows, lambda _: draw(simulated(NOISES[-1], 24)), worst)
 
 
 def draw(record: hs.Record) -> Figure:
