@@ -45,9 +45,9 @@ def test_a_polynomial_of_the_second_degree_is_met_to_rounding():
     turn = np.maximum.accumulate(U)  # of each fall; a rise to a turning point passes no curve
     rises = np.append(np.diff(U) > 0.0, False)
     y = 3.0 * (1.0 + np.where(rises, U, turn)) * (1.0 + U)
-    diagram = hs.forc(hs.Record(u=U, y=y), smoothing=2.0)
-    known = np.isfinite(diagram.density)
-    np.testing.assert_allclose(diagram.density[known], np.full(known.sum(), 1.5), atol=1e-9)
+    known = np.isfinite((diagram := hs.forc(hs.Record(u=U, y=y), smoothing=2.0)).density)
+    expected = np.outer([1.5, 0.0], np.ones(known.sum()))
+    np.testing.assert_allclose([diagram.density[known], diagram.stderr[known]], expected, atol=1e-9)
 
 
 def test_curves_that_rise_have_the_density_of_the_record_turned():
