@@ -13,7 +13,7 @@ beside each other, of the same family:
 
 A case is reached if no other has less than 99 % of the default's sum of squares, or if the default's law has fewer
 parameters and a BIC that is no higher: a default call may leave out what the record does not show. Each case is stored
-as it is done, and `python experiments/35_simulated_twins.py resume` goes on after those that are stored.
+as it is done, and a run that was ended early is continued by the next one.
 """
 
 import sys
@@ -30,7 +30,7 @@ from hysim.plot import Figure
 sys.path.insert(0, str(Path(__file__).parent))
 import random_starts as starts
 from random_starts import Box
-from results_folder import append_lines, median_and_worst, stored_lines, wall_timed, write_results
+from results_folder import median_and_worst, stored_cases, wall_timed, write_results
 
 RESULTS = Path(__file__).parent / "results" / "simulated_twins"
 N_SEEDS = 19
@@ -263,26 +263,13 @@ def case(device: str, seed: int) -> Row:
     }
 
 
-def main(smoke: bool = False, resume: bool = False) -> list[Row]:
+def main(smoke: bool = False) -> list[Row]:
     """Run all cases, store each as it is done, print, and write table, figure and result."""
     if smoke:
         return [case("bearing", 0)]
-    stored = RESULTS / "cases.jsonl"
-    rows = stored_lines(stored) if resume else []
-    RESULTS.mkdir(parents=True, exist_ok=True)
-    if not rows:
-        stored.unlink(missing_ok=True)
-    done = {(row["device"], row["seed"]) for row in rows}
-    for device, seed in ((device, seed) for seed in range(N_SEEDS) for device in DEVICES):
-        if (device, seed) in done:
-            continue
-        rows.append(case(device, seed))
-        print(line_of(rows[-1]), flush=True)
-        append_lines(stored, rows[-1])
-    rows.sort(key=lambda row: (row["seed"], list(DEVICES).index(row["device"])))
-    write_results(RESULTS, rows, draw, summary(rows))
-    stored.unlink()
-    return rows
+    keys = {(device, seed): (device, seed) for seed in range(N_SEEDS) for device in DEVICES}
+    rows = stored_cases(RESULTS, ("device", "seed"), keys, lambda key: case(*key), line_of)
+    return write_results(RESULTS, rows, draw, summary(rows))
 
 
 def line_of(row: Row) -> str:
@@ -324,4 +311,4 @@ def draw(rows: list[Row]) -> Figure:
 
 
 if __name__ == "__main__":
-    main(resume="resume" in sys.argv[1:])
+    main()

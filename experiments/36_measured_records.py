@@ -14,10 +14,9 @@ that suit it. Sums of squares stand beside each other, of the same family:
 
 No truth is known. Whether a case is reached is judged as in experiment 35: no other method has less than 99 % of the
 default's sum of squares, or the default's law has fewer parameters and a BIC that is no higher. All seconds are those
-of the processor. Each case is stored as it is done, and `resume` adds those that are not stored yet;
-`report` writes the results of those that are:
+of the processor. Each case is stored as it is done, and a run that was ended early is continued by the next one:
 
-    python experiments/36_measured_records.py FOLDER [resume | report]
+    python experiments/36_measured_records.py FOLDER
 """
 
 import sys
@@ -35,7 +34,7 @@ sys.path.insert(0, str(Path(__file__).parent))
 import random_starts as starts
 from measured_cores import AMPLITUDES, column, core_loops
 from random_starts import Box
-from results_folder import append_lines, median_and_worst, stored_lines, stored_result, write_results
+from results_folder import cpu_timed, median_and_worst, stored_cases, write_results
 
 RESULTS = Path(__file__).parent / "results" / "measured_records"
 LONGEST = 10.0  # seconds of the random starts of a case
@@ -143,36 +142,23 @@ def case(device: str, record: hs.Record, family: str, seed: int = 0) -> Row:
     }
 
 
-def main(smoke: bool = False, folder: Path | None = None, resume: bool = False, only_report: bool = False) -> list[Row]:
+def main(smoke: bool = False, folder: Path | None = None) -> list[Row]:
     """Run all cases, store each as it is done, print, and write table, figure and result."""
     if smoke or folder is None:
         device, record, families = stand_in()
         return [case(device, record, families[0])]
-    stored = RESULTS / "cases.jsonl"
-    rows = stored_rows(stored) if resume or only_report else []
-    stored.unlink(missing_ok=True)
-    RESULTS.mkdir(parents=True, exist_ok=True)
-    append_lines(stored, *rows)
-    done = {(row["device"], row["record"], row["family"]) for row in rows}
-    cases = [(device, record, family) for device, record, families in measured(folder) for family in families]
-    missing = [
-        (device, record, family) for device, record, family in cases if (device, record.name, family) not in done
-    ]
-    for device, record, family in () if only_report else missing:
-        begin = time.process_time()
-        rows.append({**case(device, record, family), "total_seconds": time.process_time() - begin})
-        print(line_of(rows[-1]), flush=True)
-        append_lines(stored, rows[-1])
-    left_out = dict.fromkeys(f"{device} {record.name}" for device, record, _ in missing) if only_report else {}
-    numbers = {**summary(rows), "cases_left_out": len(cases) - len(rows), "records_left_out": list(left_out)}
-    write_results(RESULTS, rows, draw, numbers)
-    stored.unlink()
-    return rows
+    cases = {
+        (device, record.name, family): (device, record, family)
+        for device, record, families in measured(folder)
+        for family in families
+    }
+    rows = stored_cases(RESULTS, ("device", "record", "family"), cases, timed_case, line_of)
+    return write_results(RESULTS, rows, draw, summary(rows))
 
 
-def stored_rows(stored: Path) -> list[Row]:
-    """Cases of a run that was stopped, or else of the last one that ended."""
-    return stored_lines(stored) if stored.exists() else stored_result(RESULTS).get("rows", [])
+def timed_case(arguments: tuple[str, hs.Record, str]) -> Row:
+    row, seconds = cpu_timed(case, *arguments)
+    return {**row, "total_seconds": seconds}
 
 
 def line_of(row: Row) -> str:
@@ -229,6 +215,4 @@ def draw(rows: list[Row]) -> Figure:
 
 
 if __name__ == "__main__":
-    if len(sys.argv) < 2:
-        raise SystemExit("usage: python experiments/36_measured_records.py FOLDER [resume | report]")
-    main(folder=Path(sys.argv[1]), resume="resume" in sys.argv[2:], only_report="report" in sys.argv[2:])
+    main(folder=Path(sys.argv[1]))

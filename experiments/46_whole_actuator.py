@@ -11,7 +11,7 @@ no record holds, is predicted; its error is that against the true displacement, 
 Beside it stand, on the first draws, the law alone, identified on all records, and the law with a transfer function of
 two poles and a delay behind it, identified on the steps, the one record that shows a mode.
 
-    python experiments/46_whole_actuator.py [CASES.jsonl]    with a file, its cases are kept and others are added to it
+    python experiments/46_whole_actuator.py    continues a run that was ended early
 """
 
 import sys
@@ -26,7 +26,7 @@ import hysim as hs
 from hysim.plot import Figure, figure
 
 sys.path.insert(0, str(Path(__file__).parent))
-from results_folder import append_lines, median_and_worst, stored_lines, write_results
+from results_folder import median_and_worst, stored_cases, write_results
 from simulated_stages import RANGE, STRUCTURE, drawn_law, noise_of, record
 
 RESULTS = Path(__file__).parent / "results" / "whole_actuator"
@@ -141,16 +141,12 @@ def case(draw: int, model: str) -> Row:
     }  # fmt: skip
 
 
-def computed(file: Path | None) -> list[Row]:
-    """All cases, each stored in the file as soon as it is known; all whole actuators first."""
-    known = {(row["draw"], row["model"]): row for row in stored_lines(file)}
-    for model, n in ((WHOLE, N_DRAWS), (ALONE, N_OF_ALONE), (CASCADE, N_OF_CASCADE)):
-        for draw in range(n):
-            if (draw, model) not in known:
-                known[draw, model] = case(draw, model)
-                print(draw, model, known[draw, model]["error_in_noise"], flush=True)
-                append_lines(file, known[draw, model])
-    return [known[key] for key in sorted(known)]
+def computed() -> list[Row]:
+    """All cases, all whole actuators first."""
+    counts = ((WHOLE, N_DRAWS), (ALONE, N_OF_ALONE), (CASCADE, N_OF_CASCADE))
+    keys = {(draw, model): (draw, model) for model, n in counts for draw in range(n)}
+    rows = stored_cases(RESULTS, ("draw", "model"), keys, lambda key: case(*key))
+    return sorted(rows, key=lambda row: (row["draw"], row["model"]))
 
 
 # ---------------------------------------------------------------------------------- results
@@ -187,14 +183,14 @@ def coverage(cases: list[Row]) -> dict[str, Any]:
     }
 
 
-def main(smoke: bool = False, file: Path | None = None) -> list[Row]:
+def main(smoke: bool = False) -> list[Row]:
     """Measure, and unless it is a smoke run write table, figure and JSON."""
     if smoke:
         truth, structure, records, _ = stage(1)
         subject = hs.Actuator.structure(structure, creep=False, sensor=hs.Sensor(quantum=truth.sensor.quantum))
         fit = hs.identify(subject, [records[0][:1500:3], records[1][:800]], noise="gaussian")
         return [{"model": WHOLE, "fit_percent": fit.fit_percent}]
-    cases = computed(file)
+    cases = computed()
     rows = [summary(cases, model) for model in (WHOLE, CASCADE, ALONE)]
     numbers = coverage(cases)
     write_results(RESULTS, rows, lambda _: draw(cases), numbers)
@@ -224,4 +220,4 @@ def draw(cases: list[Row]) -> Figure:
 
 
 if __name__ == "__main__":
-    main(file=Path(sys.argv[1]) if len(sys.argv) > 1 else None)
+    main()

@@ -14,7 +14,7 @@ are given in units of the standard errors that are expected with the designed in
 expected with the record's own input: both from differences of whole responses. A further record, which no fit sees, is
 predicted: a sine of 17 Hz, then steps held for 0.1 s; its error is in units of the sensor's noise.
 
-    python experiments/51_design.py [CASES.jsonl]    with a file, its cases are kept and others are added to it
+    python experiments/51_design.py    continues a run that was ended early
 """
 
 import sys
@@ -29,7 +29,7 @@ import hysim as hs
 from hysim.plot import Figure, figure
 
 sys.path.insert(0, str(Path(__file__).parent))
-from results_folder import append_lines, median_and_worst, stored_lines, write_results
+from results_folder import median_and_worst, stored_cases, write_results
 from simulated_stages import RANGE, STRUCTURE, drawn_law, noise_of, record
 
 RESULTS = Path(__file__).parent / "results" / "design"
@@ -179,16 +179,14 @@ def cases(draw: int, inputs: dict[str, np.ndarray], design_seconds: float) -> li
     return rows
 
 
-def computed(file: Path | None) -> list[Row]:
-    """All cases, those of a draw stored in the file as soon as they are known."""
-    known = stored_lines(file)
-    for draw in range(N_DRAWS):
-        if all(row["draw"] != draw for row in known):
-            found = cases(draw, *designs(draw))
-            known += found
-            print(draw, {row["input"]: round(row["error_in_noise"], 3) for row in found}, flush=True)
-            append_lines(file, *found)
-    return known
+def computed() -> list[Row]:
+    """All cases."""
+
+    def of_draw(draw: int) -> Row:
+        return {"draw": draw, "rows": cases(draw, *designs(draw))}
+
+    draws = stored_cases(RESULTS, ("draw",), {(draw,): draw for draw in range(N_DRAWS)}, of_draw)
+    return [row for each in draws for row in each["rows"]]
 
 
 # ---------------------------------------------------------------------------------- results
@@ -215,7 +213,7 @@ def summary(rows: list[Row], name: str) -> Row:
     }
 
 
-def main(smoke: bool = False, file: Path | None = None) -> list[Row]:
+def main(smoke: bool = False) -> list[Row]:
     """Measure, and unless it is a smoke run write table, figure and JSON."""
     if smoke:
         limits = replace(LIMITS, duration=0.2)
@@ -224,7 +222,7 @@ def main(smoke: bool = False, file: Path | None = None) -> list[Row]:
             structure_of(truth, truth.hysteresis), limits=limits, values=parts, free=FREE, candidates=5, moves=2
         )
         return [{"input": name, "efficiency": value} for name, value in design.efficiency.items()]
-    rows = computed(file)
+    rows = computed()
     table = [summary(rows, name) for name in INPUTS]
     inputs, _ = designs(0)
     seconds = float(np.median([row["design_cpu_seconds"] for row in rows]))
@@ -261,4 +259,4 @@ def draw(rows: list[Row], inputs: dict[str, np.ndarray]) -> Figure:
 
 
 if __name__ == "__main__":
-    main(file=Path(sys.argv[1]) if len(sys.argv) > 1 else None)
+    main()

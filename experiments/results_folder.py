@@ -14,6 +14,7 @@ import hysim as hs
 from hysim.plot import Figure, figure, house_style, save_svg
 
 PIXEL = hs.datasets.PIXEL  # um, of the paper's camera
+CASES = "cases.jsonl"
 
 Row = TypeVar("Row", bound=Mapping[str, Any])
 T = TypeVar("T")
@@ -48,6 +49,7 @@ def write_results(
     for name, value in numbers.items():
         print(name, value)
     write_files(folder, rows, draw, numbers)
+    (folder / CASES).unlink(missing_ok=True)
     return rows
 
 
@@ -83,6 +85,28 @@ def append_lines(file: Path | None, *rows: Mapping[str, Any]) -> None:
     if file is not None:
         with file.open("a", encoding="utf-8") as lines:
             lines.writelines(json.dumps(row, allow_nan=False) + "\n" for row in rows)
+
+
+def stored_cases(
+    folder: Path,
+    columns: tuple[str, ...],
+    cases: Mapping[tuple[Any, ...], Any],
+    measure: Callable[[Any], dict[str, Any]],
+    line_of: Callable[[dict[str, Any]], Any] = str,
+    mapped: Callable[..., Iterable[Any]] = map,
+) -> list[dict[str, Any]]:
+    """The row of each case, printed and stored as soon as it is measured; its key is what the row has in `columns`.
+
+    A run that is ended early is continued by the next one: `write_results` removes what is stored.
+    """
+    folder.mkdir(parents=True, exist_ok=True)
+    rows = {tuple(row[name] for name in columns): row for row in stored_lines(folder / CASES)}
+    missing = [key for key in cases if key not in rows]
+    for key, row in zip(missing, mapped(measure, [cases[key] for key in missing]), strict=True):
+        print(line_of(row), flush=True)
+        append_lines(folder / CASES, row)
+        rows[key] = row
+    return [rows[key] for key in cases]
 
 
 def median_and_worst(name: str, values: Iterable[float]) -> dict[str, float]:
