@@ -10,6 +10,7 @@ import signal
 import sqlite3
 import subprocess
 import sys
+import time
 
 import numpy as np
 import pytest
@@ -99,6 +100,78 @@ def test_a_killed_study_goes_on_and_loses_nothing(path, uninterrupted):
         assert n_done <= len(hs.load_sweep(path)) < len(uninterrupted)
     resumed = hs.sweep(sweep_tasks.long, sweep_tasks.LONG, workers=2, store=path)
     assert bits(resumed) == bits(uninterrupted) == bits(hs.load_sweep(path))
+
+
+def shards(folder, task, space, n, **options):
+    """The stores of all shards of a study, each computed without the others."""
+    stores = [folder / f"{k}.sqlite" for k in range(n)]
+    for k, store in enumerate(stores):
+        hs.sweep(task, space, store=store, shard=(k, n), **options)
+    return stores
+
+
+@pytest.mark.parametrize("n", [1, 7, 130])
+@pytest.mark.parametrize(("task", "space"), [(sweep_tasks.noisy, sweep_tasks.SPACE), (sweep_tasks.failing, GRID)])
+def test_merged_shards_are_the_study_that_nobody_divided(task, space, n, path, tmp_path):
+    stores = shards(tmp_path, task, space, n, seed=1)
+    sizes = [len(hs.load_sweep(store)) for store in stores]
+    whole = hs.sweep(task, space, seed=1)
+    assert max(sizes) - min(sizes) <= 1
+    assert sum(sizes) == len(whole)
+    rng = np.random.default_rng(n)
+    merged = hs.sweep(task, space, seed=1, store=path, merge=rng.permutation(stores), time_limit=0.0)
+    assert bits(merged) == bits(whole) == bits(hs.load_sweep(path))
+
+
+def test_what_a_shard_lacks_is_computed_by_whoever_merges(path, tmp_path):
+    first, _, last = shards(tmp_path, sweep_tasks.noisy, sweep_tasks.SPACE, 3)
+    part = hs.sweep(sweep_tasks.noisy, sweep_tasks.SPACE, merge=[first, last], time_limit=0.0)
+    assert part.task.tolist() == [*range(40), *range(80, 120)]
+    assert part["a"].tolist() == hs.load_sweep(first)["a"].tolist() + hs.load_sweep(last)["a"].tolist()
+    whole = hs.sweep(sweep_tasks.noisy, sweep_tasks.SPACE, store=path, merge=[first, last])
+    assert bits(whole) == bits(hs.sweep(sweep_tasks.noisy, sweep_tasks.SPACE))
+
+
+def test_a_time_limit_ends_at_a_chunk_and_the_next_call_goes_on(path):
+    def slow(a, b):
+        time.sleep(0.01)
+        return a * b
+
+    space = {"a": range(50), "b": [1.0, 2.0]}
+    first = hs.sweep(slow, space, store=path, workers=1, time_limit=0.3)
+    assert 0 < len(first) < 100
+    assert bits(first) == bits(hs.load_sweep(path))
+    assert bits(hs.sweep(slow, space, store=path)) == bits(hs.sweep(sweep_tasks.product, space))
+
+
+@pytest.mark.parametrize(
+    ("task", "options", "words"),
+    [
+        (lambda a, b: a * b, {}, "another study: the task's source .* leave it out"),
+        (sweep_tasks.product, {"seed": 1}, "another study: the seed was 1 and is 0; leave it out"),
+        (lambda a, b: a * b + 1.0, {"on_change": "keep"}, "outputs of task 0 are others than those of a store"),
+        (
+            lambda a, b: {"x": a},
+            {"on_change": "keep"},
+            "returned the number x, those before the number value",
+        ),
+    ],
+)
+def test_stores_that_contradict_each_other_are_not_merged(task, options, words, path, tmp_path):
+    kept = hs.sweep(sweep_tasks.product, GRID, store=path)
+    hs.sweep(task, GRID, store=tmp_path / "other.sqlite", seed=options.get("seed", 0))
+    with pytest.raises(ValueError, match=rf"other.sqlite.*{words}"):
+        hs.sweep(sweep_tasks.product, GRID, store=path, merge=[tmp_path / "other.sqlite"], **options | {"seed": 0})
+    assert bits(hs.load_sweep(path)) == bits(kept)
+
+
+@pytest.mark.parametrize(
+    ("shard", "words"),
+    [((3, 3), "shards are counted from 0: of 3 the last is 2, got 3"), ((-1, 3), "negative"), ((0, 0), "at least 1")],
+)
+def test_a_shard_that_there_is_not_is_refused(shard, words):
+    with pytest.raises(ValueError, match=words):
+        hs.sweep(sweep_tasks.product, GRID, shard=shard)
 
 
 def test_an_interrupt_keeps_what_is_finished(path, uninterrupted):

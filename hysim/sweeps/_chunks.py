@@ -150,7 +150,7 @@ class Table:
             if layout and not self.layout:
                 self.begin(layout)
             if layout and layout != self.layout:
-                first, other = _shown(self.layout), _shown(layout)
+                first, other = shown(self.layout), shown(layout)
                 error = f"ValueError: the task returned {other}, where the first that succeeded returned {first}"
                 part = part._replace(errors=[error] * part.places.size, outputs={})
             if part.errors:
@@ -163,12 +163,23 @@ class Table:
             entered.append(part._replace(outputs=outputs))
         return entered
 
+    def rows(self, which: npt.NDArray[np.bool_]) -> list[Rows]:
+        """The rows of these tasks, which are done: those that succeeded, and those that failed."""
+        failed = np.array([*self.errors], dtype=np.int64)
+        failed, fine = failed[which[failed]], np.setdiff1d(np.flatnonzero(which), failed)
+        outputs = {name: column[fine] for name, column in self.values.items()}
+        errors = [self.errors[k] for k in failed.tolist()]
+        groups = Rows(fine, self.seconds[fine], [], outputs), Rows(failed, self.seconds[failed], errors, {})
+        return [each for each in groups if each.places.size]
 
-def _shown(layout: Layout) -> str:
+
+def shown(layout: Layout) -> str:
+    """A layout in words."""
     return ", ".join(f"{name} of shape {shape}" if shape else f"the number {name}" for name, shape in layout.items())
 
 
 _WORD = 0xFFFFFFFF
+_BLOCK = 50_000  # seeds at a time, so that the memory of a long study is that of its columns
 
 
 def seeds(seed: int | np.integer[Any], places: npt.NDArray[np.int64]) -> npt.NDArray[np.int64]:
@@ -176,7 +187,12 @@ def seeds(seed: int | np.integer[Any], places: npt.NDArray[np.int64]) -> npt.NDA
     check_whole(int(seed) if isinstance(seed, np.integer) else seed, "seed", least=0)
     calls = 4 * max(4, -(-int(seed).bit_length() // 32))  # of the hash for the words of the seed, four of its pool
     pool = np.random.SeedSequence(int(seed)).pool.tolist()
-    own = [_hashed(places.astype(np.uint64), 0x43B0D7E5, 0x931E8875, calls + k) for k in (0, 1)]
+    blocks = np.array_split(places.astype(np.uint64), 1 + places.size // _BLOCK)
+    return np.concatenate([_seeds(pool, block, calls) for block in blocks])
+
+
+def _seeds(pool: list[int], places: npt.NDArray[np.uint64], calls: int) -> npt.NDArray[np.int64]:
+    own = [_hashed(places, 0x43B0D7E5, 0x931E8875, calls + k) for k in (0, 1)]
     low, high = (_hashed(_mixed(pool[k], own[k]), 0x8B51F9DD, 0x58F38DED, k) for k in (0, 1))
     return np.asarray((high << 32 | low) >> 1, dtype=np.int64)
 

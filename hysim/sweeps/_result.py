@@ -173,20 +173,23 @@ def load_sweep(path: str | Path) -> Sweep:
 
 
 def result_of(table: Table, space: Space, task_seeds: Column) -> Sweep:
-    """The rows of the tasks that are done, with their parameters and seeds, shape (n,)."""
+    """The rows of the tasks that are done, with the parameters and seeds of these or of all tasks."""
     places = np.flatnonzero(table.done)
-    values = {name: column[places] for name, column in table.values.items()}
-    for column in values.values():
-        column[np.isnan(column)] = np.nan  # all of the same bits
-    for column in (places, task_seeds, *space.columns.values(), *values.values()):
-        column.setflags(write=False)
+
+    def done(column: Column) -> Column:
+        part: Column = column if len(column) == places.size else column[places]
+        part.setflags(write=False)
+        return part
+
+    places.setflags(write=False)
+    values = {name: done(column) for name, column in table.values.items()}
     return Sweep(
-        parameters=space.columns,
+        parameters={name: done(column) for name, column in space.columns.items()},
         outputs={name: column for name, column in values.items() if column.ndim == 1},
         arrays={name: column for name, column in values.items() if column.ndim > 1},
         task=places,
-        seed=task_seeds,
-        seconds=table.seconds[places],
+        seed=done(task_seeds),
+        seconds=done(table.seconds),
         errors=dict(sorted(table.errors.items())),
         n_tasks=table.done.size,
         axes=space.axes,

@@ -169,7 +169,7 @@ class Store:
         self._tasks = [seeds, *space.columns.values()]
         self._database.execute("BEGIN IMMEDIATE")
         before = self._read()
-        if before is not None and self._is_continued(before.identity, identity, on_change):
+        if before is not None and self._is_continued(identity, on_change):
             self._remember(before._replace(identity=identity))
         else:
             for path in self._files():
@@ -178,7 +178,7 @@ class Store:
                     raise ValueError(message)
             self._create(identity, space, before)
         self._commit()
-        named = {*self._column("shard")}
+        named = self._shards()
         for path in self._files():  # those of a transaction that failed, or of the study that was replaced
             name = re.sub(r"^\.(.*\.npz)\.[0-9a-f]{16}$", r"\1", path.name)  # without what it has during writing
             if path.name not in named and any(study.has(name) for study in (self.study, before or self.study)):
@@ -190,30 +190,29 @@ class Store:
             kinds = {name: _KINDS[kind] for name, kind in self.study.kinds.items()}
             axes: dict[str, Column] = {name: np.array(values, kinds[name]) for name, values in self.study.axes or ()}
             parameters = self.study.parameters.items()
-            columns: dict[str, Column] = {name: np.array(self._filled(c), kinds[name]) for name, c in parameters}
+            columns: dict[str, Column] = {name: self._column(c, kinds[name]) for name, c in parameters}
         return Space(columns, axes or None)
 
     def restore(self, table: Table) -> None:
         """Enter the rows of the store into the table of its study."""
         with damage_named(self.path):
             table.begin(self.study.shapes)
-            places = np.array(self._column("task"), dtype=np.int64)
+            places = self._column("task", np.int64)
             if (outside := places[(places < 0) | (places >= table.done.size)]).size:
                 raise ValueError(f"it has a row of the task {outside[0]}")
-            errors = dict(zip(places.tolist(), self._column("error"), strict=True))
-            table.errors = {place: str(error) for place, error in errors.items() if error is not None}
-            table.seconds[places] = np.array(self._filled("seconds"), dtype=float)
-            table.done[places] = True
+            failed = self._database.execute("SELECT task, error FROM results WHERE error IS NOT NULL ORDER BY task")
+            table.errors = {place: str(error) for place, error in failed}
+            table.seconds[places], table.done[places] = self._column("seconds", np.float64), True
             for name, column in self.study.numbers.items():
-                table.values[name][places] = np.array(self._column(column), dtype=float)
+                table.values[name][places] = self._column(column, np.float64, math.nan)
             arrays = {name: table.values[name] for name, shape in self.study.shapes.items() if shape}
             if arrays:
-                self._restore_arrays(arrays, errors.keys() - table.errors.keys())
+                self._restore_arrays(arrays, {*places.tolist()} - table.errors.keys())
 
     def _restore_arrays(self, arrays: Mapping[str, Column], missing: set[int]) -> None:
         """Fill in the arrays of the tasks at the missing places, from the shards that hold them."""
         known = {*missing}
-        for shard in sorted({name for name in self._column("shard") if name}):
+        for shard in sorted(self._shards()):
             with open(self._shard(shard), "rb") as raw, np.load(raw, allow_pickle=False) as file:
                 tasks = file["task"]
                 if not known.issuperset(tasks.tolist()):
@@ -270,14 +269,16 @@ class Store:
         self._facts = facts
         return facts
 
-    def _is_continued(self, before: Mapping[str, str], now: Mapping[str, str], on_change: OnChange) -> bool:
-        changes = _changes(before, now)
+    def changes(self, now: Mapping[str, str], on_change: OnChange) -> dict[str, str]:
+        """What differs from the study in the store, in words, but for what is to be kept."""
+        changes = _changes(self.study.identity, now)
+        return {} if on_change == "keep" and not {"space", "seed"} & changes.keys() else changes
+
+    def _is_continued(self, now: Mapping[str, str], on_change: OnChange) -> bool:
+        changes = self.changes(now, on_change)
         if not changes or on_change == "restart":
             return not changes
-        has_same_tasks = not {"space", "seed"} & changes.keys()
-        if on_change == "keep" and has_same_tasks:
-            return True
-        keep = 'on_change="keep" to keep the finished rows and go on, or ' if has_same_tasks else ""
+        keep = "" if {"space", "seed"} & changes.keys() else 'on_change="keep" to keep the finished rows and go on, or '
         raise ValueError(
             f"{self.path} holds another study: {'; '.join(changes.values())}. Pass another store, or {keep}"
             'on_change="restart" to begin again'
@@ -307,15 +308,20 @@ class Store:
         self._database.executemany("INSERT OR REPLACE INTO study VALUES (?, ?)", facts)
         self._facts = study
 
-    def _filled(self, name: str) -> list[Any]:
-        """A column in which each row must have a value; in outputs NULL is nan, which SQLite does not know."""
-        values = self._column(name)
-        if None in values:
-            raise ValueError(f"a row has no {name!r}")
-        return values
+    def _shards(self) -> set[str]:
+        """Names of the files with the arrays of the rows."""
+        return {name for (name,) in self._database.execute("SELECT DISTINCT shard FROM results") if name}
 
-    def _column(self, name: str) -> list[Any]:
-        return [value for (value,) in self._database.execute(f"SELECT {_quoted([name])} FROM results ORDER BY task")]
+    def _column(self, name: str, kind: Any, empty: float | None = None) -> Column:
+        """Values of the rows; ValueError for a row without one, but that NULL is nan in outputs."""
+        cells = self._cells(name, empty)
+        return np.array([*cells], kind) if kind is np.str_ else np.fromiter(cells, kind)
+
+    def _cells(self, name: str, empty: float | None) -> Iterator[Any]:
+        for (cell,) in self._database.execute(f"SELECT {_quoted([name])} FROM results ORDER BY task"):
+            if cell is None and empty is None:
+                raise ValueError(f"a row has no {name!r}")
+            yield empty if cell is None else cell
 
     def _commit(self) -> None:
         self._database.execute("COMMIT")

@@ -1,8 +1,12 @@
 """The verb `sweep`: one function over many parameters, on threads, processes or a cluster, and resumable.
 
 Tasks are sent in chunks. The first chunk is one task; chunks grow at most fourfold, until one takes `_CHUNK`, so that
-sending, about a millisecond, costs little; at the end they shrink so that all workers end together. Finished chunks are
-written before they are reported. No result depends on the division into chunks.
+sending, about a millisecond, costs little; at the end they shrink so that all workers end together. Where the process
+that sends them would be busy for more than `_BUSY` of the time, they take longer. Finished chunks are written before
+they are reported. No result depends on the division into chunks.
+
+**Shards** are shares of a study that know nothing of each other. A store holds the rows of any tasks of its study, so
+that the store of a shard is one like all others, and stores are merged by entering their rows.
 
 **Workers** are threads, processes, the user's executor, or a dask cluster. Of an executor only `submit` is used, as
 `concurrent.futures.Executor` defines it.
@@ -13,8 +17,10 @@ written before they are reported. No result depends on the division into chunks.
 import dataclasses
 import hashlib
 import inspect
+import math
 import pickle
-from collections.abc import Callable, Iterator, Mapping
+import time
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from concurrent.futures import (
     FIRST_COMPLETED,
     CancelledError,
@@ -30,13 +36,14 @@ from types import CodeType, FunctionType, MethodType, ModuleType
 from typing import Any, NamedTuple, Protocol, runtime_checkable
 
 import numpy as np
+import numpy.typing as npt
 
-from hysim._basics.frozen import check_choice, check_count, last_names
+from hysim._basics.frozen import check_choice, check_count, check_not_negative, check_whole, last_names
 from hysim._basics.libraries import is_installed
 from hysim._basics.parallel import GLANCE, cores, processes, threads
 from hysim._basics.progress import Line, Progress, Reports, reports
 from hysim._release import __version__
-from hysim.sweeps._chunks import Chunk, Rows, Table, Task, computed, seeds
+from hysim.sweeps._chunks import Chunk, Rows, Table, Task, computed, seeds, shown
 from hysim.sweeps._result import Sweep, result_of
 from hysim.sweeps._space import Space, space_of
 from hysim.sweeps._store import ON_CHANGE, OnChange, Store, opened
@@ -57,10 +64,14 @@ class _DaskClient(Protocol):
 
 
 class Workers(NamedTuple):
-    """A function that sends a chunk out, and the number of chunks that are computed at a time."""
+    """How a chunk is sent out, how many are computed at a time, and seconds of processor that this process has spent.
+
+    Where workers are threads of this process, or may be, the seconds are those of the thread that sends.
+    """
 
     submit: Callable[[Chunk], Future[list[Rows]]]
     number: Callable[[], int]
+    clock: Callable[[], float] = time.thread_time
 
 
 @contextmanager
@@ -69,6 +80,7 @@ def workers_of(executor: Any, number: int | None, task: Task) -> Iterator[Worker
     if number is not None:
         check_count("workers", number)
     size: Callable[[], int] = cores
+    clock = time.thread_time
     work: tuple[Any, ...] = computed, task
     if executor in (None, "threads"):
         pool: Any = threads(number or cores())
@@ -76,6 +88,7 @@ def workers_of(executor: Any, number: int | None, task: Task) -> Iterator[Worker
         pool, work = processes(number or cores(), _begin, task), (_computed_here,)
     elif isinstance(executor, _DaskClient):
         pool, size = nullcontext(executor.get_executor()), lambda: max(1, sum(executor.nthreads().values()))
+        clock = time.process_time
     elif isinstance(executor, _Submits):
         is_pool = isinstance(executor, (ThreadPoolExecutor, ProcessPoolExecutor))
         pool, size = nullcontext(executor), (lambda: vars(executor)["_max_workers"]) if is_pool else cores
@@ -83,7 +96,7 @@ def workers_of(executor: Any, number: int | None, task: Task) -> Iterator[Worker
         words = 'executor must be "threads", "processes", a dask client, or have the method submit of an Executor'
         raise (ValueError if isinstance(executor, str) else TypeError)(f"{words}, got {executor!r}")
     with pool as opened_pool:
-        yield Workers(partial(opened_pool.submit, *work), lambda: number or size())
+        yield Workers(partial(opened_pool.submit, *work), lambda: number or size(), clock)
 
 
 def _begin(task: Task) -> None:
@@ -177,7 +190,9 @@ def _pickled(value: Any) -> bytes:
 _CHUNK, _SHORTEST = 0.075, 0.002  # seconds
 _WITH_ARRAYS = 0.5  # seconds; a shard for each
 _MOST_A_SECOND = 500  # chunks: a scheduler takes a millisecond for each
-_GROWTH = 4
+_BUSY, _LONGEST = 0.2, 5.0  # of the time at most, for sending chunks and entering rows; seconds of a chunk for it
+_NEEDLESS = 0.5  # of the time: more workers would wait for the process that sends their chunks
+_GROWTH, _MOST_TASKS = 4, 20_000  # of a chunk, whose rows a store takes as Python's numbers
 _PATIENCE = 0.6  # seconds to wait after an interrupt for the chunks that are being computed
 
 
@@ -189,6 +204,9 @@ def sweep(
     executor: Any = None,
     workers: int | None = None,
     store: str | Path | None = None,
+    shard: tuple[int, int] | None = None,
+    merge: Iterable[str | Path] = (),
+    time_limit: float | None = None,
     seed: int = 0,
     on_change: OnChange = "error",
     progress: Reports = None,
@@ -211,6 +229,14 @@ def sweep(
         chunks that it computes at a time.
     store : path, optional
         File for the finished rows. A second call with the same study computes only the missing ones.
+    shard : (int, int), optional
+        ``(k, n)`` for share k of n shares of equal size, from 0 to n - 1, in the order of the tasks: the others are not
+        computed. Shards run without each other, each with a store of its own.
+    merge : sequence of paths, optional
+        Stores of this study, such as those of its shards, whose rows are entered before the rest is computed.
+    time_limit : float, optional
+        Seconds after which no chunk should run: none is begun that would end later. The result lacks the tasks that
+        are left; with a limit of 0 nothing is computed.
     seed : int
         Seed of the study. Task k gets its own seed from this one and k: an integer for `numpy.random.default_rng`.
     on_change : {"error", "keep", "restart"}
@@ -228,7 +254,8 @@ def sweep(
     Raises
     ------
     TypeError, ValueError
-        If the task does not take the parameters, an argument is wrong, or the store holds another study.
+        If the task does not take the parameters, an argument is wrong, a store holds another study, or stores that are
+        merged contradict each other.
     OSError
         If the store is locked, read-only or full, or the executor fails. Reported rows are not lost.
 
@@ -243,20 +270,57 @@ def sweep(
     [0.337, 0.299, 0.264, 0.509, 0.442, 0.378]
     """
     check_choice("on_change", on_change, ON_CHANGE)
+    check_not_negative(time_limit=time_limit)
+    limit = math.inf if time_limit is None else time_limit
     if isinstance(progress, Line) and not is_installed("pandas"):
         progress.warn("pandas is not installed: the result has no to_frame (pip install 'hysim[tables]')")
     tasks = space_of(space)
-    task_seeds = seeds(seed, np.arange(tasks.n_tasks))
+    own, task_seeds = _share(shard, tasks.n_tasks), seeds(seed, np.arange(tasks.n_tasks))
     columns = {**tasks.columns, "seed": task_seeds} if _takes_seed(task, tasks) else tasks.columns
-    table = Table(tasks.n_tasks, tasks.columns)
+    table, facts = Table(tasks.n_tasks, tasks.columns), identity(task, tasks, seed) if store or merge else {}
     with nullcontext() if store is None else opened(store) as opened_store:
         if opened_store is not None:
-            opened_store.begin(identity(task, tasks, seed), tasks, task_seeds, on_change)
+            opened_store.begin(facts, tasks, task_seeds, on_change)
             opened_store.restore(table)
-        remaining = Chunk(np.arange(tasks.n_tasks), columns).part(~table.done)
+        for path in merge:
+            rows = _merged(path, table, facts, on_change)
+            if rows and opened_store is not None:
+                opened_store.commit(rows, table.layout)
+        remaining = Chunk(np.flatnonzero(own & ~table.done), columns)  # of all tasks
         with workers_of(executor, workers, task) as pool:
-            _Run(remaining, table, opened_store, pool, progress or None).run()
+            _Run(remaining, int(own.sum()), table, opened_store, pool, progress or None, limit).run()
     return result_of(table, tasks, task_seeds)
+
+
+def _share(shard: tuple[int, int] | None, n_tasks: int) -> npt.NDArray[np.bool_]:
+    """The tasks of a shard, shape (n_tasks,)."""
+    k, n = shard or (0, 1)
+    check_count("the number of shards", n)
+    check_whole(k, "the shard", least=0)
+    if k >= n:
+        raise ValueError(f"shards are counted from 0: of {n} the last is {n - 1}, got {k}")
+    places = np.arange(n_tasks)
+    return np.asarray((places >= k * n_tasks // n) & (places < (k + 1) * n_tasks // n))
+
+
+def _merged(path: str | Path, table: Table, facts: Mapping[str, str], on_change: OnChange) -> list[Rows]:
+    """Enter the rows of a store that the table has not; ValueError where they contradict it."""
+    with opened(path, to_read=True) as store:
+        if changes := store.changes(facts, on_change):
+            raise ValueError(f"{path} holds another study: {'; '.join(changes.values())}; leave it out")
+        other = Table(table.done.size, store.study.parameters)
+        store.restore(other)
+    if other.layout and table.layout and other.layout != table.layout:
+        raise ValueError(f"{path}: its tasks returned {shown(other.layout)}, those before {shown(table.layout)}")
+    both = other.done & table.done
+    apart = {k for k in other.errors.keys() ^ table.errors.keys() if both[k]}
+    for name in other.values.keys() & table.values.keys():
+        one, same = other.values[name], table.values[name]
+        differ = ~((one == same) | (np.isnan(one) & np.isnan(same))).all(axis=(*range(1, one.ndim),))
+        apart.update(np.flatnonzero(both & differ).tolist())
+    if apart:
+        raise ValueError(f"{path}: the outputs of task {min(apart)} are others than those of a store before it")
+    return table.enter(other.rows(other.done & ~table.done))
 
 
 def _takes_seed(task: Callable[..., Any], space: Space) -> bool:
@@ -277,18 +341,26 @@ class _Run:
     """One run of a study: the tasks that remain, the chunks that are being computed, and the rows that are done."""
 
     def __init__(
-        self, remaining: Chunk, table: Table, store: Store | None, workers: Workers, progress: Progress | None
+        self,
+        remaining: Chunk,
+        total: int,
+        table: Table,
+        store: Store | None,
+        workers: Workers,
+        progress: Progress | None,
+        limit: float,
     ) -> None:
         self.remaining, self.table, self.store, self.workers = remaining, table, store, workers
         self.progress = progress or (lambda done, total: None)
         self.running: dict[Future[list[Rows]], int] = {}  # numbers of tasks
         self.sent, self.largest, self.seconds_a_task = 0, 0, 0.0
+        self.done, self.total, self.n_chunks = total - remaining.places.size, total, 0
+        self.begin, self.busy, self.limit = time.monotonic(), workers.clock(), limit
 
     def run(self) -> None:
-        self.progress(*self._done())
+        self.progress(self.done, self.total)
         try:
-            while self.sent < self.remaining.places.size or self.running:
-                self._fill_queues()
+            while self._fill_queues() or self.running:
                 self._wait()
                 self._settle()
         except BaseException as error:
@@ -299,29 +371,41 @@ class _Run:
                 wait(self.running, timeout=_PATIENCE)
                 self._settle()
             raise
+        share = (self.workers.clock() - self.busy) / max(time.monotonic() - self.begin, _SHORTEST)
+        if isinstance(self.progress, Line) and share > _NEEDLESS:
+            self.progress.warn(
+                f"sending chunks kept this process busy for {share:.0%} of the time: divide the study by shard="
+            )
 
-    def _done(self) -> tuple[int, int]:
-        return int(self.table.done.sum()), self.table.done.size
-
-    def _fill_queues(self) -> None:
-        total, number = self.remaining.places.size, self.workers.number()
-        while self.sent < total and len(self.running) < 2 * number + 1:
-            stop = self.sent + self._size(total - self.sent, number)
+    def _fill_queues(self) -> bool:
+        """Send chunks out, as many as the workers need; whether any was sent."""
+        left, number, before = self.remaining.places.size - self.sent, self.workers.number(), self.sent
+        while left and len(self.running) < 2 * number + 1:
+            size = self._size(left, number)
+            ends = time.monotonic() - self.begin + self.seconds_a_task * size * (1 + len(self.running) // number)
+            if ends >= self.limit:
+                break
+            places = self.remaining.places[self.sent : self.sent + size]
+            chunk = Chunk(places, {name: values[places] for name, values in self.remaining.columns.items()})
             try:
-                future = self.workers.submit(self.remaining.part(slice(self.sent, stop)))
+                future = self.workers.submit(chunk)
             except Exception as error:  # a broken pool raises here or in the future
                 future = Future()
                 future.set_exception(error)
-            self.running[future], self.sent = stop - self.sent, stop
+            self.running[future] = size
+            self.sent, left = self.sent + size, left - size
+        return self.sent > before
 
     def _size(self, remaining: int, number: int) -> int:
         if not self.largest:
             return 1
         has_arrays = any(self.table.layout.values())
-        target = max(_WITH_ARRAYS if has_arrays and self.store else _CHUNK, number / _MOST_A_SECOND)
+        own = (self.workers.clock() - self.busy) / self.n_chunks  # seconds that a chunk takes here
+        least = min(max(number / _MOST_A_SECOND, number * own / _BUSY), _LONGEST)
+        target = max(_WITH_ARRAYS if has_arrays and self.store else _CHUNK, least)
         cost = max(self.seconds_a_task, 1e-9)
         share = max(remaining / (2 * number), _SHORTEST / cost)
-        return max(1, min(remaining, int(min(target / cost, share, _GROWTH * self.largest))))
+        return max(1, min(remaining, _MOST_TASKS, int(min(target / cost, share, _GROWTH * self.largest))))
 
     def _wait(self) -> None:
         """Wait until a chunk can be settled: before the layout is known, the first one."""
@@ -348,11 +432,12 @@ class _Run:
             cost = float(np.concatenate([part.seconds for part in rows]).mean())
             self.seconds_a_task = 0.5 * (self.seconds_a_task + cost) if self.largest else cost
             self.largest = max(self.largest, *(self.running.pop(future) for future in settled))
-            self.progress(*self._done())
+            self.n_chunks += len(settled)
+            self.done += sum(part.places.size for part in rows)
+            self.progress(self.done, self.total)
         if lost is not None:
             error = CancelledError("it was cancelled") if lost.cancelled() else lost.exception()
-            done, total = self._done()
             raise OSError(
                 f"the executor lost a chunk of {self.running[lost]} tasks: {type(error).__name__}: {error}. "
-                f"{done} of {total} tasks are done"
+                f"{self.done} of {self.total} tasks are done"
             ) from error
