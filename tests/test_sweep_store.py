@@ -403,6 +403,44 @@ def test_the_command_is_interrupted_and_goes_on(study, path, shell):
     assert (code, "the task's source" in err) == (2, True)
 
 
+def test_an_array_of_jobs_computes_shards_and_the_command_merges_them(study, path, shell, monkeypatch):
+    monkeypatch.setenv("SLURM_ARRAY_TASK_MIN", "10")
+    monkeypatch.setenv("SLURM_ARRAY_TASK_STEP", "5")
+    monkeypatch.setenv("SLURM_ARRAY_TASK_COUNT", "3")
+    assert "no shard beside" in shell("sweep", study, "--out", path, "--merge")[2]
+    assert shell("sweep", study, "--out", path, "--shard", "auto")[0] == 2
+    for job, code in (("10", 1), ("20", 0)):
+        monkeypatch.setenv("SLURM_ARRAY_TASK_ID", job)
+        assert shell("sweep", study, "--out", path, "--shard", "auto")[0] == code
+    code, out, err = shell("sweep", study, "--out", path, "--merge")
+    assert (code, err) == (3, "hysim: not finished: 33 tasks are left, the first is 33\n")
+    assert shell("sweep", study, "--out", path, "--shard", "1/3", "--time-limit", 0)[0] == 3
+    assert shell("sweep", study, "--out", path, "--shard", "1/3")[0] == 0
+    code, out, err = shell("sweep", study, "--out", path, "--merge")
+    assert (code, out.partition(",")[0], err) == (1, "100 of 100 tasks: 99 succeeded", "")
+    assert sorted(each.name for each in path.parent.glob("*.sqlite")) == [
+        *(f"study.{k}-of-3.sqlite" for k in range(3)),
+        "study.sqlite",
+    ]
+    whole = path.with_name("whole.sqlite")
+    shell("sweep", study, "--out", whole)
+    assert bits(hs.load_sweep(path)) == bits(hs.load_sweep(whole))
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (["--shard", "3/3"], "of 3 the last is 2, got 3"),
+        (["--shard", "auto"], "none of SLURM_ARRAY_TASK_ID, JOB_COMPLETION_INDEX, PBS_ARRAY_INDEX is set"),
+        (["--shard", "1"], "--shard takes K/N"),
+        (["--shard", "1/3", "--merge"], "--shard and --merge exclude each other"),
+    ],
+)
+def test_a_wrong_shard_is_one_line(words, said, study, path, shell):
+    code, _, err = shell("sweep", study, "--out", path, *words)
+    assert (code, err.count("\n"), said in err) == (2, 1, True)
+
+
 def rows(path):
     try:
         return len(hs.load_sweep(path))

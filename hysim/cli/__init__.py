@@ -85,7 +85,8 @@ class Command(click.Command):
         try:
             with np.errstate(all="ignore"), reporting:  # an overflow is inf or nan: null in JSON
                 outputs.check(files, prints=values.get("json", False))
-                return NOT_REACHED if options.call(self.function, values) is False else DONE
+                result = options.call(self.function, values)
+                return result if isinstance(result, int) and result > 1 else NOT_REACHED if result is False else DONE
         except (ValueError, TypeError, SimulationError) as error:
             words = in_shell_words(str(error) or type(error).__name__, outputs.flags(self))
             raise ValueError(words) from error

@@ -5,8 +5,11 @@ study with a task is code: its module or file is executed. A study with a respon
 """
 
 import functools
+import glob
 import importlib.util
+import os
 import pkgutil
+import re
 import sys
 import tomllib
 from collections.abc import Callable, Iterator, Mapping
@@ -19,6 +22,7 @@ from hysim._basics.libraries import optional
 from hysim.cli import models, options, outputs
 from hysim.cli.records import STANDARD
 
+NOT_FINISHED = 3
 _SPACES = ("grid", "list", "sample")
 
 
@@ -31,18 +35,21 @@ def sweep(
     processes: bool = False,
     dask: str | None = None,
     workers: int | None = None,
+    shard: str | None = None,
+    merge: bool = False,
+    time_limit: float | None = None,
     show: Annotated[str, options.file("DATABASE", options.INPUT)] | None = None,
     csv: options.Result | None = None,
     plot: options.Picture | None = None,
     of: str | None = None,
     json: bool = False,
-) -> bool:
+) -> bool | int:
     """Compute a study over many parameters, or continue one.
 
     Compute a task for many sets of parameters, as a TOML file says, and keep every finished row in a database.
 
-    An interrupted study continues with --resume. Exit code 1: some tasks failed. A study of the error of a law on a
-    record, beside both files:
+    An interrupted study continues with --resume. Exit code 1: some tasks failed; 3: the study is not finished. A study
+    of the error of a law on a record, beside both files:
 
       seed = 1
       [response]
@@ -62,6 +69,10 @@ def sweep(
     processes : processes instead of threads
     dask : a dask cluster: address of its scheduler, or scheduler file
     workers : number of threads or processes (default: one for each core)
+    shard : compute share K/N, such as 0/100 to 99/100, in a database of its own beside --out, or go on with it; auto or
+        auto/N: the share that SLURM, Kubernetes or PBS numbers
+    merge : compute nothing: enter the rows of all shards of --out into it
+    time_limit : begin nothing that would end later than so long after the start [s]
     show : compute nothing: print what is in a database
     csv : write the rows; - writes them to the standard output
     plot : draw every row as a line over its parameters
@@ -71,9 +82,12 @@ def sweep(
     --------
     hysim sweep study.toml --out rows.sqlite --csv rows.csv --plot rows.svg
     hysim sweep study.toml --out rows.sqlite --resume
+    hysim sweep study.toml --out rows.sqlite --shard 3/100 --time-limit 3300
+    hysim sweep study.toml --out rows.sqlite --merge
     hysim sweep --show rows.sqlite
     """
     options.exclusive(processes=processes, dask=dask)
+    options.exclusive(shard=shard, merge=merge)
     if out == STANDARD:
         raise ValueError("the rows are kept in a database: give --out a file")
     if show is not None:
@@ -85,17 +99,72 @@ def sweep(
             raise ValueError("give a study, such as study.toml, and --out RESULTS.sqlite, or --show RESULTS.sqlite")
         if not out:
             raise ValueError(f"the rows are kept in a database: give --out {Path(study).stem}.sqlite")
-        if Path(out).exists() and not resume:
+        share = _share(shard) if shard else None
+        if Path(out).exists() and not (resume or share or merge):
             raise ValueError(f"{out} exists: continue it with --resume, or give another --out")
+        stores, out = (_stores(out) if merge else []), (_store(out, *share) if share else out)
+        time_limit = 0.0 if merge else time_limit
         task, space, seed, files = read(study)
         outputs.keep(files, [out, csv, plot])
         with _executor(dask, processes) as executor:
             result = hs.sweep(
-                task, space, executor=executor, store=out, seed=seed, workers=workers, on_change=on_change
+                task,
+                space,
+                executor=executor,
+                workers=workers,
+                store=out,
+                shard=share,
+                merge=stores,
+                time_limit=time_limit,
+                seed=seed,
+                on_change=on_change,
             )
     pictures: outputs.Files = {csv: result.to_csv, plot: lambda: _picture(result, of)}
     outputs.write(pictures, result.summary, lambda: _document(result))
-    return show is not None or not result.errors
+    if show is not None:
+        return True
+    k, n = share or (0, 1)
+    left = set(range(k * result.n_tasks // n, (k + 1) * result.n_tasks // n)).difference(result.task.tolist())
+    if left:
+        print(f"hysim: not finished: {len(left)} tasks are left, the first is {min(left)}", file=sys.stderr)
+        return NOT_FINISHED
+    return not result.errors
+
+
+# Number of a job in an array, the first number, the step and the number of jobs.
+_ARRAYS = (
+    [f"SLURM_ARRAY_TASK_{name}" for name in ("ID", "MIN", "STEP", "COUNT")],
+    ["JOB_COMPLETION_INDEX", "", "", ""],
+    ["PBS_ARRAY_INDEX", "", "", ""],
+)
+
+
+def _share(text: str) -> tuple[int, int]:
+    """The shard K/N, or that of this job in an array of jobs."""
+    place, _, number = text.partition("/")
+    if place == "auto":
+        names = next((names for names in _ARRAYS if names[0] in os.environ), None)
+        if names is None:
+            known = ", ".join(names[0] for names in _ARRAYS)
+            raise ValueError(f"--shard auto is for an array of jobs: none of {known} is set")
+        own, first, step = (int(os.environ.get(name, default)) for name, default in zip(names, "001", strict=False))
+        place, number = str((own - first) // step), number or os.environ.get(names[3], "")
+    if not (re.fullmatch(r"\d{1,9}", place) and re.fullmatch(r"\d{1,9}", number)):
+        raise ValueError(f"--shard takes K/N, such as 0/100, auto or auto/N, got {text!r}")
+    return int(place), int(number)
+
+
+def _store(out: str, k: int, n: int) -> str:
+    path = Path(out)
+    return str(path.with_name(f"{path.stem}.{k:0{len(str(n - 1))}d}-of-{n}{path.suffix}"))
+
+
+def _stores(out: str) -> list[str]:
+    path = Path(out)
+    stores = sorted(glob.glob(f"{glob.escape(str(path.with_suffix('')))}.*-of-*{glob.escape(path.suffix)}"))
+    if not stores:
+        raise ValueError(f"there is no shard beside {out}, such as {_store(out, 0, 100)}")
+    return stores
 
 
 @contextmanager
