@@ -1,5 +1,9 @@
-"""The tasks of the scaling experiment, in a module that the workers of a cluster can import."""
+"""The tasks of the scaling experiment, in a module that the workers of a cluster can import.
 
+``python experiments/scaling_tasks.py N STORE`` computes a study of N short tasks and prints its memory [MB].
+"""
+
+import sys
 from functools import cache
 
 import numpy as np
@@ -46,3 +50,18 @@ def fit(a: float, b: float) -> float:
 def _driven(a: float, b: float, n_samples: int) -> float:
     law = {"A": 1.0 + a, "beta": 0.5 + b, "n": 1.5}
     return float(hs.BoucWen.responses(law, wave(n_samples), reduce="final", workers=1)[0])
+
+
+def numbers(a: float, b: float) -> dict[str, float]:
+    """Two numbers, or columns of them."""
+    return {"product": a * b, "sum": a + b}
+
+
+numbers.batch = numbers  # type: ignore[attr-defined]
+
+if __name__ == "__main__":
+    import resource
+
+    n_tasks, store = sys.argv[1:]
+    hs.sweep(numbers, {"a": np.linspace(0.0, 1.0, int(n_tasks) // 10), "b": range(10)}, store=store)
+    print(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024.0)

@@ -65,7 +65,7 @@ def test_a_finding_is_a_few_sentences_that_follow_the_numbers(finding):
     number = r"(?<!\w)\d+(?: \d{3})*(?:\.\d+)?(?:e-?\d+)?"
     said = re.split(r"(?<=[.?])\s", " ".join(paragraphs))
     assert [each for each in said if len(re.findall(number, each)) > 3] == []
-    kinds = {int} if finding.__name__ in ("fuzz", "kill_and_resume") else {float}  # these two count
+    kinds = {int} if finding.__name__ == "fuzz" else {float}  # it counts
     if finding.__name__ in (
         "exact_step",
         "batch",
@@ -88,7 +88,7 @@ def test_a_finding_is_a_few_sentences_that_follow_the_numbers(finding):
         ("sindy_lag_trap", lambda result: result["rows"][0].update(verdict="linear lag")),
         ("pixel_sensor", lambda result: result["rows"][0].update(stable=True)),
         ("pixel_sensor", lambda result: result["rows"][3].update(hysteresis_reduction_percent=99.0)),
-        ("kill_and_resume", lambda result: result["rows"][0].update(in_time=0.0)),
+        ("shards", lambda result: result["rows"][0].update(kills=0)),
         ("lag_of_equation_1", lambda result: result["rows"][1].update(lag_reduction_percent=95.0)),
     ],
 )
@@ -225,9 +225,9 @@ def test_a_loop_depends_most_on_beta():
         assert max(rows, key=lambda row: abs(row["rank_correlation"]))["parameter"] == "beta"
 
 
-def test_a_study_that_was_killed_is_the_same():
-    assert all(row["in_time"] for row in rows_of("kill_and_resume"))
-    assert result_of("kill_and_resume")["columns_that_differ"] == 0
+def test_a_study_in_shards_that_were_killed_is_the_same():
+    assert result_of("shards")["columns_that_differ"] == 0
+    assert sum(row["tasks"] for row in rows_of("shards")) == result_of("shards")["n_tasks"]
 
 
 def test_two_workers_share_kernels_on_threads_and_fits_on_processes():

@@ -11,6 +11,7 @@ import sqlite3
 import subprocess
 import sys
 import time
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -485,3 +486,45 @@ def test_a_store_that_moved_is_the_same_store(path, tmp_path):
     shutil.move(path, moved)
     shutil.move(f"{path}.arrays", f"{moved}.arrays")
     assert bits(hs.load_sweep(moved)) == bits(first)
+
+
+CLUSTER = Path(__file__).parent.parent / "examples" / "cluster"
+
+
+def test_the_job_array_of_the_examples_computes_what_one_process_does(path, tmp_path, shell, monkeypatch):
+    for file in CLUSTER.iterdir():
+        shutil.copy(file, tmp_path)
+    for name, line in (("hysim", f'exec "{sys.executable}" -m hysim "$@"'), ("scontrol", 'echo "$@" > asked')):
+        (tmp_path / "bin" / name).parent.mkdir(exist_ok=True)
+        (tmp_path / "bin" / name).write_text(f"#!/bin/sh\n{line}\n")
+        (tmp_path / "bin" / name).chmod(0o755)
+    root = os.path.dirname(os.path.dirname(__file__))
+    array = {"SLURM_ARRAY_JOB_ID": "7", "SLURM_ARRAY_TASK_MIN": "0", "SLURM_ARRAY_TASK_COUNT": "2", "PYTHONPATH": root}
+
+    def job(k):
+        paths = {"PATH": os.pathsep.join([str(tmp_path / "bin"), os.environ["PATH"]]), "SLURM_ARRAY_TASK_ID": str(k)}
+        return subprocess.run(
+            ["bash", "slurm_array.sh"], cwd=tmp_path, env={**os.environ, **array, **paths}, capture_output=True
+        ).returncode
+
+    script = (tmp_path / "slurm_array.sh").read_text()
+    (tmp_path / "slurm_array.sh").write_text(script.replace("3300", "0"))
+    assert (job(1), (tmp_path / "asked").read_text()) == (3, "requeue 7_1\n")
+    (tmp_path / "slurm_array.sh").write_text(script)
+    assert job(1) == 0
+    monkeypatch.chdir(tmp_path)
+    assert shell("sweep", "study.toml", "--out", "rows.sqlite", "--shard", "0/2")[0] == 0
+    assert shell("sweep", "study.toml", "--out", "rows.sqlite", "--merge")[0] == 0
+    assert shell("sweep", "study.toml", "--out", path)[0] == 0
+    assert bits(hs.load_sweep("rows.sqlite")) == bits(hs.load_sweep(path))
+
+
+def test_the_other_recipes_have_the_form_of_what_reads_them():
+    for file in CLUSTER.glob("*.py"):
+        compile(file.read_text(), file, "exec")
+    for file in CLUSTER.glob("*.sh"):
+        assert subprocess.run(["bash", "-n", file], capture_output=True).returncode == 0
+    yaml = pytest.importorskip("yaml")
+    job = yaml.safe_load((CLUSTER / "kubernetes_job.yaml").read_text())
+    assert job["spec"]["completionMode"] == "Indexed"
+    assert f"auto/{job['spec']['completions']}" in job["spec"]["template"]["spec"]["containers"][0]["args"]

@@ -124,9 +124,9 @@ def sweep(
     if show is not None:
         return True
     k, n = share or (0, 1)
-    left = set(range(k * result.n_tasks // n, (k + 1) * result.n_tasks // n)).difference(result.task.tolist())
-    if left:
-        print(f"hysim: not finished: {len(left)} tasks are left, the first is {min(left)}", file=sys.stderr)
+    remaining = set(range(k * result.n_tasks // n, (k + 1) * result.n_tasks // n)).difference(result.task.tolist())
+    if remaining:
+        print(f"hysim: not finished: {len(remaining)} tasks remain, the first is {min(remaining)}", file=sys.stderr)
         return NOT_FINISHED
     return not result.errors
 
@@ -163,7 +163,7 @@ def _stores(out: str) -> list[str]:
     path = Path(out)
     stores = sorted(glob.glob(f"{glob.escape(str(path.with_suffix('')))}.*-of-*{glob.escape(path.suffix)}"))
     if not stores:
-        raise ValueError(f"there is no shard beside {out}, such as {_store(out, 0, 100)}")
+        raise ValueError(f"there is no shard of {out}, such as {_store(out, 0, 100)}")
     return stores
 
 

@@ -379,9 +379,9 @@ class _Run:
 
     def _fill_queues(self) -> bool:
         """Send chunks out, as many as the workers need; whether any was sent."""
-        left, number, before = self.remaining.places.size - self.sent, self.workers.number(), self.sent
-        while left and len(self.running) < 2 * number + 1:
-            size = self._size(left, number)
+        total, number, before = self.remaining.places.size, self.workers.number(), self.sent
+        while self.sent < total and len(self.running) < 2 * number + 1:
+            size = self._size(total - self.sent, number)
             ends = time.monotonic() - self.begin + self.seconds_a_task * size * (1 + len(self.running) // number)
             if ends >= self.limit:
                 break
@@ -393,7 +393,7 @@ class _Run:
                 future = Future()
                 future.set_exception(error)
             self.running[future] = size
-            self.sent, left = self.sent + size, left - size
+            self.sent += size
         return self.sent > before
 
     def _size(self, remaining: int, number: int) -> int:
