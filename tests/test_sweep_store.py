@@ -166,6 +166,27 @@ def test_stores_that_contradict_each_other_are_not_merged(task, options, words, 
     assert bits(hs.load_sweep(path)) == bits(kept)
 
 
+@pytest.mark.parametrize("share", [0.0, 0.3, 0.7, 0.99])
+def test_a_shard_that_was_cut_is_named_and_the_others_can_be_merged(share, path, tmp_path):
+    cut, whole = shards(tmp_path, sweep_tasks.noisy, sweep_tasks.SPACE, 2)
+    cut.write_bytes(cut.read_bytes()[: int(share * cut.stat().st_size)])
+    with pytest.raises(ValueError, match=re.escape(str(cut))):
+        hs.sweep(sweep_tasks.noisy, sweep_tasks.SPACE, store=path, merge=[whole, cut])
+    merged = hs.sweep(sweep_tasks.noisy, sweep_tasks.SPACE, store=path, merge=[whole])
+    assert bits(merged) == bits(hs.sweep(sweep_tasks.noisy, sweep_tasks.SPACE))
+
+
+def test_of_two_merges_at_once_the_second_is_refused(path, tmp_path):
+    stores = shards(tmp_path, sweep_tasks.product, GRID, 2)
+
+    def second(done, total):
+        with pytest.raises(OSError, match="the store is locked"):
+            hs.sweep(sweep_tasks.product, GRID, store=path, merge=stores)
+
+    first = hs.sweep(sweep_tasks.product, GRID, store=path, merge=stores, progress=second)
+    assert bits(first) == bits(hs.load_sweep(path)) == bits(hs.sweep(sweep_tasks.product, GRID))
+
+
 @pytest.mark.parametrize(
     ("shard", "words"),
     [((3, 3), "shards are counted from 0: of 3 the last is 2, got 3"), ((-1, 3), "negative"), ((0, 0), "at least 1")],
