@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
-from strategies import assert_cut_and_continued_gives_the_same_bits, outputs_of_compiled_steps
+from strategies import assert_cut_or_stepped_it_has_the_same_bits
 
 import hysim as hs
 from hysim.errors import SimulationError
@@ -111,10 +111,10 @@ def test_the_closed_form_of_zhu_and_wang_solves_the_equation(delta, beta, gamma)
     n=st.sampled_from([0.5, 1.0, 1.3, 2.0, 3.0]),
     cut=st.integers(0, 12),
 )
-def test_cut_at_a_sample_or_in_batch_it_is_the_same_bits(family, u, n, cut):
+def test_cut_stepped_or_in_batch_it_is_the_same_bits(family, u, n, cut):
     model = law(family, n)
     y = model.response(u)
-    assert_cut_and_continued_gives_the_same_bits(model, u, cut)
+    assert_cut_or_stepped_it_has_the_same_bits(model, u, cut)
     sets = {**COMMON, **OWN[family], "n": [1.7, n, n, 1.0], "beta": [0.5, 0.7, 0.9, 0.7]}
     assert np.array_equal(family.responses(sets, u)[1], y)
     assert np.array_equal(family.responses(sets, np.tile(u, (4, 1)), workers=1)[1], y)
@@ -195,12 +195,6 @@ def test_an_escape_names_its_sample_and_spares_the_rest_of_a_batch(family):
     rows = family.responses({"beta": [-1.0, 0.5], "gamma": [-1.0, 0.5], "n": 3.0}, [0.0, 0.1, 9.0])
     assert np.isposinf(rows[0]).all()
     assert np.isfinite(rows[1]).all()
-
-
-@pytest.mark.parametrize("family", FAMILIES)
-def test_a_chain_takes_the_compiled_step(family):
-    model = law(family, 1.3)
-    assert np.array_equal(outputs_of_compiled_steps(model, PATH)[0], model.response(PATH))
 
 
 @pytest.mark.parametrize("family", FAMILIES)

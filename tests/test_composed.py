@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from strategies import bounded_laws, needs_compiled, refused, short_inputs
+from strategies import assert_cut_or_stepped_it_has_the_same_bits, bounded_laws, needs_compiled, refused, short_inputs
 
 import hysim as hs
 from hysim.models.model import every_family
@@ -36,9 +36,11 @@ def test_a_cascade_is_the_composition_to_the_bit(law, u):
 
 
 @given(sums(), short_inputs(), st.integers(0, 90))
-def test_cut_and_continued_is_uncut(law, u, cut):
+def test_cut_or_stepped_it_has_the_same_bits(law, u, cut):
     dynamic = (law >> PLANT) + hs.Dashpot(c=0.3)
-    for model, time in ((law, {}), (law >> law, {}), (dynamic, {"sample_time": TIME})):
+    for model in (law, law >> hs.Play(threshold=0.1)):
+        assert_cut_or_stepped_it_has_the_same_bits(model, u, cut)
+    for model, time in ((law >> law, {}), (dynamic, {"sample_time": TIME})):
         head, state = model.advance(u[:cut], **time)
         tail, _ = model.advance(u[cut:], state, **time)
         assert np.concatenate([head, tail]).tolist() == model.response(u, **time).tolist()
@@ -85,13 +87,8 @@ def test_a_sum_of_laws_does_not_know_the_rate(law, u, repeats):
 
 
 @given(sums(), short_inputs())
-def test_compiled_steps_are_the_response(law, u):
-    for model in (law, law >> hs.Play(threshold=0.1)):
-        compiled = model.compiled(float(u[0]))
-        y = [compiled.step(compiled.parameters, compiled.state, value) for value in u]
-        assert y == model.response(u).tolist()
-    actuator = hs.Actuator(hysteresis=law)
-    assert actuator.response(u).tolist() == law.response(u).tolist()
+def test_an_actuator_has_the_response_of_its_law(law, u):
+    assert hs.Actuator(hysteresis=law).response(u).tolist() == law.response(u).tolist()
 
 
 @st.composite

@@ -7,7 +7,7 @@ import pickle
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
-from strategies import assert_cut_and_continued_gives_the_same_bits, refused
+from strategies import assert_cut_or_stepped_it_has_the_same_bits, refused
 
 import hysim as hs
 from hysim.errors import SimulationError
@@ -88,8 +88,8 @@ def test_rests_change_nothing():
 
 
 @pytest.mark.parametrize("cut", range(PATH.size + 1))
-def test_cut_at_a_sample_and_continued_is_the_same_bits(cut):
-    assert_cut_and_continued_gives_the_same_bits(GENERAL, PATH, cut)
+def test_cut_or_stepped_it_has_the_same_bits(cut):
+    assert_cut_or_stepped_it_has_the_same_bits(GENERAL, PATH, cut)
 
 
 def test_batch_is_the_path_to_the_bit():
@@ -100,11 +100,6 @@ def test_batch_is_the_path_to_the_bit():
         alone = hs.Duhem(p=sets["p"][k], q=GENERAL.q, y0=factors[k]).response(PATH)
         assert np.array_equal(together[k], alone)
     assert np.array_equal(together, hs.Duhem.responses(sets, np.tile(PATH, (200, 1)), workers=1))
-
-
-def test_the_compiled_step_is_the_path_to_the_bit():
-    law = GENERAL.compiled(PATH[0])
-    assert np.array_equal([law.step(law.parameters, law.state, u) for u in PATH], GENERAL.response(PATH))
 
 
 def test_the_memory_is_the_output():

@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
-from strategies import assert_cut_and_continued_gives_the_same_bits, outputs_of_compiled_steps
+from strategies import assert_cut_or_stepped_it_has_the_same_bits
 
 import hysim as hs
 from hysim.errors import SimulationError
@@ -136,13 +136,8 @@ def test_an_odd_law_is_odd_to_the_bit(u):
 
 @pytest.mark.parametrize("law", [MIXED, WITH_OFFSET], ids=["mixed", "offset"])
 @pytest.mark.parametrize("cut", range(PATH.size + 1))
-def test_cut_at_a_sample_and_continued_is_the_same_bits(law, cut):
-    assert_cut_and_continued_gives_the_same_bits(law, PATH, cut)
-
-
-@pytest.mark.parametrize("law", [MIXED, WITH_OFFSET], ids=["mixed", "offset"])
-def test_the_compiled_step_is_the_path_to_the_bit(law):
-    assert np.array_equal(outputs_of_compiled_steps(law, PATH)[0], law.response(PATH))
+def test_cut_or_stepped_it_has_the_same_bits(law, cut):
+    assert_cut_or_stepped_it_has_the_same_bits(law, PATH, cut)
 
 
 def test_batches_are_the_path_to_the_bit():

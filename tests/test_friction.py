@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from friction_laws import FAMILIES, backlash, decades, drawn, lugre, maxwell, walk
 from scipy.integrate import solve_ivp
-from strategies import needs_compiler, printed_by_main, refused
+from strategies import assert_cut_or_stepped_it_has_the_same_bits, needs_compiler, printed_by_main, refused
 
 import hysim as hs
 from hysim.models.model import candidates
@@ -129,12 +129,7 @@ def stiff(law, u):
 @every_family
 def test_a_cut_changes_no_bit(family):
     for law, u, time in laws_of(family, 1):
-        whole = law.response(u, time)
-        first, state = law.advance(u[:17], sample_time=time)
-        second, _ = law.advance(u[17:], state, sample_time=time)
-        assert np.concatenate([first, second]).tolist() == whole.tolist()
-        step, parameters, memory = law.startable(time).started(u[0])
-        assert [step(parameters, memory, each) for each in u] == whole.tolist()
+        assert_cut_or_stepped_it_has_the_same_bits(law, u, 17, sample_time=time)
         assert law.responses({"offset": [0.0, 1.0]} if "offset" in law.scalars else {}, u, time).shape[1] == u.size
 
 
