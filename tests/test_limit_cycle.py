@@ -12,7 +12,7 @@ import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
 from strategies import bounded_laws, refused
-from test_boucwen_closed_forms import ROWS
+from test_boucwen import ROWS
 
 import hysim as hs
 
