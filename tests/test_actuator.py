@@ -1,8 +1,6 @@
 """An actuator is its law, then its linear dynamics, exact under the hold; it begins at rest."""
 
-import copy
 import dataclasses
-import pickle
 
 import numpy as np
 import pytest
@@ -106,27 +104,6 @@ def test_simulate_takes_an_actuator():
     assert np.array_equal(sim.z, LAW.memory(u))
     with pytest.raises(ValueError, match="time"):
         hs.simulate(actuator, None, u)
-
-
-@pytest.mark.parametrize(
-    "actuator",
-    [
-        hs.Actuator(),
-        hs.Actuator(hysteresis=LAW),
-        hs.Actuator(vibration=MODE),
-        hs.Actuator(hysteresis=LAW, vibration=MODE),
-    ],
-    ids=["nothing", "law", "mode", "both"],
-)
-def test_an_actuator_is_a_value_and_comes_back_from_its_file(actuator, tmp_path):
-    hs.save(actuator, tmp_path / "actuator.json")
-    twins = [hs.load_model(tmp_path / "actuator.json"), copy.deepcopy(actuator), pickle.loads(pickle.dumps(actuator))]
-    for twin in twins:
-        assert twin == actuator
-        assert hash(twin) == hash(actuator)
-    assert actuator != hs.Actuator(hysteresis=hs.Line())
-    with pytest.raises(dataclasses.FrozenInstanceError):
-        actuator.hysteresis = None
 
 
 test_wrong_arguments_are_named = refused(

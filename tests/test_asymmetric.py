@@ -120,15 +120,6 @@ def test_cut_stepped_or_in_batch_it_is_the_same_bits(family, u, n, cut):
     assert np.array_equal(family.responses(sets, np.tile(u, (4, 1)), workers=1)[1], y)
 
 
-@pytest.mark.parametrize("family", FAMILIES)
-@given(u=st.lists(st.floats(-1.0, 1.0), min_size=2, max_size=12), n=st.sampled_from([0.5, 1.0, 1.3, 2.0, 3.0]))
-def test_the_rate_of_the_input_does_not_matter(family, u, n):
-    model = law(family, n)
-    z = model.memory(u)
-    slow = np.concatenate([np.repeat(np.linspace(a, b, 5)[:-1], 2) for a, b in itertools.pairwise(u)] + [[u[-1]]])
-    assert np.abs(model.memory(slow)[::8] - z).max() < 1e-10 * max(1.0, np.ptp(z))  # an integrated law's promise
-
-
 @given(u=st.lists(st.floats(-1.0, 1.0), min_size=2, max_size=12), n=st.sampled_from([1.0, 1.3, 2.0]))
 def test_the_odd_terms_give_an_odd_law(u, n):
     """delta u sgn(du), b2 and b3 are reflected into themselves."""
@@ -224,12 +215,6 @@ def test_on_a_one_sided_input_the_terms_that_are_alike_are_held():
     assert {"gamma", "b4", "b5"} <= set(names)
     assert not {"b2", "b3", "b6"} & set(names)
     assert "b6" in hs.GeneralizedBoucWen().search_space(hs.Record(u=u - 0.5, y=rec.y)).names
-
-
-@pytest.mark.parametrize("family", FAMILIES)
-def test_it_is_stored_to_the_bit(family, tmp_path):
-    hs.save(law(family, 1.3), tmp_path / "law.json")
-    assert hs.load_model(tmp_path / "law.json") == law(family, 1.3)
 
 
 @pytest.mark.parametrize("n", [0.6, 1.0, 2.5])

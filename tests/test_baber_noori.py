@@ -107,12 +107,9 @@ def test_cut_stepped_or_in_batch_it_is_the_same_bits(own, u, n, cut):
 
 @FEW
 @given(u=st.lists(st.floats(-1.0, 1.0), min_size=2, max_size=12), n=st.sampled_from([0.5, 1.0, 1.3, 2.0, 5.0]))
-def test_samples_on_the_way_do_not_matter_and_the_law_is_odd(u, n):
+def test_the_law_is_odd(u, n):
     model = law(OWN["both"], n, z0=0.0)
-    z = model.memory(u)
-    slow = np.concatenate([np.linspace(a, b, 5)[:-1] for a, b in itertools.pairwise(u)] + [[u[-1]]])
-    assert np.abs(model.memory(slow)[::4] - z).max() < 1e-10 * max(1.0, np.ptp(z))  # an integrated law's promise
-    assert np.array_equal(model.memory(np.negative(u)), -z)
+    assert np.array_equal(model.memory(np.negative(u)), -model.memory(u))
 
 
 def test_a_loop_wears_off_and_pinches():

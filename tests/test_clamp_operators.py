@@ -153,14 +153,6 @@ def test_the_definition_to_the_bit(law, u):
     assert np.array_equal(law.memory(u).reshape(z.shape), z)
 
 
-@pytest.mark.parametrize("law", LAWS, ids=family)
-@given(u=short_inputs(1.0), extra=st.integers(1, 4))
-def test_samples_on_the_way_change_nothing_to_the_bit(law, u, extra):
-    fine = np.append(np.linspace(u[:-1], u[1:], extra + 1, endpoint=False, axis=1).ravel(), u[-1])
-    assert np.array_equal(law.memory(fine)[:: extra + 1], law.memory(u))
-    assert np.array_equal(law.response(fine)[:: extra + 1], law.response(u))
-
-
 @given(short_inputs(1.0), short_inputs(1.0))
 def test_a_larger_turn_wipes_out_the_smaller_ones(first, second):
     both = [EXAMPLE.memory(np.append(past, [4.0, -4.0]))[-1] for past in (first, second)]

@@ -172,16 +172,6 @@ test_clear_refusals = refused(
 )
 
 
-def test_a_composed_model_is_stored_to_the_bit(tmp_path):
-    model = (
-        (hs.BoucWen(beta=0.1 + 0.2) >> PLANT)
-        + hs.Dashpot(c=1 / 3)
-        + hs.PrandtlIshlinskii(thresholds=(0.0, 0.5), weights=(1.0, 2.0))
-    )
-    hs.save(model, tmp_path / "model.json")
-    assert hs.load_model(tmp_path / "model.json") == model
-
-
 def test_signals_show_what_each_part_gives():
     u = hs.signals.triangle(-1.0, 1.0, cycles=1, samples_per_cycle=20)
     t = TIME * np.arange(u.size)

@@ -341,8 +341,3 @@ def test_an_offset_is_searched_where_there_is_one_or_it_is_asked_for():
     assert "offset" in replace(plain, offset=1.0).search_space(record).names
     assert "offset" not in plain.search_space(record).names
     assert "offset" in plain.search_space(record, Freedom(free=("offset",))).names
-
-
-def test_a_law_with_an_offset_comes_back_from_json(tmp_path):
-    hs.save(WITH_OFFSET, tmp_path / "law.json")
-    assert hs.load_model(tmp_path / "law.json") == WITH_OFFSET

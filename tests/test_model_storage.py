@@ -15,8 +15,8 @@ import hysim as hs
 NUMBERS = [
     (hs.BoucWen(A=1 / 3, beta=0.1, gamma=-np.pi, n=1.7), "beta"),
     (hs.PolynomialBoucWen(input_coefficients=(0.1, 1e-17, 3e300)), "input_coefficients"),
-    (hs.ZhuWangBoucWen(delta=0.2), "delta"),
-    (hs.GeneralizedBoucWen(b4=0.2), "b4"),
+    (hs.ZhuWangBoucWen(A=1.1, n=1.3, gain=-0.5, delta=0.4, z0=0.1, input_coefficients=(1.5, 0.1)), "delta"),
+    (hs.GeneralizedBoucWen(n=1.3, b2=0.2, b3=-0.15, b4=0.1, b5=0.05, b6=-0.1), "b4"),
     (hs.Duhem.from_terms({"u'": 0.1, "|u'| u y": -2 / 3}, y0=0.7), "q"),
     (hs.Duhem(p=[[1.0]], q=[[0.0]], p_abs=[[0.5]], q_abs=[[0.0, -1.0]]), "q_abs"),
     (
@@ -69,6 +69,12 @@ NUMBERS = [
 MODELS = [
     *(model for model, _ in NUMBERS),
     hs.PrandtlIshlinskii(),
+    hs.PreisachRelays(levels=(0.0, 1 / 3), weights=(0.1,), offset=0.3, z0=(0.5,)),
+    hs.Duhem.from_terms({"u'": 1.0, "|u'| z": -0.6, "u' |z|": -0.3}, feedthrough=2.0, offset=7.0, y0=7.25),
+    (hs.BoucWen(beta=0.1 + 0.2) >> hs.mode(5.0, 0.1, delay=0.07)) + hs.Dashpot(c=1 / 3) + hs.Play(threshold=0.5),
+    hs.PID.standard(0.1, 0.7, limits=(0.0, 1 / 3), tracking_time=0.1),
+    hs.Actuator(),
+    hs.Actuator(vibration=hs.mode(1 / 3, 0.1)),
     hs.ParametricPrandtlIshlinskii(),
     hs.Actuator(hysteresis=hs.BoucWen(n=1.7), vibration=hs.TransferFunction(num=(1.0,), den=(1.0, 0.1, 3.0))),
     hs.Actuator(
@@ -161,6 +167,14 @@ def test_equality_and_hash_see_every_number(model, name):
 def test_families_with_the_same_numbers_differ():
     assert hs.Line() != hs.SingleValued(u=[0.0], y=[0.0])
     assert hs.Line() != dataclasses.asdict(hs.Line())
+    assert hs.Actuator() != hs.Actuator(hysteresis=hs.Line())
+    assert hs.Preisach(levels=(0.0, 1.0), weights=(1.0,)) != hs.PreisachRelays(levels=(0.0, 1.0), weights=(1.0,))
+
+
+def test_numbers_may_be_integers_in_lists():
+    law = hs.PolynomialBoucWen(input_coefficients=[1, 2])
+    assert hash(law) == hash(hs.PolynomialBoucWen(input_coefficients=(1.0, 2.0)))
+    assert hash(hs.Duhem(p=[[1]], q=[[0]])) == hash(hs.Duhem(p=[[1.0]], q=[[0.0]]))
 
 
 def test_an_array_of_the_caller_stays_the_callers():

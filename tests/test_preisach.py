@@ -1,7 +1,6 @@
 """Relays under a staircase: closed forms, the properties that define the family, the exact inverse, reversal curves."""
 
 import dataclasses
-import pickle
 
 import numpy as np
 import pytest
@@ -161,14 +160,6 @@ def test_the_everett_function_is_half_of_a_fall(law):
 
 
 # ---------------------------------------------------------------------------------- the operators' properties
-
-
-@pytest.mark.parametrize("family", FAMILIES)
-@given(u=short_inputs(1.2), extra=st.integers(1, 4))
-def test_samples_on_the_way_change_nothing_to_the_bit(family, u, extra):
-    fine = np.append(np.linspace(u[:-1], u[1:], extra + 1, endpoint=False, axis=1).ravel(), u[-1])
-    law = a_law(family)
-    assert np.array_equal(law.response(fine)[:: extra + 1], law.response(u))
 
 
 @pytest.mark.parametrize("family", FAMILIES)
@@ -535,15 +526,6 @@ def test_a_law_is_a_plant_of_a_loop_and_of_an_actuator():
     assert run.y[1:] == pytest.approx(law.response([0.0, *run.u])[1:-1], abs=1e-12)
     actuator = hs.Actuator(hysteresis=law, vibration=hs.mode(100.0, 0.1))
     assert np.isfinite(actuator.response(np.sin(t), 0.01)).all()
-
-
-def test_a_law_is_a_value(tmp_path):
-    for family in FAMILIES:
-        law = a_law(family, z0=(0.5,))
-        assert pickle.loads(pickle.dumps(law)) == law
-        hs.save(law, tmp_path / "law.json")
-        assert hs.load_model(tmp_path / "law.json") == law
-    assert a_law(hs.Preisach) != a_law(hs.PreisachRelays)
 
 
 def test_nothing_in_nothing_out():
