@@ -17,6 +17,7 @@ from importlib.util import find_spec
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent
+sys.path.insert(0, str(ROOT / "experiments"))  # whose helpers several tests take
 STRUCTURES = (
     "test_structure",
     "plants/structures/",

@@ -1,5 +1,6 @@
 """What several tests share: conditions, random laws and inputs for the invariants, and tests of what is refused."""
 
+import importlib.util
 import json
 import re
 import shutil
@@ -95,6 +96,23 @@ def rao_garnier(snr, seed):
     return hs.Record(u=u, y=clean + noise, t=0.01 * np.arange(u.size)), clean, true
 
 
+def loaded(path):
+    """The module in a file."""
+    spec = importlib.util.spec_from_file_location(path.stem, path)
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+class Passes:
+    """A controller that passes its reference on."""
+
+    def compiled(self, sample_time, u0, y0):
+        from hysim.kernels.controllers import through
+
+        return through, np.zeros(0), np.zeros(1)
+
+
 def with_peak_memory(call):
     """What a call returns, and the most bytes that it held at once."""
     tracemalloc.start()
@@ -111,6 +129,13 @@ def document_of(run, *words, **options):
     return json.loads(out)
 
 
+def assert_refused(message, call, *arguments, error=ValueError, **options):
+    """A call ends with an error of one line, in which the message, a regular expression, is found."""
+    with pytest.raises(error, match=message) as caught:
+        call(*arguments, **options)
+    assert "\n" not in str(caught.value)
+
+
 def refused(*cases, call=lambda make: make(), error=ValueError):
     """Make a test of calls that are refused, each with its message.
 
@@ -122,8 +147,7 @@ def refused(*cases, call=lambda make: make(), error=ValueError):
         *arguments, message = case
         other = isinstance(arguments[-1], type) and issubclass(arguments[-1], Exception)
         expected = arguments.pop() if other else error
-        with pytest.raises(expected, match=message):
-            call(*arguments)
+        assert_refused(message, call, *arguments, error=expected)
 
     return test
 

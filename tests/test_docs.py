@@ -1,6 +1,5 @@
 """The Python blocks of the documentation run, page by page, without what builds the pages."""
 
-import importlib.util
 import inspect
 import re
 import tomllib
@@ -8,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from strategies import loaded
 
 import hysim as hs
 
@@ -23,15 +23,7 @@ NEEDS = {
 WITHOUT_FIGURE = {"decisions", "scope", "versions"}  # reasons, a list of what is not there, a table of versions
 
 
-def loaded(name):
-    """A module of the documentation."""
-    spec = importlib.util.spec_from_file_location(name, DOCS / f"{name}.py")
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
-
-
-page_runs = loaded("page_runs")
+page_runs = loaded(DOCS / "page_runs.py")
 
 
 @pytest.mark.parametrize("page", [pytest.param(page, id=page.stem, marks=NEEDS.get(page.stem, ())) for page in PAGES])
@@ -73,7 +65,7 @@ def test_the_page_on_installation_explains_every_extra():
 def gallery():
     with pytest.MonkeyPatch.context() as patch:
         patch.syspath_prepend(DOCS)
-        yield loaded("gallery")
+        yield loaded(DOCS / "gallery.py")
 
 
 def test_the_gallery_has_every_law_every_plant_and_every_picture(gallery):
@@ -114,7 +106,7 @@ def test_a_picture_that_no_page_draws_is_named(gallery):
 
 
 def test_every_public_name_stands_in_the_reference_once(gallery):
-    front_door = loaded("front_door")
+    front_door = loaded(DOCS / "front_door.py")
     listed = re.findall(r"^   (\w\S*)$", "\n".join(front_door.groups().values()), flags=re.MULTILINE)
     names = [name for name in hs.__all__ if name[0] != "_" and not inspect.ismodule(getattr(hs, name))]
     assert sorted(name for name in listed if "." not in name) == sorted(names)
@@ -125,7 +117,7 @@ def test_every_public_name_stands_in_the_reference_once(gallery):
 
 @pytest.mark.extra("sphinx")
 def test_every_formula_of_the_pages_becomes_mathml(gallery):
-    mathml = loaded("mathml")
+    mathml = loaded(DOCS / "mathml.py")
     prose = [re.sub(r"^```.*?^```$", "", page.read_text(), flags=re.MULTILINE | re.DOTALL) for page in PAGES]
     blocks = [tex for text in prose for tex in re.findall(r"^\$\$\n(.*?)\n\$\$$", text, flags=re.MULTILINE | re.DOTALL)]
     cards = re.findall(r"\$([^$]+)\$", gallery.family_cards())

@@ -4,9 +4,7 @@ The laws, states and strides are those of `experiments/32_more_samples.py`, and 
 `experiments/more_samples.py` for the reason of each tolerance.
 """
 
-import importlib.util
-import sys
-from pathlib import Path
+import importlib
 
 import numba
 import numpy as np
@@ -14,11 +12,7 @@ import pytest
 
 import hysim as hs
 
-EXPERIMENTS = Path(__file__).parent.parent / "experiments"
-sys.path.insert(0, str(EXPERIMENTS))
-spec = importlib.util.spec_from_file_location("more_samples_experiment", EXPERIMENTS / "32_more_samples.py")
-experiment = importlib.util.module_from_spec(spec)
-spec.loader.exec_module(experiment)
+experiment = importlib.import_module("32_more_samples")
 
 N_CASES = 2 if numba.config.DISABLE_JIT else 8
 

@@ -1,10 +1,10 @@
 """Notebooks are run cell by cell, and what is shown is what Jupyter would show."""
 
-import importlib.util
 import json
 from pathlib import Path
 
 import pytest
+from strategies import loaded
 
 from hysim.cli import main
 from hysim.cli.learn import example
@@ -16,10 +16,7 @@ PAGES = sorted((DOCS / "notebooks").glob("*.ipynb"))
 @pytest.fixture(scope="module")
 def notebook_cells():
     pytest.importorskip("docutils", reason="the extra docs has it")
-    spec = importlib.util.spec_from_file_location("notebook_cells", DOCS / "notebook_cells.py")
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
+    return loaded(DOCS / "notebook_cells.py")
 
 
 CELLS = [

@@ -4,16 +4,11 @@ Where an output is small beside its terms, or the law is flat, many inputs give 
 output at the input that is found: it may be off by what rounds its terms, and by the promise of an integrated law.
 """
 
-import sys
-from pathlib import Path
-
 import numpy as np
 import pytest
+from more_samples_inverse import through_peaks
 
 import hysim as hs
-
-sys.path.insert(0, str(Path(__file__).parent.parent / "experiments"))
-from more_samples_inverse import through_peaks
 
 UNIT = 2.0**-52
 STEPS = 16.0  # roundings of the terms that a search may leave

@@ -5,11 +5,11 @@ import dataclasses
 import gzip
 import json
 import re
-import sys
 from pathlib import Path
 
 import numpy as np
 import pytest
+from browser import BROWSER, TELEPHONE, WIDE, started, wait_for
 
 import hysim as hs
 from hysim._columns.turning import TOLERANCE, complete_cycles
@@ -22,9 +22,6 @@ from hysim.laws.dashpot import RatePart
 from hysim.laws.friction.rated_law import RatedLaw
 from hysim.models.model import every_family
 from hysim.paper.reproduction import browser_page
-
-sys.path.insert(0, str(Path(__file__).parent.parent / "experiments"))
-from browser import BROWSER, TELEPHONE, WIDE, started, wait_for
 
 WASM = Path(hs.__file__).parent / "export" / FOLDER
 LAW = hs.BoucWen(beta=0.03, gamma=0.02, gain=-0.01, feedthrough=0.03)
