@@ -459,12 +459,6 @@ test_wrong_arguments_are_named = refused(
 )
 
 
-@pytest.mark.parametrize("law", [EXAMPLE, SLIP, hs.Play(), hs.Dahl()], ids=family)
-def test_a_constant_input_cannot_be_identified(law):
-    with pytest.raises(ValueError, match="the input is constant"):
-        hs.identify(law, hs.Record(u=np.ones(20), y=np.arange(20.0)))
-
-
 def test_nothing_in_nothing_out():
     assert EXAMPLE.response([]).size == 0
     many = {"thresholds": np.arange(80.0), "weights": np.ones((3, 80))}
