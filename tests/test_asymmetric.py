@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
-from strategies import assert_cut_or_stepped_it_has_the_same_bits
+from strategies import assert_cut_or_stepped_it_has_the_same_bits, assert_refused
 
 import hysim as hs
 from hysim.errors import SimulationError
@@ -174,15 +174,13 @@ def test_an_output_without_an_inverse_is_refused(family):
     model = law(family, gain=-1.3)  # its slope is negative behind some of the reversals
     with pytest.raises(SimulationError, match=r"has no inverse at sample \d .* turns on the way"):
         model.inverse_response(model.response(PATH))
-    with pytest.raises(ValueError, match="u0 or state, not both"):
-        model.inverse_response([0.0], u0=0.0, state=(0.0, 0.0))
+    assert_refused("u0 or state, not both", model.inverse_response, [0.0], u0=0.0, state=(0.0, 0.0))
 
 
 @pytest.mark.parametrize("family", FAMILIES)
 def test_an_escape_names_its_sample_and_spares_the_rest_of_a_batch(family):
     escaping = family(beta=-1.0, gamma=-1.0, n=3.0)
-    with pytest.raises(SimulationError, match=r"diverges at sample 2 \(u = 9\)"):
-        escaping.memory([0.0, 0.1, 9.0])
+    assert_refused(r"diverges at sample 2 \(u = 9\)", escaping.memory, [0.0, 0.1, 9.0], error=SimulationError)
     rows = family.responses({"beta": [-1.0, 0.5], "gamma": [-1.0, 0.5], "n": 3.0}, [0.0, 0.1, 9.0])
     assert np.isposinf(rows[0]).all()
     assert np.isfinite(rows[1]).all()

@@ -6,7 +6,14 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from strategies import assert_cut_or_stepped_it_has_the_same_bits, bounded_laws, needs_compiled, refused, short_inputs
+from strategies import (
+    assert_cut_or_stepped_it_has_the_same_bits,
+    assert_refused,
+    bounded_laws,
+    needs_compiled,
+    refused,
+    short_inputs,
+)
 
 import hysim as hs
 from hysim.models.model import every_family
@@ -138,8 +145,7 @@ def test_a_dashpot_is_the_slope_of_the_stretch_before():
     u = np.array([0.0, 1.0, 3.0, 3.0, 2.5])
     assert hs.Dashpot(c=2.0).response(u, 0.5).tolist() == [0.0, 4.0, 8.0, 0.0, -2.0]
     assert hs.Dashpot().response([], 0.5).tolist() == []
-    with pytest.raises(ValueError, match="sample_time must be positive"):
-        hs.Dashpot().response(u, 0.0)
+    assert_refused("sample_time must be positive", hs.Dashpot().response, u, 0.0)
 
 
 def test_parts_keep_their_order_and_are_not_nested_by_the_operators():
@@ -152,10 +158,8 @@ def test_parts_keep_their_order_and_are_not_nested_by_the_operators():
 
 @pytest.mark.parametrize("wrong", [hs.BoucWen, hs.PID(kp=1.0), 3.0, hs.TransferFunction.structure(poles=1, zeros=0)])
 def test_a_part_without_a_response_is_refused(wrong):
-    with pytest.raises(TypeError, match="a response, got"):
-        hs.Sum(parts=(hs.BoucWen(), wrong))
-    with pytest.raises(TypeError, match="a response, got"):
-        hs.Cascade(stages=(hs.BoucWen(), wrong))
+    assert_refused("a response, got", hs.Sum, error=TypeError, parts=(hs.BoucWen(), wrong))
+    assert_refused("a response, got", hs.Cascade, error=TypeError, stages=(hs.BoucWen(), wrong))
 
 
 test_clear_refusals = refused(

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
-from strategies import COMPILED, needs_compiled, refused
+from strategies import COMPILED, assert_refused, needs_compiled, refused
 
 import hysim as hs
 
@@ -99,8 +99,7 @@ def test_the_table_of_a_measured_loop_has_this_loop():
     small = hs.signals.triangle(-0.5, 0.5, cycles=1, samples_per_cycle=80)
     path = np.concatenate([u, small])
     assert np.abs(table.response(path) - law.response(path))[-80:].max() < 1e-2
-    with pytest.raises(ValueError, match="nodes must be at least 3"):
-        hs.TellinenTable.from_loop(record, nodes=2)
+    assert_refused("nodes must be at least 3", hs.TellinenTable.from_loop, record, nodes=2)
 
 
 @pytest.mark.parametrize("law", COILS, ids=["plain", "gap", "steep behind a gap"])

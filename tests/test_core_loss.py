@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from scipy.special import beta
+from strategies import assert_refused
 
 import hysim as hs
 from hysim.metrics import magnetic_metrics
@@ -83,8 +84,7 @@ def test_what_does_not_cross_an_axis_has_no_measure_there():
 
 @pytest.mark.parametrize(("arguments", "message"), [({"mu0": 0.0}, "mu0 must be positive"), ({"cycles": 9}, "cycle")])
 def test_a_loop_that_cannot_be_measured_is_refused(arguments, message):
-    with pytest.raises(ValueError, match=message):
-        magnetic_metrics(*parallelogram(), **arguments)
+    assert_refused(message, magnetic_metrics, *parallelogram(), **arguments)
 
 
 # ---------------------------------------------------------------------------------- losses
@@ -136,10 +136,8 @@ def test_many_parts_at_once_have_the_bits_of_each(part):
     assert rows.tolist() == [part(c=each).response(row, 0.1).tolist() for each, row in zip(c, u, strict=True)]
     assert part.responses({"c": c}, u[0], 0.1, reduce="final")[1] == part(c=-2.0).response(u[0], 0.1)[-1]
     assert part.responses({}, u[0], 0.1).tolist() == [part().response(u[0], 0.1).tolist()]
-    with pytest.raises(TypeError, match="unknown parameter 'k'"):
-        part.responses({"k": 1.0}, u, 0.1)
-    with pytest.raises(ValueError, match="sample_time must be positive"):
-        part.responses({"c": c}, u, 0.0)
+    assert_refused("unknown parameter 'k'", part.responses, {"k": 1.0}, u, 0.1, error=TypeError)
+    assert_refused("sample_time must be positive", part.responses, {"c": c}, u, 0.0)
 
 
 def test_the_parts_beside_a_line_are_identified_together():

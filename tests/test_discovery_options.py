@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from discovered import CYCLES, DAHL, LAW, TRUTH, duhem, multisine, record_of, zigzag
-from strategies import refused
+from strategies import assert_refused, refused
 
 import hysim as hs
 from hysim.discovery import _discover, _refinement
@@ -237,8 +237,7 @@ test_only_records_are_taken_and_at_least_one_is_needed = refused(
 def test_a_gap_is_refused_where_the_record_is_made():
     y = RECORD.y.copy()
     y[7] = np.nan
-    with pytest.raises(ValueError, match="y must be finite, got nan at index 7"):
-        hs.Record(u=RECORD.u, y=y)
+    assert_refused("y must be finite, got nan at index 7", hs.Record, u=RECORD.u, y=y)
 
 
 @pytest.mark.parametrize("library", [NAMES, "duhem"])

@@ -7,7 +7,13 @@ import numpy as np
 import pytest
 from friction_laws import FAMILIES, backlash, decades, drawn, lugre, maxwell, walk
 from scipy.integrate import solve_ivp
-from strategies import assert_cut_or_stepped_it_has_the_same_bits, needs_compiler, printed_by_main, refused
+from strategies import (
+    assert_cut_or_stepped_it_has_the_same_bits,
+    assert_refused,
+    needs_compiler,
+    printed_by_main,
+    refused,
+)
 
 import hysim as hs
 from hysim.models.model import candidates
@@ -276,8 +282,7 @@ def test_every_number_is_identified(family):
         assert abs(fit.estimates[name] - law.scalars[name]) < 6.0 * fit.stderr[name] + 1e-3 * abs(law.scalars[name]), (
             name
         )
-    with pytest.raises(ValueError, match="has no time"):
-        hs.identify(start, hs.Record(u=u, y=y))
+    assert_refused("has no time", hs.identify, start, hs.Record(u=u, y=y))
 
 
 @every_family
@@ -290,12 +295,9 @@ def test_laws_are_composed_and_simulated(family):
     # times are k h, whose differences are h to rounding
     np.testing.assert_allclose(simulation.y, law.response(u, time), rtol=1e-9)
     assert ("z" in simulation.signals) is (family is not hs.StribeckFriction)
-    with pytest.raises(ValueError, match="moves in time: give sample_time"):
-        law.compiled(0.0)
-    with pytest.raises(ValueError, match="sample_time must be positive"):
-        law.response(u, 0.0)
-    with pytest.raises(TypeError, match="that a loop can step"):
-        hs.InverseFeedforward(law=law).compiled(time)
+    assert_refused("moves in time: give sample_time", law.compiled, 0.0)
+    assert_refused("sample_time must be positive", law.response, u, 0.0)
+    assert_refused("that a loop can step", hs.InverseFeedforward, error=TypeError, law=law)
 
 
 @needs_compiler

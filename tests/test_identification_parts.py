@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from strategies import assert_refused
 
 import hysim as hs
 from hysim.identification import Candidate, _descent, marquardt
@@ -18,8 +19,7 @@ RECORDS = [hs.Record(u=scale * TRIANGLE, y=TRIANGLE) for scale in (1.0, 2.0)]
 def test_two_records_are_two_folds_and_one_is_refused():
     found = left_out("records", RECORDS)
     assert [fold.tolist() for fold in found] == [[*range(61)], [*range(61, 122)]]
-    with pytest.raises(ValueError, match="at least 2 records"):
-        left_out("records", RECORDS[:1])
+    assert_refused("at least 2 records", left_out, "records", RECORDS[:1])
 
 
 def test_cycles_of_every_record_are_folds_but_its_first():
@@ -27,8 +27,7 @@ def test_cycles_of_every_record_are_folds_but_its_first():
     found = left_out("cycles", RECORDS)
     assert [(fold[0], fold[-1]) for fold in found] == [(20, 39), (40, 60), (81, 100), (101, 121)]
     assert all((np.diff(fold) == 1).all() for fold in found)
-    with pytest.raises(ValueError, match="at least 2 cycles"):
-        left_out("cycles", [record[:15] for record in RECORDS])
+    assert_refused("at least 2 cycles", left_out, "cycles", [record[:15] for record in RECORDS])
 
 
 def test_only_an_input_that_never_turns_is_said_not_to():

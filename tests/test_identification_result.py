@@ -4,6 +4,7 @@ import json
 
 import numpy as np
 import pytest
+from strategies import assert_refused
 
 import hysim as hs
 
@@ -71,9 +72,7 @@ def test_what_is_not_finite_comes_back(fits):
     ],
 )
 def test_other_text_is_refused_in_one_line(text):
-    with pytest.raises(ValueError, match="this is no identification of hysim") as caught:
-        hs.Identification.from_json(text)
-    assert "\n" not in str(caught.value)
+    assert_refused("this is no identification of hysim", hs.Identification.from_json, text)
 
 
 @pytest.mark.parametrize("name", ["profile", "bootstrap", "several"])
@@ -119,9 +118,7 @@ def test_residuals_without_resolution_have_the_unit_of_y():
 
 
 def test_a_picture_of_another_record_is_refused(fits):
-    with pytest.raises(ValueError, match="the result is of 45 samples, the record has 44"):
-        hs.plot.identification(fits["linear"], record()[1:])
-    with pytest.raises(ValueError, match="the result is of another record"):
-        hs.plot.identification(fits["linear"], record(1))
-    with pytest.raises(ValueError, match="3 Axes are needed"):
-        hs.plot.identification(fits["profile"], record(), hs.plot.figure().subplots(1, 2))
+    picture, two_axes = hs.plot.identification, hs.plot.figure().subplots(1, 2)
+    assert_refused("the result is of 45 samples, the record has 44", picture, fits["linear"], record()[1:])
+    assert_refused("the result is of another record", picture, fits["linear"], record(1))
+    assert_refused("3 Axes are needed", picture, fits["profile"], record(), two_axes)

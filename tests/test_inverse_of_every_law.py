@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from numba import njit
+from strategies import assert_refused
 
 import hysim as hs
 from hysim.models.inverse_search import inverse_step
@@ -141,15 +142,13 @@ def test_with_creep_and_an_amplifier(law):
 
 @pytest.mark.parametrize(("law", "error", "message"), REFUSED.values(), ids=REFUSED)
 def test_what_has_no_inverse_is_refused(law, error, message):
-    with pytest.raises(error, match=message):
-        hs.InverseFeedforward(law=law)
+    assert_refused(message, hs.InverseFeedforward, error=error, law=law)
 
 
 def test_a_rate_too_high_for_an_inverse_is_refused():
     law = LAWS["RateDependentPrandtlIshlinskii"]
     t = 1e-3 * np.arange(5)
-    with pytest.raises(ValueError, match=r"no stable inverse at this sample time"):
-        hs.close_loop(law, hs.InverseFeedforward(law=law), t, t)
+    assert_refused(r"no stable inverse at this sample time", hs.close_loop, law, hs.InverseFeedforward(law=law), t, t)
 
 
 @pytest.mark.parametrize("name", ["BoucWen", "Dahl", "Preisach", "Sum", "Stop"])

@@ -9,6 +9,7 @@ import sys
 
 import numpy as np
 import pytest
+from strategies import assert_refused
 
 import hysim as hs
 
@@ -128,8 +129,7 @@ def test_a_model_is_a_value(model, copied):
 
 @pytest.mark.parametrize("model", MODELS, ids=family)
 def test_a_typo_in_a_parameter_is_an_error(model):
-    with pytest.raises(TypeError, match="gian"):
-        changed(model, "gian", 1.0)
+    assert_refused("gian", changed, model, "gian", 1.0, error=TypeError)
 
 
 @pytest.mark.parametrize("bad", [np.nan, np.inf, -np.inf])
@@ -137,21 +137,18 @@ def test_a_typo_in_a_parameter_is_an_error(model):
 def test_a_number_that_is_not_finite_is_refused_by_name(model, name, bad):
     values = np.array(getattr(model, name), dtype=float)
     values.flat[-1] = bad
-    with pytest.raises(ValueError, match=f"{name} must be finite"):
-        changed(model, name, values)
+    assert_refused(f"{name} must be finite", changed, model, name, values)
 
 
 @pytest.mark.parametrize("wrong", ["one", 1j, {}])
 @pytest.mark.parametrize(("model", "name"), NUMBERS)
 def test_what_is_no_number_is_refused_by_name(model, name, wrong):
-    with pytest.raises(TypeError, match=f"{name} must be"):
-        changed(model, name, wrong)
+    assert_refused(f"{name} must be", changed, model, name, wrong, error=TypeError)
 
 
 @pytest.mark.parametrize(("model", "name"), NUMBERS)
 def test_parameters_go_by_name(model, name):
-    with pytest.raises(TypeError, match="positional"):
-        type(model)(*arguments_of(model).values())
+    assert_refused("positional", type(model), *arguments_of(model).values(), error=TypeError)
 
 
 @pytest.mark.parametrize(("model", "name"), NUMBERS)
@@ -225,30 +222,26 @@ def test_a_file_without_a_model_is_named(tmp_path, text, message):
 
 
 def test_what_is_no_model_is_not_saved(tmp_path):
-    with pytest.raises(TypeError, match="takes a model"):
-        hs.save({"beta": 1.0}, tmp_path / "model.json")
+    assert_refused("takes a model", hs.save, {"beta": 1.0}, tmp_path / "model.json", error=TypeError)
     assert not list(tmp_path.iterdir())
 
 
 def test_a_failed_write_leaves_the_old_file(tmp_path):
     path = tmp_path / "model.json"
     hs.save(MODELS[0], path)
-    with pytest.raises(ValueError, match="JSON"):
-        hs.save(hs.Line(), path, units={"u": float("nan")})
+    assert_refused("JSON", hs.save, hs.Line(), path, units={"u": float("nan")})
     assert hs.load_model(path) == MODELS[0]
 
 
 def test_a_file_that_is_not_text_is_named(tmp_path):
     path = tmp_path / "bad.json"
     path.write_bytes(b"\xff\xfe")
-    with pytest.raises(ValueError, match=r"bad\.json does not hold a model"):
-        hs.load_model(path)
+    assert_refused(r"bad\.json does not hold a model", hs.load_model, path)
 
 
 def test_nothing_is_left_beside_a_file_that_cannot_be_replaced(tmp_path):
     (tmp_path / "folder").mkdir()
-    with pytest.raises(OSError, match="folder"):
-        hs.save(hs.Line(), tmp_path / "folder")
+    assert_refused("folder", hs.save, hs.Line(), tmp_path / "folder", error=OSError)
     assert [entry.name for entry in tmp_path.iterdir()] == ["folder"]
 
 

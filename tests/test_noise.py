@@ -7,6 +7,7 @@ import re
 import numpy as np
 import pytest
 from scipy import stats
+from strategies import assert_refused
 
 import hysim as hs
 from hysim._columns.input_noise import input_noise, quiet_path
@@ -161,8 +162,7 @@ def test_the_treatment_of_the_input_can_be_told():
     assert isinstance(fits["filtered"].model, hs.Cascade)
     for fit in fits.values():
         np.testing.assert_array_equal(fit.residual, record.y - fit.model.response(record.u))
-    with pytest.raises(ValueError, match="input must be one of auto, raw, filtered"):
-        hs.identify(hs.BoucWen, record, input="quiet")
+    assert_refused("input must be one of auto, raw, filtered", hs.identify, hs.BoucWen, record, input="quiet")
     with pytest.raises(ValueError, match="no noise was found in the input"):
         hs.identify(hs.BoucWen, hs.Record(u=CYCLES, y=record.y), input="filtered")
 
@@ -229,10 +229,8 @@ def test_a_weight_of_two_is_a_sample_twice():
 )
 def test_wrong_weights_are_named(weights, message):
     u = np.linspace(0.0, 1.0, 12)
-    with pytest.raises(ValueError, match=message):
-        hs.identify(hs.Line, hs.Record(u=u, y=u), weights=weights)
-    with pytest.raises(ValueError, match=message):
-        hs.identify(hs.SingleValued, hs.Record(u=u, y=u), weights=weights)
+    assert_refused(message, hs.identify, hs.Line, hs.Record(u=u, y=u), weights=weights)
+    assert_refused(message, hs.identify, hs.SingleValued, hs.Record(u=u, y=u), weights=weights)
 
 
 @pytest.mark.parametrize("source", ["spoilt.csv", "-"])

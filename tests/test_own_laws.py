@@ -6,7 +6,7 @@ import pickle
 import numba
 import numpy as np
 import pytest
-from strategies import COMPILED, assert_cut_or_stepped_it_has_the_same_bits, refused
+from strategies import COMPILED, assert_cut_or_stepped_it_has_the_same_bits, assert_refused, refused
 
 import hysim as hs
 
@@ -121,8 +121,7 @@ def test_a_lost_law_names_the_sample():
     law = hs.CustomLaw(step=logarithm, parameters={"gain": 1.0})
     if not COMPILED:  # Python's own logarithm raises instead of nan
         return
-    with pytest.raises(hs.SimulationError, match=r"sample 1 \(u = -1\)"):
-        law.response([1.0, -1.0])
+    assert_refused(r"sample 1 \(u = -1\)", law.response, [1.0, -1.0], error=hs.SimulationError)
 
 
 test_wrong_arguments_are_named = refused(
@@ -145,5 +144,4 @@ test_wrong_arguments_are_named = refused(
     "step", [lambda parameters, state, u: "text", lambda parameters, state, u: sorted(u), lambda p, s, u: s.missing]
 )
 def test_what_does_not_compile_is_refused_with_the_reason(step):
-    with pytest.raises(TypeError, match="does not compile as step"):
-        hs.CustomLaw(step=step, parameters={"a": 1.0})
+    assert_refused("does not compile as step", hs.CustomLaw, error=TypeError, step=step, parameters={"a": 1.0})

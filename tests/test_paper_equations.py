@@ -5,6 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from strategies import assert_refused
 
 import hysim.paper
 from hysim.control import to_control
@@ -96,8 +97,7 @@ def test_the_general_second_order_form_has_what_it_is_given():
 def test_a_response_without_overshoot_says_so():
     creeping = characteristics(second_order(1.0, natural_frequency=1.0, damping_ratio=2.0))
     assert creeping.overshoot_percent == 0.0
-    with pytest.raises(ValueError, match="overshoot"):
-        matched_second_order(creeping)
+    assert_refused("overshoot", matched_second_order, creeping)
 
 
 def test_a_change_of_the_unit_of_time_keeps_the_plant():
@@ -143,8 +143,7 @@ def test_controllability_and_observability_by_their_definitions(form, controllab
 
 
 def test_a_feedthrough_has_no_such_form():
-    with pytest.raises(ValueError, match="strictly proper"):
-        companion(TransferFunction(num=(1.0, 2.0), den=(1.0, 3.0)))
+    assert_refused("strictly proper", companion, TransferFunction(num=(1.0, 2.0), den=(1.0, 3.0)))
 
 
 def test_the_amplifier():
@@ -154,8 +153,7 @@ def test_the_amplifier():
     assert full_power_bandwidth(0.5e6, 5.0) == pytest.approx(15.9e3, rel=2e-3)
     assert full_power_bandwidth(0.5e6, 50.0) == pytest.approx(1.59e3, rel=2e-3)
     assert UA741_SUPPLY_SPAN < 50.0
-    with pytest.raises(ValueError, match="positive"):
-        full_power_bandwidth(0.5e6, 0.0)
+    assert_refused("positive", full_power_bandwidth, 0.5e6, 0.0)
 
 
 def test_the_bandwidth_is_where_a_sine_reaches_the_slew_rate():
@@ -175,8 +173,7 @@ def test_the_standard_form_is_the_sum_of_its_terms():
 
 @pytest.mark.parametrize("wrong", [{"Ti": 0.0}, {"Ti": np.nan}, {"Td": -1.0}, {"derivative_filter": -0.1}])
 def test_the_standard_form_refuses_times_that_are_none(wrong):
-    with pytest.raises(ValueError, match="must"):
-        pid_standard(1.0, **{"Ti": 1.0, "Td": 0.0, **wrong})
+    assert_refused("must", pid_standard, 1.0, **{"Ti": 1.0, "Td": 0.0, **wrong})
 
 
 def test_an_integral_needs_no_steady_error():
@@ -214,5 +211,4 @@ def test_a_quantum_is_the_largest_step():
     step = quantum(awkward, 0.05)
     assert np.abs(awkward - step * np.round(awkward / step)).max() <= 0.05
     for values, tolerance in (([0.0, 0.0], 0.1), ([1.0], 0.0)):
-        with pytest.raises(ValueError, match="quantum"):
-            quantum(values, tolerance)
+        assert_refused("quantum", quantum, values, tolerance)

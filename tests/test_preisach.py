@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 from strategies import (
     COMPILED,
     assert_cut_or_stepped_it_has_the_same_bits,
+    assert_refused,
     outputs_of_compiled_steps,
     refused,
     short_inputs,
@@ -379,8 +380,7 @@ def test_the_reversal_curves_turn_at_every_level():
     assert u[[2, 8, 18]].tolist() == [0.0, 1.0, 2.0]
     assert np.abs(np.diff(u)) == pytest.approx(0.5)
     for wrong in ({"curves": 0}, {"curves": 1, "samples_per_step": 0}):
-        with pytest.raises(ValueError, match="at least 1"):
-            hs.signals.reversal_curves(0.0, 1.0, **wrong)
+        assert_refused("at least 1", hs.signals.reversal_curves, 0.0, 1.0, **wrong)
 
 
 @given(laws(), short_inputs(1.0), st.integers(1, 3))

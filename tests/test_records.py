@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from strategies import refused
+from strategies import assert_refused, refused
 
 import hysim as hs
 
@@ -145,8 +145,7 @@ def test_wiggles_below_the_tolerance_are_no_reversals():
     assert len(noisy.reversals()) > 10
     assert len(noisy.reversals(tolerance=0.1)) == 5
     assert len(noisy.branches(tolerance=0.1)) == 6
-    with pytest.raises(ValueError, match=r"tolerance .* got 0\.5"):
-        noisy.reversals(tolerance=0.5)
+    assert_refused(r"tolerance .* got 0\.5", noisy.reversals, tolerance=0.5)
 
 
 def test_cycles_are_those_that_loop_metrics_measures():
@@ -171,8 +170,7 @@ def test_an_uneven_record_is_resampled_along_straight_lines():
 
 @pytest.mark.parametrize("step", [0.0, -1.0, 0.31, 1e-12, math.nan, math.inf])
 def test_a_step_that_does_not_fit_the_record_is_refused(step):
-    with pytest.raises(ValueError, match="sample_time must be from"):
-        record().resample(step)
+    assert_refused("sample_time must be from", record().resample, step)
 
 
 @given(st.floats(-0.01, 0.01), st.floats(-1e-5, 1e-5), st.booleans())
@@ -192,11 +190,9 @@ def test_a_record_is_split_at_samples_and_fractions():
     assert [part.u.tolist() for part in rec.split(3, 0.8)] == [[0, 1, 2], [3, 4, 5, 6, 7], [8, 9]]
     assert {(part.name, part.units["u"]) for part in rec.split(np.int64(3), np.float64(0.8))} == {("loop", "V")}
     for places, message in (((), "needs a place"), ((9,), r"got \[9, 1\]"), ((5, 4), r"got \[5, -1, 6\]")):
-        with pytest.raises(ValueError, match=message):
-            rec.split(*places)
+        assert_refused(message, rec.split, *places)
     for place in (True, 1.0, "half", math.nan):
-        with pytest.raises(TypeError, match="a place must be a sample's number or a fraction"):
-            rec.split(place)
+        assert_refused("a place must be a sample's number or a fraction", rec.split, place, error=TypeError)
 
 
 def test_units_change_by_their_prefix():

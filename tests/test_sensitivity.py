@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 from scipy import stats
-from strategies import refused
+from strategies import assert_refused, refused
 
 import hysim as hs
 
@@ -76,8 +76,7 @@ def test_the_pictures_show_the_numbers(result):
     grid = hs.sweep(lambda a, b, c: {"y": a + 10.0 * b}, {"a": [1, 2, 3], "b": [0.0, 1.0], "c": ["x", "y"]})
     table = hs.plot.heat_map(grid, "a", "b", "y", ax=axes()).collections[0].get_array()
     assert table.tolist() == [[1.0, 2.0, 3.0], [11.0, 12.0, 13.0]]
-    with pytest.raises(ValueError, match="needs a grid"):
-        hs.plot.heat_map(result, "a", "b", "y", ax=axes())
+    assert_refused("needs a grid", hs.plot.heat_map, result, "a", "b", "y", ax=axes())
 
     bands = hs.plot.quantile_bands(grid, "a", "y", ax=axes())
     assert bands.lines[0].get_xydata().tolist() == [[1.0, 6.0], [2.0, 7.0], [3.0, 8.0]]

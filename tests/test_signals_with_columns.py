@@ -5,7 +5,7 @@ import io
 
 import numpy as np
 import pytest
-from strategies import document_of, refused_in_one_line
+from strategies import assert_refused, document_of, refused_in_one_line
 
 import hysim as hs
 
@@ -171,8 +171,7 @@ def test_signals_are_drawn_with_a_line_for_each_column(simulation):
     assert kinetic.get_legend() is None
     with pytest.raises(ValueError, match=r"give signals out of t, u, y, displacement, .* got velocity"):
         hs.plot.signals(simulation, "velocity")
-    with pytest.raises(ValueError, match="got no name"):
-        hs.plot.signals(simulation)
+    assert_refused("got no name", hs.plot.signals, simulation)
 
 
 @pytest.fixture

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from strategies import refused
+from strategies import assert_refused, refused
 
 import hysim as hs
 from hysim.laws.operators._densities import linear_between, parts_of, roughness
@@ -108,8 +108,7 @@ test_wrong_options_are_refused = refused(
 
 
 def test_a_constant_input_is_refused():
-    with pytest.raises(ValueError, match="the input is constant"):
-        hs.Preisach.smoothed(hs.Record(u=np.ones(5), y=np.arange(5.0)))
+    assert_refused("the input is constant", hs.Preisach.smoothed, hs.Record(u=np.ones(5), y=np.arange(5.0)))
 
 
 def loops_of(law, amplitudes, noise):

@@ -10,7 +10,7 @@ import sweep_tasks
 from hypothesis import given
 from hypothesis import strategies as st
 from scipy import stats
-from strategies import refused
+from strategies import assert_refused, refused
 
 import hysim as hs
 from hysim.sweeps import _sweep
@@ -288,8 +288,7 @@ def test_the_table_as_text_keeps_every_digit(serial):
 @pytest.mark.parametrize(("library", "view"), [("pandas", "to_frame"), ("xarray", "to_xarray")])
 def test_a_view_says_what_it_needs(serial, library, view, monkeypatch):
     monkeypatch.setitem(sys.modules, library, None)
-    with pytest.raises(ImportError, match=rf"{view} needs {library}: pip install 'hysim\[tables\]'"):
-        getattr(serial, view)()
+    assert_refused(rf"{view} needs {library}: pip install 'hysim\[tables\]'", getattr(serial, view), error=ImportError)
 
 
 @pytest.mark.extra("pandas")
