@@ -34,11 +34,7 @@ OSCILLATORS = {
     "rate-dependent": {SPRING: 5e4, DISSIPATIVE: -800.0, RELAXATION: -50.0},
     "no structure": {},
 }
-VERDICTS = {
-    "lag": "linear lag",
-    "rate-dependent": "rate-dependent hysteresis",
-    "no structure": "no structure found",
-}
+VERDICTS = {"lag": "linear lag", "rate-dependent": "rate-dependent hysteresis", "no structure": "no structure found"}
 LAWS = {
     "memory": (lambda u: LAW.memory(u), {"route": "memory", "library": list(TRUTH)}),
     "output": (lambda u: 5.0 + 40.0 * u - 60.0 * LAW.memory(u), {"route": "output", "library": list(TRUTH)}),

@@ -73,8 +73,7 @@ def invertible_plays(draw) -> dict:
     sums = np.array(draw(st.lists(st.floats(0.2, 3.0), min_size=1, max_size=5)))
     steps = draw(st.lists(st.floats(0.05, 0.3), min_size=sums.size - 1, max_size=sums.size - 1))
     law = hs.PrandtlIshlinskii(
-        thresholds=np.cumsum([0.0, *steps]),
-        weights=draw(st.sampled_from([1.0, -1.0])) * np.diff(sums, prepend=0.0),
+        thresholds=np.cumsum([0.0, *steps]), weights=draw(st.sampled_from([1.0, -1.0])) * np.diff(sums, prepend=0.0)
     )
     past = draw(short_inputs(1.0))
     return {

@@ -198,10 +198,7 @@ def test_a_whole_loop_inside_python_control_is_the_loop_of_close_loop(controller
     ahead, r = controller.ahead(H), 0.5 * np.sin(T) ** 2
     plant, block = hs.to_control(STACK, H), hs.to_control(controller, H)
     loop = control.interconnect(
-        [plant, block],
-        connections=[[(0, 0), (1, 0)], [(1, 1), (0, 0)]],
-        inplist=[(1, 0)],
-        outlist=[(0, 0), (1, 0)],
+        [plant, block], connections=[[(0, 0), (1, 0)], [(1, 1), (0, 0)]], inplist=[(1, 0)], outlist=[(0, 0), (1, 0)]
     )
     given_ahead = np.append(r[ahead:], np.full(ahead, r[-1]))
     own = hs.close_loop(STACK, controller, T, r)

@@ -89,8 +89,7 @@ def test_a_memory_with_several_places_is_written_as_columns(run, tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("file", "options"),
-    [("quake.AT2", []), ("quake.csv", []), ("list.txt", ["--sample-time", "0.1"]), ("-", [])],
+    ("file", "options"), [("quake.AT2", []), ("quake.csv", []), ("list.txt", ["--sample-time", "0.1"]), ("-", [])]
 )
 def test_a_ground_motion_moves_a_plant(run, file, options):
     code, out, err = run("simulate", "floors:frame", file, *options, stdin=AT2)

@@ -170,10 +170,7 @@ def test_an_actuator_with_a_sensor_is_what_it_measures(delay):
     u = walk(6)
     for quantum in (0.0, 0.01):
         sensor = hs.Sensor(quantum=quantum, delay=delay)
-        for plant in (
-            hs.Actuator(hysteresis=LAW, sensor=sensor),
-            replace(SENSED, sensor=sensor),
-        ):
+        for plant in (hs.Actuator(hysteresis=LAW, sensor=sensor), replace(SENSED, sensor=sensor)):
             expected = plant.measured(u, TIME)
             assert stepped(plant, u, TIME) == pytest.approx(expected, abs=1e-13 * np.abs(expected).max())
             noisy = replace(plant, sensor=replace(sensor, noise=0.1))

@@ -94,8 +94,7 @@ def loops(plant, reference, pid):
 
 
 @pytest.mark.parametrize(
-    ("name", "bound"),
-    [*((name, 2.0) for name in TASKS), ("late", 1.5), ("law", 1.5), ("mode", 1.5)],
+    ("name", "bound"), [*((name, 2.0) for name in TASKS), ("late", 1.5), ("law", 1.5), ("mode", 1.5)]
 )
 def test_the_bound_on_the_sensitivity_holds(name, bound):
     plant, _, reference, _ = TASKS[name]

@@ -39,13 +39,7 @@ LAWS = {
     "ReversalFilter": hs.ReversalFilter(threshold=0.3),
     "Line": hs.Line(slope=2.0),
 }  # fmt: skip
-MORE_THAN_FIELDS = {
-    "BoucWenBaberNoori",
-    "ParametricPrandtlIshlinskii",
-    "Chan",
-    "JilesAtherton",
-    "ReversalFilter",
-}
+MORE_THAN_FIELDS = {"BoucWenBaberNoori", "ParametricPrandtlIshlinskii", "Chan", "JilesAtherton", "ReversalFilter"}
 WITHOUT_INVERSE = {"Play", "Stop", "MaxwellSlip", "ColemanHodgdon", "ReversalFilter"}
 U = RNG.uniform(-1.0, 1.0, 40)
 
