@@ -187,6 +187,19 @@ def shell(monkeypatch, capsys):
     return run
 
 
+@pytest.fixture
+def folder(tmp_path):
+    """The folder in which commands are run; files of tests have others, with records in them."""
+    return tmp_path
+
+
+@pytest.fixture
+def run(folder, monkeypatch, shell):
+    """Run a command in the folder: exit code, standard output, standard error."""
+    monkeypatch.chdir(folder)
+    return shell
+
+
 def shared_folder(tmp_path_factory):
     """Of what all processes compute once: that of HYSIM_SHARED, where several sessions test one state, or a new one."""
     own = tmp_path_factory.getbasetemp()

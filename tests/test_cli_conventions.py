@@ -43,13 +43,6 @@ def folder(tmp_path_factory):
     return folder
 
 
-@pytest.fixture
-def run(folder, monkeypatch, shell):
-    """Run a command in that folder: exit code, standard output, standard error."""
-    monkeypatch.chdir(folder)
-    return shell
-
-
 def test_the_commands_are_those_of_the_design():
     wanted = {"simulate", "identify", "discover", "compare", "metrics", "control", "plot", "sweep", "reproduce"}
     assert wanted <= PARSERS.keys()
