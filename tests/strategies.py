@@ -52,6 +52,15 @@ def assert_cut_or_stepped_it_has_the_same_bits(law, u, cut, **time) -> None:
     assert np.array_equal(outputs_of_compiled_steps(law, u, **time)[0], whole)
 
 
+def assert_batch_has_the_bits_of_its_laws(family, sets, u, own_inputs) -> None:
+    """A row for each set, all under the same input or each under its own share of it."""
+    laws = [family(**dict(zip(sets, values, strict=True))) for values in zip(*sets.values(), strict=True)]
+    inputs = u * np.linspace(1.0, -0.3, len(laws))[:, np.newaxis]
+    rows = family.responses(sets, inputs if own_inputs else u, workers=2)
+    for law, row, own in zip(laws, rows, inputs, strict=True):
+        assert np.array_equal(row, law.response(own if own_inputs else u))
+
+
 def outputs_of_compiled_steps(law, u, **time):
     """Outputs of the compiled step, one sample at a time, and the state at the end."""
     from hysim.kernels.stepping import drive

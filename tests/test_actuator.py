@@ -147,9 +147,7 @@ def test_an_actuator_of_a_fit_stays_within_its_record():
 def test_an_actuator_of_a_model_takes_the_range_that_this_was_identified_on():
     law = hs.BoucWen(u0=-2.0, u_range=(-2.0, 4.0))
     assert hs.Actuator.of(law) == hs.Actuator(hysteresis=law, amplifier=hs.Amplifier(limits=(-2.0, 4.0)))
-    own = hs.Actuator(
-        hysteresis=law, amplifier=hs.Amplifier(gain=2.0, limits=(0.0, 1.0)), sensor=hs.Sensor(quantum=0.5)
-    )
+    own = hs.Actuator(hysteresis=law, amplifier=hs.Amplifier(gain=2.0, limits=(0, 1)), sensor=hs.Sensor(quantum=0.5))
     assert hs.Actuator.of(own) == own
     assert_refused(r"are not known: give Actuator.of\(fit, record\)", hs.Actuator.of, hs.BoucWen())
 

@@ -10,6 +10,7 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 from strategies import (
+    assert_batch_has_the_bits_of_its_laws,
     assert_cut_or_stepped_it_has_the_same_bits,
     assert_refused,
     bounded_laws,
@@ -248,11 +249,8 @@ def test_plateaus_change_nothing(law, u):
 
 @given(st.lists(bounded_laws(), min_size=1, max_size=5), short_inputs(), st.booleans())
 def test_batch_is_the_path_to_the_bit(laws, u, own_inputs):
-    inputs = np.stack([u * (k + 1) / len(laws) for k in range(len(laws))]) if own_inputs else u
-    parameters = {name: [getattr(law, name) for law in laws] for name in laws[0].scalars}
-    rows = hs.BoucWen.responses(parameters, inputs, workers=2)
-    for k, law in enumerate(laws):
-        assert np.array_equal(rows[k], law.response(inputs[k] if own_inputs else u))
+    sets = {name: [getattr(law, name) for law in laws] for name in laws[0].scalars}
+    assert_batch_has_the_bits_of_its_laws(hs.BoucWen, sets, u, own_inputs)
 
 
 @pytest.mark.parametrize("scale", [0.05, 1.0, 30.0, 900.0])
@@ -293,11 +291,9 @@ def test_admissible_laws_dissipate(beta, ratio, n, amplitude):
 
 def test_a_large_batch_is_the_same_on_one_thread_and_on_two():
     rng = np.random.default_rng(0)
-    parameters = {"beta": rng.uniform(0, 2, 500), "gamma": rng.uniform(-1, 1, 500), "n": rng.uniform(0.5, 5, 500)}
-    u = np.sin(np.linspace(0, 20, 60))
-    assert np.array_equal(
-        hs.BoucWen.responses(parameters, u, workers=1), hs.BoucWen.responses(parameters, u, workers=2)
-    )
+    sets = {"beta": rng.uniform(0, 2, 500), "gamma": rng.uniform(-1, 1, 500), "n": rng.uniform(0.5, 5, 500)}
+    one, two = (hs.BoucWen.responses(sets, np.sin(np.linspace(0, 20, 60)), workers=workers) for workers in (1, 2))
+    assert np.array_equal(one, two)
 
 
 def test_a_law_that_escapes_is_a_row_of_inf():
@@ -545,9 +541,8 @@ def test_scaling_of_the_memory_and_of_the_input(law, factor):
     stretched = wider.limit_cycle(0.7 * factor)
     assert stretched.peak == pytest.approx(loop.peak, rel=RELATIVE)
     assert stretched.energy == pytest.approx(loop.energy * factor, rel=RELATIVE)
-    taller = hs.BoucWen(
-        A=law.A * factor, beta=law.beta * factor ** (1 - law.n), gamma=law.gamma * factor ** (1 - law.n), n=law.n
-    )
+    decay = factor ** (1 - law.n)
+    taller = hs.BoucWen(A=law.A * factor, beta=law.beta * decay, gamma=law.gamma * decay, n=law.n)
     assert taller.limit_cycle(0.7).peak == pytest.approx(loop.peak * factor, rel=RELATIVE)
 
 

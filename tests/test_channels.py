@@ -107,9 +107,7 @@ def test_degree_0_is_no_dependence_to_the_bit(name):
 
 
 def test_a_channel_that_stands_still_is_one_number(fit):
-    still = [
-        dataclasses.replace(each, channels={"T": np.full(U.size, each.channel("T"))}) for each in records(noise=0.01)
-    ]
+    still = [dataclasses.replace(rec, channels={"T": np.full(U.size, rec.channel("T"))}) for rec in records(noise=0.01)]
     again = hs.identify(hs.Play, still, depends=DEPENDS)
     assert again.estimates == fit.estimates
     np.testing.assert_equal(dict(again.intervals), dict(fit.intervals))
@@ -271,9 +269,7 @@ test_what_is_no_dependent_law_is_refused = refused(
     ({"polynomials": (polynomial("threshold", 1.0, -2.0),)}, "threshold"),
     ({"polynomials": (polynomial("gain", 1.0, 2.0),) * 2}, "two polynomials"),
     ({"polynomials": ("gain",)}, TypeError, "must hold ChannelPolynomial"),
-    call=lambda arguments: hs.Dependent(
-        **{"law": hs.Play(), "polynomials": (polynomial("gain", 1.0, 2.0),)} | arguments
-    ),
+    call=lambda given: hs.Dependent(**{"law": hs.Play(), "polynomials": (polynomial("gain", 1.0, 2.0),)} | given),
 )
 
 

@@ -7,7 +7,12 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from strategies import assert_cut_or_stepped_it_has_the_same_bits, refused, short_inputs
+from strategies import (
+    assert_batch_has_the_bits_of_its_laws,
+    assert_cut_or_stepped_it_has_the_same_bits,
+    refused,
+    short_inputs,
+)
 
 import hysim as hs
 from hysim.models.search_space import Freedom
@@ -67,9 +72,7 @@ def invertible_laws(draw) -> hs.PrandtlIshlinskii:
         weights=sign * np.diff(sums, prepend=0.0),
         offset=draw(st.floats(-1.0, 1.0)),
     )
-    return hs.PrandtlIshlinskii(
-        thresholds=law.thresholds, weights=law.weights, offset=law.offset, z0=law.memory(past)[-1]
-    )
+    return dataclasses.replace(law, z0=law.memory(past)[-1])
 
 
 # ---------------------------------------------------------------------------------- closed forms
@@ -181,11 +184,7 @@ def test_batch_is_the_path_to_the_bit(u, seed, own_inputs):
         "offset": rng.normal(size=3),
         "z0": rng.normal(size=(3, 1)),
     }
-    inputs = u * np.array([[1.0], [0.7], [-0.3]]) if own_inputs else u
-    rows = hs.PrandtlIshlinskii.responses(sets, inputs, workers=2)
-    for k in range(3):
-        law = hs.PrandtlIshlinskii(**{name: values[k] for name, values in sets.items()})
-        assert np.array_equal(rows[k], law.response(inputs[k] if own_inputs else u))
+    assert_batch_has_the_bits_of_its_laws(hs.PrandtlIshlinskii, sets, u, own_inputs)
 
 
 @given(

@@ -64,9 +64,7 @@ def test_tellinen_obeys_its_differential_equation(law):
 
     m = [0.5 * (1.0 + law.z0) * upper(u[0]) + 0.5 * (1.0 - law.z0) * lower(u[0])]
     for before, after in pairwise(u):
-        run = solve_ivp(
-            slope, (before, after), [m[-1]], args=(after - before,), method="DOP853", rtol=1e-10, atol=1e-11
-        )
+        run = solve_ivp(slope, (before, after), [m[-1]], "DOP853", args=(after - before,), rtol=1e-10, atol=1e-11)
         m.append(run.y[0, -1])
     expected = law.offset + law.feedthrough * u + law.saturation * np.array(m)
     # 1e-9: the slope of a branch by differences, and the tolerance of the solver
@@ -300,9 +298,7 @@ test_what_is_no_core_is_refused = refused(
 
 
 LOOPS = hs.signals.triangle(-1.0, 1.0, cycles=1, samples_per_cycle=120)
-LOOPS = np.concatenate(
-    [[0.0], np.linspace(0.0, -1.0, 20), LOOPS, np.linspace(-1.0, 0.6, 30), np.linspace(0.6, -0.3, 20)]
-)
+LOOPS = np.concatenate([[0.0], np.linspace(0, -1, 20), LOOPS, np.linspace(-1.0, 0.6, 30), np.linspace(0.6, -0.3, 20)])
 
 
 def noisy(law, seed=8):

@@ -15,9 +15,7 @@ U = hs.signals.triangle(0.0, 1.0, cycles=2, samples_per_cycle=20)
 Y = hs.BoucWen(beta=2.0).response(U)
 T = 0.1 * np.arange(U.size)
 UNITS = {"t": "s", "u": "V", "y": "um", "current": "A"}
-RECORD = hs.Record(
-    u=U, y=Y, t=T, units=UNITS, name="stack", resolution=0.01, channels={"T": 20.0, "current": np.sqrt(T)}
-)
+RECORD = hs.Record(u=U, y=Y, t=T, units=UNITS, name="stack", resolution=0.01, channels={"T": 20, "current": np.sqrt(T)})
 
 needs_pandas = pytest.mark.extra("pandas")
 needs_xarray = pytest.mark.extra("xarray")
@@ -102,12 +100,10 @@ test_tables_that_hold_no_record_are_refused_with_the_column = refused(
 
 def test_verbs_name_the_columns_that_a_table_lacks():
     table = PolarsLike({"voltage": U, "y": Y})
-    with pytest.raises(
-        ValueError, match=r"got a PolarsLike without u, with voltage and y: name the columns by hs.load"
-    ):
-        hs.identify(hs.Line, table)
-    with pytest.raises(ValueError, match="delimiter is for text, this is the PolarsLike: leave it out"):
-        hs.load(table, u="voltage", delimiter=",")
+    lacking = "got a PolarsLike without u, with voltage and y: name the columns by hs.load"
+    assert_refused(lacking, hs.identify, hs.Line, table)
+    excess = "delimiter is for text, this is the PolarsLike: leave it out"
+    assert_refused(excess, hs.load, table, u="voltage", delimiter=",")
     assert_refused("load takes a path, an open file or a DataFrame, got int", hs.load, 3, error=TypeError)
 
 

@@ -69,7 +69,5 @@ def test_arguments_are_checked():
     assert_refused("at least 10 samples, got 6", hs.InputLimits, amplitude=1.0, slew=1.0, duration=0.5, sample_time=0.1)
     with pytest.raises(ValueError, match="no input within the limits tells A, gain, beta, gamma apart"):
         hs.design_input(hs.BoucWen(), limits=LIMITS, free=("A", "gain", "beta", "gamma"), candidates=4, moves=2)
-    with pytest.raises(
-        TypeError, match=r"takes a law that a step describes, such as BoucWen, or an Actuator\.structure"
-    ):
-        hs.design_input(hs.PID(kp=1.0), limits=LIMITS, free=FREE)
+    message = r"takes a law that a step describes, such as BoucWen, or an Actuator\.structure"
+    assert_refused(message, hs.design_input, hs.PID(kp=1.0), error=TypeError, limits=LIMITS, free=FREE)

@@ -70,9 +70,7 @@ def test_cross_validation_repeats_the_whole_search(monkeypatch):
 
     monkeypatch.setattr(_discover, "searched", searched_and_noted)
     record, done = record_of(LAW.memory, multisine(120), noise=0.01), []
-    found = hs.discover(
-        record, library=NAMES, route="memory", cross_validate=3, progress=lambda *step: done.append(step)
-    )
+    found = hs.discover(record, library=NAMES, route="memory", cross_validate=3, progress=lambda *at: done.append(at))
     folds = np.array_split(np.arange(len(record)), 3)
     assert every[0] is None
     assert [np.flatnonzero(~seen).tolist() for (seen,) in every[1:]] == [f.tolist() for f in folds]

@@ -143,9 +143,7 @@ def test_the_scale_of_a_memory_is_a_convention(n, A, offset):
     assert isinstance(model, hs.BoucWen)
     assert (model.A, model.gain, model.n) == (1.0, A, float(n))
     assert found.coefficients["u'"] == 1.0
-    assert model.response(record.u) == pytest.approx(
-        expected, abs=1e-10 * np.ptp(expected)
-    )  # an integrated law's promise
+    assert model.response(record.u) == pytest.approx(expected, abs=1e-10 * np.ptp(expected))  # its promise
 
 
 @pytest.mark.parametrize("n", [0.5, 1.7])

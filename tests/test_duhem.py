@@ -189,9 +189,7 @@ def test_names_outside_the_vocabulary_are_refused(name):
 
 
 def test_every_term_has_one_name():
-    terms = [
-        Term(rectified, degree, j) for rectified in (False, True) for degree in range(4) for j in range(degree + 1)
-    ]
+    terms = [Term(rectified, n, j) for rectified in (False, True) for n in range(4) for j in range(n + 1)]
     assert [Term.parse(term.name) for term in terms] == terms == sorted(terms)
 
 
@@ -221,9 +219,8 @@ def test_the_search_space_begins_at_the_law_and_goes_back_to_it():
     assert space.parameters(space.lower)["|u'|"][0] == 0.0
     assert space.parameters(space.upper)["|u'|"][0] == pytest.approx(0.5, rel=1e-15)
     assert GENERAL.regressors(values, record)[0, :, 0] == pytest.approx(record.y, abs=1e-14)  # rounding of the scaling
-    assert GENERAL.assemble({name: value[0] for name, value in values.items()}).terms == pytest.approx(
-        GENERAL.terms, rel=1e-14
-    )
+    again = GENERAL.assemble({name: value[0] for name, value in values.items()})
+    assert again.terms == pytest.approx(GENERAL.terms, rel=1e-14)
 
 
 def test_at_rest_the_law_starts_at_zero():

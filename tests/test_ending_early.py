@@ -163,9 +163,7 @@ def test_a_pool_takes_no_work_after_its_end_and_finishes_what_it_has():
     assert_refused("after shutdown", pool.submit, pow, 1, 2, error=RuntimeError)
 
 
-@pytest.mark.skipif(
-    sys.gettrace() is not None, reason="under a tracer such an exception may be lost, and is waited for"
-)
+@pytest.mark.skipif(sys.gettrace() is not None, reason="under a tracer such an exception may be lost")
 def test_an_exception_for_a_thread_does_not_reach_one_that_it_starts(monkeypatch):
     strays = []
     monkeypatch.setattr(sys, "unraisablehook", strays.append)

@@ -43,9 +43,8 @@ def test_lugre_is_the_solution_of_its_equation_where_bristles_are_soft():
         law, length, time = drawn(hs.LuGre, rng)
         u = np.clip(np.diff(walk(rng, length, 9)), -length, length).cumsum()  # DOP853 needs many steps for long strokes
         # the error of DOP853 at its tolerance of 1e-12, from eight strokes
-        np.testing.assert_allclose(
-            law.response(u, time), lugre(law, u, time), rtol=0, atol=1e-10 * size(lugre(law, u, time))
-        )
+        expected = lugre(law, u, time)
+        np.testing.assert_allclose(law.response(u, time), expected, rtol=0, atol=1e-10 * size(expected))
 
 
 def test_maxwell_slip_is_the_solution_of_its_equations():
@@ -226,10 +225,9 @@ def work_and_store(law, u, h, parts=400):
     z = law.memory(fine, h / parts)
     # within a part the velocity is even: the trapezoidal rule on the force behind the jump at its begin
     first = z[:-1]
-    damping = law.viscosity * rises / (h / parts)
-    bristles = law.sigma0 * first - law.sigma1 * law.sigma0 * np.abs(rises) / (h / parts) * first / law.friction(
-        rises / (h / parts)
-    )
+    velocity = rises / (h / parts)
+    damping = law.viscosity * velocity
+    bristles = law.sigma0 * first - law.sigma1 * law.sigma0 * np.abs(velocity) * first / law.friction(velocity)
     return float(np.sum(0.5 * (force[1:] + bristles + damping) * rises)), 0.5 * law.sigma0 * (z[-1] ** 2 - z[0] ** 2)
 
 
@@ -278,10 +276,9 @@ def test_every_number_is_identified(family):
     assert fit.success
     assert {"offset"} < set(fit.free_names)
     for name in fit.free_names:
+        value = law.scalars[name]
         # six standard errors of noise, one in a thousand for numbers that hardly matter
-        assert abs(fit.estimates[name] - law.scalars[name]) < 6.0 * fit.stderr[name] + 1e-3 * abs(law.scalars[name]), (
-            name
-        )
+        assert abs(fit.estimates[name] - value) < 6.0 * fit.stderr[name] + 1e-3 * abs(value), name
     assert_refused("has no time", hs.identify, start, hs.Record(u=u, y=y))
 
 

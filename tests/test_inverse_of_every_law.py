@@ -105,9 +105,7 @@ def reversing(law, u0, n=240):
 
 
 def test_every_family_has_its_case():
-    laws = {
-        name for name, family in every_family().items() if is_law(family) and family.__module__.startswith("hysim.")
-    }
+    laws = {name for name, each in every_family().items() if is_law(each) and each.__module__.startswith("hysim.")}
     assert laws <= {name.split(",")[0] for name in (*LAWS, *REFUSED)}
 
 

@@ -142,9 +142,8 @@ def test_the_modules_of_the_package_are_made_of_the_steps_as_they_are(all_steps)
 
 def test_the_command_writes_the_same_page(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
-    rows = [
-        f"{u},{y}" for u, y in zip(*(hs.datasets.table1()[:].u.tolist(), hs.datasets.table1().y.tolist()), strict=True)
-    ]
+    table1 = hs.datasets.table1()
+    rows = [f"{u},{y}" for u, y in zip(table1.u.tolist(), table1.y.tolist(), strict=True)]
     Path("loop.csv").write_text("\n".join(["voltage [V],displacement [um]", *rows]))
     hs.save(LAW, "law.json", units={"u": "V", "y": "um"})
     columns = ("--u", "voltage", "--y", "displacement")

@@ -189,9 +189,8 @@ def test_the_stored_errors_are_those_of_the_experiment():
     assert [(each.model, each.start) for each in stored] == [(row["model"], row["start"]) for row in rows]
     for each, row in zip(stored, rows, strict=True):
         assert (each.left_out_rmse, each.behind) == (row["left_out_rmse_um"], row["behind_in_stderr"])
-        assert all(
-            each._asdict()[name] == row[name] for name in ("n_parameters", "folds", "same_structure", "terms_kept")
-        )
+        for name in ("n_parameters", "folds", "same_structure", "terms_kept"):
+            assert each._asdict()[name] == row[name]
 
 
 def test_rows_stand_in_the_order_of_their_errors_and_the_best_that_was_searched_again_is_behind_none():

@@ -9,6 +9,7 @@ from hypothesis import example, given
 from hypothesis import strategies as st
 from strategies import (
     COMPILED,
+    assert_batch_has_the_bits_of_its_laws,
     assert_cut_or_stepped_it_has_the_same_bits,
     assert_refused,
     outputs_of_compiled_steps,
@@ -233,12 +234,8 @@ def test_batch_is_the_path_to_the_bit(u, seed, own_inputs):
         "offset": rng.normal(size=3),
         "z0": rng.normal(size=(3, 2)),
     }
-    inputs = u * np.array([[1.0], [0.7], [-0.3]]) if own_inputs else u
     for family in FAMILIES:
-        rows = family.responses(sets, inputs, workers=2)
-        for k in range(3):
-            law = family(**{name: values[k] for name, values in sets.items()})
-            assert np.array_equal(rows[k], law.response(inputs[k] if own_inputs else u))
+        assert_batch_has_the_bits_of_its_laws(family, sets, u, own_inputs)
 
 
 def test_reductions_are_the_measures_of_the_rows():

@@ -268,9 +268,7 @@ def test_an_output_cannot_have_the_name_of_a_parameter():
 
 def test_progress_ends_at_the_total():
     seen = []
-    hs.sweep(
-        sweep_tasks.product, {"a": range(30), "b": [1, 2]}, progress=lambda done, total: seen.append((done, total))
-    )
+    hs.sweep(sweep_tasks.product, {"a": range(30), "b": [1, 2]}, progress=lambda *at: seen.append(at))
     assert seen[0] == (0, 60)
     assert seen[-1] == (60, 60)
     assert seen == sorted(seen)
