@@ -172,13 +172,6 @@ def test_identify_finds_wear_and_holds_what_the_record_cannot_tell():
     assert_refused("no steady cycle", hs.identify, hs.BoucWenBaberNoori, record, fixed={"n": 1.0}, initial="periodic")
 
 
-def test_it_runs_in_a_chain_and_a_closed_loop():
-    mode = hs.TransferFunction(num=(1.0,), den=(1.0, 0.4, 1.0))
-    plant = hs.Actuator(hysteresis=law(OWN["both"], gain=0.5), vibration=mode)
-    t = np.arange(100) / 20.0
-    assert np.isfinite(hs.close_loop(plant, hs.PID(ki=0.4), t, 0.5 * np.sin(t)).y).all()
-
-
 THEIRS = {
     "opensees": {
         **{"alpha": 0.1, "ko": 3.0, "n": 1.2, "gamma": 0.3, "beta": 0.6, "Ao": 0.9},

@@ -131,12 +131,6 @@ def test_the_density_is_returned_where_it_predicts_better_than_the_grid(density)
     assert np.mean(np.abs(output - truth) < 2.0 * fit.response_stderr) > 0.7
 
 
-def test_the_grid_is_returned_where_a_density_predicts_no_better():
-    fit = hs.identify(hs.Preisach, hs.datasets.table1())
-    assert fit.n_parameters == 8
-    assert "a smooth density predicts parts left out not clearly better" in fit.message
-
-
 def test_a_line_a_hundred_times_the_loop_is_free_of_the_penalty():
     law = hs.Preisach.from_density(LEVELS, positive)
     loops = loops_of(law, (0.4, 0.6, 0.9, 1.2), 1e-3)
