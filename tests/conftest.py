@@ -17,6 +17,7 @@ from importlib.util import find_spec
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent
+sys.path.insert(0, str(ROOT / "experiments"))  # whose helpers several tests take
 STRUCTURES = (
     "test_structure",
     "plants/structures/",
@@ -184,6 +185,19 @@ def shell(monkeypatch, capsys):
         return code, *capsys.readouterr()
 
     return run
+
+
+@pytest.fixture
+def folder(tmp_path):
+    """The folder in which commands are run; files of tests have others, with records in them."""
+    return tmp_path
+
+
+@pytest.fixture
+def run(folder, monkeypatch, shell):
+    """Run a command in the folder: exit code, standard output, standard error."""
+    monkeypatch.chdir(folder)
+    return shell
 
 
 def shared_folder(tmp_path_factory):

@@ -1,5 +1,6 @@
 """What several tests share: conditions, random laws and inputs for the invariants, and tests of what is refused."""
 
+import importlib.util
 import json
 import re
 import shutil
@@ -39,14 +40,25 @@ def bounded_laws(draw) -> hs.BoucWen:
     )
 
 
-def assert_cut_and_continued_gives_the_same_bits(law, u, cut, **time) -> None:
-    """Outputs and the state at the end are those of the uncut input."""
+def assert_cut_or_stepped_it_has_the_same_bits(law, u, cut, **time) -> None:
+    """A cut input has the outputs and the last state of the uncut one; so have the outputs of the compiled step."""
+    u = np.asarray(u)
     head, state = law.advance(u[:cut], **time) if cut else (np.empty(0), None)
     tail, end = law.advance(u[cut:], state, **time)
     whole, whole_end = law.advance(u, **time)
     assert np.array_equal(np.concatenate([head, tail]), whole)
     assert np.array_equal(law.response(u, **time), whole)
     assert end == whole_end
+    assert np.array_equal(outputs_of_compiled_steps(law, u, **time)[0], whole)
+
+
+def assert_batch_has_the_bits_of_its_laws(family, sets, u, own_inputs) -> None:
+    """A row for each set, all under the same input or each under its own share of it."""
+    laws = [family(**dict(zip(sets, values, strict=True))) for values in zip(*sets.values(), strict=True)]
+    inputs = u * np.linspace(1.0, -0.3, len(laws))[:, np.newaxis]
+    rows = family.responses(sets, inputs if own_inputs else u, workers=2)
+    for law, row, own in zip(laws, rows, inputs, strict=True):
+        assert np.array_equal(row, law.response(own if own_inputs else u))
 
 
 def outputs_of_compiled_steps(law, u, **time):
@@ -93,6 +105,23 @@ def rao_garnier(snr, seed):
     return hs.Record(u=u, y=clean + noise, t=0.01 * np.arange(u.size)), clean, true
 
 
+def loaded(path):
+    """The module in a file."""
+    spec = importlib.util.spec_from_file_location(path.stem, path)
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+class Passes:
+    """A controller that passes its reference on."""
+
+    def compiled(self, sample_time, u0, y0):
+        from hysim.kernels.controllers import through
+
+        return through, np.zeros(0), np.zeros(1)
+
+
 def with_peak_memory(call):
     """What a call returns, and the most bytes that it held at once."""
     tracemalloc.start()
@@ -109,6 +138,13 @@ def document_of(run, *words, **options):
     return json.loads(out)
 
 
+def assert_refused(message, call, *arguments, error=ValueError, **options):
+    """A call ends with an error of one line, in which the message, a regular expression, is found."""
+    with pytest.raises(error, match=message) as caught:
+        call(*arguments, **options)
+    assert "\n" not in str(caught.value)
+
+
 def refused(*cases, call=lambda make: make(), error=ValueError):
     """Make a test of calls that are refused, each with its message.
 
@@ -120,8 +156,7 @@ def refused(*cases, call=lambda make: make(), error=ValueError):
         *arguments, message = case
         other = isinstance(arguments[-1], type) and issubclass(arguments[-1], Exception)
         expected = arguments.pop() if other else error
-        with pytest.raises(expected, match=message):
-            call(*arguments)
+        assert_refused(message, call, *arguments, error=expected)
 
     return test
 

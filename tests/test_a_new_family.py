@@ -13,7 +13,7 @@ import pytest
 from fading_dahl import FadingDahl
 from scipy.integrate import solve_ivp
 from square_dahl import SquareDahl
-from strategies import needs_compiler, printed_by_main
+from strategies import assert_cut_or_stepped_it_has_the_same_bits, needs_compiler, printed_by_main
 
 import hysim as hs
 
@@ -57,9 +57,8 @@ def test_more_samples_on_a_branch_change_nothing(law):
     assert np.abs(law.remembered(fine)[::8] - law.remembered(U)).max() < 1e-9
 
 
-def test_a_cut_input_gives_the_same_bits(law):
-    first, state = law.advance(U[:50])
-    assert np.array_equal(np.append(first, law.advance(U[50:], state)[0]), law.response(U))
+def test_cut_or_stepped_it_has_the_same_bits(law):
+    assert_cut_or_stepped_it_has_the_same_bits(law, U, 50)
     assert law.offset + law.c * U + law.remembered(U)[:, 0] == pytest.approx(law.response(U), abs=1e-15)
 
 

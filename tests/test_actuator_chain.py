@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.linalg import expm
-from strategies import COMPILED
+from strategies import COMPILED, Passes
 
 import hysim as hs
 
@@ -88,15 +88,6 @@ def test_creep_and_vibration_together_are_exact_under_the_hold(vibration, delay)
     )
     expected = literal_response(continuous(CREEP, vibration), w, delay, H, H * np.arange(40))
     assert plant.y == pytest.approx(expected, abs=EXACT)
-
-
-class Passes:
-    """A controller that passes its reference on."""
-
-    def compiled(self, sample_time, u0, y0):
-        from hysim.kernels.controllers import through
-
-        return through, np.zeros(0), np.zeros(1)
 
 
 @pytest.mark.parametrize("delay", [0.0, 0.25 * H, 0.5 * H, H, 1.75 * H, 3.0 * H])

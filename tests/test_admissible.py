@@ -167,10 +167,7 @@ def test_tables_of_several_laws_mark_the_unsafe_ones():
     names = {"bouc-wen": hs.BoucWen(n=1.0), "line": hs.Line}
     selection = hs.select({"unsafe": hs.BoucWen, "line": hs.Line}, table).to_text()
     assert "unsafe (UNSAFE)" in selection
-    fits = {
-        "bouc-wen": hs.identify(names["bouc-wen"], table, fixed={"n": 1.0}),
-        "line": hs.identify(hs.Line, table),
-    }
+    fits = {"bouc-wen": hs.identify(names["bouc-wen"], table, fixed={"n": 1.0}), "line": hs.identify(hs.Line, table)}
     comparison = hs.compare(fits, table)
     assert "bouc-wen (UNSAFE)" in comparison.to_text()
     assert comparison["bouc-wen"].unsafe == fits["bouc-wen"].unsafe

@@ -1,7 +1,7 @@
 """A search may be bounded, and says so where it was."""
 
 import numpy as np
-import pytest
+from strategies import assert_refused
 
 import hysim as hs
 
@@ -58,5 +58,4 @@ def test_a_comparison_marks_partial_results_and_says_which_runs():
     chosen = hs.select([hs.BoucWen, hs.Line], RECORD, max_evaluations=200, announce=names.append)
     assert names == ["BoucWen", "Line"]
     assert "BoucWen (partial)" in chosen.to_text()
-    with pytest.raises(ValueError, match="max_evaluations must be"):
-        hs.identify(hs.Line, RECORD, max_evaluations=0)
+    assert_refused("max_evaluations must be", hs.identify, hs.Line, RECORD, max_evaluations=0)

@@ -37,10 +37,7 @@ LINEAR = hs.Actuator(hysteresis=hs.Line(offset=0.1, slope=0.02), creep=CREEP, se
 PID = hs.PID(
     kp=4.0, ki=800.0, kd=1e-3, derivative_filter=1e-3, limits=(5.0, 95.0), setpoint_weight=0.7, derivative_weight=0.3
 )
-FILTERED = {
-    "notch": hs.Notch(**MODE),
-    "damping": hs.DampingLoop(gain=2.0, frequency=2.0 * math.pi * 500.0),
-}
+FILTERED = {"notch": hs.Notch(**MODE), "damping": hs.DampingLoop(gain=2.0, frequency=2.0 * math.pi * 500.0)}
 
 
 def learner():

@@ -14,7 +14,7 @@ from typing import Annotated, Literal
 import click
 import numpy as np
 import pytest
-from strategies import document_of, refused_in_one_line
+from strategies import assert_refused, document_of, refused_in_one_line
 
 import hysim as hs
 from hysim._basics.atomic import write_all
@@ -41,13 +41,6 @@ def folder(tmp_path_factory):
     (folder / "width.py").write_text("def width(beta, n):\n    return {'width': beta * n}\n")
     (folder / "study.toml").write_text('task = "width.py:width"\n[grid]\nbeta = [0.1, 0.2]\nn = [1.0, 2.0]\n')
     return folder
-
-
-@pytest.fixture
-def run(folder, monkeypatch, shell):
-    """Run a command in that folder: exit code, standard output, standard error."""
-    monkeypatch.chdir(folder)
-    return shell
 
 
 def test_the_commands_are_those_of_the_design():
@@ -134,8 +127,7 @@ def test_options_follow_from_signature_annotations_and_docstring():
     assert "one of two words [default: zoh]" in help_
     assert "a number [required]" in help_
     for wrong in (["--limits", "1"], ["--hold", "hold"], ["--unit", "x=m"], ["--scale", "3um"]):
-        with pytest.raises(click.BadParameter, match=f"expected .*, got '{wrong[1]}'"):
-            called(*wrong)
+        assert_refused(f"expected .*, got '{wrong[1]}'", called, *wrong, error=click.BadParameter)
 
 
 def test_without_a_command_help_is_printed_and_nothing_done(run):
@@ -264,8 +256,7 @@ def test_a_picture_in_another_form_is_the_same_bytes_each_time(run, tmp_path, fo
 
 
 def test_another_form_of_a_picture_is_refused():
-    with pytest.raises(ValueError, match="form must be one of svg, png, pdf, got 'gif'"):
-        hs.plot.to_bytes(hs.plot.figure(), "gif")
+    assert_refused("form must be one of svg, png, pdf, got 'gif'", hs.plot.to_bytes, hs.plot.figure(), "gif")
 
 
 def test_nothing_is_written_if_one_of_the_files_cannot_be(tmp_path):

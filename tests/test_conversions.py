@@ -7,7 +7,7 @@ import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
-from strategies import refused
+from strategies import assert_refused, refused
 
 import hysim as hs
 
@@ -161,8 +161,7 @@ test_what_cannot_be_expressed_is_refused = refused(
 
 @pytest.mark.parametrize("name", THEIRS)
 def test_parameters_go_by_name(name):
-    with pytest.raises(TypeError, match="positional"):
-        getattr(hs.BoucWen, f"from_{name}")(*THEIRS[name].values())
+    assert_refused("positional", getattr(hs.BoucWen, f"from_{name}"), *THEIRS[name].values(), error=TypeError)
 
 
 @pytest.mark.parametrize(

@@ -6,7 +6,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from strategies import refused
+from strategies import assert_refused, refused
 
 import hysim as hs
 from hysim.interop import heading, table_in
@@ -15,9 +15,7 @@ U = hs.signals.triangle(0.0, 1.0, cycles=2, samples_per_cycle=20)
 Y = hs.BoucWen(beta=2.0).response(U)
 T = 0.1 * np.arange(U.size)
 UNITS = {"t": "s", "u": "V", "y": "um", "current": "A"}
-RECORD = hs.Record(
-    u=U, y=Y, t=T, units=UNITS, name="stack", resolution=0.01, channels={"T": 20.0, "current": np.sqrt(T)}
-)
+RECORD = hs.Record(u=U, y=Y, t=T, units=UNITS, name="stack", resolution=0.01, channels={"T": 20, "current": np.sqrt(T)})
 
 needs_pandas = pytest.mark.extra("pandas")
 needs_xarray = pytest.mark.extra("xarray")
@@ -71,10 +69,8 @@ def test_missing_values_of_any_kind_are_missing_samples():
         table = PolarsLike({"u": [0, 1, gap, 3, 4], "y": [0.0, 2.0, 4.0, 6.0, 8.0]})
         assert hs.load(table, on_missing="drop").u.tolist() == [0.0, 1.0, 3.0, 4.0]
         assert [len(part) for part in hs.load(table, on_missing="split")] == [2, 2]
-        with pytest.raises(ValueError, match="the PolarsLike: row 2, column 'u': the value is missing"):
-            hs.load(table)
-        with pytest.raises(ValueError, match="u must be finite, got nan at index 2"):
-            hs.identify(hs.Line, table)
+        assert_refused("the PolarsLike: row 2, column 'u': the value is missing", hs.load, table)
+        assert_refused("u must be finite, got nan at index 2", hs.identify, hs.Line, table)
 
 
 def test_dates_and_time_spans_are_seconds():
@@ -104,14 +100,11 @@ test_tables_that_hold_no_record_are_refused_with_the_column = refused(
 
 def test_verbs_name_the_columns_that_a_table_lacks():
     table = PolarsLike({"voltage": U, "y": Y})
-    with pytest.raises(
-        ValueError, match=r"got a PolarsLike without u, with voltage and y: name the columns by hs.load"
-    ):
-        hs.identify(hs.Line, table)
-    with pytest.raises(ValueError, match="delimiter is for text, this is the PolarsLike: leave it out"):
-        hs.load(table, u="voltage", delimiter=",")
-    with pytest.raises(TypeError, match="load takes a path, an open file or a DataFrame, got int"):
-        hs.load(3)
+    lacking = "got a PolarsLike without u, with voltage and y: name the columns by hs.load"
+    assert_refused(lacking, hs.identify, hs.Line, table)
+    excess = "delimiter is for text, this is the PolarsLike: leave it out"
+    assert_refused(excess, hs.load, table, u="voltage", delimiter=",")
+    assert_refused("load takes a path, an open file or a DataFrame, got int", hs.load, 3, error=TypeError)
 
 
 @pytest.mark.parametrize(
@@ -211,8 +204,7 @@ def test_two_series_whose_times_differ_are_refused():
     import pandas as pd
 
     u, y = pd.Series(U, index=T), pd.Series(Y, index=T + 0.05)
-    with pytest.raises(ValueError, match="u and y must have the same times, got two indexes that differ: align them"):
-        hs.Record(u=u, y=y)
+    assert_refused("u and y must have the same times, got two indexes that differ: align them", hs.Record, u=u, y=y)
 
 
 @needs_pandas
@@ -236,10 +228,8 @@ def test_nullable_and_repeated_columns():
     nullable = pd.DataFrame({"u": [0, None, 2, 3], "y": [0, 1, 2, 3]}, dtype="Float64")
     assert hs.load(nullable, on_missing="drop").u.tolist() == [0.0, 2.0, 3.0]
     twice = pd.DataFrame([[0, 1, 2], [3, 4, 5]], columns=["u", "u", "y"])
-    with pytest.raises(ValueError, match="2 columns are called 'u'"):
-        hs.load(twice)
-    with pytest.raises(ValueError, match="2 columns are called 'u': rename them"):
-        hs.load(twice, u=1)
+    assert_refused("2 columns are called 'u'", hs.load, twice)
+    assert_refused("2 columns are called 'u': rename them", hs.load, twice, u=1)
 
 
 @needs_pandas
@@ -332,8 +322,7 @@ def test_tables_of_arrow():
 
 def test_without_pandas_the_extra_is_named(monkeypatch):
     monkeypatch.setitem(sys.modules, "pandas", None)
-    with pytest.raises(ImportError, match=r"to_frame needs pandas: pip install 'hysim\[tables\]'"):
-        RECORD.to_frame()
+    assert_refused(r"to_frame needs pandas: pip install 'hysim\[tables\]'", RECORD.to_frame, error=ImportError)
 
 
 @pytest.mark.parametrize(
@@ -350,5 +339,4 @@ def test_without_pandas_the_extra_is_named(monkeypatch):
     ],
 )
 def test_save_and_save_record_say_which_is_which(verb, value, message, tmp_path):
-    with pytest.raises(TypeError, match=message):
-        verb(value, tmp_path / "file.csv")
+    assert_refused(message, verb, value, tmp_path / "file.csv", error=TypeError)

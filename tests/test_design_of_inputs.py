@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from strategies import assert_refused
 
 import hysim as hs
 
@@ -62,17 +63,11 @@ def test_a_design_is_the_same_for_the_same_seed(design):
 
 
 def test_arguments_are_checked():
-    with pytest.raises(ValueError, match="free has 'slope': a Dahl has stiffness"):
-        hs.design_input(LAW, limits=LIMITS, free=("slope",))
-    with pytest.raises(ValueError, match='criterion must be "D", "A" or "E"'):
-        hs.design_input(LAW, limits=LIMITS, free=FREE, criterion="G")
-    with pytest.raises(ValueError, match="slew must be positive"):
-        hs.InputLimits(amplitude=1.0, slew=0.0, duration=1.0, sample_time=0.01)
-    with pytest.raises(ValueError, match="at least 10 samples, got 6"):
-        hs.InputLimits(amplitude=1.0, slew=1.0, duration=0.5, sample_time=0.1)
+    assert_refused("free has 'slope': a Dahl has stiffness", hs.design_input, LAW, limits=LIMITS, free=("slope",))
+    assert_refused('criterion must be "D", "A" or "E"', hs.design_input, LAW, limits=LIMITS, free=FREE, criterion="G")
+    assert_refused("slew must be positive", hs.InputLimits, amplitude=1.0, slew=0.0, duration=1.0, sample_time=0.01)
+    assert_refused("at least 10 samples, got 6", hs.InputLimits, amplitude=1.0, slew=1.0, duration=0.5, sample_time=0.1)
     with pytest.raises(ValueError, match="no input within the limits tells A, gain, beta, gamma apart"):
         hs.design_input(hs.BoucWen(), limits=LIMITS, free=("A", "gain", "beta", "gamma"), candidates=4, moves=2)
-    with pytest.raises(
-        TypeError, match=r"takes a law that a step describes, such as BoucWen, or an Actuator\.structure"
-    ):
-        hs.design_input(hs.PID(kp=1.0), limits=LIMITS, free=FREE)
+    message = r"takes a law that a step describes, such as BoucWen, or an Actuator\.structure"
+    assert_refused(message, hs.design_input, hs.PID(kp=1.0), error=TypeError, limits=LIMITS, free=FREE)

@@ -348,11 +348,7 @@ def test_a_long_record_is_judged_on_fewer_samples():
     assert set(lengths) == {1001}  # every 20th of 20 001
 
 
-@given(
-    log_tau=st.floats(-3.0, 3.0),
-    rate=st.sampled_from(RATES),
-    zero=st.floats(0.0, 2.0),
-)
+@given(log_tau=st.floats(-3.0, 3.0), rate=st.sampled_from(RATES), zero=st.floats(0.0, 2.0))
 @settings(max_examples=40)
 def test_the_steady_width_is_the_sine_of_the_phase(log_tau, rate, zero):
     t = times(400, 1.0 / (2.0 * np.pi), cycles=1)

@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from discovered import CYCLES, DAHL, LAW, TRUTH, duhem, multisine, record_of, zigzag
-from strategies import refused
+from strategies import assert_refused, refused
 
 import hysim as hs
 from hysim.discovery import _discover, _refinement
@@ -70,9 +70,7 @@ def test_cross_validation_repeats_the_whole_search(monkeypatch):
 
     monkeypatch.setattr(_discover, "searched", searched_and_noted)
     record, done = record_of(LAW.memory, multisine(120), noise=0.01), []
-    found = hs.discover(
-        record, library=NAMES, route="memory", cross_validate=3, progress=lambda *step: done.append(step)
-    )
+    found = hs.discover(record, library=NAMES, route="memory", cross_validate=3, progress=lambda *at: done.append(at))
     folds = np.array_split(np.arange(len(record)), 3)
     assert every[0] is None
     assert [np.flatnonzero(~seen).tolist() for (seen,) in every[1:]] == [f.tolist() for f in folds]
@@ -237,8 +235,7 @@ test_only_records_are_taken_and_at_least_one_is_needed = refused(
 def test_a_gap_is_refused_where_the_record_is_made():
     y = RECORD.y.copy()
     y[7] = np.nan
-    with pytest.raises(ValueError, match="y must be finite, got nan at index 7"):
-        hs.Record(u=RECORD.u, y=y)
+    assert_refused("y must be finite, got nan at index 7", hs.Record, u=RECORD.u, y=y)
 
 
 @pytest.mark.parametrize("library", [NAMES, "duhem"])

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from strategies import needs_compiled, refused
+from strategies import assert_refused, needs_compiled, refused
 
 import hysim as hs
 from hysim.discovery import _oscillator
@@ -209,8 +209,7 @@ test_an_option_that_cannot_do_is_refused = refused(
 
 @pytest.mark.parametrize("given", [[1.0], None, {"u": 1.0}])
 def test_only_records_are_taken(given):
-    with pytest.raises(TypeError, match="discover_oscillator takes a Record or several"):
-        hs.discover_oscillator(given)
+    assert_refused("discover_oscillator takes a Record or several", hs.discover_oscillator, given, error=TypeError)
 
 
 def test_the_library_has_names_of_its_own():

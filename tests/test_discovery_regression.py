@@ -1,4 +1,4 @@
-"""The regression under `discover`: slopes, libraries, and PySINDy's path over them."""
+"""The regression under `discover`: slopes, libraries, the path over them, and the elimination of terms."""
 
 import inspect
 import itertools
@@ -13,10 +13,11 @@ from discovered import COLEMAN_HODGDON, CYCLES, DAHL, QUADRATIC, duhem, record_o
 
 import hysim as hs
 from hysim.discovery import _slopes
+from hysim.discovery._hidden_memory import TermRegression
 from hysim.discovery._refinement import Terms
 from hysim.discovery._selection import best_subsets, is_complete, preferred, thinning
 from hysim.discovery._slopes import branches, feature, signs_of, slopes, smoothed, weak_rows
-from hysim.laws.differential.terms import Term, duhem_terms, memory_terms, named_terms, symmetric
+from hysim.laws.differential.terms import Term, duhem_terms, memory_terms, named_terms, power_term, symmetric
 
 
 def test_slopes_are_never_taken_across_a_reversal():
@@ -221,3 +222,44 @@ def test_pysindy_is_what_the_adapter_expects():
 def test_importing_discovery_does_not_import_pysindy():
     code = "import sys, hysim.discovery; sys.exit('pysindy' in sys.modules)"
     assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
+
+
+# -------------------------------------------------------------- the elimination of terms is that of plain regressions
+
+
+TERMS = tuple(power_term(False, power, even=False) for power in range(4))
+
+
+def regression(features, target):
+    return TermRegression(TERMS, (), features, target, 1.0, 1e-9, 0, [np.arange(len(target))])
+
+
+def losses(features, target, kept):
+    """Sum of squares without each of the columns."""
+    found = []
+    for k in range(len(kept)):
+        rest = features[:, kept[:k] + kept[k + 1 :]]
+        found.append(np.sum((target - rest @ np.linalg.lstsq(rest, target, rcond=None)[0]) ** 2))
+    return found
+
+
+def test_each_step_leaves_out_the_term_that_costs_least():
+    rng = np.random.default_rng(0)
+    features = rng.standard_normal((60, 4)) * [1.0, 1e-6, 1e6, 1.0]
+    target = features @ [1.0, 3e6, 1e-7, 0.0] + 0.1 * rng.standard_normal(60)
+    kept, path = list(range(4)), []
+    while kept:
+        path.append(tuple(TERMS[k] for k in kept))
+        kept.pop(int(np.argmin(losses(features, target, kept))))
+    assert regression(features, target).eliminated() == path
+
+
+def test_terms_that_depend_on_each_other_or_vanish_go_first():
+    rng = np.random.default_rng(1)
+    features = rng.standard_normal((60, 4))
+    features[:, 1], features[:, 3] = 2.0 * features[:, 0], 0.0
+    path = regression(features, features[:, 0] + features[:, 2]).eliminated()
+    assert [len(each) for each in path] == [4, 3, 2, 1]
+    assert TERMS[3] not in path[2]
+    assert not {TERMS[0], TERMS[1]} <= set(path[2])
+    assert TERMS[2] in path[2]

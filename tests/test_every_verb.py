@@ -1,15 +1,10 @@
 """Every verb says the same number of one fit, that of the returned model on the record as it was measured."""
 
-import sys
-from pathlib import Path
-
 import numpy as np
 import pytest
+from every_verb import PRINTED, largest_difference, numbers_of_every_verb
 
 import hysim as hs
-
-sys.path.insert(0, str(Path(__file__).parent.parent / "experiments"))
-from every_verb import PRINTED, largest_difference, numbers_of_every_verb
 
 T = 0.01 * np.arange(241)
 U = np.append(

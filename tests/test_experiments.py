@@ -1,14 +1,11 @@
 """Every experiment runs in its smoke mode, and its committed results are complete."""
 
-import importlib.util
 import json
-import sys
 from pathlib import Path
 
 import pytest
-
-sys.path.insert(0, str(Path(__file__).parent.parent / "experiments"))
 from browser import BROWSER
+from strategies import loaded
 
 EXPERIMENTS = sorted((Path(__file__).parent.parent / "experiments").glob("[0-9]*.py"))
 NEEDS = dict.fromkeys(("29_registration", "30_virtual_rig"), pytest.mark.extra("skimage"))
@@ -24,9 +21,7 @@ NEEDS["53_page_redraw"] = (
     "path", [pytest.param(path, id=path.stem, marks=NEEDS.get(path.stem, ())) for path in EXPERIMENTS]
 )
 def test_smoke(path, monkeypatch, tmp_path):
-    spec = importlib.util.spec_from_file_location(path.stem, path)
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
+    module = loaded(path)
     monkeypatch.setattr(module, "RESULTS", tmp_path)
     rows = module.main(smoke=True)
     assert rows

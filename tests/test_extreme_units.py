@@ -1,10 +1,15 @@
-"""The laws that are integrated along a branch, in extreme units: powers such as w^n neither overflow nor vanish."""
+"""Laws and plants in extreme units: the same results, or one line that names the cause."""
+
+import itertools
 
 import mpmath
 import numpy as np
 import pytest
 
 import hysim as hs
+
+# ---------------------------------------------------------------------------------- laws
+
 
 EXPONENTS = (0.5, 1.0, 1.5, 2.0, 3.0, 8.0, 20.0)
 ORDERS = (-300, -120, 0, 120, 300)
@@ -43,7 +48,7 @@ def are_numbers(j, i, law):
 def test_units_change_nothing(name, n, start):
     family, own = LAWS[name]
     if name == "forced" and start["A"] == 0.0 and n < 1.0:
-        pytest.skip("too stiff near zero in any units, as in tests/test_zhu_wang.py")
+        pytest.skip("too stiff near zero in any units, as in tests/test_asymmetric.py")
     law = {**start, "beta": 0.6, "gamma": 0.3, "n": n, **own}
     units = [(j, i) for j in ORDERS for i in ORDERS if are_numbers(j, i, law)]
     assert len(units) >= 5
@@ -108,3 +113,62 @@ def test_a_law_of_a_batch_has_the_units_that_it_has_alone(family):
     alone = [family(**{name: values[k] for name, values in sets.items()}).response(u[k]) for k in range(40)]
     assert np.array_equal(rows, alone)
     assert np.isfinite(rows).all()
+
+
+# ---------------------------------------------------------------------------------- plants
+
+
+ENDS = (1e300, 1e-300, 0.0)
+NUMBERS = [each for each in itertools.product((*ENDS, 1.0), repeat=3) if 1.0 in each]
+INPUT = np.array([0.0, 1.0, 0.5, -1.0, 0.0])
+SYSTEMS = {
+    "structure": lambda m, c, k: hs.Structure(mass=m, damping=c, stiffness=k),
+    "pushed": lambda m, c, k: hs.Structure(mass=m, damping=c, stiffness=k, excitation="force"),
+    "oscillator": lambda m, c, k: hs.BoucWenOscillator(mass=m, damping=c, stiffness=k, law=hs.BoucWen()),
+    "transfer function": lambda m, c, k: hs.TransferFunction(num=(1.0,), den=(m, c, k)),
+    "actuator": lambda m, c, k: hs.Actuator(
+        hysteresis=hs.BoucWen(), vibration=hs.TransferFunction(num=(1.0,), den=(m, c, k))
+    ),
+}
+
+
+def told(call):
+    """Nothing but a result or an error of hysim's own."""
+    message = "must"
+    try:
+        call()
+    except np.linalg.LinAlgError:
+        raise
+    except hs.SimulationError:
+        pass
+    except ValueError as error:
+        message = str(error)
+    assert any(word in message for word in ("must", "check", "too long", "cannot")), message
+
+
+@pytest.mark.parametrize("kind", SYSTEMS)
+@pytest.mark.parametrize("sample_time", [0.01, 1e-300, 1e300])
+def test_extreme_numbers_end_in_a_result_or_one_clear_error(kind, sample_time):
+    t = sample_time * np.arange(INPUT.size)
+    for numbers in NUMBERS:
+        told(lambda numbers=numbers: hs.simulate(SYSTEMS[kind](*numbers), t, INPUT))
+
+
+@pytest.mark.parametrize("sample_time", [0.01, 1e-300, 1e300])
+def test_extreme_loops_end_in_a_result_or_one_clear_error(sample_time):
+    t = sample_time * np.arange(INPUT.size)
+    for kp, ki, kd in NUMBERS:
+        pid = hs.PID(kp=kp, ki=ki, kd=kd)
+        told(lambda pid=pid: pid.advance(INPUT, INPUT, sample_time))
+        for plant in ("pushed", "transfer function"):
+            told(lambda plant=plant, pid=pid: hs.close_loop(SYSTEMS[plant](1.0, 1.0, 1.0), pid, t, INPUT))
+            told(lambda n=(kp, ki, kd), p=plant: hs.close_loop(SYSTEMS[p](*n), hs.PID(kp=1.0, ki=1.0), t, INPUT))
+
+
+def test_the_cause_is_named():
+    with pytest.raises(ValueError, match=r"a sample would take .* sub-steps: it is too long for the stiffness"):
+        hs.simulate(hs.Structure(mass=1e-300, stiffness=1.0), 0.01 * np.arange(5), INPUT)
+    with pytest.raises(ValueError, match="stiffness or damping over mass is beyond the largest number"):
+        hs.simulate(hs.Structure(mass=1e-300, stiffness=1e300), 0.01 * np.arange(5), INPUT)
+    with pytest.raises(ValueError, match="num and den over the first of den must be finite"):
+        hs.TransferFunction(num=(1.0,), den=(1e-300, 1e300))

@@ -100,11 +100,9 @@ def test_no_place_may_name_a_family_that_it_does_not_name():
 def test_every_family_has_an_example_in_its_own_class(name):
     family = hs.families()[name]
     assert family.__name__ == name
-    assert family.example is vars(family)["example"]
-    law, (low, high) = family(**family.example.fields), family.example.between
-    assert low < high
-    assert np.isfinite([low, high]).all()
-    assert hs.families()[name](**family.example.fields) == law
+    assert family.example is vars(family)["example"], "an example stands in the family's own class"
+    low, high = family.example.between
+    assert -np.inf < low < high < np.inf
 
 
 @pytest.mark.parametrize("name", [name for name, each in hs.families().items() if hasattr(each, "searched")])

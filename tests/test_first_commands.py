@@ -18,13 +18,6 @@ from hysim.cli.learn import DEVICES
 from hysim.files import FileColumn
 
 
-@pytest.fixture
-def run(tmp_path, monkeypatch, shell):
-    """Run a command in an empty folder: exit code, standard output, standard error."""
-    monkeypatch.chdir(tmp_path)
-    return shell
-
-
 @pytest.mark.parametrize("name", ["piezo.csv", "piezo.npz", "piezo.mat"])
 def test_the_example_is_table_1(run, name):
     assert run("example", name)[0] == 0

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from friction_laws import FAMILIES
 from scipy.integrate import solve_ivp
-from strategies import COMPILED, needs_compiled
+from strategies import COMPILED, assert_refused, needs_compiled
 
 import hysim as hs
 
@@ -136,10 +136,8 @@ def test_many_structures_are_those_one_by_one():
 
 
 def test_friction_stands_in_an_element_of_its_own():
-    with pytest.raises(TypeError, match="takes a LuGre by itself"):
-        hs.Element(ARTICLE + hs.Line(slope=1.0), between=(0, 1))
-    with pytest.raises(TypeError, match="takes friction and dashpots only"):
-        hs.Element(hs.mode(1.0, 0.1), between=(0, 1))
+    assert_refused("takes a LuGre by itself", hs.Element, ARTICLE + hs.Line(slope=1.0), error=TypeError, between=(0, 1))
+    assert_refused("takes friction and dashpots only", hs.Element, hs.mode(1.0, 0.1), error=TypeError, between=(0, 1))
 
 
 @needs_compiled

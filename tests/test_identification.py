@@ -1,11 +1,20 @@
-"""`identify` finds the global optimum, says what the data tell, and refuses what it cannot do."""
+"""`identify` finds the global optimum, says what the data tell, and refuses what it cannot do, whatever the units."""
+
+import functools
 
 import numpy as np
 import pytest
-from strategies import refused, with_peak_memory
+from square_dahl import SquareDahl
+from strategies import assert_refused, refused, with_peak_memory
 
 import hysim as hs
-from hysim.models.search_space import SearchSpace
+from hysim.identification import Candidate, _descent, marquardt
+from hysim.identification._diagnostics import left_out
+from hysim.identification._problem import Problem, problem
+from hysim.identification._searched import _phrases
+from hysim.identification._uncertainty import _named, uncertainty
+from hysim.models.model import candidates
+from hysim.models.search_space import Freedom, SearchSpace
 
 
 def loop_record(law) -> hs.Record:
@@ -108,11 +117,9 @@ def test_a_sign_is_a_bound_too(table1):
     assert fit.estimates["gain"] <= 0.0
     assert 0.5 <= fit.estimates["n"] <= 10.0
     assert fit.fit_percent > 90.0
-    with pytest.raises(ValueError, match="from zero to infinity"):
-        hs.identify(hs.BoucWen, table1, bounds={"beta": (1.0, np.inf)})
+    assert_refused("from zero to infinity", hs.identify, hs.BoucWen, table1, bounds={"beta": (1.0, np.inf)})
     for pair in ((0.0, 2.0), (-np.inf, 0.0), (-1.0, 3.0)):
-        with pytest.raises(ValueError, match="bounds of 'n' must be positive"):
-            hs.identify(hs.BoucWen, table1, bounds={"n": pair})
+        assert_refused("bounds of 'n' must be positive", hs.identify, hs.BoucWen, table1, bounds={"n": pair})
 
 
 def test_rest_holds_the_memory_at_zero(table1):
@@ -200,3 +207,176 @@ def test_a_search_space_is_data(table1):
     assert back["beta"][0] == pytest.approx(0.01)
     assert back["gamma"][0] == pytest.approx(-0.004)
     assert back["n"][0] == pytest.approx(1.0)
+
+
+# ----------------------------------------------------- samples that are left out together, and the words of the message
+
+
+TRIANGLE = hs.signals.triangle(-1.0, 1.0, cycles=3, samples_per_cycle=20)
+RECORDS = [hs.Record(u=scale * TRIANGLE, y=TRIANGLE) for scale in (1.0, 2.0)]
+
+
+def test_two_records_are_two_folds_and_one_is_refused():
+    found = left_out("records", RECORDS)
+    assert [fold.tolist() for fold in found] == [[*range(61)], [*range(61, 122)]]
+    assert_refused("at least 2 records", left_out, "records", RECORDS[:1])
+
+
+def test_cycles_of_every_record_are_folds_but_its_first():
+    """From -1: the turns are at samples 10, 20, ..., and every second of them, from 20 on, begins a cycle."""
+    found = left_out("cycles", RECORDS)
+    assert [(fold[0], fold[-1]) for fold in found] == [(20, 39), (40, 60), (81, 100), (101, 121)]
+    assert all((np.diff(fold) == 1).all() for fold in found)
+    assert_refused("at least 2 cycles", left_out, "cycles", [record[:15] for record in RECORDS])
+
+
+def test_only_an_input_that_never_turns_is_said_not_to():
+    """Whatever the size of its steps."""
+    for u, turns in ((TRIANGLE, True), (np.linspace(0.0, 1.0, 61), False), (np.linspace(5.0, -9.0, 61), False)):
+        fit = hs.identify(hs.Line, hs.Record(u=u, y=2.0 * u + 0.1 * np.cos(7.0 * np.arange(61))))
+        assert ("never turns back" not in fit.message) == turns
+
+
+@pytest.mark.parametrize(
+    ("direction", "named"), [([0.4, 0.04], "ab"), ([0.4, 0.01], "a"), ([0.0, 4.0], "b"), ([1.0, 1.0], "ab")]
+)
+def test_a_parameter_takes_part_in_a_direction_from_a_twentieth_of_the_largest_share_on(direction, named):
+    assert _named(("a", "b"), np.array(direction), np.ones(2)) == tuple(named)
+
+
+@pytest.mark.parametrize(
+    ("n_rivals", "words"), [(1, "1 other optimum within the noise"), (2, "2 other optima within the noise")]
+)
+def test_other_optima_are_counted(n_rivals, words):
+    whole = problem(hs.Dahl(), RECORDS[:1], Freedom({}, (), {}), None)
+    theta = np.zeros(len(whole.space.coordinates) + len(whole.space.linear))
+    known = uncertainty(whole, theta, np.ones(whole.y.size))
+    rival = Candidate(model=hs.Dahl(), estimates={}, fit_percent=90.0, rmse=0.1)
+    assert words in _phrases(True, whole, known, [rival] * n_rivals, {})
+
+
+def long_record():
+    """20 cycles of growing amplitude that begin between two reversals, with 0.5 % of noise."""
+    phase = np.linspace(0.9, 40.0 * np.pi, 3001)
+    u = np.linspace(0.5, 1.0, phase.size) * np.sin(phase)
+    y = hs.BoucWen(beta=1.4, gamma=-0.6, feedthrough=0.7, gain=-0.5).response(u)
+    return hs.Record(u=u, y=y + 0.005 * np.random.default_rng(3).standard_normal(u.size), t=0.01 * np.arange(u.size))
+
+
+def test_a_search_on_a_thinned_record_ends_in_the_optimum_of_the_search_on_all_samples(monkeypatch):
+    thinned = hs.identify(hs.BoucWen, long_record(), fixed={"n": 1.0})
+    monkeypatch.setattr(Problem, "thinned", lambda *_: None)
+    monkeypatch.setattr(_descent, "_MOST_AT_ONCE", 1)  # sets descend one by one, and rows are taken in pieces, as on
+    monkeypatch.setattr(marquardt, "_LONG", 100)  # records of more than 100 000 samples
+    whole = hs.identify(hs.BoucWen, long_record(), fixed={"n": 1.0})
+    assert thinned.rmse == pytest.approx(whole.rmse, rel=1e-9)
+    assert thinned.residual.size == 3001
+    for name in whole.free_names:  # each descent ends where a step gains 2e-8 of the sum of squares
+        assert thinned.estimates[name] == pytest.approx(whole.estimates[name], abs=0.01 * whole.stderr[name])
+
+
+def test_a_thinned_record_keeps_ends_and_reversals_and_the_outputs_of_a_law():
+    record = long_record()
+    whole = problem(hs.BoucWen(), [record], Freedom(), None)
+    short = whole.thinned(250)
+    u = short.parts[0].record.u
+    assert 250 <= u.size <= 250 + record.reversals(tolerance=0.01).size
+    assert set(record.u[[0, -1, *record.reversals(tolerance=0.01)]]) <= set(u)
+    x = 0.5 * (whole.space.lower + whole.space.upper)[np.newaxis]
+    places = np.searchsorted(record.t, record.t[np.isin(record.u, u)])
+    np.testing.assert_allclose(short.split(x)[0][0], whole.split(x)[0][0, places], atol=1e-12)  # rounding
+
+
+def test_a_record_is_not_thinned_for_a_model_that_depends_on_time_or_where_it_would_stay_long():
+    record = long_record()
+    assert problem(hs.TransferFunction.structure(poles=1, zeros=0), [record], Freedom(), None).thinned(250) is None
+    assert problem(hs.BoucWen(), [record[:400]], Freedom(), None).thinned(250) is None
+
+
+# ---------------------------------------------------------------------------------- the units of input and output
+
+
+RNG = np.random.default_rng(0)
+SHARE = np.linspace(0.0, 1.0, 100)
+U = np.sin(6.0 * np.pi * SHARE) * (1.0 - 0.5 * SHARE)
+TRUTH = hs.BoucWen(beta=1.2, gamma=0.5, gain=2.0, feedthrough=0.5, offset=0.3)
+Y = TRUTH.response(U) + 0.01 * RNG.standard_normal(U.size)
+FACTORS = ((2.0**-100, 1.0), (1.0, 2.0**100), (1e30, 1e-25))
+FREE_OF_ROUNDING = 1e-6  # of the rmse: where a search that is rounded otherwise comes to rest on the same optimum
+SUBJECTS = {
+    **{name: each for name, each in candidates().items() if name.partition(" ")[0] in hs.__all__},
+    "SquareDahl": SquareDahl,
+    "BoucWenBaberNoori": hs.BoucWenBaberNoori,
+    "LuGre": hs.LuGre,
+    "GeneralizedMaxwellSlip": hs.GeneralizedMaxwellSlip,
+    "StribeckFriction": hs.StribeckFriction,
+    "ElasticBacklash": hs.ElasticBacklash,
+    "Dashpot": hs.Dashpot,
+    "ExcessLoss": hs.ExcessLoss,
+    "a sum": hs.Sum.structure(hs.Dahl, hs.Line),
+    "a cascade": hs.Cascade.structure(hs.Play, hs.TransferFunction.structure(poles=1, zeros=0)),
+}
+
+
+def fitted(name: str, u_factor: float, y_factor: float) -> hs.Identification:
+    record = hs.Record(u=u_factor * U, y=y_factor * Y, t=0.01 * np.arange(U.size))
+    return hs.identify(SUBJECTS[name], record, max_evaluations=100)
+
+
+@pytest.mark.parametrize("name", SUBJECTS)
+def test_a_record_in_other_units_has_the_same_fit(name):
+    """In both units at once; one search scales all families, so that three of them stand for single units."""
+    plain = fitted(name, 1.0, 1.0)
+    for factors in FACTORS if name in ("BoucWen", "SquareDahl", "a cascade") else FACTORS[-1:]:
+        scaled = fitted(name, *factors)
+        apart = np.abs(scaled.residual / factors[1] - plain.residual).max()
+        assert apart <= FREE_OF_ROUNDING * plain.rmse
+        assert scaled.free_names == plain.free_names
+
+
+@pytest.mark.parametrize(("u_factor", "y_factor"), [(1e-30, 1e30), (1e30, 1e-30), (1.0, 1e12)])
+def test_estimates_and_errors_are_those_of_the_other_units(u_factor, y_factor):
+    plain = hs.identify(hs.Dahl, hs.Record(u=U, y=Y))
+    fit = hs.identify(hs.Dahl, hs.Record(u=u_factor * U, y=y_factor * Y))
+    units = {"stiffness": y_factor / u_factor, "coulomb": y_factor, "offset": y_factor, "z0": y_factor}
+    for name, unit in units.items():
+        assert fit.estimates[name] / unit == pytest.approx(plain.estimates[name], rel=1e-6)
+        assert fit.stderr[name] / unit == pytest.approx(plain.stderr[name], rel=1e-4)  # of differences
+    assert fit.success
+
+
+def test_a_core_in_unknown_units_has_a_feedthrough_of_its_own():
+    steel = hs.JilesAtherton(Ms=1.2e6, a=60.0, alpha=1e-4, k=50.0, c=0.2)
+    u = 200.0 * np.sin(np.linspace(0.0, 4.0 * np.pi, 81))
+    freed = [
+        "feedthrough" in hs.identify(hs.JilesAtherton, record, max_evaluations=50).free_names
+        for record in (
+            hs.Record(u=u, y=steel.response(u), units={"u": "A/m", "y": "T"}),
+            hs.Record(u=u, y=1e4 * steel.response(u), units={"u": "A/m", "y": "G"}),
+            hs.Record(u=u, y=1e-8 * steel.response(u)),
+        )
+    ]
+    assert freed == [False, True, True]
+
+
+@pytest.mark.parametrize(
+    "verb", [functools.partial(hs.identify, hs.BoucWen), hs.discover, functools.partial(hs.compare, ["dahl"])]
+)
+@pytest.mark.parametrize(("u_factor", "y_factor", "name"), [(1e-300, 1.0, "input u"), (1.0, 1e300, "output y")])
+def test_numbers_whose_squares_are_none_are_refused_in_one_sentence(verb, u_factor, y_factor, name):
+    with pytest.raises(ValueError, match=f"takes records between 1e-40 and 1e\\+40 in size, got an {name}"):
+        verb(hs.Record(u=u_factor * U, y=y_factor * Y))
+
+
+@pytest.mark.parametrize(("u_factor", "y_factor"), [(2.0**-100, 1.0), (1e30, 1.0), (1.0, 1e-30)])
+def test_an_oscillator_of_any_mass_is_found(u_factor, y_factor):
+    law = hs.BoucWen(A=5e4, beta=800.0, gamma=-300.0, n=1.0)
+    plant = hs.BoucWenOscillator(mass=2.0, damping=10.0, stiffness=5e4, law=law, substeps=4)
+    lines = np.zeros(65, dtype=complex)
+    lines[1:14] = np.exp(2j * np.pi * RNG.random(13))
+    force = 2000.0 * np.fft.irfft(lines)
+    force -= force[0]
+    y = plant.response(force, 1.0 / 750.0)
+    record = hs.Record(u=u_factor * force, y=y_factor * y, t=np.arange(128) / 750.0)
+    fit = hs.identify(hs.BoucWenOscillator.structure(), record, fixed={"n": 1.0}, max_evaluations=100)
+    assert fit.estimates["mass"] * y_factor / u_factor == pytest.approx(2.0, rel=1e-2)  # the integration's error

@@ -6,9 +6,9 @@ from functools import cache
 
 import numpy as np
 import pytest
-from hypothesis import assume, given, settings
+from hypothesis import given, settings
 from hypothesis import strategies as st
-from strategies import COMPILED, EXPONENTS, refused, short_inputs
+from strategies import COMPILED, assert_refused, bounded_laws, refused, short_inputs
 
 import hysim as hs
 from hysim.kernels import boucwen_inverse as kernels
@@ -24,23 +24,13 @@ ASYMMETRIC = hs.PolynomialBoucWen(A=0.4, beta=0.3, gamma=0.1, n=1.4, gain=-0.5, 
 @st.composite
 def invertible_laws(draw) -> hs.BoucWen:
     """Laws whose slope is between 1e-3 and 1 times its largest for every input, rising or falling."""
-    loading = draw(st.floats(0.05, 5.0))
-    unloading = draw(st.floats(-loading, 5.0))
-    law = hs.BoucWen(
-        A=draw(st.floats(0.2, 3.0)),
-        beta=(loading + unloading) / 2,
-        gamma=(loading - unloading) / 2,
-        n=draw(EXPONENTS),
-        gain=draw(st.sampled_from([-1.0, 1.0])) * draw(st.floats(0.1, 2.0)),
-        offset=draw(st.floats(-1.0, 1.0)),
-    )
+    gain = draw(st.sampled_from([-1.0, 1.0])) * draw(st.floats(0.1, 2.0))
+    law = replace(draw(bounded_laws()), gain=gain, feedthrough=0.0)
     low, high = law.slope_bounds()
     flattest = draw(st.sampled_from([1e-3, 0.03, 0.5]))
     feedthrough = (flattest * high - low) / (1.0 - flattest)  # then low is `flattest` times high
-    assert hs.BoucWen(A=law.A, beta=law.beta, gamma=law.gamma, n=law.n, gain=law.gain, feedthrough=feedthrough)
     turned = draw(st.sampled_from([-1.0, 1.0]))
-    scalars = law.scalars | {"feedthrough": turned * feedthrough, "gain": turned * law.gain}
-    return hs.BoucWen(**scalars)
+    return replace(law, feedthrough=turned * feedthrough, gain=turned * law.gain)
 
 
 def walk(rng: np.random.Generator, n_samples: int) -> np.ndarray:
@@ -104,8 +94,7 @@ def test_a_memory_alone_needs_its_first_input():
     y = law.response(u)
     assert law.inverse_response(y, u0=3.0) == pytest.approx(u, abs=1e-12)  # slopes are above 0.05 here
     assert law.inverse_response(y[1:], state=(3.0, 0.2)) == pytest.approx(u[1:], abs=1e-12)
-    with pytest.raises(ValueError, match="give u0"):
-        law.inverse_response(y)
+    assert_refused("give u0", law.inverse_response, y)
 
 
 def test_from_rest_at_an_input_the_first_sample_is_reached():
@@ -130,15 +119,13 @@ def test_other_branches_of_a_polynomial():
     rising, falling = np.linspace(-1.0, 0.5, 50), np.linspace(3.0, 2.0, 50)
     assert law.inverse_response(law.response(rising)) == pytest.approx(rising, abs=1e-13)
     assert law.inverse_response(law.response(falling), u0=3.0) == pytest.approx(falling, abs=1e-13)
-    with pytest.raises(hs.SimulationError, match="sample"):
-        law.inverse_response(law.response(np.linspace(0.0, 2.0, 60)))
+    assert_refused("sample", law.inverse_response, law.response(np.linspace(0.0, 2.0, 60)), error=hs.SimulationError)
 
 
 def test_a_polynomial_that_turns_twice_between_two_samples_is_refused():
     law = hs.PolynomialBoucWen(A=1.0, beta=0.5, gamma=0.5, gain=0.01, input_coefficients=(1.0, -1.5, 0.55))
     u = np.array([0.0, 2.5])
-    with pytest.raises(hs.SimulationError, match="sample 1"):
-        law.inverse_response(law.response(u))
+    assert_refused("sample 1", law.inverse_response, law.response(u), error=hs.SimulationError)
 
 
 def test_a_polynomial_that_turns_in_the_middle_alone_is_refused_and_one_that_flattens_is_not():
@@ -147,8 +134,7 @@ def test_a_polynomial_that_turns_in_the_middle_alone_is_refused_and_one_that_fla
     turns, flattens = (
         hs.PolynomialBoucWen(gain=0.01, n=n, input_coefficients=(c1, 0.0, 1.0)) for n, c1 in ((1.5, -0.05), (1.0, 0.1))
     )
-    with pytest.raises(hs.SimulationError, match="sample 1"):
-        turns.inverse_response(turns.response(u), u0=-1.0)
+    assert_refused("sample 1", turns.inverse_response, turns.response(u), error=hs.SimulationError, u0=-1.0)
     assert flattens.inverse_response(flattens.response(u), u0=-1.0) == pytest.approx(u, abs=1e-14)
 
 
@@ -173,8 +159,7 @@ def test_the_slope_just_after_a_reversal_is_looked_at():
 
 def test_what_cannot_be_reached_is_refused():
     law = hs.BoucWen(A=1.0, beta=0.6, gamma=0.4)
-    with pytest.raises(hs.SimulationError, match=r"sample 1 \(y = 1\.5\)"):
-        law.inverse_response([0.5, 1.5], u0=0.0)
+    assert_refused(r"sample 1 \(y = 1\.5\)", law.inverse_response, [0.5, 1.5], error=hs.SimulationError, u0=0.0)
     compiled = law.inverse().compiled(u0=0.0)
     assert np.isnan(compiled.step(compiled.parameters, compiled.state, 1.5))
     # and the state has not moved: the next output is reached as if nothing had been
@@ -193,8 +178,7 @@ test_wrong_arguments_are_named = refused(
 
 def test_a_turned_polynomial_has_no_first_input():
     law = hs.PolynomialBoucWen(A=0.1, gain=0.1, input_coefficients=(1.0, 1.0))  # turns at u = -0.5, y = -0.25
-    with pytest.raises(hs.SimulationError, match="give u0"):
-        law.inverse_response([-0.3])
+    assert_refused("give u0", law.inverse_response, [-0.3], error=hs.SimulationError)
 
 
 def test_nothing_in_nothing_out():
@@ -216,16 +200,6 @@ def test_the_inverse_is_a_law_for_simulate():
     u = np.linspace(0.0, 30.0, 20)
     sim = hs.simulate(STACK.inverse(), None, STACK.response(u))
     assert sim.y == pytest.approx(u, abs=1e-12)
-
-
-@given(invertible_laws(), st.integers(0, 1000))
-def test_the_inverse_does_not_mind_extra_samples(law, seed):
-    """Rate independence of the inverse: samples put in between on the way do not change the others."""
-    assume(law.slope_bounds()[0] * law.slope_bounds()[1] > 0.0)
-    y = law.response(walk(np.random.default_rng(seed), 30))
-    fine = np.append((y[:-1, None] + np.diff(y)[:, None] * np.array([0.0, 0.3, 0.8])).ravel(), y[-1])
-    coarse = law.inverse_response(y)
-    assert law.inverse_response(fine)[::3] == pytest.approx(coarse, abs=1e-11 * max(1.0, np.ptp(coarse)))
 
 
 @cache
@@ -312,8 +286,7 @@ def test_a_slope_of_zero_on_the_way_back_is_no_negative_one(A, beta, gamma):
     for roundings in (-4, -1, 0, 1, 4):
         assert found(roundings * 2.0**-52) == pytest.approx(u, rel=1e-13)
     for excess in (-1e-10, -1e-6):
-        with pytest.raises(hs.SimulationError, match="not positive"):
-            found(excess)
+        assert_refused("not positive", found, excess, error=hs.SimulationError)
 
 
 @pytest.mark.parametrize("law", [STACK, ASYMMETRIC, hs.BoucWen(n=1.5, gain=0.5, feedthrough=0.2, offset=3.0)])

@@ -4,9 +4,7 @@ The laws, states and strides are those of `experiments/32_more_samples.py`, and 
 `experiments/more_samples.py` for the reason of each tolerance.
 """
 
-import importlib.util
-import sys
-from pathlib import Path
+import importlib
 
 import numba
 import numpy as np
@@ -14,11 +12,7 @@ import pytest
 
 import hysim as hs
 
-EXPERIMENTS = Path(__file__).parent.parent / "experiments"
-sys.path.insert(0, str(EXPERIMENTS))
-spec = importlib.util.spec_from_file_location("more_samples_experiment", EXPERIMENTS / "32_more_samples.py")
-experiment = importlib.util.module_from_spec(spec)
-spec.loader.exec_module(experiment)
+experiment = importlib.import_module("32_more_samples")
 
 N_CASES = 2 if numba.config.DISABLE_JIT else 8
 
@@ -158,9 +152,7 @@ def test_the_inverse_of_a_cascade_comes_back_from_a_guess_that_is_far_too_long()
     first = hs.BoucWen(beta=-0.05, gamma=-0.05, n=2.0, gain=-0.1, feedthrough=1.0)  # it turns at u = 3.95
     law = first >> hs.PrandtlIshlinskii(thresholds=(0.0, 0.1), weights=(0.02, 1.0))
     u = np.array([0.0, 3.0, 1.0])
-    assert law.inverse_response(law.response(u), u0=0.0) == pytest.approx(
-        u, abs=1e-12
-    )  # 1e-16 of y over a slope of 0.02
+    assert law.inverse_response(law.response(u), u0=0.0) == pytest.approx(u, abs=1e-12)  # 1e-16 of y over 0.02
 
 
 def test_a_sum_of_short_laws_is_inverted():

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
-from strategies import COMPILED, refused
+from strategies import COMPILED, assert_refused, refused
 
 import hysim as hs
 from hysim.kernels import oscillator as kernels
@@ -251,8 +251,7 @@ test_wrong_arguments_are_named = refused(
 
 @pytest.mark.parametrize("sample_time", [0.0, -1.0, np.inf, np.nan])
 def test_a_sample_time_that_is_none_is_refused(sample_time):
-    with pytest.raises(ValueError, match="sample_time must be positive"):
-        plant().response([0.0, 1.0], sample_time)
+    assert_refused("sample_time must be positive", plant().response, [0.0, 1.0], sample_time)
 
 
 @pytest.mark.parametrize(

@@ -36,14 +36,6 @@ def folder(tmp_path_factory):
     return folder
 
 
-@pytest.fixture
-def run(folder, monkeypatch, shell):
-    """Run a command in that folder: exit code, standard output, standard error."""
-    monkeypatch.chdir(folder)
-
-    return shell
-
-
 def test_a_record_goes_from_file_to_model_to_simulation_to_picture(run, folder, tmp_path):
     model, loop = tmp_path / "fit.json", tmp_path / "fit.svg"
     code, out, err = run(

@@ -5,11 +5,11 @@ import dataclasses
 import gzip
 import json
 import re
-import sys
 from pathlib import Path
 
 import numpy as np
 import pytest
+from browser import BROWSER, TELEPHONE, WIDE, started, wait_for
 
 import hysim as hs
 from hysim._columns.turning import TOLERANCE, complete_cycles
@@ -22,9 +22,6 @@ from hysim.laws.dashpot import RatePart
 from hysim.laws.friction.rated_law import RatedLaw
 from hysim.models.model import every_family
 from hysim.paper.reproduction import browser_page
-
-sys.path.insert(0, str(Path(__file__).parent.parent / "experiments"))
-from browser import BROWSER, TELEPHONE, WIDE, started, wait_for
 
 WASM = Path(hs.__file__).parent / "export" / FOLDER
 LAW = hs.BoucWen(beta=0.03, gamma=0.02, gain=-0.01, feedthrough=0.03)
@@ -145,9 +142,8 @@ def test_the_modules_of_the_package_are_made_of_the_steps_as_they_are(all_steps)
 
 def test_the_command_writes_the_same_page(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
-    rows = [
-        f"{u},{y}" for u, y in zip(*(hs.datasets.table1()[:].u.tolist(), hs.datasets.table1().y.tolist()), strict=True)
-    ]
+    table1 = hs.datasets.table1()
+    rows = [f"{u},{y}" for u, y in zip(table1.u.tolist(), table1.y.tolist(), strict=True)]
     Path("loop.csv").write_text("\n".join(["voltage [V],displacement [um]", *rows]))
     hs.save(LAW, "law.json", units={"u": "V", "y": "um"})
     columns = ("--u", "voltage", "--y", "displacement")

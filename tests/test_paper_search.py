@@ -1,6 +1,8 @@
 """The search for controllers: its bounds hold, its costs are the library's measures, its sentences follow the rows."""
 
+import json
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -9,6 +11,7 @@ import hysim as hs
 from hysim.paper.camera import _width, needed, vibration_cameras
 from hysim.paper.equations import EQUATION_1, EQUATION_4
 from hysim.paper.loops import law_plant
+from hysim.paper.preference import nested_errors, of_discovered
 from hysim.paper.search import (
     Gains,
     Robustness,
@@ -172,3 +175,39 @@ def test_many_controllers_at_once_are_judged_as_one_by_one(step):
     })  # fmt: skip
     expected = [max(first / 2.0, second / 2.5) for first, second in map(robustness.of, pids[:2])]
     assert robustness.over_bound(gains, 2.0, fine=True) == pytest.approx(expected, rel=1e-3)
+
+
+# ----------------------------------------------------------------------------- the stored errors of repeated searches
+
+
+RESULT = Path(__file__).parent.parent / "experiments" / "results" / "nested_table1" / "result.json"
+
+
+def test_the_stored_errors_are_those_of_the_experiment():
+    rows = json.loads(RESULT.read_text(encoding="utf-8"))["rows"]
+    stored = nested_errors()
+    assert [(each.model, each.start) for each in stored] == [(row["model"], row["start"]) for row in rows]
+    for each, row in zip(stored, rows, strict=True):
+        assert (each.left_out_rmse, each.behind) == (row["left_out_rmse_um"], row["behind_in_stderr"])
+        for name in ("n_parameters", "folds", "same_structure", "terms_kept"):
+            assert each._asdict()[name] == row[name]
+
+
+def test_rows_stand_in_the_order_of_their_errors_and_the_best_that_was_searched_again_is_behind_none():
+    stored = nested_errors()
+    assert [each.left_out_rmse for each in stored] == sorted(each.left_out_rmse for each in stored)
+    assert next(each for each in stored if not each.terms_kept).behind == 0.0
+    assert all(each.behind >= 0.0 for each in stored if not each.terms_kept)
+    assert all(each.folds == 50 for each in stored)
+
+
+def test_the_report_quotes_the_nested_error_of_the_law_that_it_shows(reproduction, paper_study):
+    page = (reproduction.folder / "report.html").read_text(encoding="utf-8")
+    nested = of_discovered()
+    assert f"errs by {nested.left_out_rmse:.4f} µm at the point left out" in page
+    assert f"has the terms above in {nested.same_structure} of 50 searches" in page
+    assert "predicts best" not in page
+    assert nested.n_parameters == paper_study.discovery.n_parameters
+    assert nested.fit_percent == pytest.approx(paper_study.discovery.scores["fit_percent"], abs=1e-4)  # one law
+    models = json.loads((reproduction.folder / "summary.json").read_text(encoding="utf-8"))["models"]
+    assert models["sindy"]["cv_rmse_um"] == pytest.approx(nested.left_out_rmse, rel=1e-8)  # nine digits are written

@@ -51,9 +51,7 @@ def test_more_plays_converge_to_the_density():
     assert np.all(np.array(errors[:-1]) / errors[1:] > 1.8)  # 4 for a smooth density, 2 where a sample meets a kink
 
 
-@given(
-    weight=st.floats(-0.9, 0.9), slope=st.floats(-0.5, 0.5), u=st.lists(st.floats(-1.0, 1.0), min_size=2, max_size=20)
-)
+@given(weight=st.floats(-0.9, 0.9), slope=st.floats(-0.5, 0.5), u=st.lists(st.floats(-1, 1), min_size=2, max_size=20))
 def test_a_return_to_a_turning_point_returns_to_its_output(weight, slope, u):
     """Wiping out: a minor loop closes to rounding, whatever the common weight does."""
     law = hs.ParametricPrandtlIshlinskii(

@@ -1,9 +1,7 @@
 """A PID is its difference equations: started without a bump, cut where one likes, the same bits as in a loop."""
 
-import copy
 import dataclasses
 import math
-import pickle
 
 import numpy as np
 import pytest
@@ -138,11 +136,6 @@ def test_a_pid_is_a_value():
     assert pid != hs.PID(kp=1.0, limits=(0.0, 5.0))
     assert pid != hs.PID(kp=1.0, tracking_time=2.0)
     assert {pid: 1}[hs.PID(kp=1.0, limits=np.array([0.0, 5.0]), tracking_time=2.0)] == 1
-    for twin in (pickle.loads(pickle.dumps(pid)), copy.deepcopy(pid)):
-        assert twin == pid
-        assert hash(twin) == hash(pid)
-    with pytest.raises(dataclasses.FrozenInstanceError):
-        pid.kp = 2.0
 
 
 def test_a_run_leaves_the_controller_as_it_was():
@@ -152,12 +145,6 @@ def test_a_run_leaves_the_controller_as_it_was():
     assert pid.advance([1.0, 2.0], [0.0, 0.0], 0.1)[0].tolist() == first[0].tolist()
     assert not compiled.parameters.flags.writeable
     assert np.array_equal(pid.compiled(0.1, 1.0, 2.0).state, compiled.state)
-
-
-@pytest.mark.parametrize("pid", [hs.PID(kp=1 / 3), hs.PID.standard(0.1, 0.7, limits=(0.0, 1 / 3), tracking_time=0.1)])
-def test_a_pid_comes_back_from_its_file(pid, tmp_path):
-    hs.save(pid, tmp_path / "pid.json")
-    assert hs.load_model(tmp_path / "pid.json") == pid
 
 
 test_wrong_arguments_are_named = refused(

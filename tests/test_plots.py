@@ -12,7 +12,7 @@ import matplotlib
 import numpy as np
 import pytest
 from PIL import Image
-from strategies import refused
+from strategies import assert_refused, refused
 
 import hysim as hs
 from hysim.paper import figures
@@ -171,8 +171,7 @@ def test_selection_of_a_real_discovery():
 
 
 def test_too_few_axes_are_refused(comparison):
-    with pytest.raises(ValueError, match="3 Axes are needed, got 2"):
-        hs.plot.loops(comparison, hs.plot.figure().subplots(1, 2))
+    assert_refused("3 Axes are needed, got 2", hs.plot.loops, comparison, hs.plot.figure().subplots(1, 2))
 
 
 def test_given_axes_are_used_and_keep_their_look(comparison):

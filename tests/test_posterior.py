@@ -12,7 +12,7 @@ import sys
 import numpy as np
 import pytest
 from scipy import stats
-from strategies import refused
+from strategies import assert_refused, refused
 
 import hysim as hs
 from hysim.identification.likelihood import density
@@ -191,14 +191,12 @@ def test_sampling_begins_at_the_optimum_of_the_fit():
 
 def test_the_number_of_walkers_follows_that_of_samples():
     assert [walkers_of(8, None, samples) for samples in (100, 1000, 10_000)] == [32, 40, 128]
-    with pytest.raises(ValueError, match="walkers must be even, and at least 16 for 8 parameters, got 14"):
-        walkers_of(8, 14, 100)
+    assert_refused("walkers must be even, and at least 16 for 8 parameters, got 14", walkers_of, 8, 14, 100)
 
 
 def test_other_records_than_those_of_the_fit_are_an_error():
     fit = hs.identify(hs.Line, cubic_record(n=12))
-    with pytest.raises(ValueError, match="other residuals"):
-        posed(fit, (cubic_record(seed=1, n=12),), "gaussian", {}, None)
+    assert_refused("other residuals", posed, fit, (cubic_record(seed=1, n=12),), "gaussian", {}, None)
 
 
 # Chains
@@ -312,8 +310,7 @@ def test_a_posterior_is_read(of_table1):
     assert "Posterior of Play" in str(post)
     assert "R-hat" in post.summary()
     assert "prior of sigma: flat in its logarithm" in post.summary()
-    with pytest.raises(ValueError, match="level must be between 0 and 1"):
-        post.interval(95.0)
+    assert_refused("level must be between 0 and 1", post.interval, 95.0)
 
 
 @pytest.mark.extra("emcee", "arviz")
@@ -405,5 +402,4 @@ def test_a_model_whose_evidence_was_not_found_stays_in_question():
 def test_without_emcee_the_extra_is_named(monkeypatch):
     monkeypatch.setitem(sys.modules, "emcee", None)
     rec = cubic_record(n=9)
-    with pytest.raises(ImportError, match=r"hysim\[bayes\]"):
-        hs.sample_posterior(hs.identify(hs.Line, rec), rec)
+    assert_refused(r"hysim\[bayes\]", hs.sample_posterior, hs.identify(hs.Line, rec), rec, error=ImportError)

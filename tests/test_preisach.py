@@ -1,7 +1,7 @@
 """Relays under a staircase: closed forms, the properties that define the family, the exact inverse, reversal curves."""
 
 import dataclasses
-import pickle
+import json
 
 import numpy as np
 import pytest
@@ -9,13 +9,16 @@ from hypothesis import example, given
 from hypothesis import strategies as st
 from strategies import (
     COMPILED,
-    assert_cut_and_continued_gives_the_same_bits,
+    assert_batch_has_the_bits_of_its_laws,
+    assert_cut_or_stepped_it_has_the_same_bits,
+    assert_refused,
     outputs_of_compiled_steps,
     refused,
     short_inputs,
 )
 
 import hysim as hs
+from hysim.cli import main
 from hysim.models.search_space import Freedom
 
 FAMILIES = [hs.Preisach, hs.PreisachRelays]
@@ -164,14 +167,6 @@ def test_the_everett_function_is_half_of_a_fall(law):
 
 
 @pytest.mark.parametrize("family", FAMILIES)
-@given(u=short_inputs(1.2), extra=st.integers(1, 4))
-def test_samples_on_the_way_change_nothing_to_the_bit(family, u, extra):
-    fine = np.append(np.linspace(u[:-1], u[1:], extra + 1, endpoint=False, axis=1).ravel(), u[-1])
-    law = a_law(family)
-    assert np.array_equal(law.response(fine)[:: extra + 1], law.response(u))
-
-
-@pytest.mark.parametrize("family", FAMILIES)
 @given(past=short_inputs(0.5), loop=short_inputs(0.4))
 def test_a_return_to_an_extreme_wipes_out_what_came_since_to_the_bit(family, past, loop):
     law = a_law(family)
@@ -201,18 +196,10 @@ def test_a_symmetric_density_is_odd(u, n, seed):
 
 @pytest.mark.parametrize("family", FAMILIES)
 @given(u=short_inputs(1.2), data=st.data())
-def test_cut_and_continue_gives_the_same_bits(family, u, data):
+def test_cut_or_stepped_it_has_the_same_bits(family, u, data):
     law = a_law(family, z0=(0.8, -0.4))
-    assert_cut_and_continued_gives_the_same_bits(law, u, data.draw(st.integers(0, u.size)))
-
-
-@pytest.mark.parametrize("family", FAMILIES)
-@given(u=short_inputs(1.2))
-def test_stepping_one_sample_at_a_time_gives_the_same_bits(family, u):
-    law = a_law(family, z0=(0.8, -0.4))
-    y, state = outputs_of_compiled_steps(law, u)
-    assert np.array_equal(y, law.response(u))
-    assert state[0] == u[-1]
+    assert_cut_or_stepped_it_has_the_same_bits(law, u, data.draw(st.integers(0, u.size)))
+    assert outputs_of_compiled_steps(law, u)[1][0] == u[-1]
 
 
 def test_a_compiled_loop_forgets_the_smallest_of_too_many_extremes():
@@ -247,12 +234,8 @@ def test_batch_is_the_path_to_the_bit(u, seed, own_inputs):
         "offset": rng.normal(size=3),
         "z0": rng.normal(size=(3, 2)),
     }
-    inputs = u * np.array([[1.0], [0.7], [-0.3]]) if own_inputs else u
     for family in FAMILIES:
-        rows = family.responses(sets, inputs, workers=2)
-        for k in range(3):
-            law = family(**{name: values[k] for name, values in sets.items()})
-            assert np.array_equal(rows[k], law.response(inputs[k] if own_inputs else u))
+        assert_batch_has_the_bits_of_its_laws(family, sets, u, own_inputs)
 
 
 def test_reductions_are_the_measures_of_the_rows():
@@ -396,8 +379,7 @@ def test_the_reversal_curves_turn_at_every_level():
     assert u[[2, 8, 18]].tolist() == [0.0, 1.0, 2.0]
     assert np.abs(np.diff(u)) == pytest.approx(0.5)
     for wrong in ({"curves": 0}, {"curves": 1, "samples_per_step": 0}):
-        with pytest.raises(ValueError, match="at least 1"):
-            hs.signals.reversal_curves(0.0, 1.0, **wrong)
+        assert_refused("at least 1", hs.signals.reversal_curves, 0.0, 1.0, **wrong)
 
 
 @given(laws(), short_inputs(1.0), st.integers(1, 3))
@@ -487,6 +469,7 @@ def test_one_loop_tells_two_weights_for_each_interval_but_one():
     assert fit.model.is_invertible()
     assert np.isfinite([fit.stderr[name] for name in fit.free_names]).all()
     assert "3 of the 10 weights cannot be estimated separately" in fit.message
+    assert "a smooth density predicts parts left out not clearly better" in fit.message
     wide = hs.identify(hs.Preisach, hs.datasets.table1(), free="weights[6]")
     assert wide.n_parameters == 9
     assert wide.rmse == pytest.approx(fit.rmse, rel=1e-9)  # it adds nothing
@@ -545,15 +528,6 @@ def test_a_law_is_a_plant_of_a_loop_and_of_an_actuator():
     assert np.isfinite(actuator.response(np.sin(t), 0.01)).all()
 
 
-def test_a_law_is_a_value(tmp_path):
-    for family in FAMILIES:
-        law = a_law(family, z0=(0.5,))
-        assert pickle.loads(pickle.dumps(law)) == law
-        hs.save(law, tmp_path / "law.json")
-        assert hs.load_model(tmp_path / "law.json") == law
-    assert a_law(hs.Preisach) != a_law(hs.PreisachRelays)
-
-
 def test_nothing_in_nothing_out():
     law = a_law(hs.Preisach, z0=(0.5, 0.2))
     assert law.response([]).size == 0
@@ -568,3 +542,106 @@ def test_a_memory_of_any_length_is_not_offered_as_an_array(law):
     """The arrays of other laws have no room for extremes: filling them wrote beyond their end."""
     assert law.memory is None
     assert law.remembered is None
+
+
+# --------------------------------------------- density and drift of reversal curves, and the law of the smoothed curves
+
+
+CURVES = 40
+U = hs.signals.reversal_curves(-1.0, 1.0, curves=CURVES, samples_per_step=2)
+
+
+def true(a, b):
+    return np.exp(-20.0 * (a + b) ** 2 - 8.0 * (a - b - 0.6) ** 2) + 0.3 * np.exp(-3.0 * (a - b - 1.0) ** 2)
+
+
+LAW = hs.Preisach.from_density(np.linspace(-1.0, 1.0, 4 * CURVES // 2 + 1), true)
+Y = LAW.response(U)
+SIZE = np.ptp(Y)
+
+
+def measured(noise, drift=0.0, seed=0):
+    late = np.arange(U.size) / U.size
+    return hs.Record(u=U, y=Y + SIZE * (noise * np.random.default_rng(seed).standard_normal(U.size) + drift * late))
+
+
+def correlation(diagram):
+    known = np.isfinite(diagram.density)
+    a, b = np.meshgrid(diagram.levels, diagram.levels, indexing="ij")
+    return np.corrcoef(diagram.density[known], true(a, b)[known])[0, 1]
+
+
+@pytest.mark.parametrize(("noise", "least"), [(0.0, 0.995), (1e-3, 0.985), (5e-3, 0.95)])
+def test_the_chosen_smoothing_is_about_the_best_one(noise, least):
+    record = measured(noise)
+    given = [correlation(hs.forc(record, smoothing=s)) for s in (1.5, 3.0, 5.0, 7.0)]
+    assert correlation(hs.forc(record)) > max(least, max(given) - 0.015)
+
+
+def test_a_polynomial_of_the_second_degree_is_met_to_rounding():
+    """On curves that fall from a to b, y = 3 (1 + a) (1 + b): the density is half of 3."""
+    turn = np.maximum.accumulate(U)  # of each fall; a rise to a turning point passes no curve
+    rises = np.append(np.diff(U) > 0.0, False)
+    y = 3.0 * (1.0 + np.where(rises, U, turn)) * (1.0 + U)
+    known = np.isfinite((diagram := hs.forc(hs.Record(u=U, y=y), smoothing=2.0)).density)
+    expected = np.outer([1.5, 0.0], np.ones(known.sum()))
+    np.testing.assert_allclose([diagram.density[known], diagram.stderr[known]], expected, atol=1e-9)
+
+
+def test_curves_that_rise_have_the_density_of_the_record_turned():
+    record = measured(1e-3)
+    falls, rises = (hs.forc(each, smoothing=3.0) for each in (record, hs.Record(u=-record.u, y=-record.y)))
+    np.testing.assert_allclose(rises.density, falls.density[::-1, ::-1].T, rtol=1e-9)
+    np.testing.assert_allclose(rises.ridge[:, 1], -falls.ridge[:, 1], atol=1e-12)
+
+
+def test_a_drift_is_told_from_noise_and_subtracted():
+    still, moves = (hs.forc(measured(2e-4, drift), smoothing=3.0) for drift in (0.0, 0.02))
+    assert [still.drift, still.noise] == pytest.approx([0.0, 2e-4 * SIZE], rel=0.3)
+    assert [moves.drift, moves.noise] == pytest.approx([0.02 * SIZE, 4e-4 * SIZE], rel=0.3)
+    assert correlation(moves) > correlation(still) - 0.005
+    assert ["none above" in str(each) for each in (still, moves)] == [True, False]
+
+
+@pytest.mark.parametrize("noise", [0.0, 1e-3])
+def test_the_law_of_smoothed_curves_predicts_those_left_out(noise):
+    """Every fifth one; without noise it is better than the law between the samples, and with noise near the truth."""
+    record = measured(noise)
+    falls = [part for part in record.branches(1e-6) if part.u[0] > part.u[-1]]
+    rest = [part for k, part in enumerate(falls) if k % 5 != 2]
+    path = [np.concatenate([getattr(part, name) for part in rest]) for name in "uy"]
+    laws = {s: hs.Preisach.from_reversal_curves(hs.Record(u=path[0], y=path[1]), smoothing=s) for s in (None, "auto")}
+    left = np.concatenate([np.append(part.u, -1.0) for part in falls[2::5]])
+    errors = {s: np.sqrt(np.mean((law.response(left) - LAW.response(left)) ** 2)) / SIZE for s, law in laws.items()}
+    assert errors["auto"] < min(errors[None], 6e-4 + 0.7 * noise)
+
+
+def test_standard_errors_are_those_of_many_draws():
+    drawn = [hs.forc(measured(5e-3, seed=k), smoothing=5.0) for k in range(12)]
+    spread = np.std([each.density for each in drawn], axis=0, ddof=1)
+    assert 0.85 < np.nanmedian(np.mean([each.stderr for each in drawn], axis=0) / spread) < 1.3
+
+
+def smoothed(case):
+    u = hs.signals.reversal_curves(0.0, 1.0, curves=case[0])
+    return hs.forc(hs.Record(u=u, y=0.0 * u), smoothing=case[1])
+
+
+test_what_cannot_be_smoothed_is_refused = refused(
+    ((5, "auto"), "at least 10 reversal curves, the record has 5"),
+    ((20, 0.0), "smoothing must be positive"),
+    ((20, "all"), 'a number or "auto"'),
+    ((2, 2.0), "too few or too short"),
+    call=smoothed,
+)
+
+
+def test_the_command_line_measures_and_draws_it(tmp_path, capsys):
+    file = tmp_path / "curves.csv"
+    record = measured(1e-3)
+    np.savetxt(file, np.column_stack([record.u, record.y]), delimiter=",", header="u,y", comments="")
+    assert main(["metrics", str(file), "--forc", "--json", "--plot", str(tmp_path / "density.svg")]) == 0
+    found, diagram = json.loads(capsys.readouterr().out), hs.forc(hs.load(file))
+    assert found["peak"] == pytest.approx(list(diagram.peak))
+    assert "ridge" in (tmp_path / "density.svg").read_text()
+    assert main(["metrics", str(file), "--forc", "--cycles"]) != 0

@@ -5,7 +5,7 @@ import functools
 
 import numpy as np
 import pytest
-from strategies import refused
+from strategies import assert_refused, refused
 
 import hysim as hs
 from hysim.cli import Command, main, models, options, records
@@ -97,8 +97,7 @@ def test_the_test_record_of_a_comparison_is_not_cut(folder):
     ],
 )
 def test_a_range_without_samples_is_refused(folder, arguments, message):
-    with pytest.raises(ValueError, match=message):
-        read("loop.csv", *arguments)
+    assert_refused(message, read, "loop.csv", *arguments)
 
 
 @pytest.mark.parametrize(("option", "value"), [("--from", "-1"), ("--from", "1.5"), ("--to", "3min"), ("--every", "0")])

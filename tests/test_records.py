@@ -1,15 +1,16 @@
-"""A record never changes, and never forgets what is known about it."""
+"""A record never changes, and never forgets what is known about it; the tables hold the values of the paper."""
 
 import copy
 import dataclasses
 import math
 import pickle
+from importlib.resources import files
 
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from strategies import refused
+from strategies import assert_refused, refused
 
 import hysim as hs
 
@@ -145,8 +146,7 @@ def test_wiggles_below_the_tolerance_are_no_reversals():
     assert len(noisy.reversals()) > 10
     assert len(noisy.reversals(tolerance=0.1)) == 5
     assert len(noisy.branches(tolerance=0.1)) == 6
-    with pytest.raises(ValueError, match=r"tolerance .* got 0\.5"):
-        noisy.reversals(tolerance=0.5)
+    assert_refused(r"tolerance .* got 0\.5", noisy.reversals, tolerance=0.5)
 
 
 def test_cycles_are_those_that_loop_metrics_measures():
@@ -171,8 +171,7 @@ def test_an_uneven_record_is_resampled_along_straight_lines():
 
 @pytest.mark.parametrize("step", [0.0, -1.0, 0.31, 1e-12, math.nan, math.inf])
 def test_a_step_that_does_not_fit_the_record_is_refused(step):
-    with pytest.raises(ValueError, match="sample_time must be from"):
-        record().resample(step)
+    assert_refused("sample_time must be from", record().resample, step)
 
 
 @given(st.floats(-0.01, 0.01), st.floats(-1e-5, 1e-5), st.booleans())
@@ -192,11 +191,9 @@ def test_a_record_is_split_at_samples_and_fractions():
     assert [part.u.tolist() for part in rec.split(3, 0.8)] == [[0, 1, 2], [3, 4, 5, 6, 7], [8, 9]]
     assert {(part.name, part.units["u"]) for part in rec.split(np.int64(3), np.float64(0.8))} == {("loop", "V")}
     for places, message in (((), "needs a place"), ((9,), r"got \[9, 1\]"), ((5, 4), r"got \[5, -1, 6\]")):
-        with pytest.raises(ValueError, match=message):
-            rec.split(*places)
+        assert_refused(message, rec.split, *places)
     for place in (True, 1.0, "half", math.nan):
-        with pytest.raises(TypeError, match="a place must be a sample's number or a fraction"):
-            rec.split(place)
+        assert_refused("a place must be a sample's number or a fraction", rec.split, place, error=TypeError)
 
 
 def test_units_change_by_their_prefix():
@@ -303,3 +300,70 @@ def test_a_lag_takes_part_in_a_comparison_with_rounded_times():
         {"lag": hs.TransferFunction.structure(poles=1, zeros=0)}, hs.Record(t=t, u=u, y=y), cross_validate=None
     )
     assert table["lag"].fit_percent > 99.99
+
+
+# ---------------------------------------------------- the tables of the paper, typed from it independently of the files
+
+
+TABLE_1_NANOMETRES = (35024, 38542)  # sums of the displacements of part 1 and part 2
+TABLE_1_PRINTED = [  # row, volts and nanometres of part 1, volts and nanometres of part 2
+    (1, 0, 0, 125, 2671),
+    (2, 5, 79, 120, 2599),
+    (7, 30, 610, 95, 2137),
+    (8, 35, 687, 90, 2137),
+    (13, 60, 1297, 65, 1603),
+    (17, 80, 1829, 45, 1221),
+    (19, 90, 1984, 35, 919),
+    (24, 115, 2439, 10, 305),
+    (26, 125, 2671, 0, 0),
+]
+
+
+def nanometres(rec):
+    return np.rint(1000 * rec.y).astype(int)
+
+
+def test_table_1_is_the_printed_one():
+    rec = hs.datasets.table1()
+    assert len(rec) == 52
+    assert (nanometres(rec)[:26].sum(), nanometres(rec)[26:].sum()) == TABLE_1_NANOMETRES
+    for row, *printed in TABLE_1_PRINTED:
+        k, m = row - 1, row + 25
+        assert [rec.u[k], nanometres(rec)[k], rec.u[m], nanometres(rec)[m]] == printed
+
+
+def test_table_1_lies_on_whole_pixels():
+    rec = hs.datasets.table1()
+    assert rec.resolution == 0.0763
+    pixels = np.rint(rec.y / rec.resolution)
+    assert np.abs(rec.y - pixels * rec.resolution).max() < 0.005  # as the file says
+
+
+def test_table_1_takes_the_dwell_as_its_step():
+    rec = hs.datasets.table1(dwell=0.7)
+    assert rec.sample_time == pytest.approx(0.7, rel=1e-12)  # a mean of 51 rounded steps
+    assert (rec.t[0], dict(rec.units), rec.name) == (0.0, {"t": "s", "u": "V", "y": "um"}, "Table 1")
+
+
+@pytest.mark.parametrize("dwell", [0.0, -1.0, float("nan"), float("inf")])
+def test_an_impossible_dwell_is_refused(dwell):
+    assert_refused("dwell must be positive and finite", hs.datasets.table1, dwell=dwell)
+
+
+def test_table_2_is_the_printed_one():
+    rec = hs.datasets.table2()
+    assert rec.u.tolist() == [18, 18, 50, 50, 18, 18, 50, 50, 18, 18]
+    assert nanometres(rec).tolist() == [11224, 11224, 12245, 12245, 11224, 11224, 12245, 12245, 11224, 11224]
+    assert rec.t[4] == pytest.approx(1 / 1.01626, rel=1e-15)  # one rounding
+    assert rec.resolution is None
+
+
+@pytest.mark.parametrize("name", ["table1", "table2"])
+def test_the_files_name_their_source_and_can_be_loaded(name):
+    path = files("hysim") / "data" / f"{name}.csv"
+    assert "Jurnal Teknologi, 2016" in path.read_text(encoding="utf-8")
+    rec = getattr(hs.datasets, name)()
+    loaded = hs.load(path, u="voltage", y="displacement")
+    assert np.array_equal(loaded.u, rec.u)
+    assert np.array_equal(loaded.y, rec.y)
+    assert dict(loaded.units) == {"u": "V", "y": "um"}

@@ -5,6 +5,7 @@ import sys
 
 import numpy as np
 import pytest
+from strategies import assert_refused
 
 from hysim._basics import parallel as _parallel
 from hysim._basics.parallel import second_process
@@ -47,8 +48,7 @@ def test_results_come_back(executor):
 def test_exceptions_come_back_when_the_result_is_asked_for(executor):
     with executor() as pool:
         failed, fine = pool.submit(fail, "what was wrong"), pool.submit(add, 1, b=1)
-        with pytest.raises(ValueError, match=r"^what was wrong$"):
-            failed.result()
+        assert_refused(r"^what was wrong$", failed.result)
         assert fine.result() == 2
         assert isinstance(failed.exception(), ValueError)
 
@@ -59,8 +59,7 @@ def test_an_error_of_ones_own_passes_through(executor):
             pool.submit(add, 1, b=1)
             raise KeyError("mine")
 
-    with pytest.raises(KeyError, match="mine"):
-        work()
+    assert_refused("mine", work, error=KeyError)
 
 
 def test_nothing_can_be_submitted_to_a_pool_that_is_left(monkeypatch):
@@ -68,8 +67,7 @@ def test_nothing_can_be_submitted_to_a_pool_that_is_left(monkeypatch):
     with second_process() as pool:
         pool.submit(add, 1, b=1).result()
     if FORKS:
-        with pytest.raises(RuntimeError, match="after shutdown"):
-            pool.submit(add, 1, b=1)
+        assert_refused("after shutdown", pool.submit, add, 1, error=RuntimeError, b=1)
 
 
 @pytest.mark.skipif(not FORKS, reason="elsewhere the work is done in place")

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from strategies import refused
+from strategies import assert_refused, refused
 
 import hysim as hs
 
@@ -76,8 +76,7 @@ def test_records_are_left_out_one_at_a_time():
         slope, offset = np.polyfit(*(np.concatenate([getattr(each, name) for each in others]) for name in "uy"), 1)
         errors.append(left_out.y - offset - slope * left_out.u)
     assert fit.cv_rmse == pytest.approx(np.sqrt(np.mean(np.concatenate(errors) ** 2)), rel=1e-10)
-    with pytest.raises(ValueError, match="at least 2 records"):
-        hs.identify(hs.Line, records[0], cross_validate="records")
+    assert_refused("at least 2 records", hs.identify, hs.Line, records[0], cross_validate="records")
 
 
 def test_blocks_are_left_out_one_at_a_time():

@@ -5,7 +5,7 @@ import io
 
 import numpy as np
 import pytest
-from strategies import document_of, refused_in_one_line
+from strategies import assert_refused, document_of, refused_in_one_line
 
 import hysim as hs
 
@@ -89,8 +89,7 @@ def test_a_memory_with_several_places_is_written_as_columns(run, tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("file", "options"),
-    [("quake.AT2", []), ("quake.csv", []), ("list.txt", ["--sample-time", "0.1"]), ("-", [])],
+    ("file", "options"), [("quake.AT2", []), ("quake.csv", []), ("list.txt", ["--sample-time", "0.1"]), ("-", [])]
 )
 def test_a_ground_motion_moves_a_plant(run, file, options):
     code, out, err = run("simulate", "floors:frame", file, *options, stdin=AT2)
@@ -171,8 +170,7 @@ def test_signals_are_drawn_with_a_line_for_each_column(simulation):
     assert kinetic.get_legend() is None
     with pytest.raises(ValueError, match=r"give signals out of t, u, y, displacement, .* got velocity"):
         hs.plot.signals(simulation, "velocity")
-    with pytest.raises(ValueError, match="got no name"):
-        hs.plot.signals(simulation)
+    assert_refused("got no name", hs.plot.signals, simulation)
 
 
 @pytest.fixture

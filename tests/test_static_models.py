@@ -6,7 +6,7 @@ import tracemalloc
 import numpy as np
 import pytest
 from scipy import interpolate, stats
-from strategies import refused
+from strategies import assert_refused, refused
 
 import hysim as hs
 
@@ -170,24 +170,15 @@ def test_a_static_curve_is_constant_outside_its_knots():
     assert curve.response([-1.0, 0.25, 2.0]).tolist() == [1.0, 1.5, 3.0]
 
 
-@pytest.mark.parametrize(
-    ("u", "y"), [([0.0, 0.0], [1.0, 2.0]), ([1.0, 0.0], [1.0, 2.0]), ([0.0], [1.0, 2.0]), ([], [])]
-)
+@pytest.mark.parametrize(("u", "y"), [([0, 0], [1, 2]), ([1, 0], [1, 2]), ([0], [1, 2]), ([], [])])
 def test_knots_that_make_no_function_are_refused(u, y):
-    with pytest.raises(ValueError, match="u"):
-        hs.SingleValued(u=u, y=y)
+    assert_refused("u", hs.SingleValued, u=u, y=y)
 
 
 def test_the_yardsticks_have_no_memory():
     u = np.array([0.0, 1.0, 0.5, 1.0, 0.0, 0.5])
     for model in (hs.Line(offset=0.3, slope=2.0), hs.SingleValued(u=[0.0, 1.0], y=[0.3, -1.0])):
         assert model.response(u).tolist() == [float(model.response([value])[0]) for value in u]
-
-
-@pytest.mark.parametrize("family", [hs.Line, hs.SingleValued])
-def test_a_constant_input_is_refused(family):
-    with pytest.raises(ValueError, match="constant"):
-        hs.identify(family, hs.Record(u=np.ones(5), y=np.arange(5.0)))
 
 
 @pytest.mark.parametrize("family", [hs.SingleValued, hs.Line, hs.Play])

@@ -6,12 +6,13 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from strategies import needs_compiled
+from strategies import assert_refused, needs_compiled
 
 import hysim as hs
 from hysim.discovery._hidden_memory import Oscillator, Response
 from hysim.kernels import memory_terms
 from hysim.laws.differential.terms import bouc_wen_terms
+from hysim.models.steady_cycle import fixed_point
 from hysim.plants.oscillator import attracting_state
 
 STEP, OMEGA = 0.01, 12.0
@@ -66,8 +67,7 @@ def test_a_damped_plant_settles_in_few_periods_where_thousands_lead(zeta, most, 
 
 @pytest.mark.parametrize("kind", ["linear", "elastic", "cubic"])
 def test_an_undamped_plant_is_refused_quickly(kind, periods):
-    with pytest.raises(hs.SimulationError, match="has not settled"):
-        oscillator(0.0, kind).periodic_response(U, STEP)
+    assert_refused("has not settled", oscillator(0.0, kind).periodic_response, U, STEP, error=hs.SimulationError)
     assert len(periods) < (400 if kind == "cubic" else 60)
 
 
@@ -86,8 +86,7 @@ def test_a_fixed_point_that_does_not_attract_is_not_used():
         found = attracting_state(lambda x, size=size: 1.0 + size * (x - 1.0), state, scale, 1e-10)
         assert (found is not None) == expected
         assert found is None or np.abs(found - 1.0).max() < 1e-9
-    with pytest.raises(hs.SimulationError, match="needs damping"):
-        attracting_state(lambda x: 2.0 - x, state, scale, 1e-10)
+    assert_refused("needs damping", attracting_state, lambda x: 2.0 - x, state, scale, 1e-10, error=hs.SimulationError)
 
 
 @needs_compiled
@@ -130,3 +129,26 @@ def test_a_law_that_diverges_within_a_step_ends():
     """In a process of its own: a step that does not end cannot be interrupted."""
     ended = subprocess.run([sys.executable, "-c", EXPLOSIVE], capture_output=True, text=True, timeout=60, check=True)
     assert "refused: the motion leaves the finite numbers" in ended.stdout
+
+
+# ----------------------------------------------------------------------- the memory with which a cycle ends as it began
+
+
+def memory_after(one_pass, start):
+    """The fixed point of the same pass for all sets, from `start` (n_sets,)."""
+    return fixed_point(lambda sets: one_pass, np.array(start)[:, np.newaxis])[:, 0]
+
+
+def test_a_cycle_that_leads_away_is_not_found():
+    """The pass, which saturates as a memory does, has fixed points at 0 and at the ends of z = 1.5 tanh z."""
+    ends = memory_after(lambda z: 1.5 * np.tanh(z), [0.3, -0.3, 2.0])
+    assert ends == pytest.approx([1.28783945, -1.28783945, 1.28783945], abs=2e-3)  # after eight passes
+
+
+@pytest.mark.parametrize("factor", [0.95, 0.0, -0.9])
+def test_a_cycle_that_attracts_is_found_to_rounding(factor):
+    assert memory_after(lambda z: 2.0 + factor * (z - 2.0), [-5.0, 1e3]) == pytest.approx(2.0, abs=1e-9)
+
+
+def test_a_pass_that_overshoots_by_more_than_it_was_off_has_no_steady_cycle():
+    assert np.abs(memory_after(lambda z: -1.5 * z, [1.0])[0]) > 1.0

@@ -7,6 +7,7 @@ import sqlite3
 
 import numpy as np
 import pytest
+from strategies import assert_refused
 from test_sweep import bits
 
 import hysim as hs
@@ -83,8 +84,7 @@ def test_the_arrays_stay_until_the_study_that_follows_is_in_the_database(path, s
     before = bits(hs.load_sweep(path))
     with monkeypatch.context() as patch:
         patch.setattr(Store, "_commit", fail)
-        with pytest.raises(OSError, match="full"):
-            hs.sweep(cubes, SPACE, store=path, on_change="restart")
+        assert_refused("full", hs.sweep, cubes, SPACE, error=OSError, store=path, on_change="restart")
     assert bits(hs.load_sweep(path)) == before
 
 
@@ -113,8 +113,7 @@ def test_a_link_in_the_folder_is_neither_read_nor_written_through(path, shards):
         "INSERT INTO results (task, seconds, shard, error) VALUES (2, 0.0, ?, 'failed')",
         f"{digits}-000000000.npz",
     )
-    with pytest.raises(ValueError, match="is a link"):
-        hs.sweep(squares, SPACE, store=path, workers=1)
+    assert_refused("is a link", hs.sweep, squares, SPACE, store=path, workers=1)
     assert outside.read_bytes() == before
 
 
@@ -180,8 +179,7 @@ def test_a_damaged_row_of_the_results_is_one_line(path, statement, word):
 
 def test_a_row_without_its_parameter_is_not_read_as_nan(path):
     change(path, "UPDATE results SET a = NULL WHERE task = 1")
-    with pytest.raises(ValueError, match="a row has no 'a'"):
-        hs.load_sweep(path)
+    assert_refused("a row has no 'a'", hs.load_sweep, path)
 
 
 @pytest.mark.parametrize("damage", ["cut", "empty", "text", "shape", "tasks", "names"])
@@ -202,8 +200,7 @@ def test_a_damaged_file_with_arrays_is_one_line(path, shards, damage):
 def test_a_file_with_arrays_that_is_gone_is_named(path, shards):
     (file, *_) = sorted(shards.iterdir())
     file.unlink()
-    with pytest.raises(FileNotFoundError, match=file.name):
-        hs.load_sweep(path)
+    assert_refused(file.name, hs.load_sweep, path, error=FileNotFoundError)
 
 
 @pytest.mark.parametrize("kept", [("-wal", "-shm"), ("-wal",), ("-shm",), ("-journal",)], ids="".join)

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from frame_laws import FAMILIES, JUMPING, LAWS, SMOOTH, bouc_wen
 from scipy.linalg import eigvals, expm
-from strategies import COMPILED, refused
+from strategies import COMPILED, assert_refused, refused
 
 import hysim as hs
 from hysim.laws.friction.rated_law import RatedLaw
@@ -368,10 +368,8 @@ test_errors_of_elements = refused(
 
 
 def test_errors_of_runs():
-    with pytest.raises(ValueError, match="sample_time must be positive"):
-        MIX.response(QUAKE, 0.0)
-    with pytest.raises(ValueError, match="u must be finite"):
-        MIX.response([0.0, np.nan], H)
+    assert_refused("sample_time must be positive", MIX.response, QUAKE, 0.0)
+    assert_refused("u must be finite", MIX.response, [0.0, np.nan], H)
     unstable = hs.Structure(mass=1.0, stiffness=-1e4)
     with pytest.raises(hs.SimulationError, match="the motion diverges at t = "):
         hs.simulate(unstable, np.arange(2000) * 0.01, np.ones(2000))

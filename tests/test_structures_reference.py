@@ -5,22 +5,18 @@ hysim. It is itself held to closed forms and to the one-mass oscillator here. Sh
 `experiments/39_structures_work_precision.py`.
 """
 
-import sys
 from dataclasses import replace
 from functools import cache
 from itertools import pairwise
-from pathlib import Path
 
 import numpy as np
 import pytest
-from scipy.linalg import expm
-
-import hysim as hs
-
-sys.path.insert(0, str(Path(__file__).parent.parent / "experiments"))
 import structure_cases as cases
+from scipy.linalg import expm
 from square_dahl import SquareDahl
 from structure_reference import reference
+
+import hysim as hs
 
 YIELDING = 2.0 * cases.yielding_frame().ground[210:310]
 CASES = {  # strong parts of the earthquakes

@@ -79,9 +79,7 @@ def test_a_slow_motion_of_masses_comes_close():
     load = np.interp(t, np.linspace(0.0, 400.0, slow.factor.size), slow.factor)
     peaks = hs.simulate(frame, t, load).signals["displacement"]
     places = np.linspace(0, t.size - 1, slow.factor.size).round().astype(int)
-    assert (
-        np.abs(peaks[places] - slow.displacement).max() < 0.02 * 0.1
-    )  # rests of the motion: they fall as 1 / duration
+    assert np.abs(peaks[places] - slow.displacement).max() < 0.02 * 0.1  # rests of the motion, as 1 / duration
 
 
 def test_cycles_begin_where_the_structure_does_and_have_the_steps_that_were_asked_for():

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from strategies import refused
+from strategies import assert_refused, refused
 
 import hysim as hs
 
@@ -142,5 +142,4 @@ test_what_has_no_linear_system_is_refused = refused(
 @pytest.mark.parametrize("sample_time", [0.0, -0.1, np.nan, np.inf])
 @pytest.mark.parametrize("plant", [PLANTS[0], hs.PID(kp=1.0, ki=1.0)], ids=["plant", "pid"])
 def test_a_sample_time_that_is_none_is_named(plant, sample_time):
-    with pytest.raises(ValueError, match=f"sample_time must be positive and finite, got {sample_time}"):
-        hs.to_control(plant, sample_time)
+    assert_refused(f"sample_time must be positive and finite, got {sample_time}", hs.to_control, plant, sample_time)

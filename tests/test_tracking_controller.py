@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from strategies import commanded, refused
+from strategies import assert_refused, commanded, refused
 
 import hysim as hs
 from hysim.models.storage import from_json, to_json
@@ -348,5 +348,4 @@ test_what_has_no_inverse_is_refused = refused(
 
 @pytest.mark.parametrize("h", [0.0, math.nan, math.inf])
 def test_a_sample_time_must_be_one(h):
-    with pytest.raises(ValueError, match="sample_time must be positive"):
-        hs.TrackingController().initial(h)
+    assert_refused("sample_time must be positive", hs.TrackingController().initial, h)

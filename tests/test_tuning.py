@@ -94,8 +94,7 @@ def loops(plant, reference, pid):
 
 
 @pytest.mark.parametrize(
-    ("name", "bound"),
-    [*((name, 2.0) for name in TASKS), ("late", 1.5), ("law", 1.5), ("mode", 1.5)],
+    ("name", "bound"), [*((name, 2.0) for name in TASKS), ("late", 1.5), ("law", 1.5), ("mode", 1.5)]
 )
 def test_the_bound_on_the_sensitivity_holds(name, bound):
     plant, _, reference, _ = TASKS[name]
@@ -113,9 +112,8 @@ def test_the_bound_on_the_sensitivity_holds(name, bound):
 def at_angles(system, angles):
     """C (z - A)^-1 B + D on the unit circle, of many z at once."""
     shifted = np.exp(1j * angles)[:, np.newaxis, np.newaxis] * np.eye(len(system.A)) - system.A
-    return (system.C @ np.linalg.solve(shifted, np.broadcast_to(system.B, (angles.size, *system.B.shape))))[
-        :, 0, 0
-    ] + system.D[0, 0]
+    states = np.linalg.solve(shifted, np.broadcast_to(system.B, (angles.size, *system.B.shape)))
+    return (system.C @ states)[:, 0, 0] + system.D[0, 0]
 
 
 @pytest.mark.parametrize("name", TASKS)
@@ -325,9 +323,7 @@ def test_of_several_limits_the_worst_counts_and_the_first_is_returned():
     both = tuned("mode", limits=(tight, free))
     assert both.controller.limits == tight
     assert hs.tune(MODE, T_STEP, STEP, limits=[free, tight]).controller.limits is None
-    errors = [
-        hs.close_loop(MODE, replace(both.controller, limits=limits), T_STEP, STEP).error for limits in (tight, free)
-    ]
+    errors = [hs.close_loop(MODE, replace(both.controller, limits=each), T_STEP, STEP).error for each in (tight, free)]
     weights = np.linspace(0.0, 1.0, STEP.size)
     assert both.objective == pytest.approx(max(np.mean(weights * np.abs(e)) for e in errors), rel=1e-9)
     one = tuned("mode", limits=tight)

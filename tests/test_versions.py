@@ -1,10 +1,17 @@
-"""What the package asks for is what has been tested: pyproject.toml agrees with the table of docs/versions.md."""
+"""What the package asks for has been tested, the changelog names what there is, and old files are read as meant."""
 
+import functools
+import json
 import re
+import shutil
 import tomllib
 from pathlib import Path
 
+import numpy as np
+import pytest
+
 import hysim as hs
+from hysim.cli import COMMANDS, Command
 
 ROOT = Path(__file__).parent.parent
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
@@ -49,3 +56,69 @@ def test_the_lower_bounds_are_those_that_passed_on_the_oldest_interpreter():
     tested = {NAMES.get(name, name): cell for name, cell in oldest.items()}
     for name, bound in bounds.items():
         assert re.fullmatch(rf"{re.escape(bound)}(\.0)*", tested[name])
+
+
+# ---------------------------------------------------------------------------------- the changelog
+
+
+CHANGELOG = (ROOT / "CHANGELOG.md").read_text(encoding="utf-8")
+REMOVED = re.compile(r"^### Removed\n.*?(?=^##)", re.MULTILINE | re.DOTALL)
+OLD_NAMES = re.compile(r"^\|[^|]*\|", re.MULTILINE)
+NOW = OLD_NAMES.sub("|", REMOVED.sub("", CHANGELOG))
+QUOTED = re.findall(r"`([^`]+)`", NOW)
+
+
+@pytest.mark.parametrize("name", sorted({name for text in QUOTED for name in re.findall(r"\bhs\.(\w[\w.]*\w)", text)}))
+def test_every_name_of_the_changelog_exists(name):
+    assert functools.reduce(getattr, name.split("."), hs) is not None
+
+
+def test_every_command_and_option_of_the_changelog_exists():
+    known = {option for name in COMMANDS for each in Command(name).params for option in each.opts}
+    options = {option for text in QUOTED for option in re.findall(r"(?<!\S)--[a-z][\w-]*", text)}
+    assert options
+    assert options <= known
+    assert {text.split()[1] for text in QUOTED if text.startswith("hysim ")} <= COMMANDS.keys()
+
+
+def test_the_newest_version_is_the_one_that_is_installed_and_cited():
+    (version, date), *_ = re.findall(r"^## (\S+) - (\d{4}-\d\d-\d\d)$", CHANGELOG, flags=re.MULTILINE)
+    cited = (ROOT / "CITATION.cff").read_text(encoding="utf-8")
+    assert hs.__version__ == version
+    assert f"\nversion: {version}\n" in cited
+    assert f"\ndate-released: {date}\n" in cited
+
+
+# -------------------------------------------------- files of version 0.1; tests/data/version_0_1/generate.py wrote them
+
+
+FOLDER = Path(__file__).parent / "data" / "version_0_1"
+STORED = json.loads((FOLDER / "models.json").read_text())
+U = np.array(STORED["u"])
+
+
+@pytest.mark.parametrize("stored", STORED["models"], ids=lambda stored: json.loads(stored["text"])["family"])
+def test_a_stored_model_loads_and_responds_as_it_did(stored, tmp_path):
+    path = tmp_path / "model.json"
+    path.write_text(stored["text"])
+    model = hs.load_model(path)
+    hs.save(model, path, units={"u": "V", "y": "um"})
+    assert json.loads(path.read_text())["parameters"] == json.loads(stored["text"])["parameters"]
+    if stored["y"] is not None:
+        y = hs.simulate(model, 1e-3 * np.arange(U.size), U).y
+        assert y == pytest.approx(stored["y"], rel=0.0, abs=1e-10 * np.ptp(stored["y"]))  # an integrated law's promise
+
+
+def test_a_stored_identification_comes_back():
+    fit = hs.Identification.from_json((FOLDER / "identification.json").read_text())
+    assert fit.model == hs.BoucWen(**fit.estimates)
+    assert fit.estimates["beta"] == pytest.approx(0.7, rel=0.01)
+    stored = json.loads((FOLDER / "identification.json").read_text())
+    stored["identification"]["fields"] |= {"unsafe": "", "choice": None}  # for which 0.1 did not look
+    assert json.loads(fit.to_json()) == stored | {"hysim": hs.__version__}
+
+
+def test_a_stored_study_is_read(tmp_path):
+    path = shutil.copy(FOLDER / "study.sqlite", tmp_path)
+    study = hs.load_sweep(path)
+    assert study["height"].ravel() == pytest.approx(np.outer([1.0, 2.0], np.exp([-0.0, -0.25, -1.0])).ravel())

@@ -12,18 +12,13 @@ CREEP = "creep.percent"
 FREQUENCY, DAMPING, GAIN = (f"vibration.{name}[{{}}]" for name in ("natural_frequencies", "damping_ratios", "gains"))
 DELAY = "vibration.delay"
 STAGE = hs.Actuator(
-    hysteresis=hs.Play(threshold=0.2),
-    creep=hs.Creep.per_decade(2.0),
-    vibration=hs.mode(600.0, 0.03, delay=0.7e-3),
+    hysteresis=hs.Play(threshold=0.2), creep=hs.Creep.per_decade(2.0), vibration=hs.mode(600.0, 0.03, delay=0.7e-3)
 )
 TRUTH = {"hysteresis.threshold": 0.2, "hysteresis.gain": 1.0, CREEP: 2.0, FREQUENCY.format(0): 600.0,
          DAMPING.format(0): 0.03, DELAY: 0.7e-3}  # fmt: skip
 SLOW, FAST = (
     (hs.signals.triangle(0.0, 1.0, cycles=2, samples_per_cycle=30), 0.1),
-    (
-        np.repeat([0.0, 1.0, 0.2, 0.8], 50),
-        1e-3,
-    ),
+    (np.repeat([0.0, 1.0, 0.2, 0.8], 50), 1e-3),
 )
 
 
