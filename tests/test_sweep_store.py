@@ -424,13 +424,13 @@ def test_an_array_of_jobs_computes_shards_and_the_command_merges_them(study, pat
     monkeypatch.setenv("SLURM_ARRAY_TASK_MIN", "10")
     monkeypatch.setenv("SLURM_ARRAY_TASK_STEP", "5")
     monkeypatch.setenv("SLURM_ARRAY_TASK_COUNT", "3")
-    assert "no shard beside" in shell("sweep", study, "--out", path, "--merge")[2]
+    assert "no shard of" in shell("sweep", study, "--out", path, "--merge")[2]
     assert shell("sweep", study, "--out", path, "--shard", "auto")[0] == 2
     for job, code in (("10", 1), ("20", 0)):
         monkeypatch.setenv("SLURM_ARRAY_TASK_ID", job)
         assert shell("sweep", study, "--out", path, "--shard", "auto")[0] == code
     code, out, err = shell("sweep", study, "--out", path, "--merge")
-    assert (code, err) == (3, "hysim: not finished: 33 tasks are left, the first is 33\n")
+    assert (code, err) == (3, "hysim: not finished: 33 tasks remain, the first is 33\n")
     assert shell("sweep", study, "--out", path, "--shard", "1/3", "--time-limit", 0)[0] == 3
     assert shell("sweep", study, "--out", path, "--shard", "1/3")[0] == 0
     code, out, err = shell("sweep", study, "--out", path, "--merge")
