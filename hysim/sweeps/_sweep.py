@@ -45,7 +45,7 @@ from hysim._basics.progress import Line, Progress, Reports, reports
 from hysim._release import __version__
 from hysim.sweeps._chunks import Chunk, Rows, Table, Task, computed, seeds, shown
 from hysim.sweeps._result import Sweep, result_of
-from hysim.sweeps._space import Space, space_of
+from hysim.sweeps._space import Column, Space, space_of
 from hysim.sweeps._store import ON_CHANGE, OnChange, Store, opened
 
 _task_of_process: list[Task] = []  # the task of the study that this process was started for
@@ -192,6 +192,7 @@ _WITH_ARRAYS = 0.5  # seconds; a shard for each
 _MOST_A_SECOND = 500  # chunks: a scheduler takes a millisecond for each
 _BUSY, _LONGEST = 0.2, 5.0  # of the time at most, for sending chunks and entering rows; seconds of a chunk for it
 _NEEDLESS = 0.5  # of the time: more workers would wait for the process that sends their chunks
+_WORTH_IT = 60.0  # seconds of a study to divide
 _GROWTH, _MOST_TASKS = 4, 20_000  # of a chunk, whose rows a store takes as Python's numbers
 _PATIENCE = 0.6  # seconds to wait after an interrupt for the chunks that are being computed
 
@@ -275,20 +276,19 @@ def sweep(
     if isinstance(progress, Line) and not is_installed("pandas"):
         progress.warn("pandas is not installed: the result has no to_frame (pip install 'hysim[tables]')")
     tasks = space_of(space)
-    own, task_seeds = _share(shard, tasks.n_tasks), seeds(seed, np.arange(tasks.n_tasks))
+    own, task_seeds, stores = _share(shard, tasks.n_tasks), seeds(seed, np.arange(tasks.n_tasks)), [*merge]
     columns = {**tasks.columns, "seed": task_seeds} if _takes_seed(task, tasks) else tasks.columns
-    table, facts = Table(tasks.n_tasks, tasks.columns), identity(task, tasks, seed) if store or merge else {}
+    table, facts = Table(tasks.n_tasks, tasks.columns), identity(task, tasks, seed) if store or stores else {}
     with nullcontext() if store is None else opened(store) as opened_store:
         if opened_store is not None:
             opened_store.begin(facts, tasks, task_seeds, on_change)
             opened_store.restore(table)
-        for path in merge:
+        for path in stores:
             rows = _merged(path, table, facts, on_change)
             if rows and opened_store is not None:
                 opened_store.commit(rows, table.layout)
-        remaining = Chunk(np.flatnonzero(own & ~table.done), columns)  # of all tasks
         with workers_of(executor, workers, task) as pool:
-            _Run(remaining, int(own.sum()), table, opened_store, pool, progress or None, limit).run()
+            _Run(columns, own, table, opened_store, pool, progress or None, limit).run()
     return result_of(table, tasks, task_seeds)
 
 
@@ -338,23 +338,24 @@ def _takes_seed(task: Callable[..., Any], space: Space) -> bool:
 
 
 class _Run:
-    """One run of a study: the tasks that remain, the chunks that are being computed, and the rows that are done."""
+    """One run of a study or a share: the tasks that remain, the chunks that are computed, and the rows that are done."""
 
     def __init__(
         self,
-        remaining: Chunk,
-        total: int,
+        columns: Mapping[str, Column],
+        own: npt.NDArray[np.bool_],
         table: Table,
         store: Store | None,
         workers: Workers,
         progress: Progress | None,
         limit: float,
     ) -> None:
-        self.remaining, self.table, self.store, self.workers = remaining, table, store, workers
+        self.columns, self.table, self.store, self.workers = columns, table, store, workers
+        self.places, self.total = np.flatnonzero(own & ~table.done), int(own.sum())
         self.progress = progress or (lambda done, total: None)
         self.running: dict[Future[list[Rows]], int] = {}  # numbers of tasks
         self.sent, self.largest, self.seconds_a_task = 0, 0, 0.0
-        self.done, self.total, self.n_chunks = total - remaining.places.size, total, 0
+        self.done, self.n_chunks = self.total - self.places.size, 0
         self.begin, self.busy, self.limit = time.monotonic(), workers.clock(), limit
 
     def run(self) -> None:
@@ -371,22 +372,23 @@ class _Run:
                 wait(self.running, timeout=_PATIENCE)
                 self._settle()
             raise
-        share = (self.workers.clock() - self.busy) / max(time.monotonic() - self.begin, _SHORTEST)
-        if isinstance(self.progress, Line) and share > _NEEDLESS:
+        seconds = time.monotonic() - self.begin
+        share = (self.workers.clock() - self.busy) / max(seconds, _SHORTEST)
+        if isinstance(self.progress, Line) and seconds > _WORTH_IT and share > _NEEDLESS:
             self.progress.warn(
-                f"sending chunks kept this process busy for {share:.0%} of the time: divide the study by shard="
+                f"sending chunks took {share:.0%} of the time of this process: divide the study by shard="
             )
 
     def _fill_queues(self) -> bool:
         """Send chunks out, as many as the workers need; whether any was sent."""
-        total, number, before = self.remaining.places.size, self.workers.number(), self.sent
+        total, number, before = self.places.size, self.workers.number(), self.sent
         while self.sent < total and len(self.running) < 2 * number + 1:
             size = self._size(total - self.sent, number)
             ends = time.monotonic() - self.begin + self.seconds_a_task * size * (1 + len(self.running) // number)
             if ends >= self.limit:
                 break
-            places = self.remaining.places[self.sent : self.sent + size]
-            chunk = Chunk(places, {name: values[places] for name, values in self.remaining.columns.items()})
+            places = self.places[self.sent : self.sent + size]
+            chunk = Chunk(places, {name: values[places] for name, values in self.columns.items()})
             try:
                 future = self.workers.submit(chunk)
             except Exception as error:  # a broken pool raises here or in the future
