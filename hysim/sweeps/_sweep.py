@@ -338,7 +338,7 @@ def _takes_seed(task: Callable[..., Any], space: Space) -> bool:
 
 
 class _Run:
-    """One run of a study or a share: the tasks that remain, the chunks that are computed, and the rows that are done."""
+    """One run of a study or share: tasks that remain, chunks that are being computed, and rows that are done."""
 
     def __init__(
         self,
@@ -375,9 +375,7 @@ class _Run:
         seconds = time.monotonic() - self.begin
         share = (self.workers.clock() - self.busy) / max(seconds, _SHORTEST)
         if isinstance(self.progress, Line) and seconds > _WORTH_IT and share > _NEEDLESS:
-            self.progress.warn(
-                f"sending chunks took {share:.0%} of the time of this process: divide the study by shard="
-            )
+            self.progress.warn(f"this process spends {share:.0%} of its time on chunks: divide the study by shard=")
 
     def _fill_queues(self) -> bool:
         """Send chunks out, as many as the workers need; whether any was sent."""
