@@ -78,14 +78,18 @@ class Command(click.Command):
         import numpy as np
 
         values = ctx.params
-        roles = [(values[str(each.click.name)], each.value.role) for each in self.declared if each.value.role]
-        lists = [(value if isinstance(value, tuple) else (value,), role) for value, role in roles]
-        files = [(path, role) for paths, role in lists for path in paths if path is not None]
+        roles = [(each.value.role, values[str(each.click.name)]) for each in self.declared if each.value.role]
+        lists = [(role, value if isinstance(value, tuple) else (value,)) for role, value in roles]
+        files = [(path, role) for role, paths in lists for path in paths if path is not None]
         reporting = silent() if values["quiet"] else nullcontext()
         try:
             with np.errstate(all="ignore"), reporting:  # an overflow is inf or nan: null in JSON
                 outputs.check(files, prints=values.get("json", False))
-                return NOT_REACHED if options.call(self.function, values) is False else DONE
+                result = options.call(self.function, values)
+                if isinstance(result, options.Result):
+                    outputs.write(result.files, result.text, result.document)
+                    result = result.reached
+                return NOT_REACHED if result is False else DONE
         except (ValueError, TypeError, SimulationError) as error:
             words = in_shell_words(str(error) or type(error).__name__, outputs.flags(self))
             raise ValueError(words) from error

@@ -34,8 +34,21 @@ from click.shell_completion import CompletionItem
 from hysim.cli.words import flag, suggestion
 
 T = TypeVar("T")
-Command = Callable[..., bool | None]
-"""A function behind a command: false if a result was not reached, as a search that did not converge."""
+Files = Mapping[str | None, Callable[[], Any]]
+"""Functions of the contents of files, which are texts, bytes or figures, by the paths; None stands for no file."""
+
+
+class Result(NamedTuple):
+    """What a command with ``--json`` writes, what it prints as a text and as JSON, and whether a search converged."""
+
+    files: Files
+    text: Callable[[], str]
+    document: Callable[[], Mapping[str, Any]]
+    reached: bool = True
+
+
+Command = Callable[..., Result | bool | None]
+"""A function behind a command: false if a result was not reached."""
 
 INPUT, RESULT, PRINTED, PICTURE = "input", "result", "printed result", "picture"
 TABLE, MODEL, SOURCE = "table", "model", "source"
@@ -100,18 +113,18 @@ class Parameter(NamedTuple):
 def parameters(function: Command) -> Iterator[Parameter]:
     """Arguments and options of a command, in the order of its docstrings."""
     yield from _declared(function, documented(function))
-    quiet = inspect.Parameter("quiet", inspect.Parameter.KEYWORD_ONLY, default=False, annotation=bool)
-    yield _parameter(quiet, "Options", "")
+    has_json = typing.get_type_hints(function).get("return") is Result
+    for name in ("json", "quiet") if has_json else ("quiet",):
+        own = inspect.Parameter(name, inspect.Parameter.KEYWORD_ONLY, default=False, annotation=bool)
+        yield _parameter(own, "Options", "")
 
 
-def call(function: Command, values: Mapping[str, Any]) -> bool | None:
-    arguments = {}
+def call(function: Command, values: Mapping[str, Any]) -> Result | bool | None:
+    arguments = {name: values.get(name) for name in inspect.signature(function).parameters}
     for name, hint in typing.get_type_hints(function).items():
         if dataclasses.is_dataclass(hint):
             build: Any = hint
             arguments[name] = build(**{field.name: values[field.name] for field in dataclasses.fields(hint)})
-        elif name != "return":
-            arguments[name] = values[name]
     return function(**arguments)
 
 
@@ -308,7 +321,7 @@ YesNo = Annotated[bool, Value("[yes|no]", ("no", "yes").index, "yes or no", offe
 Terms = Annotated[str | list[str], Value("NAME|TERMS", _terms)]
 RecordIn = Annotated[str, file("FILE", INPUT, _RECORD)]
 ModelIn = Annotated[str, file("MODEL", INPUT, _MODEL)]
-Result = Annotated[str, file("FILE")]
+ResultFile = Annotated[str, file("FILE")]
 Copy = Annotated[str, file("FILE", PRINTED)]
 Picture = Annotated[str, file("PICTURE.svg", PICTURE)]
 Table = Annotated[str, file("TABLE.csv", TABLE)]

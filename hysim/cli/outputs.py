@@ -14,12 +14,9 @@ import click
 
 import hysim as hs
 from hysim._basics.atomic import write_all
-from hysim.cli.options import INPUT, MODEL, PICTURE, PRINTED, SOURCE, TABLE
+from hysim.cli.options import INPUT, MODEL, PICTURE, PRINTED, SOURCE, TABLE, Files
 from hysim.cli.records import STANDARD
 from hysim.cli.words import in_shell_words
-
-Files = Mapping[str | None, Callable[[], Any]]
-"""Functions of the contents of files, which are texts, bytes or figures, by the paths; None stands for no file."""
 
 _FORMS = {  # by role: what is said of a wrong ending, and the right ones
     PICTURE: ("pictures are SVG, PNG or PDF: call the file .svg, .png or .pdf", (".svg", ".png", ".pdf")),
@@ -37,15 +34,14 @@ def check(files: Sequence[tuple[str, str]], *, prints: bool) -> None:
     `files` are paths and their roles, no two of which may be equal; `prints` is whether a document is printed.
     """
     results = [(path, role) for path, role in files if role != INPUT]
-    streams = [role for path, role in results if path == STANDARD]
-    if len(streams) + (prints and PRINTED not in streams) > 1:
+    paths = [path for path, _ in results]
+    if paths.count(STANDARD) + (prints and (STANDARD, PRINTED) not in results) > 1:
         raise ValueError("two results would go to the standard output: write one of them to a file, or leave it out")
-    if len({os.path.realpath(path) for path, _ in results}) < len(results):
-        raise ValueError(f"two results would go to one file, {results[0][0]}")
-    beside = [
-        str(Path(path).with_suffix("")) + end for path, role in results if role == SOURCE for end in _BESIDE_SOURCE
-    ]
-    keep([path for path, role in files if role == INPUT], [*(path for path, _ in results), *beside])
+    if len({*map(os.path.realpath, paths)}) < len(paths):
+        raise ValueError(f"two results would go to one file, {paths[0]}")
+    sources = [Path(path).with_suffix("") for path, role in results if role == SOURCE]
+    beside = [f"{source}{end}" for source in sources for end in _BESIDE_SOURCE]
+    keep([path for path, role in files if role == INPUT], [*paths, *beside])
     for path, role in results:
         if path != STANDARD or role == SOURCE:
             _check_path(Path(path), role)
@@ -86,9 +82,7 @@ def write(
     files: Files, text: Callable[[], str] | None = None, document: Callable[[], Mapping[str, Any]] | None = None
 ) -> None:
     """Write all files or no file; print `text`, or `document` with ``--json``, unless a path is standard output."""
-    contents: dict[Any, bytes] = {
-        path: _encoded(path, content()) for path, content in files.items() if path is not None
-    }
+    contents: dict[Any, bytes] = {path: _encoded(path, make()) for path, make in files.items() if path is not None}
     if text is not None and STANDARD not in contents:
         contents[STANDARD] = printed(text, document).encode()
     standard = contents.pop(STANDARD, None)
@@ -99,9 +93,16 @@ def write(
 
 
 def _encoded(path: str, content: Any) -> bytes:
-    if isinstance(content, str | bytes):
-        return content.encode() if isinstance(content, str) else content
-    return hs.plot.to_bytes(content, "svg" if path == STANDARD else Path(path).suffix[1:].lower(), name="picture")
+    if isinstance(content, str):
+        return content.encode()
+    form = "svg" if path == STANDARD else Path(path).suffix[1:].lower()
+    return content if isinstance(content, bytes) else hs.plot.to_bytes(content, form, name="picture")
+
+
+def model(subject: Any, units: Mapping[str, str]) -> str:
+    from hysim.models.storage import to_json as model_to_json
+
+    return model_to_json(subject, units=units)
 
 
 def printed(text: Callable[[], str], document: Callable[[], Mapping[str, Any]] | None) -> str:

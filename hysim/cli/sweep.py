@@ -32,11 +32,10 @@ def sweep(
     dask: str | None = None,
     workers: int | None = None,
     show: Annotated[str, options.file("DATABASE", options.INPUT)] | None = None,
-    csv: options.Result | None = None,
+    csv: options.ResultFile | None = None,
     plot: options.Picture | None = None,
     of: str | None = None,
-    json: bool = False,
-) -> bool:
+) -> options.Result:
     """Compute a study over many parameters, or continue one.
 
     Compute a task for many sets of parameters, as a TOML file says, and keep every finished row in a database.
@@ -93,9 +92,8 @@ def sweep(
             result = hs.sweep(
                 task, space, executor=executor, store=out, seed=seed, workers=workers, on_change=on_change
             )
-    pictures: outputs.Files = {csv: result.to_csv, plot: lambda: _picture(result, of)}
-    outputs.write(pictures, result.summary, lambda: _document(result))
-    return show is not None or not result.errors
+    contents: options.Files = {csv: result.to_csv, plot: lambda: _picture(result, of)}
+    return options.Result(contents, result.summary, lambda: _document(result), show is not None or not result.errors)
 
 
 @contextmanager
