@@ -12,7 +12,6 @@ import click
 
 import hysim as hs
 from hysim.cli import models, options, outputs, records
-from hysim.cli.words import flag
 from hysim.errors import Interrupted
 
 _FOLDER = ("parameters.csv", "samples.csv", "corner.svg", "posterior.json")
@@ -94,7 +93,7 @@ def identify(
     def picture() -> Any:
         if settings.sensor:  # the record of one sensor is not the output of the structure
             return outputs.picture_of(hs.simulate(result, record.t, record.u))
-        return outputs.loop(record, result)
+        return outputs.on_axes(hs.plot.loop, record, result)
 
     files: options.Files = {out: lambda: outputs.model(result, record.units), plot: picture}
     family = {"family": type(result.model).__name__}
@@ -237,10 +236,7 @@ def _subjects(name: str) -> dict[str, Any]:
     model = models.model_or_family(name)
     if name.endswith(".json") or models.is_import_path(name):
         return {models.name_of(name): model}
-    try:
-        of_family = candidates_named(model.__name__)
-    except ValueError:
-        raise ValueError(f"the model {name} cannot be compared without further arguments: give a .json file") from None
+    of_family = candidates_named(model.__name__)
     return of_family if len(of_family) > 1 else dict.fromkeys([name], *of_family.values())
 
 
@@ -321,16 +317,16 @@ def discover(
     verb: Any = hs.discover_oscillator if is_oscillator else functools.partial(hs.discover, route=route)
     if unused := used.keys() - inspect.signature(verb).parameters.keys():
         user = "an oscillator" if is_oscillator else f"--route {route}"
-        raise ValueError(f"{' and '.join(map(flag, sorted(unused)))} is not used by {user}: leave it out")
+        raise ValueError(f"{' and '.join(map(options.flag, sorted(unused)))} is not used by {user}: leave it out")
     record = records.read(settings, file)
     result = verb(record, **used)
     model = result.model
     files: options.Files = {
         out: lambda: outputs.model(model, record.units),
-        plot: lambda: outputs.loop(record, model),
+        plot: lambda: outputs.on_axes(hs.plot.loop, record, model),
     }
     unwritten = [name for name, path in (("--out", out), ("--plot", plot)) if path and model is None]
     if unwritten:
-        files = {path: lambda: "" for path in files if path == records.STANDARD}
+        files = {path: lambda: "" for path in files if path == options.STANDARD}
         print(f"hysim: {' and '.join(unwritten)} not written: {result.warnings[0]}", file=sys.stderr)
     return options.Result(files, result.summary, lambda: json.loads(result.to_json()), not unwritten)

@@ -14,7 +14,6 @@ from click.shell_completion import get_completion_class
 import hysim as hs
 from hysim._basics.progress import Progress, announced_by, reports
 from hysim.cli import options, outputs
-from hysim.cli.records import STANDARD
 
 _SEED = 1
 
@@ -83,7 +82,7 @@ def _notebook(path: Path) -> str:
     return source.read_text(encoding="utf-8")
 
 
-def example(path: Annotated[str, options.file("FILE")] | None = None, *, device: Kind = "piezo") -> None:
+def example(path: options.ResultFile | None = None, *, device: Kind = "piezo") -> None:
     """Write a file to try the other commands on, or a notebook.
 
     Write a record as a file like one of your own, or a notebook of Jupyter.
@@ -103,7 +102,7 @@ def example(path: Annotated[str, options.file("FILE")] | None = None, *, device:
     hysim example first_fit.ipynb
     """
     out = path or f"{device}.csv"
-    if out != STANDARD and os.path.exists(out):
+    if out != options.STANDARD and os.path.exists(out):
         raise ValueError(f"{out} is there already: give another name, as in hysim example mine.csv")
     if out.endswith(".ipynb"):
         notebook = _notebook(Path(out))

@@ -84,14 +84,12 @@ def metrics(
         raise ValueError("--csv writes the table of every cycle: give --cycles without a number too")
     record = records.read(settings, file)
     limits: dict[str, Any] = {"cycles": cycles, "tolerance": tolerance}
-    files: dict[str | None, Any] = {plot: lambda: outputs.loop(record)}
+    files: dict[str | None, Any] = {plot: lambda: outputs.on_axes(hs.plot.loop, record)}
     measured: Any
     if forc:
         measured = hs.forc(record, tolerance=tolerance)
         document = outputs.scalars(measured) | {"peak": list(measured.peak), "ridge": measured.ridge.tolist()}
-        files[plot] = lambda: outputs.drawn(
-            lambda canvas: hs.plot.forc(measured, canvas.add_subplot(), units=record.units)
-        )
+        files[plot] = lambda: outputs.on_axes(hs.plot.forc, measured, units=record.units)
     elif magnetic:
         measured = hs.magnetic_metrics(record.u, record.y, **limits)
         document = measured.to_dict() | {"closure": measured.closure}
@@ -209,8 +207,6 @@ def plot(
         if not least <= len(paths) <= most:
             number = str(least) if least == most else f"at least {least}"
             raise ValueError(f"--kind {kind} takes {number} {name}, got {len(paths)}")
-    if [*files, *model].count(records.STANDARD) > 1:
-        raise ValueError("the standard input holds one record or one model, not both: give files for the others")
     measured = [records.read(settings, path) for path in files]
     laws, runs = {}, []
     for path in model:
@@ -222,7 +218,7 @@ def plot(
 
 
 def measure(
-    frames: Annotated[str, options.file("FRAMES", options.INPUT)],
+    frames: Annotated[str, options.Value("FRAMES", role=options.INPUT)],
     *,
     scale: float,
     unit: str = "um",
@@ -287,6 +283,6 @@ def measure(
     table, units = motion.columns(log, times, on_lost)
     files: options.Files = {
         out: lambda: outputs.table(out, table, units),
-        plot: lambda: outputs.drawn(lambda canvas: hs.plot.displacement(motion, ax=canvas.add_subplot())),
+        plot: lambda: outputs.on_axes(hs.plot.displacement, motion),
     }
     return options.Result(files, motion.summary, motion.figures)

@@ -13,8 +13,6 @@ from typing import Annotated, Any, Literal, Protocol, runtime_checkable
 import hysim as hs
 from hysim._names import MODULE_OF
 from hysim.cli import options
-from hysim.cli.records import STANDARD
-from hysim.cli.words import flag, suggestion
 
 _PLANTS = ("oscillator", "actuator")
 _OPTIONS = {
@@ -212,7 +210,7 @@ class DesignOptions:
     max_voltage_noise: float | None = None
     vary_mode: options.Percent | None = None
     preview: bool = False
-    reference: Annotated[str, options.file("triangle|step|FILE", options.INPUT)] = "triangle"
+    reference: Annotated[str, options.Value("triangle|step|FILE", role=options.INPUT)] = "triangle"
     range: options.Pair | None = None
     frequency: options.Positive | None = None
     step: float | None = None
@@ -232,19 +230,20 @@ def family(name: str) -> Any:
         return family_named("BoucWenOscillator" if name == "oscillator" else name)
     except ValueError:
         known = names_to_identify()
-        near = suggestion(name, known) or f"give one of {', '.join(known)}"
+        near = options.suggestion(name, known) or f"give one of {', '.join(known)}"
         words = f"there is no model {name!r}: {near} (models of your own: MODEL.json or module:name)"
         raise ValueError(words) from None
 
 
 def resolved(path: str) -> Any:
     """The object at an import path, `module:name`, the current folder included; ValueError if it is not found."""
-    if os.getcwd() not in sys.path:
-        sys.path.insert(0, os.getcwd())  # as `python -m hysim` has it
+    folder = os.getcwd()
+    if folder not in sys.path:
+        sys.path.insert(0, folder)  # as `python -m hysim` has it
     try:
         return pkgutil.resolve_name(path)
     except (ModuleNotFoundError, AttributeError) as error:
-        places = f"modules are looked for in {os.getcwd()} and among the installed packages"
+        places = f"modules are looked for in {folder} and among the installed packages"
         raise ValueError(f"{path} is not there: {error}; {places}") from None
 
 
@@ -280,7 +279,7 @@ def to_identify(chosen: FitOptions) -> Any:
     used = {each.name: value for each in fields(StructureOptions) if (value := vars(chosen)[each.name]) != each.default}
     if name is None:
         for each in used:
-            raise ValueError(f"{flag(each)} is an option of one model: give --model, too")
+            raise ValueError(f"{options.flag(each)} is an option of one model: give --model, too")
         return None
     model = model_or_family(name)
     kind = model if isinstance(model, type) else type(model)
@@ -292,10 +291,10 @@ def to_identify(chosen: FitOptions) -> Any:
     for each in used:
         if each not in taken:
             others = [other for other in names_to_identify() if each in _arguments(family(other))]
-            raise ValueError(f"{flag(each)} is no option of the model {name}, but of {', '.join(others)}")
+            raise ValueError(f"{options.flag(each)} is no option of the model {name}, but of {', '.join(others)}")
     for each in _NEEDED:
         if each in taken and each not in used:
-            raise ValueError(f"the model {name} needs {flag(each)}")
+            raise ValueError(f"the model {name} needs {options.flag(each)}")
     structure = {taken[each]: value for each, value in used.items()}
     if is_oscillator and chosen.initial is not None:
         structure["initial"], chosen.initial = chosen.initial, None  # its structure says how the record begins
@@ -324,7 +323,7 @@ def read(path: str) -> tuple[Any, dict[str, str]]:
             return (law() if isinstance(law, type) else law), {}
         except TypeError as error:
             raise ValueError(f"{path} needs values for its parameters: give an instance ({error})") from None
-    if path == STANDARD:
+    if path == options.STANDARD:
         return from_json(sys.stdin.read(), "the standard input")
     if not Path(path).exists() and path in names_to_identify():
         raise ValueError(f"{path} is a family without numbers: write a model of it by hysim identify --out {path}.json")

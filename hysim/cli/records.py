@@ -11,9 +11,7 @@ from typing import Any, Literal
 import hysim as hs
 from hysim._basics.prefixes import power_of_ten
 from hysim.cli import options
-
-STANDARD = "-"
-"""Stands for the standard input or output."""
+from hysim.cli.options import STANDARD
 
 _ROUNDING = 1e-9  # of the record's time: 0.3 s is found among times that were added up
 _OF_NODES, _OF_ELEMENTS = (("displacement", "velocity", "acceleration"), ("drift", "force"))

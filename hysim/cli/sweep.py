@@ -12,26 +12,25 @@ import tomllib
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Annotated, Any, Literal, NamedTuple
+from typing import Annotated, Any, Literal
 
 import hysim as hs
 from hysim._basics.libraries import optional
 from hysim.cli import models, options, outputs
-from hysim.cli.records import STANDARD
 
 _SPACES = ("grid", "list", "sample")
 
 
 def sweep(
-    study: Annotated[str, options.file("STUDY.toml", options.INPUT)] | None = None,
+    study: Annotated[str, options.Value("STUDY.toml", role=options.INPUT)] | None = None,
     *,
-    out: Annotated[str, options.file("RESULTS.sqlite")] | None = None,
+    out: Annotated[str, options.Value("RESULTS.sqlite", role=options.RESULT)] | None = None,
     resume: bool = False,
     on_change: Literal["error", "keep", "restart"] = "error",
     processes: bool = False,
     dask: str | None = None,
     workers: int | None = None,
-    show: Annotated[str, options.file("DATABASE", options.INPUT)] | None = None,
+    show: Annotated[str, options.Value("DATABASE", role=options.INPUT)] | None = None,
     csv: options.ResultFile | None = None,
     plot: options.Picture | None = None,
     of: str | None = None,
@@ -73,7 +72,7 @@ def sweep(
     hysim sweep --show rows.sqlite
     """
     options.exclusive(processes=processes, dask=dask)
-    if out == STANDARD:
+    if out == options.STANDARD:
         raise ValueError("the rows are kept in a database: give --out a file")
     if show is not None:
         if study or out:
@@ -108,24 +107,19 @@ def _executor(dask: str | None, processes: bool) -> Iterator[Any]:
 
 def _document(result: "hs.Sweep") -> dict[str, Any]:
     errors = {str(place): message for place, message in result.errors.items()}
-    done = {"n_tasks": result.n_tasks, "n_done": len(result), "parameters": list(result.parameters)}
-    return done | {"errors": errors, "outputs": result.ranges}
+    numbers = {"n_tasks": result.n_tasks, "n_done": len(result)}
+    return numbers | {"parameters": list(result.parameters), "errors": errors, "outputs": result.ranges}
 
 
 def _picture(result: "hs.Sweep", output: str | None) -> Any:
     name = output or next(iter(result.outputs), None)
     if name is None or name not in result.outputs:
         raise ValueError(f"no output {name!r} to draw: there are {', '.join(result.outputs) or 'no outputs'}")
-    return outputs.drawn(lambda canvas: hs.plot.parallel_coordinates(result, name, ax=canvas.add_subplot()))
+    return outputs.on_axes(hs.plot.parallel_coordinates, result, name)
 
 
-class Study(NamedTuple):
-    """Arguments of `sweep`, and the files that were read for them."""
-
-    task: Callable[..., Any]
-    space: Any
-    seed: int
-    files: tuple[str, ...]
+Study = tuple[Callable[..., Any], Any, int, list[str]]
+"""Task, parameters and seed of a study, and the files that were read for them."""
 
 
 def read(path: str) -> Study:
@@ -137,11 +131,10 @@ def read(path: str) -> Study:
         folder, content = Path(path).resolve().parent, document[source]
         task = _function(content, folder) if source == "task" else _response(content, folder)
         names = [content.rpartition(":")[0]] if source == "task" else [content["law"], content["record"]]
-        files = tuple(str(folder / name) for name in names)
-        return Study(task, _space(space, document[space]), document.get("seed", 0), files)
+        files = [str(folder / name) for name in names]
+        return task, _space(space, document[space]), document.get("seed", 0), files
     except (ValueError, TypeError, KeyError, AttributeError, ImportError) as error:
-        message = f"{error} is missing" if isinstance(error, KeyError) else str(error)
-        raise ValueError(f"{path}: {message}") from error
+        raise ValueError(f"{path}: {error}{' is missing' * isinstance(error, KeyError)}") from error
 
 
 class FileTask:
@@ -178,10 +171,8 @@ def _response(table: Mapping[str, Any], folder: Path) -> Any:
     if not is_file and models.is_import_path(name):
         raise ValueError(f"law takes a family or a file, got {name!r}: a law of your own is code, which a task can use")
     law = hs.load_model(folder / name) if is_file else models.family(name)
-    if table["record"] == "table1":
-        record = hs.datasets.table1()
-    else:
-        record = hs.load(folder / table["record"], u=table.get("u"), y=table.get("y"))
+    is_own = table["record"] != "table1"
+    record = hs.load(folder / table["record"], u=table.get("u"), y=table.get("y")) if is_own else hs.datasets.table1()
     measure = table.get("measure", "rmse")
     return hs.response_task(law, record.u, record.y if measure in ("rmse", "sse") else None, measure)
 

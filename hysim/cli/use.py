@@ -45,7 +45,6 @@ def simulate(
     """
     from hysim.simulation import column_units
 
-    _one_standard_input(model, file)
     if file.endswith(".json") and model.endswith((".csv", ".tsv", ".txt", ".npz", ".mat", ".h5")):
         raise ValueError(f"the model stands before the record: hysim simulate {file} {model}")
     law, units = models.read(model)
@@ -58,7 +57,7 @@ def simulate(
 
     files: dict[str | None, Any] = {plot: lambda: outputs.picture_of(simulation)}
     if out is not None or not json:
-        path = out or records.STANDARD
+        path = out or options.STANDARD
         files[path] = lambda: outputs.table(path, columns, labels)
     document = {"units": labels, "columns": {name: column.tolist() for name, column in columns.items()}}
     outputs.write(files, (lambda: "") if json else None, lambda: document)
@@ -134,16 +133,10 @@ def page(
     hysim page law.json --out law.html
     hysim page law.json --data loop.csv --out law.html
     """
-    _one_standard_input(model, data)
     law, units = models.read(model)
     record = None if data is None else records.read(settings, data)
     units |= (dict(record.units) if record else {}) | (settings.units or {})
     hs.to_page(law, out, record, between=between, units=units, title=title)
-
-
-def _one_standard_input(model: str, record: str | None) -> None:
-    if model == record == records.STANDARD:
-        raise ValueError("the standard input holds the model or the record, not both")
 
 
 def c(
@@ -192,7 +185,7 @@ def _platforms(text: str) -> tuple[str, ...]:
 def fmu(
     model: options.ModelIn,
     *,
-    out: Annotated[str, options.file("MODEL.fmu")],
+    out: Annotated[str, options.Value("MODEL.fmu", role=options.RESULT)],
     version: Literal["2.0", "3.0"] = "2.0",
     sample_time: options.Positive | None = None,
     name: str | None = None,
