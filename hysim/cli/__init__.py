@@ -250,9 +250,10 @@ def _signals_handled() -> Iterator[None]:
     if threading.current_thread() is not threading.main_thread():
         yield
         return
-    numbers = [signal.Signals[name] for name in _NAMES if name in signal.Signals.__members__]
-    unhandled = [number for number in numbers if signal.getsignal(number) is signal.SIG_DFL]
-    watched = [*unhandled, *(number for number in numbers if signal.getsignal(number) is signal.default_int_handler)]
+    names = [name for name in _NAMES if name in signal.Signals.__members__]
+    handlers = {signal.Signals[name]: signal.getsignal(signal.Signals[name]) for name in names}
+    unhandled = [number for number, handler in handlers.items() if handler is signal.SIG_DFL]
+    watched = [*unhandled, *(number for number, handler in handlers.items() if handler is signal.default_int_handler)]
     for number in unhandled:
         signal.signal(number, _raise)
     report, sys.unraisablehook = sys.unraisablehook, _report_errors

@@ -6,7 +6,7 @@ the middle 80 % of the displacements that the plant reaches within the limits.
 
 import math
 from collections.abc import Callable, Mapping
-from dataclasses import asdict, is_dataclass, replace
+from dataclasses import asdict, dataclass, is_dataclass, replace
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -19,7 +19,7 @@ from hysim._basics.prefixes import label
 from hysim._basics.printing import extent, quantity, summary_text
 from hysim.cli import models, outputs
 from hysim.cli.models import DesignOptions
-from hysim.cli.options import Pair
+from hysim.cli.options import Pair, taken
 from hysim.control import HysteresisAssessment, StepAssessment, as_actuator, assess_hysteresis, assess_step, driven_by
 from hysim.models.protocols import needs_time
 from hysim.models.storage import to_document
@@ -40,7 +40,8 @@ _SMOOTHING = 0.3  # of a mode's period, in which a step of the reference becomes
 _TUNED = ("success", "message", "objective", "max_sensitivity", "gain_margin", "phase_margin", "voltage_noise")
 
 
-class Task(NamedTuple):
+@dataclass(frozen=True)
+class Task:
     """Task of a loop: to follow a triangle and a step [unit of y] from a voltage, with their times [s]."""
 
     low: float
@@ -68,10 +69,6 @@ class Design(NamedTuple):
     fit_percent: float
     options: DesignOptions
 
-    @property
-    def units(self) -> Mapping[str, str]:
-        return self.triangle.closed.units
-
 
 def designed(path: str, options: DesignOptions, exported: Callable[[Any], object]) -> Design:
     """The controller for the model in a file; `exported` is called before the search with a controller of its kind."""
@@ -96,10 +93,8 @@ def designed(path: str, options: DesignOptions, exported: Callable[[Any], object
             u0=todo.u0 if options.reference == "step" else 0.0,
         )  # fmt: skip
         made = controller(actuator, kind, within, tuning.controller, preview=options.preview)
-    triangle = assess_hysteresis(
-        actuator, made, low=todo.low, high=todo.high, period=todo.period, sample_time=todo.sample_time, cycles=_CYCLES
-    )
-    step = assess_step(actuator, made, step=todo.step, duration=todo.duration, sample_time=todo.sample_time, u0=todo.u0)
+    triangle = assess_hysteresis(actuator, made, cycles=_CYCLES, **taken(assess_hysteresis, todo))
+    step = assess_step(actuator, made, **taken(assess_step, todo))
     triangle = replace(triangle, closed=replace(triangle.closed, units=units))
     step = replace(step, closed=replace(step.closed, units=units))
     if options.reference not in ("triangle", "step"):  # which have measures of their own
@@ -252,11 +247,11 @@ def _only_mode(actuator: hs.Actuator, user: str) -> tuple[float, float]:
 
 
 def document(design: Design) -> dict[str, Any]:
-    triangle, task, conditions = design.triangle, design.task, design.triangle.closed.conditions
+    triangle, task, closed = design.triangle, design.task, design.triangle.closed
     return {
-        "plant": to_document(conditions["plant"]),
+        "plant": to_document(closed.conditions["plant"]),
         "controller": to_document(design.controller),
-        "units": design.units,
+        "units": closed.units,
         "record_fit_percent": design.fit_percent,
         "tuning": design.tuning and outputs.fields_of(design.tuning, _TUNED),
         "triangle": {
@@ -268,13 +263,13 @@ def document(design: Design) -> dict[str, Any]:
             **asdict(design.step.reduction), "stable": design.step.loop.stable,
         },
         "reference_tracking_rms": design.file_rms,
-        "conditions": {name: value for name, value in conditions.items() if not is_dataclass(value)},
+        "conditions": {name: value for name, value in closed.conditions.items() if not is_dataclass(value)},
     }  # fmt: skip
 
 
 def text(design: Design) -> str:
     """The printed design: the task of the loop, the tuning, the results and their conditions."""
-    options, task, closed, units = design.options, design.task, design.triangle.closed, design.units
+    options, task, closed, units = design.options, design.task, design.triangle.closed, design.triangle.closed.units
     u, y = (units.get(name, "") for name in "uy")
     driven, stroke = (label(units, name)[0].lower() + label(units, name)[1:] for name in "uy")
     limits = closed.conditions["limits"]
@@ -296,7 +291,7 @@ def text(design: Design) -> str:
 
 def picture(design: Design) -> Any:
     """Displacement against reference in open and closed loop, and both steps against time."""
-    triangle, units = design.triangle, {"t": "s", **design.units}
+    triangle, units = design.triangle, {"t": "s", **design.triangle.closed.units}
     last = slice(-design.task.samples_per_cycle - 1, None)
     both = {"u": units["y"], "y": units["y"]} if "y" in units else {}
     t = design.step.closed.t

@@ -315,7 +315,7 @@ def discover(
     route = used.pop("route")
     is_oscillator = route == "oscillator" or (route == "auto" and bool(used.keys() & {"mass", "damping", "stiffness"}))
     verb: Any = hs.discover_oscillator if is_oscillator else functools.partial(hs.discover, route=route)
-    if unused := used.keys() - inspect.signature(verb).parameters.keys():
+    if unused := used.keys() - {"seed", *inspect.signature(verb).parameters}:
         user = "an oscillator" if is_oscillator else f"--route {route}"
         raise ValueError(f"{' and '.join(map(options.flag, sorted(unused)))} is not used by {user}: leave it out")
     record = records.read(settings, file)

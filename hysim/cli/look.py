@@ -168,7 +168,7 @@ KINDS = {
     "cycles": Kind("each cycle in a colour, from the first, dark, to the last, light", _each("cycles")),
     "minor-loops": Kind("each cycle as a loop, the smaller the darker", _each("minor_loops")),
     "residual-map": Kind(
-        "measured minus model over input and cycles; one file, one model", _residual_map, records=(1, 1), models=(1, 1)
+        "measured minus model over input and cycles; one file, one model", _residual_map, (1, 1), (1, 1)
     ),
     "forc": Kind("density of relays, from first-order reversal curves; one file", _together("forc"), (1, 1), (0, 0)),
     "describing-function": Kind(

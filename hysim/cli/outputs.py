@@ -73,10 +73,10 @@ def _check_path(path: Path, role: str) -> None:
 def keep(inputs: Iterable[str | None], results: Iterable[str | None]) -> None:
     """Raise a ValueError if a result would overwrite an input, by whatever path or link."""
     targets = {path: os.stat(path) for path in results if path not in (None, STANDARD) and os.path.isfile(path)}
-    for source in inputs:
-        for path, target in targets.items():
-            if source is not None and any(os.path.samestat(target, each) for each in _behind(source)):
-                raise ValueError(f"{path} is an input of this command, and would be overwritten: give another file")
+    sources = [each for source in inputs if source is not None for each in _behind(source)]
+    for path, target in targets.items():
+        if any(os.path.samestat(target, each) for each in sources):
+            raise ValueError(f"{path} is an input of this command, and would be overwritten: give another file")
 
 
 def _behind(source: str) -> Iterator[os.stat_result]:
@@ -174,19 +174,17 @@ def in_shell_words(message: str, flags: Mapping[str, str]) -> str:
         return message
     options = {**flags, **{name: flag(name) for name in OTHER_NAMES if flag(name) in flags.values()}}
     known = {**OF_OTHER_COMMANDS, **options}
-    texts = _CALL.split(message)  # every other one is a call
-    texts[::2] = [
-        re.sub(rf"(?<![\w.\"'-])({_any(known)})={_VALUE}", lambda match: _option(match, known[match[1]]), text)
-        for text in texts[::2]
-    ]
     long = _any(name for name in options if len(name) > 1)
+    compound = _any(name for name in options if "_" in name)
+
+    def translated(text: str) -> str:
+        text = re.sub(rf"(?<![\w.\"'-])({_any(known)})={_VALUE}", lambda match: _option(match, known[match[1]]), text)
+        text, are, listed = text.partition(" are: ")  # names in a list, such as columns of a file, are no arguments
+        return re.sub(rf"(?<![\w.\"'-])({compound})\b(?!=)", lambda match: options[match[1]], text) + are + listed
+
+    texts = _CALL.split(message)  # every other one is a call
+    texts[::2] = map(translated, texts[::2])
     texts[0] = re.sub(rf"(^(?:\S+: )?)({long}){_VERB}", lambda match: match[1] + options[match[2]], texts[0])
-    for k, text in enumerate(texts):
-        if k % 2 == 0:  # names in a list, such as columns of a file, are no arguments
-            text, are, listed = text.partition(" are: ")
-            compound = _any(name for name in options if "_" in name)
-            text = re.sub(rf"(?<![\w.\"'-])({compound})\b(?!=)", lambda match: options[match[1]], text)
-            texts[k] = text + are + listed
     return "".join(texts)
 
 

@@ -97,7 +97,7 @@ def control(
     design = designs.designed(model, settings, code)
     written = code(design.controller)
     files: options.Files = {
-        out: lambda: outputs.model(design.controller, design.units),
+        out: lambda: outputs.model(design.controller, design.triangle.closed.units),
         c: lambda: written.source,
         c and str(Path(c).with_suffix(".h")): lambda: written.header,
         plot: lambda: designs.picture(design),
