@@ -9,8 +9,8 @@ import importlib.util
 import pkgutil
 import sys
 import tomllib
-from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Callable, Mapping
+from contextlib import AbstractContextManager, nullcontext
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -95,14 +95,11 @@ def sweep(
     return options.Result(contents, result.summary, lambda: _document(result), show is not None or not result.errors)
 
 
-@contextmanager
-def _executor(dask: str | None, processes: bool) -> Iterator[Any]:
+def _executor(dask: str | None, processes: bool) -> AbstractContextManager[Any]:
     if not dask:
-        yield "processes" if processes else "threads"
-        return
-    client_class = optional("distributed", "--dask", "dask", ValueError).Client
-    with client_class(scheduler_file=dask) if Path(dask).is_file() else client_class(dask) as client:
-        yield client
+        return nullcontext("processes" if processes else "threads")
+    client: Any = optional("distributed", "--dask", "dask", ValueError).Client
+    return client(scheduler_file=dask) if Path(dask).is_file() else client(dask)  # type: ignore[no-any-return]
 
 
 def _document(result: "hs.Sweep") -> dict[str, Any]:
@@ -118,12 +115,8 @@ def _picture(result: "hs.Sweep", output: str | None) -> Any:
     return outputs.on_axes(hs.plot.parallel_coordinates, result, name)
 
 
-Study = tuple[Callable[..., Any], Any, int, list[str]]
-"""Task, parameters and seed of a study, and the files that were read for them."""
-
-
-def read(path: str) -> Study:
-    """The study in a file; a ValueError that names the file if it is no study, an OSError if it cannot be read."""
+def read(path: str) -> tuple[Callable[..., Any], Any, int, list[str]]:
+    """Task, parameters, seed and files of a study; ValueError if the file is no study, OSError if it cannot be read."""
     try:
         document = tomllib.loads(Path(path).read_text(encoding="utf-8"))
         _check(document, {"seed", "task", "response", *_SPACES}, "a study")

@@ -169,10 +169,10 @@ def c(
     law, _ = models.read(model)
     stem = str(Path(out).with_suffix(""))
     code = hs.to_c(hs.InverseFeedforward(law=law) if inverse else law, sample_time, name=Path(out).stem, u0=u0)
-    paths = [f"{stem}.h", f"{stem}.c", f"{stem}_main.c"]
-    write_all(dict(zip(paths, (code.header, code.source, code.main), strict=True)))
-    print(f"wrote {', '.join(paths)}; a program that reads one input in each line is compiled by")
-    print(f"  cc -std=c99 -O2 -ffp-contract=off {' '.join(paths[1:])} -lm -o {stem}")
+    files: dict[Any, str | bytes] = {f"{stem}.h": code.header, f"{stem}.c": code.source, f"{stem}_main.c": code.main}
+    write_all(files)
+    print(f"wrote {', '.join(files)}; a program that reads one input in each line is compiled by")
+    print(f"  cc -std=c99 -O2 -ffp-contract=off {stem}.c {stem}_main.c -lm -o {stem}")
 
 
 Platform = Literal["linux", "windows", "mac"]
