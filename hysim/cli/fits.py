@@ -95,10 +95,11 @@ def identify(
             return outputs.picture_of(hs.simulate(result, record.t, record.u))
         return outputs.on_axes(hs.plot.loop, record, result)
 
+    def document() -> dict[str, Any]:
+        return {"family": type(result.model).__name__, **outputs.fields_of(result, _IDENTIFIED)}
+
     files: options.Files = {out: lambda: outputs.model(result, record.units), plot: picture}
-    family = {"family": type(result.model).__name__}
-    document = family | outputs.fields_of(result, _IDENTIFIED)
-    return options.Result(files, result.summary, lambda: document, bool(result.success))
+    return options.Result(files, result.summary, document, bool(result.success))
 
 
 def posterior(

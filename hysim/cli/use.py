@@ -55,12 +55,14 @@ def simulate(
     columns = simulation.columns
     labels = column_units(columns, units)
 
+    def document() -> dict[str, Any]:
+        return {"units": labels, "columns": {name: column.tolist() for name, column in columns.items()}}
+
     files: dict[str | None, Any] = {plot: lambda: outputs.picture_of(simulation)}
     if out is not None or not json:
         path = out or options.STANDARD
         files[path] = lambda: outputs.table(path, columns, labels)
-    document = {"units": labels, "columns": {name: column.tolist() for name, column in columns.items()}}
-    outputs.write(files, (lambda: "") if json else None, lambda: document)
+    outputs.write(files, (lambda: "") if json else None, document)
 
 
 def control(
