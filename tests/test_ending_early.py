@@ -17,8 +17,7 @@ from hysim._basics import atomic as _atomic
 from hysim._basics import parallel as _parallel
 from hysim._basics.atomic import write_all
 from hysim._basics.parallel import in_chunks, map_on_threads, processes, second_process, threads
-from hysim.cli import main
-from hysim.cli.signals import Ended
+from hysim.cli import Ended, main
 
 ON_LINUX = sys.platform.startswith("linux")
 linux = pytest.mark.skipif(not ON_LINUX, reason="processes are found by /proc, and forked on Linux alone")

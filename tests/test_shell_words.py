@@ -10,8 +10,8 @@ from strategies import refused_in_one_line
 
 import hysim as hs
 from hysim.cli import COMMANDS, Command
-from hysim.cli.outputs import flags
-from hysim.cli.words import OTHER_NAMES, in_shell_words, suggestion
+from hysim.cli.options import OTHER_NAMES, suggestion
+from hysim.cli.outputs import flags, in_shell_words
 
 FLAGS_OF = {name: flags(Command(name)) for name in COMMANDS}
 FLAGS = {name: flag for flags_of_one in FLAGS_OF.values() for name, flag in flags_of_one.items()}

@@ -2,22 +2,31 @@
 
 Exit codes: 0 done, 1 a search did not converge, 2 bad input, 130 interrupted, 143 or 129 ended by SIGTERM or
 SIGHUP. Results go to the standard output, progress and errors to the standard error, an error in one line.
+
+Python raises an exception for a signal between two steps of its own, never inside a call of a compiled library, so that
+a long call would delay the end. A thread therefore waits for `PATIENCE` and then ends the process, unless the command
+has ended.
 """
 
 import importlib
 import os
 import signal
 import sys
-from collections.abc import Mapping, Sequence
-from contextlib import nullcontext
+import threading
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager, nullcontext, suppress
+from types import FrameType
+from typing import Any, NoReturn
 
 import click
 from click.shell_completion import shell_complete
 
 from hysim import __version__
 from hysim._basics.progress import silent
-from hysim.cli import options, outputs, signals
-from hysim.cli.words import flag, in_shell_words, suggestion
+from hysim._names import nearest
+from hysim.cli import options, outputs
+from hysim.cli.options import flag, suggestion
+from hysim.cli.outputs import in_shell_words
 from hysim.errors import SimulationError
 
 GROUPS: Mapping[str, Mapping[str, str]] = {
@@ -34,7 +43,7 @@ GROUPS: Mapping[str, Mapping[str, str]] = {
 COMMANDS = {name: module for commands in GROUPS.values() for name, module in commands.items()}
 """Module of every command by its name."""
 
-DONE, NOT_REACHED, BAD_INPUT = 0, 1, 2
+DONE, NOT_REACHED, BAD_INPUT, NOT_FINISHED = 0, 1, 2, 3
 _SETTINGS = {"help_option_names": ["-h", "--help"], "max_content_width": 120}
 
 
@@ -78,15 +87,21 @@ class Command(click.Command):
         import numpy as np
 
         values = ctx.params
-        roles = [(values[str(each.click.name)], each.value.role) for each in self.declared if each.value.role]
-        lists = [(value if isinstance(value, tuple) else (value,), role) for value, role in roles]
-        files = [(path, role) for paths, role in lists for path in paths if path is not None]
+        roles = [(each.value.role, values[str(each.click.name)]) for each in self.declared if each.value.role]
+        lists = [(role, value if isinstance(value, tuple) else (value,)) for role, value in roles]
+        files = [(path, role) for role, paths in lists for path in paths if path is not None]
         reporting = silent() if values["quiet"] else nullcontext()
         try:
             with np.errstate(all="ignore"), reporting:  # an overflow is inf or nan: null in JSON
                 outputs.check(files, prints=values.get("json", False))
                 result = options.call(self.function, values)
-                return result if isinstance(result, int) and result > 1 else NOT_REACHED if result is False else DONE
+                if isinstance(result, options.Result):
+                    outputs.write(result.files, result.text, result.document)
+                    if result.unfinished:
+                        print(f"hysim: not finished: {result.unfinished}", file=sys.stderr)
+                        return NOT_FINISHED
+                    result = result.reached
+                return NOT_REACHED if result is False else DONE
         except (ValueError, TypeError, SimulationError) as error:
             words = in_shell_words(str(error) or type(error).__name__, outputs.flags(self))
             raise ValueError(words) from error
@@ -126,11 +141,11 @@ HYSIM = click.version_option(__version__, message="hysim %(version)s")(
 def main(arguments: Sequence[str] | None = None) -> int:
     try:
         try:
-            with signals.handled():
+            with _signals_handled():
                 return _run(sys.argv[1:] if arguments is None else list(arguments))
         finally:
             print(end="", flush=True)
-    except (KeyboardInterrupt, signals.Ended) as request:
+    except (KeyboardInterrupt, Ended) as request:
         return _ended(request)
     except click.exceptions.Exit as request:  # after --help and --version
         return request.exit_code
@@ -144,7 +159,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except (ValueError, TypeError, OSError, ImportError, SimulationError) as error:
         cause: BaseException | None = error  # an interrupted import of a compiled module is an ImportError
         while cause is not None:
-            if isinstance(cause, (KeyboardInterrupt, signals.Ended)):
+            if isinstance(cause, (KeyboardInterrupt, Ended)):
                 return _ended(cause)
             cause = cause.__cause__ or cause.__context__
         return _failed(BAD_INPUT, f"error: {_line(error)}")
@@ -161,9 +176,9 @@ def _run(arguments: list[str]) -> int:
         return code
 
 
-def _ended(request: "KeyboardInterrupt | signals.Ended") -> int:
-    number = request.number if isinstance(request, signals.Ended) else signal.SIGINT
-    return _failed(128 + number, signals.message(number))
+def _ended(request: "KeyboardInterrupt | Ended") -> int:
+    number = request.number if isinstance(request, Ended) else signal.SIGINT
+    return _failed(128 + number, _message(number))
 
 
 def _failed(code: int, text: str, program: str = "hysim") -> int:
@@ -193,23 +208,103 @@ def _advice(error: click.UsageError) -> str:
 
 
 def _line(error: BaseException) -> str:
-    if isinstance(error, FileNotFoundError) and error.filename and (near := _near_file(str(error.filename))):
-        return one_line(f"{error.filename}: {error.strerror}: {near}")
-    if isinstance(error, OSError) and error.strerror:
-        return one_line(f"{error.filename}: {error.strerror}" if error.filename else error.strerror)
-    return one_line(str(error)) or type(error).__name__
+    if not isinstance(error, OSError) or not error.strerror:
+        return one_line(str(error)) or type(error).__name__
+    path = str(error.filename or "")
+    near = _near_file(path) if path and isinstance(error, FileNotFoundError) else ""
+    return one_line(": ".join(filter(None, (path, error.strerror, near))))
 
 
 def _near_file(path: str) -> str:
     """``did you mean FILE?`` for the nearest file in the same folder, an empty text if no name is similar."""
     folder, name = os.path.split(path)
-    try:
-        near = suggestion(name, os.listdir(folder or "."))
-    except OSError:
-        return ""
-    return near and f"did you mean {os.path.join(folder, near.removeprefix('did you mean '))}"
+    near = None
+    with suppress(OSError):
+        near = nearest(name, os.listdir(folder or "."))
+    return f"did you mean {os.path.join(folder, near)}?" if near else ""
 
 
 def one_line(text: str) -> str:
     """The text in one line; characters that a terminal would obey are printed as their codes."""
     return "".join(sign if sign.isprintable() else repr(sign)[1:-1] for sign in " ".join(text.split()))
+
+
+PATIENCE = 1.3
+"""Seconds in which a command can end in order."""
+
+_NAMES = ("SIGINT", "SIGTERM", "SIGHUP")
+
+
+class Ended(BaseException):
+    """A signal asks the process to end: unfinished files are removed on the way out, as after Ctrl-C."""
+
+    @property
+    def number(self) -> int:
+        return int(self.args[0])
+
+
+def _message(number: int) -> str:
+    return "interrupted" if number == signal.SIGINT else f"ended by {signal.Signals(number).name}"
+
+
+@contextmanager
+def _signals_handled() -> Iterator[None]:
+    """Turn signals that would end the process into an exception where they have no handler; only in the main thread."""
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    names = [name for name in _NAMES if name in signal.Signals.__members__]
+    handlers = {signal.Signals[name]: signal.getsignal(signal.Signals[name]) for name in names}
+    unhandled = [number for number, handler in handlers.items() if handler is signal.SIG_DFL]
+    watched = [*unhandled, *(number for number, handler in handlers.items() if handler is signal.default_int_handler)]
+    for number in unhandled:
+        signal.signal(number, _raise)
+    report, sys.unraisablehook = sys.unraisablehook, _report_errors
+    try:
+        with _watched(frozenset(watched)):
+            yield
+    finally:
+        sys.unraisablehook = report
+        for number in unhandled:
+            signal.signal(number, signal.SIG_DFL)
+
+
+def _report_errors(unraisable: Any) -> None:
+    """Print errors that could not be raised, but no interrupts, which may come in a callback of a compiled library."""
+    if issubclass(unraisable.exc_type, Exception):
+        sys.__unraisablehook__(unraisable)
+
+
+def _raise(number: int, _: FrameType | None) -> NoReturn:
+    raise Ended(number)
+
+
+@contextmanager
+def _watched(numbers: frozenset[int]) -> Iterator[None]:
+    """Let a thread read the signals that arrive, and end the process if the block does not end in time."""
+    if sys.platform == "win32":  # where signals can be written to sockets only
+        yield
+        return
+    reader, writer = os.pipe()
+    os.set_blocking(writer, False)
+    is_over = threading.Event()
+    thread = threading.Thread(target=_watch, args=(reader, numbers, is_over), daemon=True)
+    before = signal.set_wakeup_fd(writer, warn_on_full_buffer=False)
+    thread.start()
+    try:
+        yield
+    finally:
+        is_over.set()
+        signal.set_wakeup_fd(before)
+        os.close(writer)
+        thread.join()
+        os.close(reader)
+
+
+def _watch(reader: int, numbers: frozenset[int], is_over: threading.Event) -> None:
+    """Wait for a signal, then for the end of the block, which closes the other side of the pipe."""
+    while received := os.read(reader, 1):
+        if received[0] in numbers and not is_over.wait(PATIENCE):
+            start = b"\r\x1b[K" if sys.stderr is not None and sys.stderr.isatty() else b""
+            os.write(2, start + f"hysim: {_message(received[0])}\n".encode())
+            os._exit(128 + received[0])

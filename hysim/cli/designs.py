@@ -6,7 +6,7 @@ the middle 80 % of the displacements that the plant reaches within the limits.
 
 import math
 from collections.abc import Callable, Mapping
-from dataclasses import asdict, is_dataclass, replace
+from dataclasses import asdict, dataclass, is_dataclass, replace
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -19,7 +19,7 @@ from hysim._basics.prefixes import label
 from hysim._basics.printing import extent, quantity, summary_text
 from hysim.cli import models, outputs
 from hysim.cli.models import DesignOptions
-from hysim.cli.options import Pair
+from hysim.cli.options import Pair, taken
 from hysim.control import HysteresisAssessment, StepAssessment, as_actuator, assess_hysteresis, assess_step, driven_by
 from hysim.models.protocols import needs_time
 from hysim.models.storage import to_document
@@ -40,7 +40,8 @@ _SMOOTHING = 0.3  # of a mode's period, in which a step of the reference becomes
 _TUNED = ("success", "message", "objective", "max_sensitivity", "gain_margin", "phase_margin", "voltage_noise")
 
 
-class Task(NamedTuple):
+@dataclass(frozen=True)
+class Task:
     """Task of a loop: to follow a triangle and a step [unit of y] from a voltage, with their times [s]."""
 
     low: float
@@ -66,50 +67,39 @@ class Design(NamedTuple):
     step: StepAssessment
     file_rms: float
     fit_percent: float
-    units: Mapping[str, str]
     options: DesignOptions
 
 
 def designed(path: str, options: DesignOptions, exported: Callable[[Any], object]) -> Design:
     """The controller for the model in a file; `exported` is called before the search with a controller of its kind."""
     model, units = models.read(path)
-    record = None if options.record is None else hs.load(options.record, u=options.u, y=options.y)
-    if record is not None:
-        signals_in = {name: unit for name, unit in units.items() if name in ("u", "y")}
-        record = in_units(record, signals_in, str(options.record))
+    record, within = None, options.limits
+    if options.record is not None:
+        record = in_units(hs.load(options.record, u=options.u, y=options.y), units, options.record)
         units = {**units, **record.units}
+        within = within or (float(record.u.min()), float(record.u.max()))
     actuator, kind = plant(model, options), options.controller
-    within = options.limits or (None if record is None else (float(record.u.min()), float(record.u.max())))
     todo = task(actuator, options, within)
     template = feedback(actuator, kind, within)
     made = controller(actuator, kind, within, template or hs.PID(kp=1.0, limits=within), preview=options.preview)
     exported(made)
     values, transient, objective = reference(todo, rest(actuator, todo.u0), options.reference, units.get("y"))
-    low, high, period, u0, step, duration, h = todo
-    t = h * np.arange(values.size)
-    tuning = None
+    t, tuning, file_rms = todo.sample_time * np.arange(values.size), None, math.nan
     if kind != "inverse":
         tuning = hs.tune(
             actuator, t, values, controller=template, objective=objective, limits=within,
             max_sensitivity=options.max_sensitivity, max_voltage_noise=options.max_voltage_noise,
             variations=variations(actuator, options.vary_mode), transient=transient,
-            u0=u0 if options.reference == "step" else 0.0,
+            u0=todo.u0 if options.reference == "step" else 0.0,
         )  # fmt: skip
         made = controller(actuator, kind, within, tuning.controller, preview=options.preview)
-    triangle = assess_hysteresis(actuator, made, low=low, high=high, period=period, sample_time=h, cycles=_CYCLES)
-    answer = assess_step(actuator, made, step=step, duration=duration, sample_time=h, u0=u0)
-    is_file = options.reference not in ("triangle", "step")  # which have measures of their own
-    return Design(
-        controller=made,
-        tuning=tuning,
-        task=todo,
-        triangle=replace(triangle, closed=replace(triangle.closed, units=units)),
-        step=replace(answer, closed=replace(answer.closed, units=units)),
-        file_rms=hs.metrics.rmse(values, hs.close_loop(actuator, made, t, values).y) if is_file else math.nan,
-        fit_percent=fit_percent(model, record),
-        units=units,
-        options=options,
-    )
+    triangle = assess_hysteresis(actuator, made, cycles=_CYCLES, **taken(assess_hysteresis, todo))
+    step = assess_step(actuator, made, **taken(assess_step, todo))
+    triangle = replace(triangle, closed=replace(triangle.closed, units=units))
+    step = replace(step, closed=replace(step.closed, units=units))
+    if options.reference not in ("triangle", "step"):  # which have measures of their own
+        file_rms = hs.metrics.rmse(values, hs.close_loop(actuator, made, t, values).y)
+    return Design(made, tuning, todo, triangle, step, file_rms, fit_percent(model, record), options)
 
 
 def plant(model: Any, options: DesignOptions) -> hs.Actuator:
@@ -119,15 +109,15 @@ def plant(model: Any, options: DesignOptions) -> hs.Actuator:
         actuator = replace(actuator, vibration=hs.mode(2.0 * math.pi * frequency, ratio))
     if options.creep is not None:
         actuator = replace(actuator, creep=hs.Creep.per_decade(options.creep))
-    settings = {name: vars(options)[name] for name in ("noise", "quantum", "delay") if vars(options)[name] is not None}
-    return replace(actuator, sensor=replace(actuator.sensor or hs.Sensor(), **settings)) if settings else actuator
+    sensor = {name: value for name in ("noise", "quantum", "delay") if (value := vars(options)[name]) is not None}
+    return replace(actuator, sensor=replace(actuator.sensor or hs.Sensor(), **sensor)) if sensor else actuator
 
 
 def variations(actuator: hs.Actuator, percent: float | None) -> list[hs.Actuator]:
     if percent is None:
         return []
     frequency, ratio = _only_mode(actuator, "--vary-mode")
-    gain = 1.0 if actuator.vibration is None else actuator.vibration.dc_gain
+    gain = actuator.vibration.dc_gain if actuator.vibration else 1.0
     factors = 1.0 - percent / 100.0, 1.0 + percent / 100.0
     return [replace(actuator, vibration=hs.mode(factor * frequency, ratio, gain)) for factor in factors]
 
@@ -168,7 +158,8 @@ def fit_percent(model: Any, record: hs.Record | None) -> float:
 
 def in_units(record: hs.Record, units: Mapping[str, str], source: str) -> hs.Record:
     """The record in these units, where it has others; ValueError if they differ by more than a prefix."""
-    other = {name: unit for name, unit in units.items() if record.units.get(name, unit) != unit}
+    labels = {name: unit for name, unit in units.items() if name in ("u", "y")}
+    other = {name: unit for name, unit in labels.items() if record.units.get(name, unit) != unit}
     try:
         return record.convert(other) if other else record
     except ValueError as error:
@@ -204,23 +195,17 @@ def controller(actuator: hs.Actuator, kind: str, within: Pair | None, tuned: Any
         if preview:
             raise ValueError(f"--preview is for {', '.join(INVERTING)}: the controller {kind} has no inverse")
         return tuned
-    inverse = hs.InverseFeedforward.of(actuator)
-    open_loop = hs.TrackingController(feedforward=inverse, preview=preview, limits=within)
-    if kind == "inverse":
-        return open_loop
-    tracking = replace(open_loop, feedback=replace(tuned, limits=None))
-    if kind == "tracking":
-        return tracking
-    if actuator.vibration is None:
-        return replace(tracking, model=actuator)
-    frequency, ratio = _only_mode(actuator, "the controller model-following")
-    return replace(  # before a mode, the reference is smoothed and known ahead
-        tracking,
-        model=actuator,
-        shaper=hs.Shaper(smoothing=_SMOOTHING * 2.0 * math.pi / frequency),
-        mode_inverse=hs.ModeInverse(natural_frequency=frequency, damping_ratio=ratio),
-        preview=True,
-    )
+    stages: dict[str, Any] = {"feedforward": hs.InverseFeedforward.of(actuator), "preview": preview}
+    if kind != "inverse":
+        stages["feedback"] = replace(tuned, limits=None)
+    if kind == "model-following":
+        stages["model"] = actuator
+    if kind == "model-following" and actuator.vibration is not None:
+        frequency, ratio = _only_mode(actuator, "the controller model-following")
+        stages["mode_inverse"] = hs.ModeInverse(natural_frequency=frequency, damping_ratio=ratio)
+        stages["shaper"] = hs.Shaper(smoothing=_SMOOTHING * 2.0 * math.pi / frequency)
+        stages["preview"] = True  # before a mode, the reference is smoothed and known ahead
+    return hs.TrackingController(limits=within, **stages)
 
 
 def _reach(actuator: hs.Actuator, within: Pair | None) -> Pair:
@@ -262,40 +247,41 @@ def _only_mode(actuator: hs.Actuator, user: str) -> tuple[float, float]:
 
 
 def document(design: Design) -> dict[str, Any]:
-    triangle, reduction, task = design.triangle, design.step.reduction, design.task
+    triangle, task, closed = design.triangle, design.task, design.triangle.closed
     return {
-        "plant": to_document(triangle.closed.conditions["plant"]),
+        "plant": to_document(closed.conditions["plant"]),
         "controller": to_document(design.controller),
-        "units": design.units,
+        "units": closed.units,
         "record_fit_percent": design.fit_percent,
         "tuning": design.tuning and outputs.fields_of(design.tuning, _TUNED),
         "triangle": {
-            "low": task.low, "high": task.high, "period": task.period, "cycles": _CYCLES,
+            **outputs.fields_of(task, ("low", "high", "period")), "cycles": _CYCLES,
             **outputs.scalars(triangle), "stable": triangle.loop.stable,
         },
         "step": {
             "u0": task.u0, "height": task.step, "duration": task.duration,
-            **asdict(reduction), "stable": design.step.loop.stable,
+            **asdict(design.step.reduction), "stable": design.step.loop.stable,
         },
         "reference_tracking_rms": design.file_rms,
-        "conditions": {name: value for name, value in triangle.closed.conditions.items() if not is_dataclass(value)},
+        "conditions": {name: value for name, value in closed.conditions.items() if not is_dataclass(value)},
     }  # fmt: skip
 
 
 def text(design: Design) -> str:
     """The printed design: the task of the loop, the tuning, the results and their conditions."""
-    options, task, closed, units = design.options, design.task, design.triangle.closed, design.units
+    options, task, closed, units = design.options, design.task, design.triangle.closed, design.triangle.closed.units
     u, y = (units.get(name, "") for name in "uy")
     driven, stroke = (label(units, name)[0].lower() + label(units, name)[1:] for name in "uy")
     limits = closed.conditions["limits"]
-    followed = "" if math.isnan(design.file_rms) else f", second column, tracking rms {quantity(design.file_rms, y)}"
-    source = f", the extremes of {Path(options.record).name}" if options.record and not options.limits else ""
+    command = "no limits" if limits is None else extent(limits, u)
+    if options.record and not options.limits:
+        command += f", the extremes of {Path(options.record).name}"
+    followed = f", second column, tracking rms {quantity(design.file_rms, y)}"
+    fit = f"the model fits the {stroke} by {design.fit_percent:.2f} %"
     rows = {
-        "record": ""
-        if math.isnan(design.fit_percent)
-        else f"the model fits the {stroke} by {design.fit_percent:.2f} %",
-        "reference": f"{stroke}: {Path(options.reference).name}{followed}",
-        "command": f"{driven}: {'no limits' if limits is None else extent(limits, u)}{source}",
+        "record": "" if math.isnan(design.fit_percent) else fit,
+        "reference": f"{stroke}: {Path(options.reference).name}{'' if math.isnan(design.file_rms) else followed}",
+        "command": f"{driven}: {command}",
         "triangle": f"{extent((task.low, task.high), y)}, {1.0 / task.period:.4g} Hz, cycle {_CYCLES}",
         "step": f"{quantity(task.step, y)} from rest at {quantity(task.u0, u)}",
     }
@@ -305,7 +291,7 @@ def text(design: Design) -> str:
 
 def picture(design: Design) -> Any:
     """Displacement against reference in open and closed loop, and both steps against time."""
-    triangle, units = design.triangle, {"t": "s", **design.units}
+    triangle, units = design.triangle, {"t": "s", **design.triangle.closed.units}
     last = slice(-design.task.samples_per_cycle - 1, None)
     both = {"u": units["y"], "y": units["y"]} if "y" in units else {}
     t = design.step.closed.t

@@ -2,15 +2,16 @@
 
 import functools
 import inspect
+import json
 import sys
-from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal
 
+import click
+
 import hysim as hs
 from hysim.cli import models, options, outputs, records
-from hysim.cli.words import flag
 from hysim.errors import Interrupted
 
 _FOLDER = ("parameters.csv", "samples.csv", "corner.svg", "posterior.json")
@@ -56,8 +57,7 @@ def identify(
     fit: IdentifyOptions,
     out: options.ModelOut | None = None,
     plot: options.Picture | None = None,
-    json: bool = False,
-) -> bool:
+) -> options.Result:
     """Identify a model on a file of your own.
 
     Identify a model's parameters by its error in free run, and print them with their standard errors. Without --model
@@ -80,29 +80,26 @@ def identify(
     hysim identify test.csv --model oscillator --excitation base
     hysim identify quake.csv --model frame.json --free damping --sensor acceleration_2
     """
-    from hysim.models.storage import to_json
-
-    if fit.model is None:
-        models.refuse_without_model(fit)
-    subject = None if fit.model is None else models.to_identify(fit)
+    subject = models.to_identify(fit)
     if others and (settings.weights is not None or settings.sensor or settings.y_file is not None):
         raise ValueError("--weights, --sensor and --y-file are for one file: leave out the others, or use Python")
     record, weights = records.read_with_weights(settings, file)
-    further = [records.read(settings, path) for path in others]
     measured: Any = records.of_structure(subject, record, settings.sensor) if settings.sensor else record
-    measured = [measured, *further] if further else measured
+    if others:
+        measured = [record, *(records.read(settings, path) for path in others)]
     subjects = (measured,) if subject is None else (subject, measured)
     result = hs.identify(*subjects, weights=weights, **options.taken(hs.identify, fit))
 
     def picture() -> Any:
         if settings.sensor:  # the record of one sensor is not the output of the structure
             return outputs.picture_of(hs.simulate(result, record.t, record.u))
-        return outputs.loop(record, result)
+        return outputs.on_axes(hs.plot.loop, record, result)
 
-    files: outputs.Files = {out: lambda: to_json(result, units=record.units), plot: picture}
-    family = {"family": type(result.model).__name__}
-    outputs.write(files, result.summary, lambda: family | outputs.fields_of(result, _IDENTIFIED))
-    return bool(result.success)
+    def document() -> dict[str, Any]:
+        return {"family": type(result.model).__name__, **outputs.fields_of(result, _IDENTIFIED)}
+
+    files: options.Files = {out: lambda: outputs.model(result, record.units), plot: picture}
+    return options.Result(files, result.summary, document, bool(result.success))
 
 
 def posterior(
@@ -114,8 +111,7 @@ def posterior(
     priors: options.Ranges | None = None,
     samples: options.Count = 10000,
     out: str | None = None,
-    json: bool = False,
-) -> bool:
+) -> options.Result:
     """Draw the distribution of a model's parameters given a file.
 
     Identify a model, draw its parameters from their posterior distribution, and print medians and intervals at 95 %.
@@ -152,15 +148,14 @@ def posterior(
     document = {"family": type(draws.model).__name__, "parameters": rows, **conditions}
     n = len(draws.names)
     side = max(1.25 * n, 4.0)  # inches, of a panel 1.25
-    contents: tuple[Callable[[], Any], ...] = (
+    contents = (
         lambda: csv_text([rows[0], *(row.values() for row in rows)]),
         draws.to_csv,
         lambda: outputs.drawn(lambda canvas: hs.plot.corner(draws, axes=canvas.subplots(n, n)), side, side),
         lambda: outputs.to_json(document),
     )
-    files: outputs.Files = dict(zip(paths, contents, strict=bool(paths)))
-    outputs.write(files, draws.summary, lambda: document)
-    return bool(result.success) and not draws.warnings
+    files: options.Files = dict(zip(paths, contents, strict=bool(paths)))
+    return options.Result(files, draws.summary, lambda: document, bool(result.success) and not draws.warnings)
 
 
 def compare(
@@ -173,13 +168,12 @@ def compare(
     test_cycles: int | None = None,
     max_evaluations: int | None = None,
     seed: int = 0,
-    csv: options.Result | None = None,
-    markdown: options.Result | None = None,
-    latex: options.Result | None = None,
+    csv: options.ResultFile | None = None,
+    markdown: options.ResultFile | None = None,
+    latex: options.ResultFile | None = None,
     out: options.ModelOut | None = None,
     plot: options.Picture | None = None,
-    json: bool = False,
-) -> None:
+) -> options.Result:
     """Compare models on a file of your own.
 
     Identify models on a record, all by the same protocol, and print them side by side.
@@ -219,7 +213,7 @@ def compare(
             max_evaluations=max_evaluations,
         )  # fmt: skip
     except Interrupted as interrupt:
-        if not json:
+        if not click.get_current_context().params["json"]:
             print(interrupt.finished.to_text())
         raise
     rows = min(4, len(table.rows))
@@ -227,14 +221,14 @@ def compare(
     def draw(canvas: Any) -> None:
         hs.plot.comparison(table, axes=hs.plot.panels(canvas, 3 * rows, columns=3))
 
-    files: outputs.Files = {
+    files: options.Files = {
         out: lambda: _best(table),
         csv: table.to_csv,
         markdown: lambda: table.to_markdown() + "\n",
         latex: lambda: table.to_latex() + "\n",
         plot: lambda: outputs.drawn(draw, 9.0, 2.2 * rows),
     }
-    outputs.write(files, table.to_text, lambda: _document(table))
+    return options.Result(files, table.to_text, lambda: _document(table))
 
 
 def _subjects(name: str) -> dict[str, Any]:
@@ -243,21 +237,16 @@ def _subjects(name: str) -> dict[str, Any]:
     model = models.model_or_family(name)
     if name.endswith(".json") or models.is_import_path(name):
         return {models.name_of(name): model}
-    try:
-        of_family = candidates_named(model.__name__)
-    except ValueError:
-        raise ValueError(f"the model {name} cannot be compared without further arguments: give a .json file") from None
+    of_family = candidates_named(model.__name__)
     return of_family if len(of_family) > 1 else dict.fromkeys([name], *of_family.values())
 
 
 def _best(table: "hs.Comparison") -> str:
     """The model that predicts best; if no errors of prediction are known, the one with the smallest rmse."""
-    from hysim.models.storage import to_json
-
     ranked = table.ranked() or table.ranked("rmse")
     if not ranked:
         raise ValueError(f"no model could be compared: {'; '.join(table.failed.values())}")
-    return to_json(ranked[0].model, units=table.record.units)
+    return outputs.model(ranked[0].model, table.record.units)
 
 
 def _document(table: "hs.Comparison") -> dict[str, Any]:
@@ -268,29 +257,9 @@ def _document(table: "hs.Comparison") -> dict[str, Any]:
     return {"record": table.record.name, "units": table.record.units, **verdict, "rows": rows, "failed": table.failed}
 
 
-def discover(
-    file: options.RecordIn,
-    *,
-    settings: records.RecordOptions,
-    route: Literal["auto", "memory", "output", "oscillator"] = "auto",
-    library: options.Terms | None = None,
-    degree: int | None = None,
-    symmetry: Literal["odd", "even"] | None = None,
-    mass: float | None = None,
-    damping: float | None = None,
-    stiffness: float | None = None,
-    cross_validate: options.Blocks | None = None,
-    initial: Literal["auto", "free", "rest"] | None = None,
-    seed: int = 0,
-    out: options.ModelOut | None = None,
-    plot: options.Picture | None = None,
-    json: bool = False,
-) -> bool:
-    """Find the law of the memory in a file of your own.
-
-    Find the law of a memory by sparse regression (PySINDy) and free runs, and print it with its verdict.
-
-    The verdict is hysteresis, a linear lag, or that records of one rate cannot decide.
+@dataclass(kw_only=True)
+class DiscoverOptions:
+    """Options of `discover` alone.
 
     Parameters
     ----------
@@ -304,6 +273,37 @@ def discover(
     stiffness : stiffness of an oscillator, if it is known [units of u/y]
     cross_validate : repeat the whole search without one sample at a time, or one of K blocks; not for an oscillator
     initial : whether the memory begins at a value of its own or at zero; by default the BIC decides
+    seed :
+    """
+
+    route: Literal["auto", "memory", "output", "oscillator"] = "auto"
+    library: options.Terms | None = None
+    degree: int | None = None
+    symmetry: Literal["odd", "even"] | None = None
+    mass: float | None = None
+    damping: float | None = None
+    stiffness: float | None = None
+    cross_validate: options.Blocks | None = None
+    initial: Literal["auto", "free", "rest"] | None = None
+    seed: int = 0
+
+
+def discover(
+    file: options.RecordIn,
+    *,
+    settings: records.RecordOptions,
+    search: DiscoverOptions,
+    out: options.ModelOut | None = None,
+    plot: options.Picture | None = None,
+) -> options.Result:
+    """Find the law of the memory in a file of your own.
+
+    Find the law of a memory by sparse regression (PySINDy) and free runs, and print it with its verdict.
+
+    The verdict is hysteresis, a linear lag, or that records of one rate cannot decide.
+
+    Parameters
+    ----------
     out : write the model; - writes it to the standard output
     plot : draw the record and the law
 
@@ -312,27 +312,22 @@ def discover(
     hysim discover loop.csv --plot law.svg
     hysim discover test.csv --route oscillator --mass 2.5
     """
-    from hysim.models.storage import to_json
-
-    of_plant = {"mass": mass, "damping": damping, "stiffness": stiffness}
-    others = {"library": library, "cross_validate": cross_validate, "degree": degree, "symmetry": symmetry}
-    values = of_plant | others | {"initial": initial}
-    used = {name: value for name, value in values.items() if value is not None}
-    is_oscillator = route == "oscillator" or (route == "auto" and bool(of_plant.keys() & used.keys()))
+    used = {name: value for name, value in vars(search).items() if value is not None}
+    route = used.pop("route")
+    is_oscillator = route == "oscillator" or (route == "auto" and bool(used.keys() & {"mass", "damping", "stiffness"}))
     verb: Any = hs.discover_oscillator if is_oscillator else functools.partial(hs.discover, route=route)
-    if unused := used.keys() - inspect.signature(verb).parameters.keys():
+    if unused := used.keys() - {"seed", *inspect.signature(verb).parameters}:
         user = "an oscillator" if is_oscillator else f"--route {route}"
-        raise ValueError(f"{' and '.join(map(flag, sorted(unused)))} is not used by {user}: leave it out")
+        raise ValueError(f"{' and '.join(map(options.flag, sorted(unused)))} is not used by {user}: leave it out")
     record = records.read(settings, file)
-    result = verb(record, seed=seed, **used)
+    result = verb(record, **used)
     model = result.model
-    files: dict[str | None, Any] = {
-        out: lambda: to_json(model, units=record.units),
-        plot: lambda: outputs.loop(record, model),
+    files: options.Files = {
+        out: lambda: outputs.model(model, record.units),
+        plot: lambda: outputs.on_axes(hs.plot.loop, record, model),
     }
     unwritten = [name for name, path in (("--out", out), ("--plot", plot)) if path and model is None]
     if unwritten:
-        files = {path: lambda: "" for path in files if path == records.STANDARD}
+        files = {path: lambda: "" for path in files if path == options.STANDARD}
         print(f"hysim: {' and '.join(unwritten)} not written: {result.warnings[0]}", file=sys.stderr)
-    outputs.write(files, result.to_json if json else result.summary)
-    return not unwritten
+    return options.Result(files, result.summary, lambda: json.loads(result.to_json()), not unwritten)

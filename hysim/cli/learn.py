@@ -2,20 +2,18 @@
 
 import os
 import tempfile
-from collections import Counter
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from contextlib import suppress
 from functools import partial
 from pathlib import Path
 from typing import Annotated, Any, Literal, NamedTuple
 
 import click
-from click.shell_completion import BashComplete, FishComplete, ZshComplete
+from click.shell_completion import get_completion_class
 
 import hysim as hs
 from hysim._basics.progress import Progress, announced_by, reports
 from hysim.cli import options, outputs
-from hysim.cli.records import STANDARD
 
 _SEED = 1
 
@@ -32,13 +30,12 @@ def _damper() -> "hs.Record":
     """Cycles of growing amplitude on a steel damper, whose load cell has noise."""
     import numpy as np
 
-    phase = np.linspace(0.0, 2.0 * np.pi, 120, endpoint=False)
-    u = np.concatenate([*(amplitude * np.sin(phase) for amplitude in (2.0, 4.0, 6.0, 8.0, 10.0, 10.0)), [0.0]])
+    cycle = np.sin(np.linspace(0.0, 2.0 * np.pi, 120, endpoint=False))
+    u = np.append(np.outer((2.0, 4.0, 6.0, 8.0, 10.0, 10.0), cycle), 0.0)
     law = hs.BoucWen(A=1.0, beta=0.35, gamma=0.15, n=1.5, feedthrough=1.2, gain=18.0)
-    noise = 0.1 * np.random.default_rng(_SEED).standard_normal(u.size)
-    t = 0.1 * np.arange(float(u.size))
+    y = law.response(u) + 0.1 * np.random.default_rng(_SEED).standard_normal(u.size)
     units = {"t": "s", "u": "mm", "y": "kN"}
-    return hs.Record(t=t, u=u, y=law.response(u) + noise, units=units, name="steel damper, simulated")
+    return hs.Record(t=0.1 * np.arange(float(u.size)), u=u, y=y, units=units, name="steel damper, simulated")
 
 
 def _magnet() -> "hs.Record":
@@ -72,24 +69,20 @@ DEVICES = {
 """Devices that `--device` takes."""
 
 
-_SCRIPTS = {"bash": BashComplete, "zsh": ZshComplete, "fish": FishComplete}
 Kind = Annotated[str, options.one_of({name: device.what for name, device in DEVICES.items()})]
 
 
 def _notebook(path: Path) -> str:
     """Text of the notebook with the name of `path`, from a wheel or from a checkout."""
     package = Path(hs.__file__).parent
-    folder = next(
-        each for each in (package / "data" / "notebooks", package.parent / "docs" / "notebooks") if each.is_dir()
-    )
+    folder = next(filter(Path.is_dir, (package / "data" / "notebooks", package.parent / "docs" / "notebooks")))
     if not (source := folder / path.name).is_file():
-        raise ValueError(
-            f"the notebooks are {', '.join(sorted(each.name for each in folder.iterdir()))}, got {path.name}"
-        )
+        known = ", ".join(sorted(each.name for each in folder.iterdir()))
+        raise ValueError(f"the notebooks are {known}, got {path.name}")
     return source.read_text(encoding="utf-8")
 
 
-def example(path: Annotated[str, options.file("FILE")] | None = None, *, device: Kind = "piezo") -> None:
+def example(path: options.ResultFile | None = None, *, device: Kind = "piezo") -> None:
     """Write a file to try the other commands on, or a notebook.
 
     Write a record as a file like one of your own, or a notebook of Jupyter.
@@ -108,8 +101,8 @@ def example(path: Annotated[str, options.file("FILE")] | None = None, *, device:
     hysim example curves.mat --device magnet
     hysim example first_fit.ipynb
     """
-    out = f"{device}.csv" if path is None else path
-    if out != STANDARD and os.path.exists(out):
+    out = path or f"{device}.csv"
+    if out != options.STANDARD and os.path.exists(out):
         raise ValueError(f"{out} is there already: give another name, as in hysim example mine.csv")
     if out.endswith(".ipynb"):
         notebook = _notebook(Path(out))
@@ -119,8 +112,8 @@ def example(path: Annotated[str, options.file("FILE")] | None = None, *, device:
     columns = {name: values for name in "tuy" if (values := vars(record)[name]) is not None}
     content = outputs.table(out, columns, record.units, resolution=record.resolution, name=record.name)
     names = ", ".join(f"{name} [{record.units[name]}]" for name in columns)
-    text = f"{out}: {len(record)} samples of {names}: {what}. Try:\n" + "\n".join(f"  hysim {each}" for each in tries)
-    return outputs.write({out: lambda: content}, lambda: text.replace("{}", out))
+    lines = [f"{out}: {len(record)} samples of {names}: {what}. Try:", *(f"  hysim {each}" for each in tries)]
+    return outputs.write({out: lambda: content}, lambda: "\n".join(lines).replace("{}", out))
 
 
 def explore(*, out: options.Page | None = None, no_browser: bool = False) -> None:
@@ -176,23 +169,8 @@ def reproduce(
     if json:
         print((result.folder / "summary.json").read_text(encoding="utf-8"), end="")
     else:
-        print(*_lines(result.findings), f"report: {result.folder / 'report.html'}", sep="\n")
+        print(result)
     return all(fit.success for fit in result.findings.study.fits.values())
-
-
-def _lines(findings: Any) -> Iterator[str]:
-    study, claims, comparison = findings.study, findings.claims, findings.study.comparison
-    yield f"Table 1: {len(comparison.record)} points. {comparison.loop.to_text(comparison.record.units)}"
-    yield comparison.to_text()
-    for name, fit in study.fits.items():
-        for region, best in fit.regions.items():
-            yield f"{name}: the best {region} law fits {best.fit_percent:.2f} %"
-    yield f"sindy: {study.discovery.equation}  ({study.discovery.verdict})"
-    counts = Counter(claim.verdict for claim in claims)
-    yield f"{len(claims)} claims: " + ", ".join(f"{number} {verdict}" for verdict, number in counts.most_common())
-    for claim in claims:
-        if claim.id.startswith(("hysteresis-90", "vibration-97")):
-            yield f"{claim.id}: {claim.recomputed:.1f} % where the paper says {claim.printed:g} %, {claim.verdict}"
 
 
 def completion(shell: Literal["bash", "zsh", "fish"]) -> None:
@@ -212,7 +190,8 @@ def completion(shell: Literal["bash", "zsh", "fish"]) -> None:
     hysim completion bash
     hysim completion fish
     """
-    print(_SCRIPTS[shell](click.get_current_context().find_root().command, {}, "hysim", "_HYSIM_COMPLETE").source())
+    kind: Any = get_completion_class(shell)
+    print(kind(click.get_current_context().find_root().command, {}, "hysim", "_HYSIM_COMPLETE").source())
 
 
 def calls() -> dict[str, Callable[[], object]]:
@@ -242,19 +221,16 @@ def calls() -> dict[str, Callable[[], object]]:
             with suppress(ValueError, hs.SimulationError):  # of a law that has no inverse for this output
                 model.inverse_response(y, *time)
 
-    def oscillator(method: Any) -> None:
-        hs.BoucWenOscillator(mass=1.0, damping=0.1, stiffness=1.0, law=law, method=method).response(u, 0.1)
-
-    return {
-        **{name: partial(one, family) for name, family in hs.families().items()},
+    plant = partial(hs.BoucWenOscillator, mass=1.0, damping=0.1, stiffness=1.0, law=law)
+    every: dict[str, Callable[[], object]] = {name: partial(one, family) for name, family in hs.families().items()}
+    every |= {f"oscillator, {each}": partial(plant(method=each).response, u, 0.1) for each in METHODS}
+    every |= {
+        f"identify {name}": partial(hs.identify, each, record, max_evaluations=1) for name, each in candidates().items()
+    }
+    return every | {
         "responses": lambda: hs.BoucWen.responses({"n": [1.0, 1.5, 2.0]}, u),
-        **{f"oscillator, {each}": partial(oscillator, each) for each in METHODS},
         "frame": lambda: hs.simulate(frame, t, u),
         "closed loop": lambda: [hs.close_loop(stage, each, t, u) for each in (follow, learn)],
-        **{
-            f"identify {name}": partial(hs.identify, each, record, max_evaluations=1)
-            for name, each in candidates().items()
-        },
     }
 
 

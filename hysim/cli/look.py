@@ -10,15 +10,12 @@ from hysim.cli import models, options, outputs, records
 _MANY, _AMPLITUDES = 100, 50
 
 
-def columns(file: options.RecordIn, *, settings: records.TextOptions, json: bool = False) -> None:
+def columns(file: options.RecordIn, *, settings: records.TextOptions) -> options.Result:
     """List what a file holds.
 
     List the columns of a file, with units, numbers of samples and ranges.
 
     Their names and numbers are what --u, --y and --t take.
-
-    Parameters
-    ----------
 
     Examples
     --------
@@ -33,7 +30,7 @@ def columns(file: options.RecordIn, *, settings: records.TextOptions, json: bool
         for column in listed
     ]
     text = "\n".join(lines) or "the file holds no columns"
-    outputs.write({}, lambda: text, lambda: {"columns": [column._asdict() for column in listed]})
+    return options.Result({}, lambda: text, lambda: {"columns": [column._asdict() for column in listed]})
 
 
 def _content(column: Any) -> str:
@@ -53,10 +50,9 @@ def metrics(
     magnetic: bool = False,
     tolerance: float = 0.01,
     out: options.Copy | None = None,
-    csv: options.Result | None = None,
+    csv: options.ResultFile | None = None,
     plot: options.Picture | None = None,
-    json: bool = False,
-) -> None:
+) -> options.Result:
     """Measure the loop in a file of your own.
 
     Measure the loop of the input's last complete cycle, the average loop of the last few, or every cycle. The table of
@@ -87,35 +83,34 @@ def metrics(
     if csv is not None and cycles:
         raise ValueError("--csv writes the table of every cycle: give --cycles without a number too")
     record = records.read(settings, file)
-    files: dict[str | None, Any] = {plot: lambda: outputs.loop(record)}
+    limits: dict[str, Any] = {"cycles": cycles, "tolerance": tolerance}
+    files: dict[str | None, Any] = {plot: lambda: outputs.on_axes(hs.plot.loop, record)}
     measured: Any
     if forc:
         measured = hs.forc(record, tolerance=tolerance)
         document = outputs.scalars(measured) | {"peak": list(measured.peak), "ridge": measured.ridge.tolist()}
-        files[plot] = lambda: outputs.drawn(
-            lambda canvas: hs.plot.forc(measured, canvas.add_subplot(), units=record.units)
-        )
+        files[plot] = lambda: outputs.on_axes(hs.plot.forc, measured, units=record.units)
     elif magnetic:
-        measured = hs.magnetic_metrics(record.u, record.y, cycles=cycles, tolerance=tolerance)
+        measured = hs.magnetic_metrics(record.u, record.y, **limits)
         document = measured.to_dict() | {"closure": measured.closure}
     elif cycles:
-        measured = hs.loop_metrics(record.u, record.y, cycles=cycles, tolerance=tolerance)
+        measured = hs.loop_metrics(record.u, record.y, **limits)
         lobes = [lobe._asdict() for lobe in measured.lobes]
         document = outputs.scalars(measured) | {"crossings": list(measured.crossings), "lobes": lobes}
     else:
         measured = hs.cycle_metrics(record.u, record.y, tolerance=tolerance)
-        document = {"cycles": measured.rows(), "level": measured.level, "energy_outside": measured.energy_outside}
+        document = {"cycles": measured.rows(), **outputs.fields_of(measured, ("level", "energy_outside"))}
         files[csv] = lambda: measured.to_csv(record.units)
     document |= {} if forc or magnetic else {"sign_convention": measured.sign_convention}
     document |= {"units": record.units}
 
     def text() -> str:
         step = record.detect_resolution() if record.resolution is None else None
-        steps = f"the output has steps of {step and quantity(step, record.units.get('y', ''))}"
-        return str(measured.to_text(record.units)) + (f"\n{steps}: --resolution detect takes them" if step else "")
+        advice = step and f"the output has steps of {quantity(step, record.units.get('y', ''))}: --resolution detect"
+        return "\n".join([measured.to_text(record.units), *([f"{advice} takes them"] if advice else [])])
 
     files[out] = lambda: outputs.printed(text, lambda: document)
-    outputs.write(files, text, lambda: document)
+    return options.Result(files, text, lambda: document)
 
 
 Results = list[Any]
@@ -160,11 +155,10 @@ def _residual_map(canvas: Any, results: Results, _: dict[str, Any]) -> None:
 
 
 def _describing_function(canvas: Any, results: Results, laws: dict[str, Any]) -> None:
-    lowest, highest = float(results[0].u.min()), float(results[0].u.max())
-    middle, reach = 0.5 * (lowest + highest), 0.5 * (highest - lowest)
-    amplitudes = [reach * k / _AMPLITUDES for k in range(1, _AMPLITUDES + 1)]
+    low, high = float(results[0].u.min()), float(results[0].u.max())
+    amplitudes = [0.5 * (high - low) * k / _AMPLITUDES for k in range(1, _AMPLITUDES + 1)]
     axes = hs.plot.panels(canvas, 2)
-    hs.plot.describing_function(laws, amplitudes, axes, mean=middle, units=results[0].units)
+    hs.plot.describing_function(laws, amplitudes, axes, mean=0.5 * (low + high), units=results[0].units)
 
 
 KINDS = {
@@ -174,7 +168,7 @@ KINDS = {
     "cycles": Kind("each cycle in a colour, from the first, dark, to the last, light", _each("cycles")),
     "minor-loops": Kind("each cycle as a loop, the smaller the darker", _each("minor_loops")),
     "residual-map": Kind(
-        "measured minus model over input and cycles; one file, one model", _residual_map, records=(1, 1), models=(1, 1)
+        "measured minus model over input and cycles; one file, one model", _residual_map, (1, 1), (1, 1)
     ),
     "forc": Kind("density of relays, from first-order reversal curves; one file", _together("forc"), (1, 1), (0, 0)),
     "describing-function": Kind(
@@ -213,21 +207,18 @@ def plot(
         if not least <= len(paths) <= most:
             number = str(least) if least == most else f"at least {least}"
             raise ValueError(f"--kind {kind} takes {number} {name}, got {len(paths)}")
-    if [*files, *model].count(records.STANDARD) > 1:
-        raise ValueError("the standard input holds one record or one model, not both: give files for the others")
     measured = [records.read(settings, path) for path in files]
-    read = {models.name_of(path): models.read(path) for path in model}
-    laws = {name if len(read) > 1 else type(law).__name__: law for name, (law, _) in read.items()}
-    units = [{**measured[0].units, **own} for _, own in read.values()]
-    runs = [
-        replace(models.simulated(law, measured[0], labels), name=name)
-        for (name, law), labels in zip(laws.items(), units, strict=True)
-    ]
+    laws, runs = {}, []
+    for path in model:
+        law, units = models.read(path)
+        name = models.name_of(path) if len(model) > 1 else type(law).__name__
+        laws[name] = law
+        runs.append(replace(models.simulated(law, measured[0], {**measured[0].units, **units}), name=name))
     outputs.write({out: lambda: outputs.drawn(lambda canvas: chosen.draw(canvas, [*measured, *runs], laws))})
 
 
 def measure(
-    frames: Annotated[str, options.file("FRAMES", options.INPUT)],
+    frames: Annotated[str, options.Value("FRAMES", role=options.INPUT)],
     *,
     scale: float,
     unit: str = "um",
@@ -242,8 +233,7 @@ def measure(
     on_lost: Literal["error", "drop"] = "error",
     out: options.Table,
     plot: options.Picture | None = None,
-    json: bool = False,
-) -> None:
+) -> options.Result:
     """Measure the displacement in camera frames.
 
     Measure the displacement of the picture in each frame, to a fraction of a pixel, and write it as columns.
@@ -290,25 +280,9 @@ def measure(
         frames, scale, region=region, direction=direction, reference=reference, method=method, unit=unit
     )
     times = None if frame_rate is None else np.arange(len(motion)) / frame_rate
-    table, units = _table(motion, log, times, on_lost)
-
-    files: outputs.Files = {
+    table, units = motion.columns(log, times, on_lost)
+    files: options.Files = {
         out: lambda: outputs.table(out, table, units),
-        plot: lambda: outputs.drawn(lambda canvas: hs.plot.displacement(motion, ax=canvas.add_subplot())),
+        plot: lambda: outputs.on_axes(hs.plot.displacement, motion),
     }
-    outputs.write(files, motion.summary, motion.figures)
-
-
-def _table(motion: Any, log: "hs.Record | None", times: Any, on_lost: Any) -> tuple[dict[str, Any], dict[str, str]]:
-    import numpy as np
-
-    units, is_kept = {"t": "s", "y": motion.units["y"], "uncertainty": motion.units["y"]}, np.full(len(motion), True)
-    columns = {"t": times, "y": motion.y}
-    if log is not None:
-        at = {"t": log.t} if times is None else {"frame_times": times, "u_times": log.t}
-        labels = {signal: unit for signal, unit in log.units.items() if signal != "y"}
-        record = motion.record(log.u, **at, on_lost=on_lost, units=labels)
-        columns, is_kept = {"t": record.t, "u": record.u, "y": record.y}, np.isfinite(motion.y)
-        units |= dict(record.units)
-    columns |= {"uncertainty": motion.uncertainty[is_kept], "quality": motion.quality[is_kept]}
-    return {name: values for name, values in columns.items() if values is not None}, units
+    return options.Result(files, motion.summary, motion.figures)

@@ -13,21 +13,21 @@ from typing import Annotated, Any, Literal, Protocol, runtime_checkable
 import hysim as hs
 from hysim._names import MODULE_OF
 from hysim.cli import options
-from hysim.cli.records import STANDARD
-from hysim.cli.words import flag, suggestion
 
 _PLANTS = ("oscillator", "actuator")
-_OPTIONS = {"elements": "plays", "intervals": "relay_intervals"}
+_OPTIONS = {
+    "elements": "plays", "intervals": "relay_intervals", "hysteresis": "law", "amplifier": "first_order_amplifier",
+}  # fmt: skip
 """Arguments of a structure whose option has another name, and that name."""
-
-_NEEDED = ("poles", "zeros", "degree")
 
 
 @runtime_checkable
 class _Structured(Protocol):
-    """A family that `identify` takes through a structure."""
-
     structure: Any
+
+
+_NEEDED = ("poles", "zeros", "degree")
+_OF_ACTUATOR: dict[str, Any] = {"hysteresis": "bouc-wen", "creep": False, "delay": False}
 
 
 def names() -> list[str]:
@@ -72,28 +72,6 @@ Law = Annotated[str, options.Value("MODEL", offers=_offered)]
 
 
 @dataclass(kw_only=True)
-class ActuatorOptions:
-    """Options of the model actuator.
-
-    actuator: the model actuator, from records of several rates
-    ------
-    law : law of the actuator, as --model (default: bouc-wen)
-    modes : number of resonances, 0 to 3 (default: 1)
-    creep : creep that grows by so many percent a decade
-    creep_elements : creep of so many log-spaced elements
-    delay : a dead time
-    first_order_amplifier : a time constant before the law
-    """
-
-    law: Law | None = None
-    modes: int | None = None
-    creep: bool = False
-    creep_elements: int | None = None
-    delay: bool = False
-    first_order_amplifier: bool = False
-
-
-@dataclass(kw_only=True)
 class StructureOptions:
     """Options of the structure of other models.
 
@@ -121,6 +99,15 @@ class StructureOptions:
     oversampling : steps of the simulation between two samples
     period : samples of a period, with --initial periodic
     excitation : whether the input is a force, or the acceleration of the base
+
+    actuator: the model actuator, from records of several rates
+    ------
+    law : law of the actuator, as --model (default: bouc-wen)
+    modes : number of resonances, 0 to 3 (default: 1)
+    creep : creep that grows by so many percent a decade
+    creep_elements : creep of so many log-spaced elements
+    delay : a dead time
+    first_order_amplifier : a time constant before the law
     """
 
     plays: options.Count | None = None
@@ -135,10 +122,16 @@ class StructureOptions:
     oversampling: int | None = None
     period: int | None = None
     excitation: Literal["force", "base"] | None = None
+    law: Law | None = None
+    modes: int | None = None
+    creep: bool = False
+    creep_elements: int | None = None
+    delay: bool = False
+    first_order_amplifier: bool = False
 
 
 @dataclass(kw_only=True)
-class FitOptions(StructureOptions, ActuatorOptions):
+class FitOptions(StructureOptions):
     """Options of a model to identify.
 
     Parameters
@@ -217,7 +210,7 @@ class DesignOptions:
     max_voltage_noise: float | None = None
     vary_mode: options.Percent | None = None
     preview: bool = False
-    reference: Annotated[str, options.file("triangle|step|FILE", options.INPUT)] = "triangle"
+    reference: Annotated[str, options.Value("triangle|step|FILE", role=options.INPUT)] = "triangle"
     range: options.Pair | None = None
     frequency: options.Positive | None = None
     step: float | None = None
@@ -237,19 +230,20 @@ def family(name: str) -> Any:
         return family_named("BoucWenOscillator" if name == "oscillator" else name)
     except ValueError:
         known = names_to_identify()
-        near = suggestion(name, known) or f"give one of {', '.join(known)}"
+        near = options.suggestion(name, known) or f"give one of {', '.join(known)}"
         words = f"there is no model {name!r}: {near} (models of your own: MODEL.json or module:name)"
         raise ValueError(words) from None
 
 
 def resolved(path: str) -> Any:
     """The object at an import path, `module:name`, the current folder included; ValueError if it is not found."""
-    if os.getcwd() not in sys.path:
-        sys.path.insert(0, os.getcwd())  # as `python -m hysim` has it
+    folder = os.getcwd()
+    if folder not in sys.path:
+        sys.path.insert(0, folder)  # as `python -m hysim` has it
     try:
         return pkgutil.resolve_name(path)
     except (ModuleNotFoundError, AttributeError) as error:
-        places = f"modules are looked for in {os.getcwd()} and among the installed packages"
+        places = f"modules are looked for in {folder} and among the installed packages"
         raise ValueError(f"{path} is not there: {error}; {places}") from None
 
 
@@ -280,12 +274,13 @@ def model_or_family(text: str) -> Any:
 
 
 def to_identify(chosen: FitOptions) -> Any:
-    """The argument of `identify`; `initial` becomes None where the structure takes it. ValueError on a wrong option."""
-    name, of_actuator, used = chosen.model, _used(chosen, ActuatorOptions), _used(chosen, StructureOptions)
-    if name == "actuator":
-        _refuse(used, name)
-        return _actuator(chosen)
-    _refuse(of_actuator, name)
+    """The argument of `identify`, None without --model; `initial` becomes None where the structure takes it."""
+    name: str | None = chosen.model
+    used = {each.name: value for each in fields(StructureOptions) if (value := vars(chosen)[each.name]) != each.default}
+    if name is None:
+        for each in used:
+            raise ValueError(f"{options.flag(each)} is an option of one model: give --model, too")
+        return None
     model = model_or_family(name)
     kind = model if isinstance(model, type) else type(model)
     is_oscillator = kind.__name__ == "BoucWenOscillator"
@@ -293,47 +288,29 @@ def to_identify(chosen: FitOptions) -> Any:
         used = {"excitation": model.excitation, "hold": model.hold} | used
         model = kind
     taken = _arguments(model)
-    if foreign := [each for each in used if each not in taken]:
-        others = [each for each in names_to_identify() if foreign[0] in _arguments(family(each))]
-        _refuse(foreign, f"{name}, but of {', '.join(others)}")
-    if missing := [each for each in _NEEDED if each in taken and each not in used]:
-        raise ValueError(f"the model {name} needs {flag(missing[0])}")
+    for each in used:
+        if each not in taken:
+            others = [other for other in names_to_identify() if each in _arguments(family(other))]
+            raise ValueError(f"{options.flag(each)} is no option of the model {name}, but of {', '.join(others)}")
+    for each in _NEEDED:
+        if each in taken and each not in used:
+            raise ValueError(f"the model {name} needs {options.flag(each)}")
     structure = {taken[each]: value for each, value in used.items()}
     if is_oscillator and chosen.initial is not None:
         structure["initial"], chosen.initial = chosen.initial, None  # its structure says how the record begins
+    if model is hs.Actuator:
+        structure = _OF_ACTUATOR | structure
+        structure["hysteresis"] = model_or_family(structure["hysteresis"])
+        structure["amplifier"] = "first-order" if chosen.first_order_amplifier else None
     return model.structure(**structure) if structure or is_oscillator else model
-
-
-def _used(chosen: FitOptions, group: type[StructureOptions | ActuatorOptions]) -> dict[str, Any]:
-    return {each.name: value for each in fields(group) if (value := vars(chosen)[each.name]) != each.default}
-
-
-def refuse_without_model(chosen: FitOptions) -> None:
-    """Refuse options of a model's structure where no model is given."""
-    for each in (*_used(chosen, ActuatorOptions), *_used(chosen, StructureOptions)):
-        raise ValueError(f"{flag(each)} is an option of one model: give --model, too")
-
-
-def _refuse(foreign: Iterable[str], name: str) -> None:
-    for each in foreign:
-        raise ValueError(f"{flag(each)} is no option of the model {name}")
 
 
 def _arguments(model: Any) -> dict[str, str]:
     """Arguments of a family's structure, if it has one, by the options that stand for them."""
     if not (isinstance(model, type) and isinstance(model, _Structured)):
         return {}
-    return {_OPTIONS.get(name, name): name for name in inspect.signature(model.structure).parameters}
-
-
-def _actuator(chosen: ActuatorOptions) -> Any:
-    return hs.Actuator.structure(
-        model_or_family(chosen.law or "bouc-wen"),
-        creep=chosen.creep if chosen.creep_elements is None else chosen.creep_elements,
-        modes=1 if chosen.modes is None else chosen.modes,
-        delay=chosen.delay,
-        amplifier="first-order" if chosen.first_order_amplifier else None,
-    )
+    own = {_OPTIONS.get(name, name): name for name in inspect.signature(model.structure).parameters}
+    return own | ({"creep_elements": "creep"} if model is hs.Actuator else {})
 
 
 def read(path: str) -> tuple[Any, dict[str, str]]:
@@ -346,7 +323,7 @@ def read(path: str) -> tuple[Any, dict[str, str]]:
             return (law() if isinstance(law, type) else law), {}
         except TypeError as error:
             raise ValueError(f"{path} needs values for its parameters: give an instance ({error})") from None
-    if path == STANDARD:
+    if path == options.STANDARD:
         return from_json(sys.stdin.read(), "the standard input")
     if not Path(path).exists() and path in names_to_identify():
         raise ValueError(f"{path} is a family without numbers: write a model of it by hysim identify --out {path}.json")

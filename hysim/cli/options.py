@@ -31,15 +31,35 @@ from typing import Annotated, Any, Literal, NamedTuple, TypeVar
 import click
 from click.shell_completion import CompletionItem
 
-from hysim.cli.words import flag, suggestion
+from hysim._names import nearest
 
 T = TypeVar("T")
-Command = Callable[..., bool | None]
-"""A function behind a command: false if a result was not reached, as a search that did not converge."""
+Files = Mapping[str | None, Callable[[], Any]]
+"""Functions of the contents of files, which are texts, bytes or figures, by the paths; None stands for no file."""
+
+
+class Result(NamedTuple):
+    """What a command with ``--json`` writes, what it prints as a text and as JSON, and whether a search converged.
+
+    Where it has to be called again, `unfinished` says what remains.
+    """
+
+    files: Files
+    text: Callable[[], str]
+    document: Callable[[], Mapping[str, Any]]
+    reached: bool = True
+    unfinished: str = ""
+
+
+Command = Callable[..., Result | bool | None]
+"""A function behind a command: false if a result was not reached."""
 
 INPUT, RESULT, PRINTED, PICTURE = "input", "result", "printed result", "picture"
 TABLE, MODEL, SOURCE = "table", "model", "source"
 """Roles of files: read, written, written with what is printed too, drawn; columns, models and C code as written."""
+
+STANDARD = "-"
+"""Stands for the standard input or output."""
 
 _FORMS = {
     PICTURE: "; written as SVG, PNG or PDF by its ending; - writes SVG to the standard output",
@@ -52,6 +72,24 @@ _HELP = {
     "quiet": "report no progress of long calls on standard error",
 }
 """Help of options whose docstring says nothing about them."""
+
+
+OTHER_NAMES = {
+    "acceleration": "u", "channels": "channel", "elements": "plays", "fixed": "fix", "priors": "prior",
+    "units": "unit",
+}  # fmt: skip
+"""Arguments whose option has another name, and that name."""
+
+
+def flag(name: str) -> str:
+    """The option for an argument, such as ``--sample-time``."""
+    return f"--{OTHER_NAMES.get(name, name).rstrip('_').replace('_', '-')}"
+
+
+def suggestion(word: str, known: Iterable[str]) -> str:
+    """``did you mean NAME?`` for the nearest of some names, an empty text if no name is similar."""
+    near = nearest(word.partition("=")[0], known)
+    return "" if near is None else f"did you mean {near}?"
 
 
 @dataclass(frozen=True)
@@ -100,18 +138,18 @@ class Parameter(NamedTuple):
 def parameters(function: Command) -> Iterator[Parameter]:
     """Arguments and options of a command, in the order of its docstrings."""
     yield from _declared(function, documented(function))
-    quiet = inspect.Parameter("quiet", inspect.Parameter.KEYWORD_ONLY, default=False, annotation=bool)
-    yield _parameter(quiet, "Options", "")
+    has_json = typing.get_type_hints(function).get("return") is Result
+    for name in ("json", "quiet") if has_json else ("quiet",):
+        own = inspect.Parameter(name, inspect.Parameter.KEYWORD_ONLY, default=False, annotation=bool)
+        yield _parameter(own, "Options", "")
 
 
-def call(function: Command, values: Mapping[str, Any]) -> bool | None:
-    arguments = {}
+def call(function: Command, values: Mapping[str, Any]) -> Result | bool | None:
+    arguments = {name: values.get(name) for name in inspect.signature(function).parameters}
     for name, hint in typing.get_type_hints(function).items():
         if dataclasses.is_dataclass(hint):
             build: Any = hint
             arguments[name] = build(**{field.name: values[field.name] for field in dataclasses.fields(hint)})
-        elif name != "return":
-            arguments[name] = values[name]
     return function(**arguments)
 
 
@@ -151,16 +189,16 @@ def _declared(subject: Any, texts: Mapping[str, tuple[str, str]]) -> Iterator[Pa
 
 def _parameter(own: inspect.Parameter, title: str, text: str) -> Parameter:
     hint, several = _of_one(own.annotation)
-    value, is_multiple, is_argument = _value(hint), several is not None, own.kind is not inspect.Parameter.KEYWORD_ONLY
+    value, is_multiple, is_needed = _value(hint), several is not None, own.default is own.empty
     text = (text or value.help or _HELP.get(own.name, "")) + _FORMS.get(value.role, "")
-    settings: dict[str, Any] = {"type": value.convert, "shell_complete": value.complete, "metavar": value.name}
-    settings["required"] = own.default is own.empty
+    settings: dict[str, Any] = {"type": value.convert, "shell_complete": value.complete, "required": is_needed}
     if own.default not in (own.empty, None, ()):
-        settings |= {"default": own.default, "show_default": not is_argument}
-    if is_argument:
-        form = value.name if settings["required"] else f"[{value.name}]{'...' * is_multiple}"
-        settings |= {"metavar": form, "nargs": -1 if is_multiple else 1}
-        return Parameter(click.Argument([own.name], **settings), value, text, "Arguments")
+        settings["default"] = own.default
+    if own.kind is not own.KEYWORD_ONLY:
+        form = value.name if is_needed else f"[{value.name}]{'...' * is_multiple}"
+        argument = click.Argument([own.name], metavar=form, nargs=-1 if is_multiple else 1, **settings)
+        return Parameter(argument, value, text, "Arguments")
+    settings |= {"metavar": value.name, "show_default": "default" in settings}
     if hint is bool:
         settings = {"is_flag": True}
     elif value.bare is not None:
@@ -262,10 +300,6 @@ def _terms(text: str) -> str | list[str]:
     return names if len(names) > 1 or "'" in text else text
 
 
-def file(name: str, role: str = RESULT, help_: str = "") -> Value:
-    return Value(name, role=role, help=help_)
-
-
 _PLAIN = {
     str: Value("TEXT"),
     bool: Value(""),
@@ -301,17 +335,15 @@ Cycles = Annotated[int, Value("CYCLES", lambda text: 0 if text == "all" else at_
 Folds = Annotated[str | int, either("loo|cycles|K", at_least(0), "loo, cycles or a number of blocks")]
 Blocks = Annotated[str | int, either("loo|K", at_least(2), "loo or a number of blocks from 2 on")]
 Angle = Annotated[float | Literal["x", "y"], either("x|y|DEGREES", float, "x, y or an angle in degrees")]
-Frame = Annotated[
-    int | Literal["first", "running"], either("first|running|N", at_least(0), "first, running or a number")
-]
+Frame = Annotated[Any, either("first|running|N", at_least(0), "first, running or a number")]
 YesNo = Annotated[bool, Value("[yes|no]", ("no", "yes").index, "yes or no", offers=lambda: ("yes", "no"))]
 Terms = Annotated[str | list[str], Value("NAME|TERMS", _terms)]
-RecordIn = Annotated[str, file("FILE", INPUT, _RECORD)]
-ModelIn = Annotated[str, file("MODEL", INPUT, _MODEL)]
-Result = Annotated[str, file("FILE")]
-Copy = Annotated[str, file("FILE", PRINTED)]
-Picture = Annotated[str, file("PICTURE.svg", PICTURE)]
-Table = Annotated[str, file("TABLE.csv", TABLE)]
-ModelOut = Annotated[str, file("MODEL.json", MODEL)]
-Page = Annotated[str, file("PAGE.html")]
-Source = Annotated[str, file("MODEL.c", SOURCE)]
+RecordIn = Annotated[str, Value("FILE", role=INPUT, help=_RECORD)]
+ModelIn = Annotated[str, Value("MODEL", role=INPUT, help=_MODEL)]
+ResultFile = Annotated[str, Value("FILE", role=RESULT)]
+Copy = Annotated[str, Value("FILE", role=PRINTED)]
+Picture = Annotated[str, Value("PICTURE.svg", role=PICTURE)]
+Table = Annotated[str, Value("TABLE.csv", role=TABLE)]
+ModelOut = Annotated[str, Value("MODEL.json", role=MODEL)]
+Page = Annotated[str, Value("PAGE.html", role=RESULT)]
+Source = Annotated[str, Value("MODEL.c", role=SOURCE)]

@@ -4,16 +4,14 @@ import io
 import os
 import sys
 from collections.abc import Callable, Iterable
-from contextlib import nullcontext
+from contextlib import nullcontext, suppress
 from dataclasses import dataclass, replace
 from typing import Any, Literal
 
 import hysim as hs
 from hysim._basics.prefixes import power_of_ten
 from hysim.cli import options
-
-STANDARD = "-"
-"""Stands for the standard input or output."""
+from hysim.cli.options import STANDARD
 
 _ROUNDING = 1e-9  # of the record's time: 0.3 s is found among times that were added up
 _OF_NODES, _OF_ELEMENTS = (("displacement", "velocity", "acceleration"), ("drift", "force"))
@@ -133,17 +131,17 @@ def read(settings: InputOptions, path: str, source: Source | None = None, *, unc
     source, step = source or source_of(path), settings.sample_time
     u = "u" if settings.u is None else settings.u
     if not isinstance(settings, RecordOptions):
-        record = _loaded(settings, path, source(), u, u)
+        record = _loaded(settings, path, source(), u=u, y=u)
     elif settings.y_file is not None:
         other = source_of(settings.y_file)  # the only column of either file need not be named
-        u = _only_column(settings, source(), "u") if settings.u is None else settings.u
+        u = _only_column(settings, source(), "u") if settings.u is None else u
         y = _only_column(settings, other(), "y") if settings.y is None else settings.y
-        drive = _loaded(settings, path, source(), u, u, resolution=None)
-        record = hs.join_records(drive, _loaded(settings, settings.y_file, other(), y, y))
+        drive = _loaded(settings, path, source(), u=u, y=u, resolution=None)
+        record = hs.join_records(drive, _loaded(settings, settings.y_file, other(), u=y, y=y))
     elif u == ("y" if settings.y is None else settings.y):
         raise ValueError(f"the input and the output are both the column {u}: name them by --u and --y")
     else:
-        record = _loaded(settings, path, source(), settings.u, settings.y)
+        record = _loaded(settings, path, source())
     if step is not None and record.t is None:
         record, step = replace(record, t=step * np.arange(float(len(record)))), None
     record = record if uncut else cut(record, settings)
@@ -152,20 +150,17 @@ def read(settings: InputOptions, path: str, source: Source | None = None, *, unc
 
 def read_input(settings: InputOptions, path: str, *, of_the_ground: bool) -> "hs.Record":
     """The input as a record with y = u; a ground motion [m/s^2] from AT2, or `of_the_ground` from a file without u."""
-    from hysim.files import column_names, is_at2
+    from hysim.files import is_at2
 
-    source = source_of(path)
+    source, may_be_motion = source_of(path), of_the_ground and settings.u is None and not settings.no_t
     if is_at2(source(), settings.encoding):
         if settings.u is not None or settings.t is not None or settings.no_t:
             raise ValueError(f"{path} is an AT2 file, which has no columns: leave out --u, --t and --no-t")
         return cut(_ground_motion(settings, source), settings)
-    if of_the_ground and settings.u is None and not settings.no_t:
-        try:
-            names = column_names(source(), **options.taken(hs.list_columns, settings))
-        except ValueError:
-            names = ()  # a list, or a fault that is named where the file is read
-        if "u" not in names:
-            return cut(_ground_motion(settings, source), settings)
+    with suppress(ValueError):  # a list, or a fault that is named where the file is read
+        may_be_motion = may_be_motion and "u" not in _columns(settings, source())
+    if may_be_motion:
+        return cut(_ground_motion(settings, source), settings)
     if settings.u is None:
         settings.u = _only_column(settings, source(), "u")
     return read(settings, path, source)
@@ -189,19 +184,17 @@ def cut(record: "hs.Record", settings: InputOptions) -> "hs.Record":
     if n < 2:
         t, unit = record.t, record.units.get("t", "")
         extent = "" if t is None else f" between {t[0]:g} and {t[-1]:g} {unit}".rstrip()
-        options_used = "--from, --to and --every"
-        raise ValueError(f"{n} of {len(record)} samples{extent} remain by {options_used}: a record needs at least 2")
+        remaining = f"{n} of {len(record)} samples{extent} remain by --from, --to and --every"
+        raise ValueError(f"{remaining}: a record needs at least 2")
     return record if part == slice(None) else record[part]
 
 
 def _sample(record: "hs.Record", place: options.Place | None, option: str) -> int | None:
     import numpy as np
 
-    if place is None:
-        return None
+    if place is None or not place[1]:
+        return None if place is None else int(place[0])
     value, unit = place
-    if not unit:
-        return int(value)
     if record.t is None:
         raise ValueError(f"{option} {value:g}{unit} needs a time: name its column by --t, or give a number")
     seconds: Any = 10.0 ** power_of_ten(unit, record.units.get("t", "s"))
@@ -248,22 +241,21 @@ def _ground_motion(settings: InputOptions, source: Source) -> "hs.Record":
     return motion if step is None else motion.resample(step)
 
 
-def _loaded(settings: InputOptions, path: str, source: Any, u: Any, y: Any, **changed: Any) -> "hs.Record":
-    time = False if settings.no_t else settings.t
-    own = {"u": u, "y": y, "t": time, "name": "record" if path == STANDARD else None, **changed}
+def _loaded(settings: InputOptions, path: str, source: Any, **changed: Any) -> "hs.Record":
+    own = {"t": False if settings.no_t else settings.t, "name": "record" if path == STANDARD else None, **changed}
     record: hs.Record = hs.load(source, **options.taken(hs.load, settings) | own)
     return record
 
 
-def _only_column(settings: InputOptions, source: Any, name: str) -> str:
-    """This name, or that of the only column apart from the time; a ValueError if there are several others."""
+def _columns(settings: InputOptions, source: Any) -> tuple[str, ...]:
     from hysim.files import column_names
 
-    others = [
-        each
-        for each in column_names(source, **options.taken(hs.list_columns, settings))
-        if each not in ("t", settings.t)
-    ]
+    return column_names(source, **options.taken(hs.list_columns, settings))
+
+
+def _only_column(settings: InputOptions, source: Any, name: str) -> str:
+    """This name, or that of the only column apart from the time; a ValueError if there are several others."""
+    others = [each for each in _columns(settings, source) if each not in ("t", settings.t)]
     if name in others or not others:
         return name
     if len(others) > 1:

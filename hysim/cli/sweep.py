@@ -12,24 +12,22 @@ import pkgutil
 import re
 import sys
 import tomllib
-from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Callable, Mapping
+from contextlib import AbstractContextManager, nullcontext
 from pathlib import Path
-from typing import Annotated, Any, Literal, NamedTuple
+from typing import Annotated, Any, Literal
 
 import hysim as hs
 from hysim._basics.libraries import optional
 from hysim.cli import models, options, outputs
-from hysim.cli.records import STANDARD
 
-NOT_FINISHED = 3
 _SPACES = ("grid", "list", "sample")
 
 
 def sweep(
-    study: Annotated[str, options.file("STUDY.toml", options.INPUT)] | None = None,
+    study: Annotated[str, options.Value("STUDY.toml", role=options.INPUT)] | None = None,
     *,
-    out: Annotated[str, options.file("RESULTS.sqlite")] | None = None,
+    out: Annotated[str, options.Value("RESULTS.sqlite", role=options.RESULT)] | None = None,
     resume: bool = False,
     on_change: Literal["error", "keep", "restart"] = "error",
     processes: bool = False,
@@ -38,12 +36,11 @@ def sweep(
     shard: str | None = None,
     merge: bool = False,
     time_limit: float | None = None,
-    show: Annotated[str, options.file("DATABASE", options.INPUT)] | None = None,
-    csv: options.Result | None = None,
+    show: Annotated[str, options.Value("DATABASE", role=options.INPUT)] | None = None,
+    csv: options.ResultFile | None = None,
     plot: options.Picture | None = None,
     of: str | None = None,
-    json: bool = False,
-) -> bool | int:
+) -> options.Result:
     """Compute a study over many parameters, or continue one.
 
     Compute a task for many sets of parameters, as a TOML file says, and keep every finished row in a database.
@@ -87,8 +84,9 @@ def sweep(
     hysim sweep --show rows.sqlite
     """
     options.exclusive(processes=processes, dask=dask)
-    options.exclusive(shard=shard, merge=merge)
-    if out == STANDARD:
+    options.exclusive(shard=shard, merge=merge, show=show)
+    share = _share(shard) if shard else None
+    if out == options.STANDARD:
         raise ValueError("the rows are kept in a database: give --out a file")
     if show is not None:
         if study or out:
@@ -99,7 +97,6 @@ def sweep(
             raise ValueError("give a study, such as study.toml, and --out RESULTS.sqlite, or --show RESULTS.sqlite")
         if not out:
             raise ValueError(f"the rows are kept in a database: give --out {Path(study).stem}.sqlite")
-        share = _share(shard) if shard else None
         if Path(out).exists() and not (resume or share or merge):
             raise ValueError(f"{out} exists: continue it with --resume, or give another --out")
         stores, out = (_stores(out) if merge else []), (_store(out, *share) if share else out)
@@ -119,16 +116,13 @@ def sweep(
                 seed=seed,
                 on_change=on_change,
             )
-    pictures: outputs.Files = {csv: result.to_csv, plot: lambda: _picture(result, of)}
-    outputs.write(pictures, result.summary, lambda: _document(result))
-    if show is not None:
-        return True
     k, n = share or (0, 1)
-    remaining = set(range(k * result.n_tasks // n, (k + 1) * result.n_tasks // n)).difference(result.task.tolist())
-    if remaining:
-        print(f"hysim: not finished: {len(remaining)} tasks remain, the first is {min(remaining)}", file=sys.stderr)
-        return NOT_FINISHED
-    return not result.errors
+    own = range(k * result.n_tasks // n, (k + 1) * result.n_tasks // n) if show is None else ()
+    missing = set(own).difference(result.task.tolist())
+    contents: options.Files = {csv: result.to_csv, plot: lambda: _picture(result, of)}
+    reached = show is not None or not result.errors
+    unfinished = f"{len(missing)} tasks remain, the first is {min(missing)}" if missing else ""
+    return options.Result(contents, result.summary, lambda: _document(result), reached, unfinished)
 
 
 # Number of a job in an array, the first number, the step and the number of jobs.
@@ -167,40 +161,28 @@ def _stores(out: str) -> list[str]:
     return stores
 
 
-@contextmanager
-def _executor(dask: str | None, processes: bool) -> Iterator[Any]:
+def _executor(dask: str | None, processes: bool) -> AbstractContextManager[Any]:
     if not dask:
-        yield "processes" if processes else "threads"
-        return
-    client_class = optional("distributed", "--dask", "dask", ValueError).Client
-    with client_class(scheduler_file=dask) if Path(dask).is_file() else client_class(dask) as client:
-        yield client
+        return nullcontext("processes" if processes else "threads")
+    client: Any = optional("distributed", "--dask", "dask", ValueError).Client
+    return client(scheduler_file=dask) if Path(dask).is_file() else client(dask)  # type: ignore[no-any-return]
 
 
 def _document(result: "hs.Sweep") -> dict[str, Any]:
     errors = {str(place): message for place, message in result.errors.items()}
-    done = {"n_tasks": result.n_tasks, "n_done": len(result), "parameters": list(result.parameters)}
-    return done | {"errors": errors, "outputs": result.ranges}
+    numbers = {"n_tasks": result.n_tasks, "n_done": len(result)}
+    return numbers | {"parameters": list(result.parameters), "errors": errors, "outputs": result.ranges}
 
 
 def _picture(result: "hs.Sweep", output: str | None) -> Any:
     name = output or next(iter(result.outputs), None)
     if name is None or name not in result.outputs:
         raise ValueError(f"no output {name!r} to draw: there are {', '.join(result.outputs) or 'no outputs'}")
-    return outputs.drawn(lambda canvas: hs.plot.parallel_coordinates(result, name, ax=canvas.add_subplot()))
+    return outputs.on_axes(hs.plot.parallel_coordinates, result, name)
 
 
-class Study(NamedTuple):
-    """Arguments of `sweep`, and the files that were read for them."""
-
-    task: Callable[..., Any]
-    space: Any
-    seed: int
-    files: tuple[str, ...]
-
-
-def read(path: str) -> Study:
-    """The study in a file; a ValueError that names the file if it is no study, an OSError if it cannot be read."""
+def read(path: str) -> tuple[Callable[..., Any], Any, int, list[str]]:
+    """Task, parameters, seed and files of a study; ValueError if the file is no study, OSError if it cannot be read."""
     try:
         document = tomllib.loads(Path(path).read_text(encoding="utf-8"))
         _check(document, {"seed", "task", "response", *_SPACES}, "a study")
@@ -208,11 +190,10 @@ def read(path: str) -> Study:
         folder, content = Path(path).resolve().parent, document[source]
         task = _function(content, folder) if source == "task" else _response(content, folder)
         names = [content.rpartition(":")[0]] if source == "task" else [content["law"], content["record"]]
-        files = tuple(str(folder / name) for name in names)
-        return Study(task, _space(space, document[space]), document.get("seed", 0), files)
+        files = [str(folder / name) for name in names]
+        return task, _space(space, document[space]), document.get("seed", 0), files
     except (ValueError, TypeError, KeyError, AttributeError, ImportError) as error:
-        message = f"{error} is missing" if isinstance(error, KeyError) else str(error)
-        raise ValueError(f"{path}: {message}") from error
+        raise ValueError(f"{path}: {error}{' is missing' * isinstance(error, KeyError)}") from error
 
 
 class FileTask:
@@ -249,10 +230,8 @@ def _response(table: Mapping[str, Any], folder: Path) -> Any:
     if not is_file and models.is_import_path(name):
         raise ValueError(f"law takes a family or a file, got {name!r}: a law of your own is code, which a task can use")
     law = hs.load_model(folder / name) if is_file else models.family(name)
-    if table["record"] == "table1":
-        record = hs.datasets.table1()
-    else:
-        record = hs.load(folder / table["record"], u=table.get("u"), y=table.get("y"))
+    is_own = table["record"] != "table1"
+    record = hs.load(folder / table["record"], u=table.get("u"), y=table.get("y")) if is_own else hs.datasets.table1()
     measure = table.get("measure", "rmse")
     return hs.response_task(law, record.u, record.y if measure in ("rmse", "sse") else None, measure)
 

@@ -45,7 +45,6 @@ def simulate(
     """
     from hysim.simulation import column_units
 
-    _one_standard_input(model, file)
     if file.endswith(".json") and model.endswith((".csv", ".tsv", ".txt", ".npz", ".mat", ".h5")):
         raise ValueError(f"the model stands before the record: hysim simulate {file} {model}")
     law, units = models.read(model)
@@ -61,7 +60,7 @@ def simulate(
 
     files: dict[str | None, Any] = {plot: lambda: outputs.picture_of(simulation)}
     if out is not None or not json:
-        path = out or records.STANDARD
+        path = out or options.STANDARD
         files[path] = lambda: outputs.table(path, columns, labels)
     outputs.write(files, (lambda: "") if json else None, document)
 
@@ -73,8 +72,7 @@ def control(
     out: options.ModelOut | None = None,
     c: options.Source | None = None,
     plot: options.Picture | None = None,
-    json: bool = False,
-) -> bool:
+) -> options.Result:
     """Design a controller for a model, and print what it achieves.
 
     Tune a sampled controller on a model's simulated loop, and measure what it achieves.
@@ -94,21 +92,20 @@ def control(
     hysim control law.json --limits 0,100 --sample-time 1e-4 --controller inverse --c stage.c
     """
     from hysim.cli import designs
-    from hysim.models.storage import to_json
 
     def code(controller: Any) -> Any:
         return None if c is None else hs.to_c(controller, settings.sample_time, name=Path(c).stem)
 
     design = designs.designed(model, settings, code)
     written = code(design.controller)
-    files: outputs.Files = {
-        out: lambda: to_json(design.controller, units=design.units),
+    files: options.Files = {
+        out: lambda: outputs.model(design.controller, design.triangle.closed.units),
         c: lambda: written.source,
         c and str(Path(c).with_suffix(".h")): lambda: written.header,
         plot: lambda: designs.picture(design),
     }
-    outputs.write(files, lambda: designs.text(design), lambda: designs.document(design))
-    return design.tuning is None or design.tuning.success
+    reached = design.tuning is None or design.tuning.success
+    return options.Result(files, lambda: designs.text(design), lambda: designs.document(design), reached)
 
 
 def page(
@@ -138,16 +135,10 @@ def page(
     hysim page law.json --out law.html
     hysim page law.json --data loop.csv --out law.html
     """
-    _one_standard_input(model, data)
     law, units = models.read(model)
     record = None if data is None else records.read(settings, data)
-    units |= ({} if record is None else dict(record.units)) | (settings.units or {})
+    units |= (dict(record.units) if record else {}) | (settings.units or {})
     hs.to_page(law, out, record, between=between, units=units, title=title)
-
-
-def _one_standard_input(model: str, record: str | None) -> None:
-    if model == record == records.STANDARD:
-        raise ValueError("the standard input holds the model or the record, not both")
 
 
 def c(
@@ -177,14 +168,13 @@ def c(
     hysim c law.json --out law.c
     hysim c law.json --inverse --out inverse.c
     """
-    path = Path(out)
     law, _ = models.read(model)
-    code = hs.to_c(hs.InverseFeedforward(law=law) if inverse else law, sample_time, name=path.stem, u0=u0)
-    texts = {".h": code.header, ".c": code.source, "_main.c": code.main}
-    paths = {end: str(path.with_name(path.stem + end)) for end in texts}
-    write_all({paths[end]: text for end, text in texts.items()})
-    print(f"wrote {', '.join(paths.values())}; a program that reads one input in each line is compiled by")
-    print(f"  cc -std=c99 -O2 -ffp-contract=off {paths['.c']} {paths['_main.c']} -lm -o {path.with_suffix('')}")
+    stem = str(Path(out).with_suffix(""))
+    code = hs.to_c(hs.InverseFeedforward(law=law) if inverse else law, sample_time, name=Path(out).stem, u0=u0)
+    files: dict[Any, str | bytes] = {f"{stem}.h": code.header, f"{stem}.c": code.source, f"{stem}_main.c": code.main}
+    write_all(files)
+    print(f"wrote {', '.join(files)}; a program that reads one input in each line is compiled by")
+    print(f"  cc -std=c99 -O2 -ffp-contract=off {stem}.c {stem}_main.c -lm -o {stem}")
 
 
 Platform = Literal["linux", "windows", "mac"]
@@ -197,7 +187,7 @@ def _platforms(text: str) -> tuple[str, ...]:
 def fmu(
     model: options.ModelIn,
     *,
-    out: Annotated[str, options.file("MODEL.fmu")],
+    out: Annotated[str, options.Value("MODEL.fmu", role=options.RESULT)],
     version: Literal["2.0", "3.0"] = "2.0",
     sample_time: options.Positive | None = None,
     name: str | None = None,

@@ -7,7 +7,8 @@ whole files only. Same input, same bytes: no dates, no timings, one way of writi
 import json
 import math
 import tempfile
-from collections.abc import Mapping, Sequence
+from collections import Counter
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any, Literal
 
@@ -49,6 +50,24 @@ class Reproduction:
     folder: Path
     files: tuple[str, ...]
     findings: Findings
+
+    def __str__(self) -> str:
+        return "\n".join([*_lines(self.findings), f"report: {self.folder / 'report.html'}"])
+
+
+def _lines(findings: Findings) -> Iterator[str]:
+    study, claims, comparison = findings.study, findings.claims, findings.study.comparison
+    yield f"Table 1: {len(comparison.record)} points. {comparison.loop.to_text(comparison.record.units)}"
+    yield comparison.to_text()
+    for name, fit in study.fits.items():
+        for region, best in fit.regions.items():
+            yield f"{name}: the best {region} law fits {best.fit_percent:.2f} %"
+    yield f"sindy: {study.discovery.equation}  ({study.discovery.verdict})"
+    counts = Counter(claim.verdict for claim in claims)
+    yield f"{len(claims)} claims: " + ", ".join(f"{number} {verdict}" for verdict, number in counts.most_common())
+    for claim in claims:
+        if claim.id.startswith(("hysteresis-90", "vibration-97")):
+            yield f"{claim.id}: {claim.recomputed:.1f} % where the paper says {claim.printed:g} %, {claim.verdict}"
 
 
 @reports

@@ -163,6 +163,22 @@ class Displacement:
             name=name,
         )
 
+    def columns(
+        self, log: Record | None, times: FloatArray | None, on_lost: Literal["error", "drop"]
+    ) -> tuple[dict[str, FloatArray], dict[str, str]]:
+        """Columns of a table, with the voltages of a log if there is one, and their units."""
+        columns: dict[str, Any] = {"t": times, "y": self.y}
+        units = {"t": "s", "y": self.units["y"], "uncertainty": self.units["y"]}
+        is_kept = np.full(len(self), True)
+        if log is not None:
+            at: dict[str, Any] = {"t": log.t} if times is None else {"frame_times": times, "u_times": log.t}
+            labels = {signal: unit for signal, unit in log.units.items() if signal != "y"}
+            record = self.record(log.u, **at, on_lost=on_lost, units=labels)
+            columns, is_kept = {"t": record.t, "u": record.u, "y": record.y}, np.isfinite(self.y)
+            units |= record.units
+        columns |= {"uncertainty": self.uncertainty[is_kept], "quality": self.quality[is_kept]}
+        return {name: values for name, values in columns.items() if values is not None}, units
+
     def _per_frame(self, values: npt.ArrayLike, name: str) -> FloatArray:
         array = read_only(values, name, ndim=1)
         if array.size != len(self):
