@@ -18,6 +18,7 @@ from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent
 sys.path.insert(0, str(ROOT / "experiments"))  # whose helpers several tests take
+ONE_BY_ONE = "test_experiments.py", "test_docs.py"
 STRUCTURES = (
     "test_structure",
     "plants/structures/",
@@ -66,8 +67,8 @@ def pytest_xdist_make_scheduler(config, log):
     """Divide the tests among the workers, whatever ``--dist`` says: pytest 9.2 does not see the groups of loadgroup.
 
     The tests of a file run in one worker, because they share fixtures and kernels; the experiments and the pages of
-    the documentation, which take seconds each, are divided one by one. All that moves structures runs in one worker,
-    whose kernels take half a minute to compile. Short files come last and even out the ends.
+    the documentation, which take seconds each, are divided one by one; they and the doctests come last and even out the
+    ends. All that moves structures runs in one worker, whose kernels take half a minute to compile.
     """
     from xdist.scheduler import LoadScopeScheduling
 
@@ -76,7 +77,7 @@ def pytest_xdist_make_scheduler(config, log):
             file = nodeid.partition("::")[0]
             if any(part in nodeid for part in STRUCTURES):
                 return "structures"
-            return nodeid if file.endswith(("test_experiments.py", "test_docs.py")) else file
+            return nodeid if file.endswith(ONE_BY_ONE) else file
 
     config.option.loadscopereorder = False  # which would put files of many tests before those of long ones
     return Files(config, log)
@@ -147,7 +148,8 @@ def pytest_terminal_summary(terminalreporter):
 
 @pytest.hookimpl(tryfirst=True)
 def pytest_collection_modifyitems(items):
-    """Mark the second circle, and skip tests that need missing packages."""
+    """Mark the second circle, skip tests that need missing packages, and put those last that are divided one by one."""
+    items.sort(key=lambda item: item.path.name in ONE_BY_ONE or ROOT / "hysim" in item.path.parents)
     for item in items:
         if (name := item.nodeid.partition("[")[0].removeprefix("tests/")) in purposes:
             item.add_marker(purposes[name])
