@@ -14,7 +14,7 @@ import hysim as hs
 
 experiment = importlib.import_module("32_more_samples")
 
-N_CASES = 2 if numba.config.DISABLE_JIT else 20
+N_CASES = 2 if numba.config.DISABLE_JIT else 12
 
 NOT_RATE_INDEPENDENT = {
     *("TransferFunction", "Dashpot", "ExcessLoss", "Actuator", "MultiInputActuator", "BoucWenOscillator"),

@@ -112,7 +112,7 @@ def shards(folder, task, space, n, **options):
     return stores
 
 
-@pytest.mark.parametrize("n", [1, 7, 130])
+@pytest.mark.parametrize("n", [1, 7, 40])
 @pytest.mark.parametrize(("task", "space"), [(sweep_tasks.noisy, sweep_tasks.SPACE), (sweep_tasks.failing, GRID)])
 def test_merged_shards_are_the_study_that_nobody_divided(task, space, n, path, tmp_path):
     stores = shards(tmp_path, task, space, n, seed=1)
