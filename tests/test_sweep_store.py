@@ -190,10 +190,16 @@ def test_of_two_merges_at_once_the_second_is_refused(path, tmp_path):
 
 @pytest.mark.parametrize(
     ("shard", "words"),
-    [((3, 3), "shards are counted from 0: of 3 the last is 2, got 3"), ((-1, 3), "negative"), ((0, 0), "at least 1")],
+    [
+        ((3, 3), "shards are counted from 0: of 3 the last is 2, got 3"),
+        ((-1, 3), "negative"),
+        ((0, 0), "at least 1"),
+        (3, "a pair"),
+        ((1, 2, 3), "a pair"),
+    ],
 )
 def test_a_shard_that_there_is_not_is_refused(shard, words):
-    with pytest.raises(ValueError, match=words):
+    with pytest.raises((TypeError, ValueError), match=words):
         hs.sweep(sweep_tasks.product, GRID, shard=shard)
 
 

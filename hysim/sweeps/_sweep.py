@@ -20,7 +20,7 @@ import inspect
 import math
 import pickle
 import time
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import (
     FIRST_COMPLETED,
     CancelledError,
@@ -294,6 +294,8 @@ def sweep(
 
 def _share(shard: tuple[int, int] | None, n_tasks: int) -> npt.NDArray[np.bool_]:
     """The tasks of a shard, shape (n_tasks,)."""
+    if shard is not None and not (isinstance(shard, Sequence) and len(shard) == 2):
+        raise TypeError(f"shard must be a pair (k, n), such as (3, 100), got {shard!r}")
     k, n = shard or (0, 1)
     check_count("the number of shards", n)
     check_whole(k, "the shard", least=0)
