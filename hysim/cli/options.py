@@ -39,7 +39,7 @@ Files = Mapping[str | None, Callable[[], Any]]
 
 
 class Result(NamedTuple):
-    """What a command with ``--json`` writes, what it prints as a text and as JSON, and whether a search converged.
+    """Files of a command with ``--json``, the text and the JSON that it prints, and whether a search converged.
 
     Where it has to be called again, `unfinished` says what remains.
     """
