@@ -270,7 +270,7 @@ class Store:
         return facts
 
     def changes(self, now: Mapping[str, str], on_change: OnChange) -> dict[str, str]:
-        """Differences from the study in the store, in words; none where its rows are to be kept all the same."""
+        """Differences from the study in the store, in words; empty where its rows are to be kept all the same."""
         changes = _changes(self.study.identity, now)
         return {} if on_change == "keep" and not {"space", "seed"} & changes.keys() else changes
 
