@@ -106,8 +106,8 @@ def draw(rows: list[Row]) -> Figure:
     canvas, ax = one_panel(3.0)
     for name, label in (("kills", "kills"), ("computed_twice", "tasks computed twice")):
         ax.plot([row["shard"] for row in rows], [row[name] for row in rows], "o", label=label)
-    ax.set(xlabel="Shard", ylabel="Number")
-    ax.legend()
+    ax.set(xlabel="Shard", ylabel="Number", xticks=range(0, len(rows), 5))
+    canvas.legend(loc="outside lower center", ncols=2)
     return canvas
 
 
