@@ -3,7 +3,9 @@
 import contextlib
 import json
 import math
+import shutil
 import sqlite3
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -13,6 +15,7 @@ from test_sweep import bits
 import hysim as hs
 from hysim.cli import main
 
+VERSION_0_2 = Path(__file__).parent / "data" / "version_0_2"
 SPACE = {"a": [1.0, 2.0, 3.0]}
 
 
@@ -30,11 +33,6 @@ def path(tmp_path):
     return tmp_path / "study.sqlite"
 
 
-@pytest.fixture
-def shards(path):
-    return path.with_name(f"{path.name}.arrays")
-
-
 def change(path, statement, *values):
     with contextlib.closing(sqlite3.connect(path)) as database, database:
         assert database.execute(statement, values).rowcount != 0
@@ -48,73 +46,51 @@ def refused(path, *words):
         assert all(word in str(caught.value) for word in words)
 
 
-@pytest.mark.parametrize("name", ["mine.npz", "000000000.npz", "0123456789abcdef-000000000.npz"])
-@pytest.mark.parametrize("how", ["new", "restart"])
-def test_arrays_of_others_are_never_deleted(path, shards, name, how):
-    (shards / name).write_bytes(b"precious")
-    if how == "new":
-        path.unlink()
-    options = {"on_change": "restart"} if how == "restart" else {}
-    before = None if how == "new" else bits(hs.load_sweep(path))
-    with pytest.raises(ValueError, match="does not belong to this study: move it") as caught:
-        hs.sweep(cubes, SPACE, store=path, **options)
-    assert str(shards) in str(caught.value)
-    assert (shards / name).read_bytes() == b"precious"
-    if how == "restart":
-        assert bits(hs.load_sweep(path)) == before  # the study that was to go is still whole
-        assert bits(hs.sweep(squares, SPACE, store=path)) == before  # and nothing keeps it from going on
-    assert (shards / name).read_bytes() == b"precious"
+@pytest.fixture
+def old(tmp_path):
+    """A study whose arrays are in files, as version 0.2 wrote it, and such a file."""
+    for each in sorted(VERSION_0_2.glob("study.*")):
+        (shutil.copytree if each.is_dir() else shutil.copy)(each, tmp_path / each.name)
+    return tmp_path / "study.sqlite", min((tmp_path / "study.sqlite.arrays").iterdir())
 
 
-def test_a_study_that_begins_anew_takes_its_own_arrays_away_and_nothing_else(path, shards):
-    own = {file.name for file in shards.iterdir()}
-    (shards / "notes.txt").write_text("mine")
-    anew = hs.sweep(cubes, SPACE, store=path, on_change="restart")
-    assert not own & {file.name for file in shards.iterdir()}
-    assert (shards / "notes.txt").read_text() == "mine"
+def test_arrays_in_files_are_read_and_a_study_with_them_is_not_continued(old):
+    path, _ = old
+    study = hs.load_sweep(path)
+    assert study["square"].tolist()[::2] == [1.0, 9.0]
+    assert study["both"].tolist()[::2] == [[1.0, 1.0], [3.0, 9.0]]
+    assert study.errors == {1: "ValueError: two"}
+    for on_change in ("error", "keep"):
+        assert_refused("arrays are in files", hs.sweep, squares, SPACE, store=path, on_change=on_change)
+    assert bits(hs.load_sweep(path)) == bits(study)
+    anew = hs.sweep(squares, SPACE, store=path, on_change="restart")
     assert bits(hs.load_sweep(path)) == bits(anew)
 
 
-def test_the_arrays_stay_until_the_study_that_follows_is_in_the_database(path, shards, monkeypatch):
-    from hysim.sweeps._store import Store
-
-    def fail(*_):
-        raise OSError("the disk is full")
-
-    before = bits(hs.load_sweep(path))
-    with monkeypatch.context() as patch:
-        patch.setattr(Store, "_commit", fail)
-        assert_refused("full", hs.sweep, cubes, SPACE, error=OSError, store=path, on_change="restart")
-    assert bits(hs.load_sweep(path)) == before
-
-
 @pytest.mark.parametrize("shard", ["../outside.npz", "/etc/outside.npz", "sub/../../outside.npz", "..", 7, b"\xff"])
-def test_no_file_outside_the_folder_is_read(path, shards, shard):
-    np.savez(shards.parent / "outside.npz", task=np.arange(3), output_both=np.zeros((3, 2)))
+def test_no_file_outside_the_folder_is_read(old, shard):
+    path, _ = old
     change(path, "UPDATE results SET shard = ?", shard)
-    refused(path, "is not the name of one of its files with arrays")
+    assert_refused("damaged store.*is not the name of one of its files", hs.load_sweep, path)
 
 
-def test_a_link_in_the_folder_is_neither_read_nor_written_through(path, shards):
-    (file, *_) = shards.iterdir()
-    outside = shards.parent / "outside.npz"
-    file.rename(outside)
-    file.symlink_to(outside)
-    refused(path, "is a link")
-    before = outside.read_bytes()
-    change(path, "DELETE FROM results")
-    for link in shards.iterdir():
-        link.unlink()
-    digits = file.name.partition("-")[0]
-    for k in range(3):
-        (shards / f"{digits}-{k:09d}.npz").symlink_to(outside)
-    change(
-        path,
-        "INSERT INTO results (task, seconds, shard, error) VALUES (2, 0.0, ?, 'failed')",
-        f"{digits}-000000000.npz",
-    )
-    assert_refused("is a link", hs.sweep, squares, SPACE, store=path, workers=1)
-    assert outside.read_bytes() == before
+@pytest.mark.parametrize("damage", ["cut", "empty", "text", "shape", "tasks", "names"])
+def test_a_damaged_file_with_arrays_is_one_line(old, damage):
+    path, file = old
+    content = file.read_bytes()
+    if damage in ("cut", "empty", "text"):
+        file.write_bytes({"cut": content[: len(content) // 2], "empty": b"", "text": b"no archive"}[damage])
+    else:
+        arrays = {"task": np.arange(1), "output_both": np.zeros((1, 2))}
+        arrays |= {"shape": {"output_both": np.zeros((1, 7))}, "tasks": {"task": np.ones(1) + math.inf}}.get(damage, {})
+        np.savez(file, **({} if damage == "names" else arrays))
+    assert_refused("damaged store", hs.load_sweep, path)
+
+
+def test_a_file_with_arrays_that_is_gone_is_named(old):
+    path, file = old
+    file.unlink()
+    assert_refused(file.name, hs.load_sweep, path, error=FileNotFoundError)
 
 
 NAMES = ['a"b', 'a"; DROP TABLE results; --', "a b", "select", "ä", "a'b", "[a]", "(SELECT 1)", "task_"]
@@ -134,7 +110,7 @@ def test_what_a_store_calls_a_column_is_no_statement_either(path):
         refused(path, "damaged store", "no column", repr(column))
 
 
-ROWS = ("identity", "n_tasks", "parameters", "kinds", "axes", "layout", "shards")
+ROWS = ("identity", "n_tasks", "parameters", "kinds", "axes", "layout")
 VALUES = [
     "null", "{}", "[]", "1e400", "-1e400", "NaN", "-1", "true", '"text"', '{"a": null}', '{"seed": "1e400"}', "[[]]",
     '[["a", 1e400]]', '[["both", [1e400], "both"]]', "1" + 400 * "0", 900 * "[" + 900 * "]", 10**5 * "[", "", "{", None,
@@ -169,7 +145,10 @@ def test_a_damaged_row_of_the_study_is_one_line(path, name, capsys):
         ("UPDATE results SET square = 'much'", "could not convert"),
         ("UPDATE results SET seconds = 'much'", "could not convert"),
         ("UPDATE results SET seconds = NULL WHERE task = 1", "a row has no 'seconds'"),
-        ("UPDATE results SET shard = NULL", "the arrays of the task 0 are missing"),
+        ("UPDATE results SET both = NULL", "both of the task 0 is missing"),
+        ("UPDATE results SET both = 1.5 WHERE task = 1", "a bytes-like object is required"),
+        ("UPDATE results SET both = x'00'", "buffer size must be a multiple"),
+        ("UPDATE results SET both = zeroblob(8)", "cannot reshape"),
     ],
 )
 def test_a_damaged_row_of_the_results_is_one_line(path, statement, word):
@@ -180,27 +159,6 @@ def test_a_damaged_row_of_the_results_is_one_line(path, statement, word):
 def test_a_row_without_its_parameter_is_not_read_as_nan(path):
     change(path, "UPDATE results SET a = NULL WHERE task = 1")
     assert_refused("a row has no 'a'", hs.load_sweep, path)
-
-
-@pytest.mark.parametrize("damage", ["cut", "empty", "text", "shape", "tasks", "names"])
-def test_a_damaged_file_with_arrays_is_one_line(path, shards, damage):
-    (file, *_) = sorted(shards.iterdir())
-    content = file.read_bytes()
-    if damage in ("cut", "empty", "text"):
-        file.write_bytes({"cut": content[: len(content) // 2], "empty": b"", "text": b"no archive"}[damage])
-    else:
-        arrays = {"task": np.arange(3), "output_both": np.zeros((3, 2))}
-        arrays |= {"shape": {"output_both": np.zeros((3, 7))}, "tasks": {"task": np.arange(3) + math.inf}}.get(
-            damage, {}
-        )
-        np.savez(file, **({} if damage == "names" else arrays))
-    refused(path, "damaged store")
-
-
-def test_a_file_with_arrays_that_is_gone_is_named(path, shards):
-    (file, *_) = sorted(shards.iterdir())
-    file.unlink()
-    assert_refused(file.name, hs.load_sweep, path, error=FileNotFoundError)
 
 
 @pytest.mark.parametrize("kept", [("-wal", "-shm"), ("-wal",), ("-shm",), ("-journal",)], ids="".join)

@@ -327,29 +327,6 @@ def test_a_full_disk_loses_no_row_that_was_reported(path, uninterrupted, monkeyp
     assert bits(hs.sweep(sweep_tasks.long, sweep_tasks.LONG, store=path)) == bits(uninterrupted)
 
 
-def test_a_disk_that_is_full_for_the_arrays_leaves_no_half_of_a_row(path, uninterrupted, monkeypatch):
-    savez, calls = np.savez, []
-
-    def full_at_the_fourth(file, **arrays):
-        calls.append(1)
-        if len(calls) == 4:
-            file.write(b"half")
-            raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
-        savez(file, **arrays)
-
-    with monkeypatch.context() as patch:
-        patch.setattr(np, "savez", full_at_the_fourth)
-        assert_refused("No space left", hs.sweep, sweep_tasks.long, sweep_tasks.LONG, error=OSError, store=path)
-    folder = path.with_name(f"{path.name}.arrays")
-    assert len(list(folder.iterdir())) == 3
-    digits = next(folder.iterdir()).name.partition("-")[0]
-    unnamed = [folder / f"{digits}-000000999.npz", folder / f".{digits}-000000998.npz.{16 * '0'}"]
-    for file in unnamed:
-        file.write_bytes(b"of a transaction that never came")
-    assert bits(hs.sweep(sweep_tasks.long, sweep_tasks.LONG, store=path)) == bits(uninterrupted)
-    assert not any(file.exists() for file in unnamed)
-
-
 class Fragile(concurrent.futures.ThreadPoolExecutor):
     """Fails with the fifth chunk."""
 
@@ -506,7 +483,6 @@ def test_a_store_that_moved_is_the_same_store(path, tmp_path):
     (tmp_path / "there").mkdir()
     moved = tmp_path / "there" / path.name
     shutil.move(path, moved)
-    shutil.move(f"{path}.arrays", f"{moved}.arrays")
     assert bits(hs.load_sweep(moved)) == bits(first)
 
 

@@ -1,12 +1,11 @@
-"""A study on disk: an SQLite database with one row for each finished task, and a folder of arrays.
+"""A study on disk: an SQLite database with one row for each finished task.
 
     study      what the study is: its identity, its parameters, the axes of a grid, the layout of a row
-    results    task, seed, seconds, error, shard; then the parameters, then the outputs that are numbers
+    results    task, seed, seconds, error; then the parameters, then the outputs
 
-Rows are written in transactions. The arrays of a transaction are in one file, a shard, which is complete before the
-transaction begins. Shards begin with digits of the study: other files in the folder are never changed, and files
-outside it never read. Columns have no declared type, since zeros would lose their sign; nan is NULL in a row without an
-error. Between transactions the writer keeps SQLite's lock for writing: others may read, not write.
+Rows are written in transactions. Arrays are blobs of float64, little-endian. Columns have no declared type, since zeros
+would lose their sign; nan is NULL in a row without an error. Between transactions the writer keeps SQLite's lock for
+writing: others may read, not write. Version 0.2 wrote arrays to files in a folder beside the store; these can be read.
 
 The facts of a study are checked when they are read from a store:
 
@@ -16,7 +15,7 @@ The facts of a study are checked when they are read from a store:
     kinds        name to kind of its values, as NumPy has it
     axes         names and values of the axes of a grid, or null
     layout       names, shapes and columns of the outputs, once a task has succeeded
-    shards       what the names of the files with arrays begin with
+    shards       what the names of the files with arrays begin with, if version 0.2 wrote them
 """
 
 import errno
@@ -25,7 +24,6 @@ import math
 import os
 import re
 import reprlib
-import secrets
 import sqlite3
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import closing, contextmanager
@@ -37,7 +35,6 @@ from zlib import error as CompressionError  # noqa: N812
 
 import numpy as np
 
-from hysim._basics.atomic import replacing
 from hysim.sweeps._chunks import Layout, Rows, Table
 from hysim.sweeps._space import Column, Space
 
@@ -51,7 +48,7 @@ _DAMAGE = (
 
 
 class Output(NamedTuple):
-    """Name and shape of an output, and its column if it is a number."""
+    """Name, shape and column of an output."""
 
     name: str
     shape: Sequence[int]
@@ -66,21 +63,12 @@ class Study(NamedTuple):
     parameters: Mapping[str, str]
     kinds: Mapping[str, str]
     axes: Sequence[tuple[str, list[Any]]] | None
-    shards: str
     layout: Sequence[Output] = ()
-
-    @property
-    def numbers(self) -> dict[str, str]:
-        """Columns of the outputs that are numbers, by their names."""
-        return {output.name: output.column for output in self.layout if not output.shape}
+    shards: str = ""
 
     @property
     def shapes(self) -> Layout:
         return {output.name: tuple(output.shape) for output in self.layout}
-
-    def has(self, shard: Any) -> bool:
-        """Whether this is the name of a file with arrays of the study."""
-        return isinstance(shard, str) and re.fullmatch(rf"{self.shards}-[0-9]{{9,18}}\.npz", shard) is not None
 
 
 def study_of(rows: Mapping[str, Any]) -> Study:
@@ -90,7 +78,7 @@ def study_of(rows: Mapping[str, Any]) -> Study:
     layout = [Output(_of(str, n), [*map(_size, shape)], _of(str, c)) for n, shape, c in facts.get("layout", ())]
     study = Study(
         *(_texts(facts["identity"]), _size(facts["n_tasks"]), _texts(facts["parameters"]), _texts(facts["kinds"])),
-        *(axes, _of(str, facts["shards"]), layout),
+        *(axes, layout, _of(str, facts.get("shards", ""))),
     )
     is_sound = (
         (layout or "layout" not in facts)
@@ -98,7 +86,7 @@ def study_of(rows: Mapping[str, Any]) -> Study:
         and (_KINDS.keys() >= {*study.kinds.values()} and int(study.identity["seed"]) >= 0)
         and (axes is None or [name for name, _ in axes] == [*study.parameters])
         and (axes is None or math.prod(len(values) for _, values in axes) == study.n_tasks)
-        and re.fullmatch("[0-9a-f]{16}", study.shards)
+        and re.fullmatch("([0-9a-f]{16})?", study.shards)
     )
     if not is_sound:
         raise ValueError("the facts of its study contradict each other")
@@ -138,7 +126,7 @@ ON_CHANGE = ("error", "keep", "restart")
 # Seconds to wait for another's lock, chosen by hand: a second writer is refused at once; a reader waits for a commit; a
 # writer waits for readers, since rows that are finished would be lost.
 _FOR_A_WRITER, _FOR_A_COMMIT, _FOR_READERS = 0.25, 10.0, 60.0
-_OWN_COLUMNS = ("task", "seed", "seconds", "error", "shard")
+_OWN_COLUMNS = ("task", "seed", "seconds", "error")
 _LOCKED = errno.EAGAIN, "the store is locked: another process is writing to it"
 _TROUBLE = {
     sqlite3.SQLITE_BUSY: _LOCKED,
@@ -154,7 +142,6 @@ class Store:
 
     def __init__(self, path: Path, database: sqlite3.Connection) -> None:
         self.path, self._database = path, database
-        self._folder = path.with_name(f"{path.name}.arrays")
         self._facts: Study | None = None  # as they were read or written last
         self._tasks: list[Column] = []  # seeds and parameters of all tasks
 
@@ -172,17 +159,8 @@ class Store:
         if before is not None and self._is_continued(identity, on_change):
             self._remember(before._replace(identity=identity))
         else:
-            for path in self._files():
-                if path.suffix == ".npz" and not (before and before.has(path.name)):
-                    message = f"{path} does not belong to this study: move it or the folder, or use another store"
-                    raise ValueError(message)
             self._create(identity, space, before)
         self._commit()
-        named = self._shards()
-        for path in self._files():  # those of a transaction that failed, or of the study that was replaced
-            name = re.sub(r"^\.(.*\.npz)\.[0-9a-f]{16}$", r"\1", path.name)  # without what it has during writing
-            if path.name not in named and any(study.has(name) for study in (self.study, before or self.study)):
-                path.unlink()
 
     def space(self) -> Space:
         """The parameters of the tasks that have a row, and the axes of all."""
@@ -203,25 +181,30 @@ class Store:
             failed = self._database.execute("SELECT task, error FROM results WHERE error IS NOT NULL ORDER BY task")
             table.errors = {place: str(error) for place, error in failed}
             table.seconds[places], table.done[places] = self._column("seconds", np.float64), True
-            for name, column in self.study.numbers.items():
-                table.values[name][places] = self._column(column, np.float64, math.nan)
-            arrays = {name: table.values[name] for name, shape in self.study.shapes.items() if shape}
-            if arrays:
-                self._restore_arrays(arrays, {*places.tolist()} - table.errors.keys())
+            missing = {*places.tolist()} - table.errors.keys()
+            for output in self.study.layout:
+                values = table.values[output.name]
+                if not output.shape:
+                    values[places] = self._column(output.column, np.float64, math.nan)
+                    continue
+                known = np.zeros(table.done.size, dtype=bool)
+                for tasks, arrays in self._arrays(output):
+                    values[tasks], known[tasks] = arrays, True
+                if lost := missing.difference(np.flatnonzero(known).tolist()):
+                    raise ValueError(f"{output.name} of the task {min(lost)} is missing")
 
-    def _restore_arrays(self, arrays: Mapping[str, Column], missing: set[int]) -> None:
-        """Fill in the arrays of the tasks at the missing places, from the shards that hold them."""
-        known = {*missing}
-        for shard in sorted(self._shards()):
-            with open(self._shard(shard), "rb") as raw, np.load(raw, allow_pickle=False) as file:
-                tasks = file["task"]
-                if not known.issuperset(tasks.tolist()):
-                    raise ValueError(f"{shard} holds tasks that have no row")
-                for name, array in arrays.items():
-                    array[tasks] = file[f"output_{name}"]
-            missing.difference_update(tasks.tolist())
-        if missing:
-            raise ValueError(f"the arrays of the task {min(missing)} are missing")
+    def _arrays(self, output: Output) -> Iterator[tuple[Any, Any]]:
+        """Places of tasks, and this output of each."""
+        if not self.study.shards:
+            column = _quoted([output.column])
+            for task, cell in self._database.execute(f"SELECT task, {column} FROM results WHERE {column} IS NOT NULL"):
+                yield task, np.frombuffer(cell, "<f8").reshape(output.shape)
+            return
+        for (name,) in self._database.execute("SELECT DISTINCT shard FROM results WHERE shard IS NOT NULL"):
+            if not re.fullmatch(rf"{self.study.shards}-[0-9]{{9,18}}\.npz", str(name)):
+                raise ValueError(f"{name!r} is not the name of one of its files with arrays")
+            with np.load(self.path.with_name(f"{self.path.name}.arrays") / name, allow_pickle=False) as file:
+                yield file["task"], file[f"output_{output.name}"]
 
     def commit(self, rows: Sequence[Rows], layout: Layout) -> None:
         """Write the rows of finished tasks, all or none of them; rows may be written again."""
@@ -239,19 +222,19 @@ class Store:
     def _write(self, rows: Sequence[Rows], layout: Layout) -> None:
         if layout and not self.study.layout:
             self._add_outputs(layout)
-        study, shard = self.study, self._write_shard([part for part in rows if part.outputs])
-        columns = ["task", "seconds", "error", "shard", "seed", *study.parameters.values(), *study.numbers.values()]
-        marks, lines = ", ".join("?" * len(columns)), self._lines(rows, shard)
-        self._database.executemany(f"INSERT OR REPLACE INTO results ({_quoted(columns)}) VALUES ({marks})", lines)
+        outputs = [output.column for output in self.study.layout]
+        columns = ["task", "seconds", "error", "seed", *self.study.parameters.values(), *outputs]
+        marks = ", ".join("?" * len(columns))
+        statement = f"INSERT OR REPLACE INTO results ({_quoted(columns)}) VALUES ({marks})"
+        self._database.executemany(statement, self._lines(rows))
 
-    def _lines(self, rows: Sequence[Rows], shard: str | None) -> Iterator[tuple[Any, ...]]:
+    def _lines(self, rows: Sequence[Rows]) -> Iterator[tuple[Any, ...]]:
         for part in rows:
             nothing = [None] * part.places.size
-            shards = [shard] * part.places.size if part.outputs else nothing
             tasks = [column[part.places].tolist() for column in self._tasks]
-            numbers = [part.outputs[name].tolist() if part.outputs else nothing for name in self.study.numbers]
-            own = part.places.tolist(), part.seconds.tolist(), part.errors or nothing, shards
-            yield from zip(*own, *tasks, *numbers, strict=True)
+            outputs = [_stored(part.outputs[name]) if part.outputs else nothing for name in self.study.shapes]
+            own = part.places.tolist(), part.seconds.tolist(), part.errors or nothing
+            yield from zip(*own, *tasks, *outputs, strict=True)
 
     def _read(self) -> Study | None:
         tables = [name for (name,) in self._database.execute("SELECT name FROM sqlite_master WHERE type = 'table'")]
@@ -262,16 +245,17 @@ class Store:
         with damage_named(self.path):
             facts = study_of(dict(self._database.execute("SELECT name, value FROM study")))
             columns = {name for _, name, *_ in self._database.execute("PRAGMA table_info(results)")}
-            if missing := {*_OWN_COLUMNS, *facts.parameters.values(), *facts.numbers.values()} - columns:
-                raise ValueError(
-                    f"it has no column {', '.join(map(repr, sorted(missing)))}"
-                )  # SQLite takes it for text
+            outputs = [output.column for output in facts.layout if not (output.shape and facts.shards)]
+            if missing := {*_OWN_COLUMNS, *facts.parameters.values(), *outputs} - columns:  # SQLite takes it for text
+                raise ValueError(f"it has no column {', '.join(map(repr, sorted(missing)))}")
         self._facts = facts
         return facts
 
     def changes(self, now: Mapping[str, str], on_change: OnChange) -> dict[str, str]:
         """Differences from the study in the store, in words; empty where its rows are to be kept all the same."""
         changes = _changes(self.study.identity, now)
+        if self.study.shards:
+            changes["space"] = "its arrays are in files of version 0.2, which are read, and not continued"
         return {} if on_change == "keep" and not {"space", "seed"} & changes.keys() else changes
 
     def _is_continued(self, now: Mapping[str, str], on_change: OnChange) -> bool:
@@ -290,27 +274,23 @@ class Store:
         parameters = _distinct(space.columns, _OWN_COLUMNS)
         self._database.execute("CREATE TABLE study (name TEXT PRIMARY KEY, value TEXT)")
         self._database.execute(
-            "CREATE TABLE results (task INTEGER PRIMARY KEY, seed INTEGER, seconds, error TEXT, shard TEXT, "
+            "CREATE TABLE results (task INTEGER PRIMARY KEY, seed INTEGER, seconds, error TEXT, "
             f"{_quoted(parameters.values())})"
         )
         kinds = {name: column.dtype.kind for name, column in space.columns.items()}
         axes = [(name, values.tolist()) for name, values in (space.axes or {}).items()] or None
-        self._remember(Study(identity, space.n_tasks, parameters, kinds, axes, secrets.token_hex(8)))
+        self._remember(Study(identity, space.n_tasks, parameters, kinds, axes))
 
     def _add_outputs(self, layout: Layout) -> None:
         columns = _distinct(layout, (*_OWN_COLUMNS, *self.study.parameters.values()))
         self._remember(self.study._replace(layout=[Output(name, layout[name], columns[name]) for name in layout]))
-        for column in self.study.numbers.values():
+        for column in columns.values():
             self._database.execute(f"ALTER TABLE results ADD COLUMN {_quoted([column])}")
 
     def _remember(self, study: Study) -> None:
-        facts = [(name, json.dumps(value)) for name, value in study._asdict().items() if name != "layout" or value]
+        facts = [(name, json.dumps(value)) for name, value in study._asdict().items() if value or name == "axes"]
         self._database.executemany("INSERT OR REPLACE INTO study VALUES (?, ?)", facts)
         self._facts = study
-
-    def _shards(self) -> set[str]:
-        """Names of the files with the arrays of the rows."""
-        return {name for (name,) in self._database.execute("SELECT DISTINCT shard FROM results") if name}
 
     def _column(self, name: str, kind: Any, empty: float | None = None) -> Column:
         """Values of the rows; ValueError for a row without one, but that NULL is nan in outputs."""
@@ -327,32 +307,6 @@ class Store:
         self._database.execute("COMMIT")
         self._database.execute(f"PRAGMA busy_timeout = {1000 * _FOR_READERS:.0f}")
         self._database.execute("BEGIN IMMEDIATE")
-
-    def _write_shard(self, rows: list[Rows]) -> str | None:
-        names = [name for name, shape in self.study.shapes.items() if shape]
-        if not rows or not names:
-            return None
-        arrays: Any = {f"output_{name}": np.concatenate([part.outputs[name] for part in rows]) for name in names}
-        places = np.concatenate([part.places for part in rows])
-        shard = f"{self.study.shards}-{places.min():09d}.npz"
-        self._folder.mkdir(exist_ok=True)
-        with replacing(self._shard(shard), "xb") as file:
-            np.savez(file, task=places, **arrays)
-            file.flush()
-            os.fsync(file.fileno())
-        return shard
-
-    def _shard(self, name: Any) -> Path:
-        """Path of the shard of this name; ValueError unless it is a shard of this study and no link."""
-        if not self.study.has(name):
-            raise ValueError(f"{name!r} is not the name of one of its files with arrays")
-        path: Path = self._folder / name
-        if path.is_symlink():
-            raise ValueError(f"{path} is a link, and not a file with arrays")
-        return path
-
-    def _files(self) -> list[Path]:
-        return sorted(self._folder.iterdir()) if self._folder.is_dir() else []
 
 
 @contextmanager
@@ -401,3 +355,8 @@ def _distinct(names: Iterable[str], taken: Iterable[str]) -> dict[str, str]:
 
 def _quoted(columns: Iterable[str]) -> str:
     return ", ".join('"' + column.replace('"', '""') + '"' for column in columns)
+
+
+def _stored(column: Column) -> Iterable[Any]:
+    """Values of an output as SQLite takes them: numbers, or the bytes of arrays."""
+    return column.tolist() if column.ndim == 1 else map(np.ndarray.tobytes, column.astype("<f8"))
