@@ -20,7 +20,7 @@ from strategies import assert_refused
 from test_sweep import bits
 
 import hysim as hs
-from hysim.sweeps import _store, _sweep
+from hysim.sweeps import _space, _store, _sweep
 
 GRID = {"a": [1.0, 2.0, 3.0, 4.0], "b": [1, 2]}
 
@@ -260,6 +260,12 @@ def test_what_is_bound_to_a_task_belongs_to_its_study(path):
 
     hs.sweep(times(2.0), GRID, store=path)
     hs.sweep(times(2.0), GRID, store=path)
+    digests = {
+        _sweep.identity(times(kind(order)), _space.space_of(GRID), 0)["task"]
+        for kind in (set, frozenset)
+        for order in ([0, 8], [8, 0])
+    }  # of one place in a table of eight
+    assert len(digests) == 1
     assert_refused("a value bound to it has changed", hs.sweep, times(3.0), GRID, store=path)
     factorial = path.with_name("factorial.sqlite")
     for _ in range(2):

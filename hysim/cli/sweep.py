@@ -116,12 +116,10 @@ def sweep(
                 seed=seed,
                 on_change=on_change,
             )
-    k, n = share or (0, 1)
-    own = range(k * result.n_tasks // n, (k + 1) * result.n_tasks // n) if show is None else ()
-    missing = set(own).difference(result.task.tolist())
+    missing = [] if show else result.missing.tolist()
     contents: options.Files = {csv: result.to_csv, plot: lambda: _picture(result, of)}
     reached = show is not None or not result.errors
-    unfinished = f"{len(missing)} tasks remain, the first is {min(missing)}" if missing else ""
+    unfinished = f"{len(missing)} tasks remain, the first is {missing[0]}" if missing else ""
     return options.Result(contents, result.summary, lambda: _document(result), reached, unfinished)
 
 

@@ -50,6 +50,8 @@ class Sweep:
         Place of a failed task to its message.
     n_tasks : int
         Number of tasks of the study, also of those without a row because it was interrupted.
+    missing : array
+        Places of the tasks of the study, or of the shard that was asked for, without a row.
     axes : mapping, optional
         Name of a parameter of a grid to the values along its axis.
     """
@@ -62,6 +64,7 @@ class Sweep:
     seconds: FloatArray
     errors: Mapping[int, str]
     n_tasks: int
+    missing: npt.NDArray[np.int64]
     axes: Mapping[str, Column] | None = None
 
     def __str__(self) -> str:
@@ -169,10 +172,11 @@ def load_sweep(path: str | Path) -> Sweep:
         study, space = store.study, store.space()
         table = Table(study.n_tasks, space.columns)
         store.restore(table)
-    return result_of(table, space, seeds(int(study.identity["seed"]), np.flatnonzero(table.done)))
+    task_seeds = seeds(int(study.identity["seed"]), np.flatnonzero(table.done))
+    return result_of(table, space, task_seeds, np.arange(study.n_tasks))
 
 
-def result_of(table: Table, space: Space, task_seeds: Column) -> Sweep:
+def result_of(table: Table, space: Space, task_seeds: Column, asked: npt.NDArray[np.int64]) -> Sweep:
     """The rows of the tasks that are done, with the parameters and seeds of these or of all tasks."""
     places = np.flatnonzero(table.done)
 
@@ -192,6 +196,7 @@ def result_of(table: Table, space: Space, task_seeds: Column) -> Sweep:
         seconds=done(table.seconds),
         errors=dict(sorted(table.errors.items())),
         n_tasks=table.done.size,
+        missing=asked[~table.done[asked]],
         axes=space.axes,
     )
 

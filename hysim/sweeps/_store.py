@@ -200,10 +200,11 @@ class Store:
             for task, cell in self._database.execute(f"SELECT task, {column} FROM results WHERE {column} IS NOT NULL"):
                 yield task, np.frombuffer(cell, "<f8").reshape(output.shape)
             return
+        folder = self.path.with_name(f"{self.path.name}.arrays")
         for (name,) in self._database.execute("SELECT DISTINCT shard FROM results WHERE shard IS NOT NULL"):
             if not re.fullmatch(rf"{self.study.shards}-[0-9]{{9,18}}\.npz", str(name)):
                 raise ValueError(f"{name!r} is not the name of one of its files with arrays")
-            with np.load(self.path.with_name(f"{self.path.name}.arrays") / name, allow_pickle=False) as file:
+            with open(folder / name, "rb") as raw, np.load(raw, allow_pickle=False) as file:
                 yield file["task"], file[f"output_{output.name}"]
 
     def commit(self, rows: Sequence[Rows], layout: Layout) -> None:

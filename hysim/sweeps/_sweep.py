@@ -14,11 +14,8 @@ that the store of a shard is one like all others, and stores are merged by enter
 **The identity** of a study is the source of the task, the parameters of the tasks, the seed, and the version of hysim.
 """
 
-import dataclasses
-import hashlib
 import inspect
 import math
-import pickle
 import time
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import (
@@ -32,13 +29,13 @@ from concurrent.futures import (
 from contextlib import contextmanager, nullcontext
 from functools import partial
 from pathlib import Path
-from types import CodeType, FunctionType, MethodType, ModuleType
+from types import CodeType, FunctionType, MethodType
 from typing import Any, NamedTuple, Protocol, runtime_checkable
 
 import numpy as np
 import numpy.typing as npt
 
-from hysim._basics.frozen import check_choice, check_count, check_not_negative, check_whole, last_names
+from hysim._basics.frozen import check_choice, check_count, check_not_negative, check_whole
 from hysim._basics.libraries import is_installed
 from hysim._basics.parallel import GLANCE, cores, processes, threads
 from hysim._basics.progress import Line, Progress, Reports, reports
@@ -107,14 +104,11 @@ def _computed_here(chunk: Chunk) -> list[Rows]:
     return computed(_task_of_process[0], chunk)
 
 
-_PLAIN = (str, bytes, int, float, complex, type(None), type(...), np.generic)
-
-
 def identity(task: Callable[..., Any], space: Space, seed: int) -> dict[str, str]:
     """The facts that must not change between two calls that share a store, as short texts."""
     names = ", ".join(space.columns)
     return {
-        "task": _digest(inspect.unwrap(task)),
+        "task": _digest(_content(inspect.unwrap(task), ())),
         "space": f"{space.n_tasks} tasks of {names} ({_digest(dict(space.columns))})",
         "seed": str(seed),
         "hysim": __version__,
@@ -122,69 +116,33 @@ def identity(task: Callable[..., Any], space: Space, seed: int) -> dict[str, str
 
 
 def _digest(value: Any) -> str:
-    digest = hashlib.sha256()
-    for part in _parts(value, ()):
-        digest.update(len(part).to_bytes(8, "little") + part)
-    return digest.hexdigest()[:16]
+    import joblib  # type: ignore[import-untyped]
 
-
-_MEMBERS: dict[Any, Callable[[Any], list[Any]]] = {
-    list | tuple: list,
-    Mapping: lambda value: [each for name in sorted(value, key=repr) for each in (name, value[name])],
-    set | frozenset: lambda value: sorted(value, key=repr),
-    np.ndarray: lambda value: [value.shape, *value.ravel().tolist()],
-    partial: lambda value: [value.func, value.args, value.keywords],
-    MethodType: lambda value: [value.__func__, value.__self__],
-    CodeType: lambda value: [value.co_code, value.co_names, value.co_varnames, value.co_consts],
-}
-"""The parts of a value in a fixed order, by its type."""
-
-
-def _parts(value: Any, above: tuple[Any, ...]) -> Iterator[bytes]:
-    """The content of a value in bytes that are the same in every process; `above` are the functions that hold it."""
-    members = next((members for kind, members in _MEMBERS.items() if isinstance(value, kind)), None)
-    if isinstance(value, (FunctionType, CodeType)) and any(value is one for one in above):
-        yield b"itself"
-    elif isinstance(value, FunctionType):
-        yield from _function_parts(value, (*above, value))
-    elif isinstance(value, np.ndarray) and value.dtype != object:
-        yield from (str(value.dtype).encode(), str(value.shape).encode(), np.ascontiguousarray(value).tobytes())
-    elif isinstance(value, _PLAIN):
-        yield repr(value).encode()
-    elif isinstance(value, (type, ModuleType)):
-        yield f"{value.__module__ if isinstance(value, type) else ''}.{value.__name__}".encode()
-    elif members is not None or dataclasses.is_dataclass(value):
-        parts = members(value) if members is not None else _fields(value)
-        yield str(len(parts)).encode()
-        for part in parts:
-            yield from _parts(part, above)
-    else:
-        yield from (repr(type(value)).encode(), _pickled(value))
-
-
-def _fields(value: Any) -> list[Any]:
-    # a user's dataclass may have slots, so that `vars` would fail
-    values = {field.name: getattr(value, field.name) for field in dataclasses.fields(value)}
-    last = last_names(type(value))
-    return [type(value), *(each for name, each in values.items() if each is not None or name not in last)]
-
-
-def _function_parts(function: FunctionType, above: tuple[Any, ...]) -> Iterator[bytes]:
-    """The source, or the compiled code where no file holds it, and the values bound to the function."""
     try:
-        yield inspect.getsource(function).encode()
-    except (OSError, TypeError):
-        yield from _parts(function.__code__, above)
-    bound = inspect.getclosurevars(function).nonlocals
-    batch = vars(function).get("batch")
-    yield from _parts([function.__defaults__, function.__kwdefaults__, bound, batch], above)
-
-
-def _pickled(value: Any) -> bytes:
-    try:
-        return pickle.dumps(value)
+        return str(joblib.hash(value))[:16]
     except Exception as error:
         raise TypeError(f"with a store a task is a function, or something that can be pickled: {error}") from error
+
+
+def _content(value: Any, above: tuple[Any, ...]) -> Any:
+    """A function's source, or its code if no file holds it, and what is bound to it; `above` are those it is in."""
+    if isinstance(value, frozenset):
+        return {*value}  # joblib sorts sets alone
+    if isinstance(value, partial):
+        return [_content(value.func, above), value.args, value.keywords]
+    if isinstance(value, MethodType):
+        return [_content(value.__func__, above), value.__self__]
+    if isinstance(value, CodeType):
+        return [value.co_code, value.co_names, value.co_varnames, [_content(each, above) for each in value.co_consts]]
+    if not isinstance(value, FunctionType) or value in above:
+        return value.__name__ if isinstance(value, FunctionType) else value
+    try:
+        source: Any = inspect.getsource(value)
+    except (OSError, TypeError):
+        source = _content(value.__code__, above)
+    bound = {**inspect.getclosurevars(value).nonlocals, "(batch)": vars(value).get("batch")}
+    contents = {name: _content(each, (*above, value)) for name, each in bound.items()}
+    return [source, value.__defaults__, value.__kwdefaults__, contents]
 
 
 _CHUNK, _SHORTEST = 0.075, 0.002  # seconds
@@ -289,11 +247,11 @@ def sweep(
                 opened_store.commit(rows, table.layout)
         with workers_of(executor, workers, task) as pool:
             _Run(columns, own, table, opened_store, pool, progress or None, limit).run()
-    return result_of(table, tasks, task_seeds)
+    return result_of(table, tasks, task_seeds, own)
 
 
-def _share(shard: tuple[int, int] | None, n_tasks: int) -> npt.NDArray[np.bool_]:
-    """The tasks of a shard, shape (n_tasks,)."""
+def _share(shard: tuple[int, int] | None, n_tasks: int) -> npt.NDArray[np.int64]:
+    """The tasks of a shard."""
     if shard is not None and not (isinstance(shard, Sequence) and len(shard) == 2):
         raise TypeError(f"shard must be a pair (k, n), such as (3, 100), got {shard!r}")
     k, n = shard or (0, 1)
@@ -301,8 +259,7 @@ def _share(shard: tuple[int, int] | None, n_tasks: int) -> npt.NDArray[np.bool_]
     check_whole(k, "the shard", least=0)
     if k >= n:
         raise ValueError(f"shards are counted from 0: of {n} the last is {n - 1}, got {k}")
-    places = np.arange(n_tasks)
-    return np.asarray((places >= k * n_tasks // n) & (places < (k + 1) * n_tasks // n))
+    return np.arange(k * n_tasks // n, (k + 1) * n_tasks // n)
 
 
 def _merged(path: str | Path, table: Table, facts: Mapping[str, str], on_change: OnChange) -> list[Rows]:
@@ -345,7 +302,7 @@ class _Run:
     def __init__(
         self,
         columns: Mapping[str, Column],
-        own: npt.NDArray[np.bool_],
+        own: npt.NDArray[np.int64],
         table: Table,
         store: Store | None,
         workers: Workers,
@@ -353,7 +310,7 @@ class _Run:
         limit: float,
     ) -> None:
         self.columns, self.table, self.store, self.workers = columns, table, store, workers
-        self.places, self.total = np.flatnonzero(own & ~table.done), int(own.sum())
+        self.places, self.total = own[~table.done[own]], own.size
         self.progress = progress or (lambda done, total: None)
         self.running: dict[Future[list[Rows]], int] = {}  # numbers of tasks
         self.sent, self.largest, self.seconds_a_task = 0, 0, 0.0
