@@ -292,9 +292,8 @@ def sobol_indices(result: Sweep, *, seed: int = 0) -> SobolIndices:
 
 def _check(result: Sweep, n: int) -> None:
     if len(result) < result.n_tasks or result.errors:
-        raise ValueError(
-            f"Sobol indices need every task: {len(result)} of {result.n_tasks} are done, {len(result.errors)} failed"
-        )
+        words = f"{len(result)} are done, {len(result.errors)} failed"
+        raise ValueError(f"Sobol indices need all {result.n_tasks} tasks: {words}")
     sets = np.column_stack([*result.parameters.values()])
     if n == 0 or not np.array_equal(sets, saltelli(sets[:n], sets[n : 2 * n])):
         raise ValueError('Sobol indices need the sample hs.Sample(..., method="saltelli")')

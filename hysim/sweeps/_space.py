@@ -2,7 +2,8 @@
 
 import math
 from collections.abc import Iterable, Mapping, Sequence
-from typing import Any, Literal, NamedTuple, Protocol, runtime_checkable
+from contextlib import suppress
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -17,16 +18,6 @@ OWN_NAMES = ("task", "seed", "seconds", "error")
 """Columns of the result that are no parameters."""
 
 _DESIGNS = ("sobol", "latin_hypercube", "saltelli")
-
-
-@runtime_checkable
-class _HasPpf(Protocol):
-    def ppf(self, fractions: FloatArray) -> FloatArray: ...
-
-
-@runtime_checkable
-class _HasIcdf(Protocol):
-    def icdf(self, fractions: FloatArray) -> FloatArray: ...
 
 
 class Space(NamedTuple):
@@ -85,9 +76,7 @@ class Sample:
         check_choice("method", self.method, _DESIGNS)
         if self.method != "latin_hypercube" and self.n & (self.n - 1):
             above = 1 << self.n.bit_length()
-            raise ValueError(
-                f"a Sobol sequence is balanced for powers of 2 only, got n = {self.n}: take {above // 2} or {above}"
-            )
+            raise ValueError(f"a Sobol sequence has a power of 2 tasks, got n = {self.n}: take {above // 2} or {above}")
         for name, distribution in self.distributions.items():
             _quantiles(name, distribution)
 
@@ -141,9 +130,9 @@ def _quantiles(name: str, distribution: Any) -> Any:
         if not (math.isfinite(low) and math.isfinite(high) and low < high):
             raise ValueError(f"the limits of {name} must be finite and in order, got ({low}, {high})")
         return lambda fractions: low + (high - low) * fractions
-    if isinstance(distribution, _HasPpf):
+    with suppress(AttributeError):
         return distribution.ppf
-    if isinstance(distribution, _HasIcdf):
+    with suppress(AttributeError):
         return distribution.icdf
     raise TypeError(
         f"the distribution of {name} must be a pair (low, high) or one of scipy.stats with its arguments, "

@@ -30,8 +30,6 @@ from contextlib import closing, contextmanager
 from itertools import chain, count
 from pathlib import Path
 from typing import Any, Literal, NamedTuple, TypeVar
-from zipfile import BadZipFile
-from zlib import error as CompressionError  # noqa: N812
 
 import numpy as np
 
@@ -41,10 +39,6 @@ from hysim.sweeps._space import Column, Space
 T = TypeVar("T")
 
 _KINDS: dict[str, Any] = {"f": np.float64, "i": np.int64, "b": np.bool_, "U": np.str_}
-_DAMAGE = (
-    ArithmeticError, AttributeError, BadZipFile, CompressionError, EOFError, LookupError, MemoryError, RecursionError,
-    TypeError, ValueError,
-)  # fmt: skip
 
 
 class Output(NamedTuple):
@@ -72,7 +66,7 @@ class Study(NamedTuple):
 
 
 def study_of(rows: Mapping[str, Any]) -> Study:
-    """The study in the rows of a store; any of `_DAMAGE` if they are damaged."""
+    """The study in the rows of a store; some error if they are damaged."""
     facts = {name: json.loads(text) for name, text in rows.items()}
     axes = None if facts["axes"] is None else [(_of(str, name), _of(list, values)) for name, values in facts["axes"]]
     layout = [Output(_of(str, n), [*map(_size, shape)], _of(str, c)) for n, shape, c in facts.get("layout", ())]
@@ -98,7 +92,9 @@ def damage_named(path: str | Path) -> Iterator[None]:
     """Turn the errors of damaged values into a ValueError that names the store."""
     try:
         yield
-    except _DAMAGE as error:
+    except (OSError, sqlite3.Error):
+        raise
+    except Exception as error:
         reason = f"{error} is missing" if isinstance(error, KeyError) else str(error) or type(error).__name__
         raise ValueError(f"{path} is a damaged store, move it away: {reason}") from error
 
@@ -295,14 +291,10 @@ class Store:
 
     def _column(self, name: str, kind: Any, empty: float | None = None) -> Column:
         """Values of the rows; ValueError for a row without one, but that NULL is nan in outputs."""
-        cells = self._cells(name, empty)
-        return np.array([*cells], kind) if kind is np.str_ else np.fromiter(cells, kind)
-
-    def _cells(self, name: str, empty: float | None) -> Iterator[Any]:
-        for (cell,) in self._database.execute(f"SELECT {_quoted([name])} FROM results ORDER BY task"):
-            if cell is None and empty is None:
-                raise ValueError(f"a row has no {name!r}")
-            yield empty if cell is None else cell
+        cells = [cell for (cell,) in self._database.execute(f"SELECT {_quoted([name])} FROM results ORDER BY task")]
+        if None in cells and empty is None:
+            raise ValueError(f"a row has no {name!r}")
+        return np.array([empty if cell is None else cell for cell in cells], kind)
 
     def _commit(self) -> None:
         self._database.execute("COMMIT")

@@ -1,9 +1,9 @@
 """The verb `sweep`: one function over many parameters, on threads, processes or a cluster, and resumable.
 
-Tasks are sent in chunks. The first chunk is one task; chunks grow at most fourfold, until one takes `_CHUNK`, so that
-sending, about a millisecond, costs little; at the end they shrink so that all workers end together. Where the process
-that sends them would be busy for more than `_BUSY` of the time, they take longer. Finished chunks are written before
-they are reported. No result depends on the division into chunks.
+Tasks are sent in chunks. The first chunk is one task; chunks grow at most fourfold, until one takes `_CHUNK`, or on a
+cluster `_OF_A_CLUSTER`, so that sending, about a millisecond, costs little; at the end they shrink so that all workers
+end together. Where the process that sends them would be busy for more than `_BUSY` of the time, they take longer.
+Finished chunks are written before they are reported. No result depends on the division into chunks.
 
 **Shards** are shares of a study that know nothing of each other. A store holds the rows of any tasks of its study, so
 that the store of a shard is one like all others, and stores are merged by entering their rows.
@@ -45,6 +45,13 @@ from hysim.sweeps._result import Sweep, result_of
 from hysim.sweeps._space import Column, Space, space_of
 from hysim.sweeps._store import ON_CHANGE, OnChange, Store, opened
 
+_CHUNK, _OF_A_CLUSTER, _SHORTEST = 0.075, 1.0, 0.002  # seconds
+_MOST_A_SECOND = 500  # chunks: a scheduler takes a millisecond for each
+_BUSY, _LONGEST = 0.2, 5.0  # of the time at most, for sending chunks and entering rows; seconds of a chunk for it
+_NEEDLESS, _WORTH_IT = 0.5, 60.0  # of the time for sending, where more workers would wait; seconds of a study to divide
+_GROWTH, _MOST_TASKS = 4, 20_000  # of a chunk, whose rows a store takes as Python's numbers
+_PATIENCE = 0.6  # seconds to wait after an interrupt for the chunks that are being computed
+
 _task_of_process: list[Task] = []  # the task of the study that this process was started for
 
 
@@ -61,14 +68,15 @@ class _DaskClient(Protocol):
 
 
 class Workers(NamedTuple):
-    """How a chunk is sent out, how many are computed at a time, and seconds of processor that this process has spent.
+    """How a chunk is sent out, how many are computed at a time, and seconds that this process spends and a chunk takes.
 
     Where workers are threads of this process, or may be, the seconds are those of the thread that sends.
     """
 
     submit: Callable[[Chunk], Future[list[Rows]]]
     number: Callable[[], int]
-    clock: Callable[[], float] = time.thread_time
+    clock: Callable[[], float]
+    chunk: float
 
 
 @contextmanager
@@ -77,7 +85,7 @@ def workers_of(executor: Any, number: int | None, task: Task) -> Iterator[Worker
     if number is not None:
         check_count("workers", number)
     size: Callable[[], int] = cores
-    clock = time.thread_time
+    clock, chunk = time.thread_time, _CHUNK
     work: tuple[Any, ...] = computed, task
     if executor in (None, "threads"):
         pool: Any = threads(number or cores())
@@ -85,15 +93,16 @@ def workers_of(executor: Any, number: int | None, task: Task) -> Iterator[Worker
         pool, work = processes(number or cores(), _begin, task), (_computed_here,)
     elif isinstance(executor, _DaskClient):
         pool, size = nullcontext(executor.get_executor()), lambda: max(1, sum(executor.nthreads().values()))
-        clock = time.process_time
+        clock, chunk = time.process_time, _OF_A_CLUSTER
     elif isinstance(executor, _Submits):
         is_pool = isinstance(executor, (ThreadPoolExecutor, ProcessPoolExecutor))
         pool, size = nullcontext(executor), (lambda: vars(executor)["_max_workers"]) if is_pool else cores
+        chunk = _CHUNK if is_pool else _OF_A_CLUSTER
     else:
         words = 'executor must be "threads", "processes", a dask client, or have the method submit of an Executor'
         raise (ValueError if isinstance(executor, str) else TypeError)(f"{words}, got {executor!r}")
     with pool as opened_pool:
-        yield Workers(partial(opened_pool.submit, *work), lambda: number or size(), clock)
+        yield Workers(partial(opened_pool.submit, *work), lambda: number or size(), clock, chunk)
 
 
 def _begin(task: Task) -> None:
@@ -106,10 +115,9 @@ def _computed_here(chunk: Chunk) -> list[Rows]:
 
 def identity(task: Callable[..., Any], space: Space, seed: int) -> dict[str, str]:
     """The facts that must not change between two calls that share a store, as short texts."""
-    names = ", ".join(space.columns)
     return {
         "task": _digest(_content(inspect.unwrap(task), ())),
-        "space": f"{space.n_tasks} tasks of {names} ({_digest(dict(space.columns))})",
+        "space": f"{space.n_tasks} tasks of {', '.join(space.columns)} ({_digest(dict(space.columns))})",
         "seed": str(seed),
         "hysim": __version__,
     }
@@ -143,16 +151,6 @@ def _content(value: Any, above: tuple[Any, ...]) -> Any:
     bound = {**inspect.getclosurevars(value).nonlocals, "(batch)": vars(value).get("batch")}
     contents = {name: _content(each, (*above, value)) for name, each in bound.items()}
     return [source, value.__defaults__, value.__kwdefaults__, contents]
-
-
-_CHUNK, _SHORTEST = 0.075, 0.002  # seconds
-_WITH_ARRAYS = 0.5  # seconds; a shard for each
-_MOST_A_SECOND = 500  # chunks: a scheduler takes a millisecond for each
-_BUSY, _LONGEST = 0.2, 5.0  # of the time at most, for sending chunks and entering rows; seconds of a chunk for it
-_NEEDLESS = 0.5  # of the time: more workers would wait for the process that sends their chunks
-_WORTH_IT = 60.0  # seconds of a study to divide
-_GROWTH, _MOST_TASKS = 4, 20_000  # of a chunk, whose rows a store takes as Python's numbers
-_PATIENCE = 0.6  # seconds to wait after an interrupt for the chunks that are being computed
 
 
 @reports
@@ -358,10 +356,8 @@ class _Run:
     def _size(self, remaining: int, number: int) -> int:
         if not self.largest:
             return 1
-        has_arrays = any(self.table.layout.values())
         own = (self.workers.clock() - self.busy) / self.n_chunks  # seconds that a chunk takes here
-        least = min(max(number / _MOST_A_SECOND, number * own / _BUSY), _LONGEST)
-        target = max(_WITH_ARRAYS if has_arrays and self.store else _CHUNK, least)
+        target = min(max(self.workers.chunk, number / _MOST_A_SECOND, number * own / _BUSY), _LONGEST)
         cost = max(self.seconds_a_task, 1e-9)
         share = max(remaining / (2 * number), _SHORTEST / cost)
         return max(1, min(remaining, _MOST_TASKS, int(min(target / cost, share, _GROWTH * self.largest))))

@@ -2,6 +2,7 @@
 
 import inspect
 from collections.abc import Mapping, Sequence
+from itertools import zip_longest
 from typing import Any, Literal, Protocol, get_args, runtime_checkable
 
 import numpy as np
@@ -180,10 +181,8 @@ def structure_task(
     for name in names:
         check_choice("measures", name, REDUCTIONS)
     if isinstance(ground_accelerations, np.ndarray) or np.ndim(ground_accelerations[0]) == 0:  # type: ignore[index]
-        records = list(np.atleast_2d(np.asarray(ground_accelerations, dtype=float)))
+        records = [*np.atleast_2d(np.asarray(ground_accelerations, dtype=float))]
     else:
         records = [read_only(each, "ground_accelerations", ndim=1) for each in ground_accelerations]  # type: ignore[union-attr]
-    table = np.zeros((len(records), max(record.size for record in records)))
-    for row, record in zip(table, records, strict=True):
-        row[: record.size] = record
+    table = np.array([*zip_longest(*records, fillvalue=0.0)]).T
     return StructureTask(structure=structure, inputs=table, sample_time=sample_time, measures=names)
