@@ -124,7 +124,10 @@ def _message(error: Exception) -> str:
 
 
 class Table:
-    """Outputs of the tasks that are done, nan elsewhere, one column for each, shape (n_tasks, *shape)."""
+    """Outputs of the tasks that are done, one column for each, shape (n_tasks, *shape).
+
+    Rows that are not done take no memory: a shard of a large study is as small as its share.
+    """
 
     def __init__(self, n_tasks: int, parameters: Iterable[str]) -> None:
         self.layout: Layout = {}  # empty until a task has succeeded
@@ -139,7 +142,7 @@ class Table:
         for name, shape in layout.items():
             if name in self._other_names:
                 raise ValueError(f"the task returned {name}, which is the name of another column: rename the output")
-            self.values[name] = np.full((self.done.size, *shape), np.nan)
+            self.values[name] = np.zeros((self.done.size, *shape))
         self.layout = layout
 
     def enter(self, rows: Iterable[Rows]) -> list[Rows]:

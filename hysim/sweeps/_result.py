@@ -186,6 +186,8 @@ def result_of(table: Table, space: Space, task_seeds: Column, asked: npt.NDArray
         return part
 
     places.setflags(write=False)
+    for column in table.values.values():
+        column[[*table.errors]] = np.nan
     values = {name: done(column) for name, column in table.values.items()}
     return Sweep(
         parameters={name: done(column) for name, column in space.columns.items()},

@@ -228,7 +228,6 @@ def sweep(
     """
     check_choice("on_change", on_change, ON_CHANGE)
     check_not_negative(time_limit=time_limit)
-    limit = math.inf if time_limit is None else time_limit
     if isinstance(progress, Line) and not is_installed("pandas"):
         progress.warn("pandas is not installed: the result has no to_frame (pip install 'hysim[tables]')")
     tasks = space_of(space)
@@ -244,7 +243,7 @@ def sweep(
             if rows and opened_store is not None:
                 opened_store.commit(rows, table.layout)
         with workers_of(executor, workers, task) as pool:
-            _Run(columns, own, table, opened_store, pool, progress or None, limit).run()
+            _Run(columns, own, table, opened_store, pool, progress or None, time_limit).run()
     return result_of(table, tasks, task_seeds, own)
 
 
@@ -305,7 +304,7 @@ class _Run:
         store: Store | None,
         workers: Workers,
         progress: Progress | None,
-        limit: float,
+        limit: float | None,
     ) -> None:
         self.columns, self.table, self.store, self.workers = columns, table, store, workers
         self.places, self.total = own[~table.done[own]], own.size
@@ -313,7 +312,7 @@ class _Run:
         self.running: dict[Future[list[Rows]], int] = {}  # numbers of tasks
         self.sent, self.largest, self.seconds_a_task = 0, 0, 0.0
         self.done, self.n_chunks = self.total - self.places.size, 0
-        self.begin, self.busy, self.limit = time.monotonic(), workers.clock(), limit
+        self.begin, self.busy, self.limit = time.monotonic(), workers.clock(), math.inf if limit is None else limit
 
     def run(self) -> None:
         self.progress(self.done, self.total)
