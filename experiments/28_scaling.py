@@ -8,10 +8,11 @@ pairs.
 
 The model says that a sweep of N tasks of tau seconds in C chunks on W workers takes start + N tau / W + p N + s C. Its
 start, p and s are fitted to the rows of each executor. On a cluster the tasks run elsewhere, while p N + s C stays with
-the client and the scheduler: they are busy for a share of the time of W (p / tau + s / T), where a chunk takes
-T = max(75 ms, W / 500 s). Above 1 they saturate, and the efficiency is the share's inverse. Here client, scheduler and
-workers shared two cores, and s holds the time that a chunk is on its way as well as the scheduler's own: p and s are
-too large rather than too small, and a real cluster does better.
+the client and the scheduler: they are busy for a share of the time of W (p / tau + s / T), where a chunk takes T =
+max(1 s, W / 500 s), and up to 5 s where they would be busy for more than a fifth of it. Above 1 they saturate, and the
+efficiency is the share's inverse. Here client, scheduler and workers shared two cores, and s holds the time that a
+chunk is on its way as well as the scheduler's own: p and s are too large rather than too small, and a real cluster does
+better.
 """
 
 import os
@@ -41,7 +42,7 @@ Row = dict[str, Any]
 Model = dict[str, float]
 
 REPEATS = 3
-SHORTEST, MOST_A_SECOND = 0.075, 500.0  # s of a chunk, and chunks a second that a scheduler is sent
+SHORTEST, LONGEST, MOST_A_SECOND, BUSY = 1.0, 5.0, 500.0, 0.2  # of a chunk on a cluster, as in hysim/sweeps/_sweep.py
 CLUSTERS = (10, 100, 1_000, 10_000)  # workers
 DURATIONS = (1e-3, 1e-2, 1e-1, 1.0)  # s of a task
 
@@ -175,7 +176,8 @@ def fitted_model(rows: list[Row]) -> Model:
 
 def predicted(model: Model, duration: float, workers: float) -> float:
     """Efficiency of a cluster [%]."""
-    chunk = max(SHORTEST, workers / MOST_A_SECOND, duration)
+    chunk = max(SHORTEST, workers / MOST_A_SECOND, workers * model["seconds_a_chunk"] / BUSY)
+    chunk = max(min(chunk, LONGEST), duration)
     busy = workers * (model["seconds_a_task"] / duration + model["seconds_a_chunk"] / chunk)
     return 100.0 / max(1.0, busy)
 

@@ -5,7 +5,8 @@ killed with SIGKILL at a random moment after its store is there, and begun again
 In the end the command merges the stores. The table is compared, to the bit, with that of a study that was not divided
 and that nobody disturbed. Every task notes that it was computed, so that what was computed twice can be counted.
 
-Beside it stands the memory of a process that computes a million tasks with two numbers each, with a store.
+Beside it stand the memory of a process that computes a million tasks with two numbers each, with a store; and the time
+of a sweep on two processes over that of the same calls, which these two processes share without a sweep, in turns.
 """
 
 import json
@@ -14,9 +15,11 @@ import subprocess
 import sys
 import tempfile
 import time
-from concurrent.futures import ThreadPoolExecutor
+from collections.abc import Callable
+from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
 from functools import partial
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -24,14 +27,16 @@ import hysim as hs
 from hysim.plot import Figure
 
 sys.path.insert(0, str(Path(__file__).parent))
-from results_folder import one_panel, write_results
+import scaling_tasks
+from results_folder import one_panel, wall_timed, write_results
 
 RESULTS = Path(__file__).parent / "results" / "shards"
 STUDY = Path(__file__).with_suffix(".toml")
 N_SHARDS, KILLS, LATEST = 20, 3, 1.5  # s after a store is there
 MANY = 1_000_000
+SHARED = ((scaling_tasks.two_seconds, 40, 3), (scaling_tasks.millisecond, MANY, 1))  # tasks, their number, and repeats
 NOTES = "HYSIM_EXPERIMENT_NOTES"
-Row = dict[str, float]
+Row = dict[str, Any]
 
 
 def task(k: float, seed: int) -> dict[str, object]:
@@ -84,6 +89,20 @@ def megabytes(n_tasks: int) -> float:
     return float(done.stdout)
 
 
+def shared(task: Callable[..., Any], n_tasks: int, repeats: int) -> Row:
+    """Times of two processes that divide these calls, and of a sweep on them [s], and the median of their ratio."""
+    space = {"a": [0.5], "b": np.linspace(0.0, 1.0, n_tasks)}
+    with ProcessPoolExecutor(2) as pool:
+        ways = (
+            lambda: list(pool.map(scaling_tasks.loop, 2 * [task], 2 * [n_tasks // 2])),
+            lambda: hs.sweep(task, space, executor=pool),
+        )
+        list(pool.map(task, [0.5] * 4, [0.5] * 4))  # compiles
+        plain, swept = zip(*([wall_timed(way)[1] for way in ways] for _ in range(repeats)), strict=True)
+    efficiency = 100.0 * float(np.median(np.divide(plain, swept)))
+    return {"tasks": n_tasks, "loop_seconds": plain, "sweep_seconds": swept, "efficiency_percent": efficiency}
+
+
 def main(smoke: bool = False) -> list[Row]:
     """Kill, go on, merge and compare, and unless it is a smoke run write table, figure and JSON."""
     n = 300 if smoke else N_SHARDS
@@ -92,13 +111,14 @@ def main(smoke: bool = False) -> list[Row]:
         with ThreadPoolExecutor(2) as pool:
             rows = list(pool.map(partial(shard, folder, n), range(1 if smoke else n)))
         if smoke:
-            return rows
+            return [*rows, shared(scaling_tasks.product, 20, 1)]
         words = ["sweep", str(STUDY), "--out", str(folder / "walks.sqlite"), "--merge"]
         subprocess.run([sys.executable, "-m", "hysim", *words], check=True)
         merged = hs.load_sweep(folder / "walks.sqlite")
     whole = hs.sweep(task, {"k": np.arange(len(merged), dtype=float)}, seed=1)
     numbers = {"columns_that_differ": differences(merged, whole), "n_tasks": len(whole), "many": MANY}
-    return write_results(RESULTS, rows, draw, numbers | {"megabytes_of_many": megabytes(MANY)})
+    numbers |= {"megabytes_of_many": megabytes(MANY), "shared": [shared(*each) for each in SHARED]}
+    return write_results(RESULTS, rows, draw, numbers)
 
 
 def draw(rows: list[Row]) -> Figure:

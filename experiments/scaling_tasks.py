@@ -4,7 +4,9 @@
 """
 
 import sys
+from collections.abc import Callable
 from functools import cache
+from typing import Any
 
 import numpy as np
 
@@ -34,6 +36,11 @@ def ten_milliseconds(a: float, b: float) -> float:
     return _driven(a, b, 200_000)
 
 
+def two_seconds(a: float, b: float) -> float:
+    """In many calls of a kernel."""
+    return sum(ten_milliseconds(a, b) for _ in range(300))
+
+
 def with_arrays(a: float, b: float) -> float:
     """Some 10 ms, a part of them with arrays of a megabyte made anew in each call."""
     u = np.sin(np.linspace(0.0, 200.0, 125_000))
@@ -58,6 +65,13 @@ def numbers(a: float, b: float) -> dict[str, float]:
 
 
 numbers.batch = numbers  # type: ignore[attr-defined]
+
+
+def loop(task: Callable[..., Any], n_tasks: int) -> None:
+    """So many calls without a sweep."""
+    for k in range(n_tasks):
+        task(0.5, k / n_tasks)
+
 
 if __name__ == "__main__":
     import resource
