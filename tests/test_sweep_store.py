@@ -177,6 +177,12 @@ def test_a_shard_that_was_cut_is_named_and_the_others_can_be_merged(share, path,
     assert bits(merged) == bits(hs.sweep(sweep_tasks.noisy, sweep_tasks.SPACE))
 
 
+def test_a_clock_that_jumps_changes_nothing(path, uninterrupted, monkeypatch):
+    ticks = itertools.cycle([1e9, -1e9])
+    monkeypatch.setattr(time, "time", lambda: next(ticks))
+    assert bits(hs.sweep(sweep_tasks.long, sweep_tasks.LONG, store=path, time_limit=600.0)) == bits(uninterrupted)
+
+
 def test_of_two_merges_at_once_the_second_is_refused(path, tmp_path):
     stores = shards(tmp_path, sweep_tasks.product, GRID, 2)
 

@@ -7,7 +7,7 @@ from typing import Any
 
 from hysim._release import __version__
 
-DEPENDENCIES = ("numpy", "scipy", "numba", "matplotlib", "pysindy", "control", "threadpoolctl", "click")
+DEPENDENCIES = ("numpy", "scipy", "numba", "matplotlib", "pysindy", "control", "threadpoolctl", "click", "joblib")
 EXTRAS = (
     *("h5py", "scikit-image", "imageio", "pandas", "xarray", "dask", "distributed", "ziglang"),
     *("emcee", "dynesty", "arviz"),

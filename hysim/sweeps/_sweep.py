@@ -124,7 +124,7 @@ def identity(task: Callable[..., Any], space: Space, seed: int) -> dict[str, str
 
 
 def _digest(value: Any) -> str:
-    import joblib  # type: ignore[import-untyped]
+    import joblib
 
     try:
         return str(joblib.hash(value))[:16]
