@@ -39,6 +39,12 @@ def test_the_conda_recipe_has_the_version_and_requirements_of_the_package():
     assert f'version: "{hs.__version__}"\n  python_min: "{PROJECT["requires-python"][2:]}"\n' in recipe
 
 
+def test_the_part_that_is_run_is_there():
+    part = re.search(r"part=\(([^)]+)\)", (ROOT / ".ci/versions").read_text())[1].split()
+    assert len(part) > 10
+    assert all((ROOT / f"tests/test_{name}.py").is_file() for name in part)
+
+
 def test_every_run_passed():
     assert all(re.fullmatch(r"\d+ passed(, \d+ skipped)?", row["tests"]) for row in rows())
 
