@@ -76,21 +76,15 @@ def pasted(function: F) -> F:
     return _compiled(function, (), inline="always", **_NO_ENTRY)
 
 
-def signed_kernel(*signatures: Any) -> Callable[[F], F]:
+def signed_kernel(*signatures: Any, **others: Any) -> Callable[[F], F]:
     """Compile a function for these signatures at once: what a typed function pointer needs."""
-    return lambda function: _compiled(function, list(signatures))
+    return lambda function: _compiled(function, list(signatures), **others)
 
 
 def signed_closure(*signatures: Any) -> Callable[[F], F]:
-    """As `signed_kernel`, for a function that closes over kernels: no later process would find it in the cache."""
+    """As `signed_kernel` and `uncounted`, for what closes over kernels: no later process would find it in the cache."""
     compiler: Any = numba.njit
-    return lambda function: compiler(list(signatures), nogil=True, error_model="numpy")(function)
-
-
-def closure(function: F) -> F:
-    """As `kernel`, for a function that closes over kernels: no later process would find it in the cache."""
-    compiler: Any = numba.njit
-    return compiler(nogil=True, error_model="numpy")(function)  # type: ignore[no-any-return]
+    return lambda function: compiler(list(signatures), nogil=True, error_model="numpy", _nrt=False)(function)
 
 
 def unstored(function: F) -> F:

@@ -58,7 +58,7 @@ import numpy.typing as npt
 from numba import float64, int64, types, void
 
 from hysim._basics.frozen import FloatArray
-from hysim.kernels._compile import borrowed, by_address, closure, inlined, signed_closure, signed_kernel
+from hysim.kernels._compile import borrowed, by_address, inlined, signed_closure, signed_kernel
 from hysim.kernels.controllers import CONTROLLER, LARGEST, ControllerStep, guarded
 from hysim.kernels.stepping import CONSTANTS, START, STEP, VECTOR, Start, Step
 
@@ -155,7 +155,7 @@ def chain_start(law: Step, law_start: Start) -> Start:
     rest_by, law_by = by_address(chain_at_rest, _CHAIN_START), by_address(law, STEP.signature)
     start_by = by_address(law_start, START.signature)
 
-    @closure
+    @signed_closure(START.signature)
     def start(parameters: FloatArray, state: FloatArray, u0: float) -> None:
         rest_by(law_by, start_by, parameters, state, u0)
 

@@ -20,8 +20,8 @@ from hysim._basics.frozen import FloatArray
 from hysim.kernels._compile import Addressed as Addressed
 from hysim.kernels._compile import borrowed as borrowed
 from hysim.kernels._compile import by_address as by_address
-from hysim.kernels._compile import closure, signed_closure, signed_kernel
 from hysim.kernels._compile import inlined_kernel as inlined_kernel
+from hysim.kernels._compile import signed_closure, signed_kernel
 from hysim.kernels._compile import sources as sources
 from hysim.kernels._compile import unstored as unstored
 
@@ -83,28 +83,32 @@ def complete(parameters: FloatArray, state: FloatArray, u0: float) -> None:
 # ---------------------------------------------------------------------- laws side by side and behind each other
 
 
-def side_by_side(first: Step, second: Step) -> Step:
-    """The step of the sum of both outputs."""
-    first_by, second_by = by_address(first, STEP.signature), by_address(second, STEP.signature)
+_PAIR = float64(STEP, STEP, CONSTANTS, VECTOR, float64)
+
+
+@signed_kernel(_PAIR, _nrt=False)
+def side_by_side(first: Step, second: Step, parameters: FloatArray, state: FloatArray, u: float) -> float:
+    """The sum of both outputs."""
+    n, m = 2 + int(parameters[0]), int(parameters[1])
+    y = first(parameters[2:n], state[:m], u)
+    return y + second(parameters[n:], state[m:], u)
+
+
+@signed_kernel(_PAIR, _nrt=False)
+def one_behind_the_other(first: Step, second: Step, parameters: FloatArray, state: FloatArray, u: float) -> float:
+    """The output of the second law for that of the first."""
+    n, m = 2 + int(parameters[0]), int(parameters[1])
+    y = first(parameters[2:n], state[:m], u)
+    return second(parameters[n:], state[m:], y) if math.isfinite(y) else y
+
+
+def paired(join: Callable[..., float], first: Step, second: Step) -> Step:
+    """The step of two laws that a kernel joins: its code is compiled once for all pairs."""
+    by, first_by, second_by = by_address(join, _PAIR), *(by_address(each, STEP.signature) for each in (first, second))
 
     @signed_closure(STEP.signature)
     def step(parameters: FloatArray, state: FloatArray, u: float) -> float:
-        n, m = 2 + int(parameters[0]), int(parameters[1])
-        y = first_by(parameters[2:n], state[:m], u)
-        return y + second_by(parameters[n:], state[m:], u)
-
-    return step
-
-
-def one_behind_the_other(first: Step, second: Step) -> Step:
-    """The step of the second law for the output of the first."""
-    first_by, second_by = by_address(first, STEP.signature), by_address(second, STEP.signature)
-
-    @signed_closure(STEP.signature)
-    def step(parameters: FloatArray, state: FloatArray, u: float) -> float:
-        n, m = 2 + int(parameters[0]), int(parameters[1])
-        y = first_by(parameters[2:n], state[:m], u)
-        return second_by(parameters[n:], state[m:], y) if math.isfinite(y) else y
+        return by(first_by, second_by, parameters, state, u)
 
     return step
 
@@ -113,7 +117,7 @@ def started_both(first: Start, second: Start) -> Start:
     """The start of two laws for the same input."""
     first_by, second_by = by_address(first, START.signature), by_address(second, START.signature)
 
-    @closure
+    @signed_closure(START.signature)
     def start_both(parameters: FloatArray, state: FloatArray, u0: float) -> None:
         first_by(parameters[2 : 2 + int(parameters[0])], state[: int(parameters[1])], u0)
         second_by(parameters[2 + int(parameters[0]) :], state[int(parameters[1]) :], u0)

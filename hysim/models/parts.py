@@ -8,7 +8,7 @@ from typing import Any, TypeVar
 import numpy as np
 
 from hysim._basics.frozen import FloatArray, read_only
-from hysim.kernels.stepping import Start, Step, complete, self_starting, started_both
+from hysim.kernels.stepping import Start, Step, complete, paired, self_starting, started_both
 from hysim.models.protocols import CompiledLaw, OfFamily, Responding, Startable, Steppable, needed_time, needs_time
 
 
@@ -51,16 +51,16 @@ def response_of(part: Any, u: FloatArray, sample_time: float | None) -> FloatArr
     return np.asarray(part.response(u, needed_time(part, sample_time)) if needs_time(part) else part.response(u))
 
 
-def compiled_pair(join: Callable[[Step, Step], Step], first: CompiledLaw, second: CompiledLaw) -> CompiledLaw:
+def compiled_pair(join: Callable[..., float], first: CompiledLaw, second: CompiledLaw) -> CompiledLaw:
     sizes = [float(first.parameters.size), float(first.state.size)]
     return CompiledLaw(
-        _joined(join, first.step, second.step),
+        _paired(join, first.step, second.step),
         read_only(np.concatenate([sizes, first.parameters, second.parameters]), finite=False),
         np.concatenate([first.state, second.state]),
     )
 
 
-def startable_pair(join: Callable[[Step, Step], Step], first: Startable, second: Startable) -> Startable:
+def startable_pair(join: Callable[..., float], first: Startable, second: Startable) -> Startable:
     """As `compiled_pair`, of laws that start at the same input."""
     return Startable(*compiled_pair(join, first.law, second.law), _joined(started_both, first.start, second.start))
 
@@ -75,6 +75,7 @@ def self_started(law: Startable) -> Startable:
 
 
 _Kernel = TypeVar("_Kernel", Step, Start)
+_paired = functools.lru_cache(maxsize=256)(paired)
 
 
 @functools.lru_cache(maxsize=256)
