@@ -23,6 +23,7 @@ LAWS = {
     "Duhem": hs.Duhem.from_terms({"u'": 1.0, "|u'| y": -0.4, "|u'| u": 0.2}),
     "Dahl": hs.Dahl(stiffness=2.0, coulomb=0.5),
     "ColemanHodgdon": hs.ColemanHodgdon(),
+    "VaianaRosati": hs.VaianaRosati(k_b=(2.0, 1.5), f_0=0.3),
     "Play": hs.Play(threshold=0.2),
     "Stop": hs.Stop(threshold=0.4),
     "MaxwellSlip": hs.MaxwellSlip(stiffness=(1.0, 2.0), slips=(0.3, 0.6), feedthrough=0.5),
