@@ -45,6 +45,7 @@ LAWS = {
     "Dahl": hs.Dahl(),
     "ColemanHodgdon": hs.ColemanHodgdon(),
     "VaianaRosati": hs.VaianaRosati(f_0=(0.4, 0.3), gamma_1=0.2),
+    "MenegottoPinto": hs.MenegottoPinto(a1=0.1),
     "JilesAtherton": hs.JilesAtherton(),
     "Line": hs.Line(slope=1.0),
 }
