@@ -109,6 +109,8 @@ from hysim.laws.operators.preisach import Preisach as Preisach
 from hysim.laws.operators.preisach import PreisachRelays as PreisachRelays
 from hysim.laws.differential.dahl import Dahl as Dahl
 from hysim.laws.differential.coleman_hodgdon import ColemanHodgdon as ColemanHodgdon
+from hysim.laws.differential.vaiana_rosati import VaianaRosati as VaianaRosati
+from hysim.laws.differential.menegotto_pinto import MenegottoPinto as MenegottoPinto
 from hysim.laws.magnetic.jiles_atherton import JilesAtherton as JilesAtherton
 from hysim.laws.magnetic.tellinen import Tellinen as Tellinen
 from hysim.laws.magnetic.tellinen_table import TellinenTable as TellinenTable

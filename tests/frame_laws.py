@@ -46,6 +46,8 @@ SMOOTH = {
     "Duhem": hs.Duhem.from_terms({"u'": 70.0, "|u'| z": -30.0}, feedthrough=30.0),
     "Dahl": hs.Dahl(stiffness=100.0, coulomb=3.0),
     "ColemanHodgdon": hs.ColemanHodgdon(alpha=30.0, c=30.0, B=100.0),
+    "VaianaRosati": hs.VaianaRosati(k_b=30.0, f_0=2.3, alpha=30.0, gamma_1=0.5, gamma_2=50.0),
+    "MenegottoPinto": hs.MenegottoPinto(stiffness=100.0, yield_input=0.02, hardening=10.0),
     "JilesAtherton": hs.JilesAtherton(Ms=0.03, a=0.02, alpha=-0.5, k=0.03, gain=100.0, feedthrough=50.0),
     "Tellinen": hs.Tellinen(saturation=2.0, coercivity=0.01, squareness=0.4, feedthrough=30.0),
     "SquareDahl": SquareDahl(k=70.0, coulomb=2.0, c=30.0),

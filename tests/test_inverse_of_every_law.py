@@ -37,6 +37,8 @@ LAWS = {
     "Duhem": hs.Duhem.from_terms({"u'": 1.0, "u' |z|": -0.3, "|u'| z": -0.6}, feedthrough=2.0),
     "Dahl": hs.Dahl(stiffness=2.0, coulomb=4.0),
     "ColemanHodgdon": hs.ColemanHodgdon(alpha=0.8, c=1.0, B=0.7),
+    "VaianaRosati": hs.VaianaRosati(k_b=1.0, f_0=0.3, alpha=(3.0, 2.0), beta_1=0.1, beta_2=1.0, gamma_1=0.2),
+    "MenegottoPinto": hs.MenegottoPinto(hardening=0.2, a1=0.05, offset=0.1, z0=0.2),
     "JilesAtherton": hs.JilesAtherton(Ms=1.0, a=0.4, alpha=0.5, k=0.3, gain=1.0, feedthrough=0.2, offset=0.1),
     "Line": hs.Line(offset=0.2, slope=-0.7),
     "PrandtlIshlinskii": PLAYS,

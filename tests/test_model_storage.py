@@ -54,6 +54,8 @@ NUMBERS = [
     (hs.MaxwellSlip(stiffness=(1 / 3, 0.1), slips=(0.3, 0.2), z0=(0.1, 0.2)), "stiffness"),
     (hs.Dahl(stiffness=1 / 3, coulomb=0.1), "coulomb"),
     (hs.ColemanHodgdon(alpha=1 / 3, c=0.1, B=0.7), "B"),
+    (hs.VaianaRosati(alpha=1 / 3, beta_2=(0.1, 1e-17)), "beta_2"),
+    (hs.MenegottoPinto(cR2=1 / 3, a1=1e-17), "cR2"),
     (hs.BoucWenBaberNoori(delta_nu=1 / 3, zeta_s=0.1, input_coefficients=(0.1, 1e-17)), "delta_nu"),
     (hs.JilesAtherton(k=1e3 / 3.0, anisotropy=0.1), "k"),
     (hs.TransferFunction(num=(1 / 3,), den=(1.0, 2.0), delay=0.1, sample="end"), "den"),

@@ -44,10 +44,26 @@ LAWS = {
     "EnergyPlays": hs.EnergyPlays(**PLAYS, field=0.3),
     "Dahl": hs.Dahl(),
     "ColemanHodgdon": hs.ColemanHodgdon(),
+    "VaianaRosati": hs.VaianaRosati(f_0=(0.4, 0.3), gamma_1=0.2),
+    "MenegottoPinto": hs.MenegottoPinto(a1=0.1),
     "JilesAtherton": hs.JilesAtherton(),
     "Line": hs.Line(slope=1.0),
 }
-POSITIVE = ("n", "coulomb", "psi", "lambda_", "decay", "reach", "beta", "gamma", "slips", "stiffness", "left", "field")
+POSITIVE = (
+    "n",
+    "coulomb",
+    "psi",
+    "lambda_",
+    "decay",
+    "reach",
+    "beta",
+    "gamma",
+    "slips",
+    "stiffness",
+    "left",
+    "field",
+    "alpha",
+)
 SIZES = (1e-300, 1e-150, 1e-20, 1e-3, 1.0, 1e3, 1e20, 1e150, 1e300)
 CLOSE = 1e-13  # functions of another library: a rounding each
 

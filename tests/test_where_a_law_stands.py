@@ -23,6 +23,8 @@ LAWS = {
     "Duhem": hs.Duhem.from_terms({"u'": 1.0, "|u'| y": -0.4, "|u'| u": 0.2}),
     "Dahl": hs.Dahl(stiffness=2.0, coulomb=0.5),
     "ColemanHodgdon": hs.ColemanHodgdon(),
+    "VaianaRosati": hs.VaianaRosati(k_b=(2.0, 1.5), f_0=0.3),
+    "MenegottoPinto": hs.MenegottoPinto(yield_input=0.3, hardening=0.1),
     "Play": hs.Play(threshold=0.2),
     "Stop": hs.Stop(threshold=0.4),
     "MaxwellSlip": hs.MaxwellSlip(stiffness=(1.0, 2.0), slips=(0.3, 0.6), feedthrough=0.5),
@@ -39,7 +41,14 @@ LAWS = {
     "ReversalFilter": hs.ReversalFilter(threshold=0.3),
     "Line": hs.Line(slope=2.0),
 }  # fmt: skip
-MORE_THAN_FIELDS = {"BoucWenBaberNoori", "ParametricPrandtlIshlinskii", "Chan", "JilesAtherton", "ReversalFilter"}
+MORE_THAN_FIELDS = {
+    "BoucWenBaberNoori",
+    "MenegottoPinto",
+    "ParametricPrandtlIshlinskii",
+    "Chan",
+    "JilesAtherton",
+    "ReversalFilter",
+}
 WITHOUT_INVERSE = {"Play", "Stop", "MaxwellSlip", "ColemanHodgdon", "ReversalFilter"}
 U = RNG.uniform(-1.0, 1.0, 40)
 

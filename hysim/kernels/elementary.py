@@ -260,3 +260,12 @@ def advance_all(
         for j in range(count):
             if not math.isnan(anew[j]):
                 z[j] = linear_advance(anew[j], du, A[j], loading[j], unloading[j])
+
+
+@inner
+def bent(t: float, length: float, sharpness: float) -> float:
+    """t / (1 + (t / length)^sharpness)^(1 / sharpness), which rises with the slope 1 and bends to `length`."""
+    small, large = min(t, length), max(t, length)
+    if small <= 0.0:
+        return 0.0
+    return float(small * math.exp(-math.log1p((small / large) ** sharpness) / sharpness))

@@ -157,6 +157,12 @@ def space_of(
         fixed = {name: np.full(len(sets), value) for name, value in constants.items()}
         return fixed | {each.name: each.decode(column) for each, column in zip(searched, sets.T, strict=True)}
 
+    def encoded(parameters: Mapping[str, float]) -> FloatArray:
+        values = [parameters.get(each.name, defaults[each.name]) for each in searched]
+        same = [value == defaults[each.name] for each, value in zip(searched, values, strict=True)]
+        there = [each.encode(value) for each, value in zip(searched, values, strict=True)]
+        return np.where(same, starts[0], there)
+
     return SearchSpace(
         coordinates=names,
         lower=lower,
@@ -168,6 +174,7 @@ def space_of(
         held=held,
         parameters=parameters,
         physical={each.name: each.physical for each in searched if each.name not in limits},
+        encoded=encoded,
         **{"bounds": {name: pair for name, pair in limits.items() if name in columns}, **others},
     )
 

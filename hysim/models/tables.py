@@ -88,7 +88,7 @@ def _table(name: str, values: Any, ndim: int) -> FloatArray:
         number = table_of_one(values)
         number.setflags(write=False)
         return number
-    array = read_only(values, name)
+    array = read_only([values] if ndim == 1 and np.ndim(values) == 0 else values, name)  # as the constructor takes it
     if array.ndim > ndim + 1:
         raise ValueError(f"{name} has too many axes: got shape {array.shape}")
     if array.ndim == ndim:
