@@ -34,7 +34,10 @@ RESULTS = Path(__file__).parent / "results" / "shards"
 STUDY = Path(__file__).with_suffix(".toml")
 N_SHARDS, KILLS, LATEST = 20, 3, 1.5  # s after a store is there
 MANY = 1_000_000
-SHARED = ((scaling_tasks.two_seconds, 40, 3), (scaling_tasks.millisecond, MANY, 1))  # tasks, their number, and repeats
+SHARED = (
+    (scaling_tasks.two_seconds, 40, 3),
+    (scaling_tasks.millisecond, 200_000, 1),
+)  # tasks, their number, and repeats
 NOTES = "HYSIM_EXPERIMENT_NOTES"
 Row = dict[str, Any]
 
