@@ -1261,9 +1261,9 @@ def portfolio(result: Result) -> list[str]:
     rows, minutes = result["rows"], result["minutes_a_million"]
     damage = result["damage"].items()
     return [
-        f"A million histories of {count(result['samples'])} samples take {span(minutes)} min on two cores with stores. "
+        f"A million histories take {span(minutes)} min on two cores with stores. "
         f"This is measured on {result['computed_shards']} of {count(result['shards'])} shards; "
-        f"the 2^20 buildings in all earthquakes would take {number(result['hours_of_all'], 2)} hours.",
+        f"all buildings in all earthquakes would take {number(result['hours_of_all'], 2)} hours.",
         by_row(
             rows,
             ("method, processor time", "method", str),
