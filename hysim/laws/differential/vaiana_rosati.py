@@ -72,7 +72,7 @@ class VaianaRosati(Law):
 
     Notes
     -----
-    *Energy.* With h = (c_+ - c_-) / 2 and one alpha for both directions, the steady cycle from a to b dissipates
+    *Energy.* With ``h = (c_+ - c_-) / 2`` and one alpha for both, the steady cycle from a to b dissipates
     ``2 (integral of h - (h(a) + h(b)) tanh(alpha (b - a) / 2) / alpha)``. It is not negative in every steady cycle
     exactly if h'' <= alpha^2 h everywhere, such as where f_0 > 0 and both directions have the same other terms: then
     every path dissipates, by ``(f - k)^2 / f_0`` for each unit of path, k the mean of both curves. Curves that come
