@@ -36,7 +36,7 @@ N_SHARDS, KILLS, LATEST = 20, 3, 1.5  # s after a store is there
 MANY = 1_000_000
 SHARED = (
     (scaling_tasks.two_seconds, 40, 3),
-    (scaling_tasks.millisecond, 200_000, 1),
+    (scaling_tasks.millisecond, 60_000, 5),
 )  # tasks, their number, and repeats
 NOTES = "HYSIM_EXPERIMENT_NOTES"
 Row = dict[str, Any]

@@ -45,7 +45,7 @@ from hysim.sweeps._result import Sweep, result_of
 from hysim.sweeps._space import Column, Space, space_of
 from hysim.sweeps._store import ON_CHANGE, OnChange, Store, opened
 
-_CHUNK, _OF_A_CLUSTER, _SHORTEST = 0.075, 1.0, 0.002  # seconds
+_CHUNK, _OF_A_CLUSTER, _SHORTEST = 0.25, 1.0, 0.002  # seconds
 _MOST_A_SECOND = 500  # chunks: a scheduler takes a millisecond for each
 _BUSY, _LONGEST = 0.2, 5.0  # of the time at most, for sending chunks and entering rows; seconds of a chunk for it
 _NEEDLESS, _WORTH_IT = 0.5, 60.0  # of the time for sending, where more workers would wait; seconds of a study to divide
