@@ -49,7 +49,7 @@ _CHUNK, _OF_A_CLUSTER, _SHORTEST = 0.25, 1.0, 0.002  # seconds
 _MOST_A_SECOND = 500  # chunks: a scheduler takes a millisecond for each
 _BUSY, _LONGEST = 0.2, 5.0  # of the time at most, for sending chunks and entering rows; seconds of a chunk for it
 _NEEDLESS, _WORTH_IT = 0.5, 60.0  # of the time for sending, where more workers would wait; seconds of a study to divide
-_GROWTH, _MOST_TASKS = 4, 20_000  # of a chunk, whose rows a store takes as Python's numbers
+_GROWTH, _MOST_TASKS = 4, 8_000  # of a chunk, whose rows a store takes as Python's numbers
 _PATIENCE = 0.6  # seconds to wait after an interrupt for the chunks that are being computed
 
 _task_of_process: list[Task] = []  # the task of the study that this process was started for
