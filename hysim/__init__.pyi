@@ -109,8 +109,15 @@ from hysim.laws.operators.preisach import Preisach as Preisach
 from hysim.laws.operators.preisach import PreisachRelays as PreisachRelays
 from hysim.laws.differential.dahl import Dahl as Dahl
 from hysim.laws.differential.coleman_hodgdon import ColemanHodgdon as ColemanHodgdon
-from hysim.laws.differential.vaiana_rosati import VaianaRosati as VaianaRosati
-from hysim.laws.differential.menegotto_pinto import MenegottoPinto as MenegottoPinto
+from hysim.laws.components.vaiana_rosati import VaianaRosati as VaianaRosati
+from hysim.laws.components.menegotto_pinto import MenegottoPinto as MenegottoPinto
+from hysim.laws.components.bilinear import Bilinear as Bilinear
+from hysim.laws.components.flag_shape import FlagShape as FlagShape
+from hysim.laws.components.slack import Slack as Slack
+from hysim.laws.components.origin_oriented import OriginOriented as OriginOriented
+from hysim.laws.components.peak_oriented import PeakOriented as PeakOriented
+from hysim.laws.components.ibarra_medina_krawinkler import IbarraMedinaKrawinkler as IbarraMedinaKrawinkler
+from hysim.laws.components.folz_filiatrault import FolzFiliatrault as FolzFiliatrault
 from hysim.laws.magnetic.jiles_atherton import JilesAtherton as JilesAtherton
 from hysim.laws.magnetic.tellinen import Tellinen as Tellinen
 from hysim.laws.magnetic.tellinen_table import TellinenTable as TellinenTable

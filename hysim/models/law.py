@@ -97,6 +97,8 @@ class Law(Placed, Searched, ABC):
         without it.
     initial : tuple of str
         Fields that are the initial memory; they stand in the state behind the last input. By default ``("z0",)``.
+    remembered : int
+        Further numbers of the memory, which stand in the state behind the initial ones and are zero at first.
     searched : tuple of Parameter
         The box in which `hysim.identify` searches, and the fields in which the output is affine.
     starts : tuple of mappings
@@ -129,6 +131,7 @@ class Law(Placed, Searched, ABC):
     tolerance: ClassVar[float] = _EXACT
     start: ClassVar[Any] = staticmethod(stepping.start)
     initial: ClassVar[tuple[str, ...]] = ("z0",)
+    remembered: ClassVar[int] = 0
     searched: ClassVar[tuple[Parameter, ...]] = ()
     starts: ClassVar[tuple[Mapping[str, float], ...]] = ()
     screened: ClassVar[int | None] = None
@@ -163,7 +166,7 @@ class Law(Placed, Searched, ABC):
     def pack(cls, tables: Tables) -> Packed:
         """Laws as the step takes them: by default the fields one after the other, and the initial memory."""
         own = sum(tables[name].shape[1] for name in cls.initial)
-        memory = cls.initial_memory(tables, further=max(0, cls.hidden_states - own))
+        memory = cls.initial_memory(tables, further=max(cls.remembered, cls.hidden_states - own))
         constants = [table for name, table in tables.items() if name not in cls.initial]
         if cls.hidden_states:
             constants.insert(0, np.full((len(memory), 1), cls.tolerance))
@@ -611,8 +614,11 @@ class Law(Placed, Searched, ABC):
         """Initial memory with which a periodic record ends as it began, (n_sets,) by name; nan where it diverges.
 
         One pass through the record contracts the memory; the fixed point is computed by the secant method. Raises
-        ValueError if an affine parameter moves the memory: it is not known yet where the others are searched.
+        ValueError if an affine parameter moves the memory: it is not known yet where the others are searched; or if
+        the law remembers more than its initial memory.
         """
+        if self.packed[1].size > 1 + len(self.initial_names):
+            raise ValueError('the memory of this law is more than its initial force: use initial="free" or "rest"')
         names, u = self.initial_names, np.append(record.u, record.u[0])
         turns = record.reversals()
         turns = turns if turns.size < _FEW * len(record) else record.reversals(TOLERANCE)

@@ -24,13 +24,11 @@ from typing import ClassVar, Self
 
 from hysim._basics.frozen import FloatArray
 from hysim.kernels.elementary import bent
-from hysim.models.law import Law, Packed
+from hysim.models.law import Law
 from hysim.models.model import Example, family
 from hysim.models.parameters import Parameter
-from hysim.models.search_space import Parameters
 from hysim.models.stages import Stage
 from hysim.models.tables import Tables
-from hysim.records import Record
 
 
 @family
@@ -114,6 +112,7 @@ class MenegottoPinto(Law):
 
     positive = ("yield_input", "R0", "cR2", "a2", "a4")
     not_negative = ("cR1", "a1", "a3", "least_reversal")
+    remembered = 8
     units: ClassVar = {"z0": "1", "least_reversal": "1"}
     example = Example(
         {"hardening": 0.03, "cR1": 0.9, "a1": 0.03, "a3": 0.03},
@@ -170,15 +169,6 @@ class MenegottoPinto(Law):
         super().check(tables)
         if not (tables["cR1"] < 1.0).all():
             raise ValueError(f"cR1 must be below 1, got {tables['cR1'].max()}")
-
-    @classmethod
-    def pack(cls, tables: Tables) -> Packed:
-        """The fields but z0, and the memory: 10 numbers, all but (u, z) zero before the first stroke."""
-        return super().pack(tables)._replace(memory=cls.initial_memory(tables, further=8))
-
-    def steady(self, parameters: Parameters, record: Record) -> dict[str, FloatArray]:
-        """Refused with a ValueError: the law remembers more than an initial force."""
-        raise ValueError('the memory of this law is more than its initial force: use initial="free" or "rest"')
 
     @property
     def known_slopes(self) -> tuple[float, float]:

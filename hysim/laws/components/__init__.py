@@ -1,0 +1,1 @@
+"""Rules of structural components: what earthquake engineers calibrate to cyclic tests."""
