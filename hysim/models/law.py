@@ -97,7 +97,7 @@ class Law(Placed, Searched, ABC):
         without it.
     initial : tuple of str
         Fields that are the initial memory; they stand in the state behind the last input. By default ``("z0",)``.
-    remembered : int
+    further_memory : int
         Further numbers of the memory, which stand in the state behind the initial ones and are zero at first.
     searched : tuple of Parameter
         The box in which `hysim.identify` searches, and the fields in which the output is affine.
@@ -131,7 +131,7 @@ class Law(Placed, Searched, ABC):
     tolerance: ClassVar[float] = _EXACT
     start: ClassVar[Any] = staticmethod(stepping.start)
     initial: ClassVar[tuple[str, ...]] = ("z0",)
-    remembered: ClassVar[int] = 0
+    further_memory: ClassVar[int] = 0
     searched: ClassVar[tuple[Parameter, ...]] = ()
     starts: ClassVar[tuple[Mapping[str, float], ...]] = ()
     screened: ClassVar[int | None] = None
@@ -166,7 +166,7 @@ class Law(Placed, Searched, ABC):
     def pack(cls, tables: Tables) -> Packed:
         """Laws as the step takes them: by default the fields one after the other, and the initial memory."""
         own = sum(tables[name].shape[1] for name in cls.initial)
-        memory = cls.initial_memory(tables, further=max(cls.remembered, cls.hidden_states - own))
+        memory = cls.initial_memory(tables, further=max(cls.further_memory, cls.hidden_states - own))
         constants = [table for name, table in tables.items() if name not in cls.initial]
         if cls.hidden_states:
             constants.insert(0, np.full((len(memory), 1), cls.tolerance))

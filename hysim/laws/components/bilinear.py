@@ -69,7 +69,7 @@ class Bilinear(Law):
 
     positive = ("yield_input",)
     not_negative = ("isotropic",)
-    remembered = 1
+    further_memory = 1
     units: ClassVar = {"z0": "1"}
     example = Example({"hardening": 0.1, "isotropic": 0.03}, (-4.0, 4.0), title="Bilinear law", group="Devices")
     searched = (

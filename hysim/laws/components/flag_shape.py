@@ -62,7 +62,7 @@ class FlagShape(Law):
     positive = ("activation",)
     not_negative = ("loss",)
     initial: ClassVar[tuple[str, ...]] = ()
-    remembered = 2
+    further_memory = 2
     example = Example({"hardening": 0.1}, (-4.0, 4.0), title="Flag: self-centring brace", group="Devices")
     searched = (
         Parameter("stiffness", unit="y/u", affine=True),

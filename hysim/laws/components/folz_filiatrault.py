@@ -93,7 +93,7 @@ class FolzFiliatrault(Law):
     not_negative = ("pinch_input", "r_1", "r_4", "alpha")
     units: ClassVar = dict.fromkeys(("r_1", "r_2", "r_3", "r_4", "alpha", "beta"), "1")
     initial: ClassVar[tuple[str, ...]] = ()
-    remembered = 5
+    further_memory = 5
     example = Example({"r_4": 0.03}, (-8.0, 8.0), title="Folz-Filiatrault: nailed timber", group="Devices")
     searched = (
         Parameter("stiffness", unit="y/u", affine=True),

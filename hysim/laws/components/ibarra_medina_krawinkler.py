@@ -119,7 +119,7 @@ class IbarraMedinaKrawinkler(Law):
     not_negative = ("capping_ratio", *_SHARES, *_CAPACITIES)
     units: ClassVar = dict.fromkeys(("capping_ratio", *_SHARES, "c"), "1")
     initial: ClassVar[tuple[str, ...]] = ()
-    remembered = 18
+    further_memory = 18
     workspace = 3
     example = Example(
         dict.fromkeys(_CAPACITIES, 60.0) | {"pinch_force": 0.25},

@@ -112,7 +112,7 @@ class MenegottoPinto(Law):
 
     positive = ("yield_input", "R0", "cR2", "a2", "a4")
     not_negative = ("cR1", "a1", "a3", "least_reversal")
-    remembered = 8
+    further_memory = 8
     units: ClassVar = {"z0": "1", "least_reversal": "1"}
     example = Example(
         {"hardening": 0.03, "cR1": 0.9, "a1": 0.03, "a3": 0.03},

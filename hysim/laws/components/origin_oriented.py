@@ -54,7 +54,7 @@ class OriginOriented(Law):
 
     positive = ("yield_input",)
     initial: ClassVar[tuple[str, ...]] = ()
-    remembered = 2
+    further_memory = 2
     example = Example({"hardening": 0.1}, (-4.0, 4.0), title="Origin-oriented: shear wall", group="Devices")
     searched = (
         Parameter("stiffness", unit="y/u", affine=True),

@@ -75,7 +75,7 @@ class PeakOriented(Law):
     not_negative = ("hardening_ratio", "unloading")
     units: ClassVar = {"hardening_ratio": "1", "unloading": "1"}
     initial: ClassVar[tuple[str, ...]] = ()
-    remembered = 10
+    further_memory = 10
     example = Example({}, (-4.0, 4.0), title="Peak-oriented: concrete column", group="Devices")
     searched = (
         Parameter("stiffness", unit="y/u", affine=True),

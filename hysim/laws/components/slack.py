@@ -61,7 +61,7 @@ class Slack(Law):
     positive = ("yield_input",)
     not_negative = ("hardening_ratio",)
     initial: ClassVar[tuple[str, ...]] = ()
-    remembered = 2
+    further_memory = 2
     units: ClassVar = {"hardening_ratio": "1"}
     example = Example(
         {"opposite_stiffness": 1.0, "slack": 0.3}, (-4.0, 4.0), title="Slack: braces of rod", group="Devices"
