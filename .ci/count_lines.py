@@ -73,13 +73,19 @@ def sizes(folder: Path, inside: Path) -> tuple[Counter[str], Counter[str], Count
 def limits(source: str) -> tuple[dict[str, int], dict[str, int]]:
     """The limits of a file of them, and the lines that the budgets of features add to them.
 
-    Docstrings are added as many as the core had for a line of code when the first budget was stated. A feature that is
-    a row of files, one for each law, states their number in [budget_files].
+    Docstrings are added as many as the core had for a line of code when the first budget was stated.
     """
     tables = tomllib.loads(source)
-    budget = sum(tables.get("budget", {}).values())
-    files = sum(tables.get("budget_files", {}).values())
-    return tables["most"], {"core_code": budget, "core_docstrings": int(0.36 * budget), "core_files": files}
+    budget = {
+        name: sum(tables.get(table, {}).values())
+        for name, table in (
+            ("core_code", "budget"),
+            ("core_files", "budget_files"),
+            ("tests_code", "budget_tests"),
+            ("experiments_code", "budget_experiments"),
+        )
+    }
+    return tables["most"], budget | {"core_docstrings": int(0.36 * budget["core_code"])}
 
 
 def raised(now: dict[str, int]) -> list[str]:
