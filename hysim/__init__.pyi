@@ -108,6 +108,7 @@ from hysim.laws.operators.maxwell_slip import MaxwellSlip as MaxwellSlip
 from hysim.laws.operators.preisach import Preisach as Preisach
 from hysim.laws.operators.preisach import PreisachRelays as PreisachRelays
 from hysim.laws.differential.dahl import Dahl as Dahl
+from hysim.laws.differential.tabulated_dahl import TabulatedDahl as TabulatedDahl
 from hysim.laws.differential.coleman_hodgdon import ColemanHodgdon as ColemanHodgdon
 from hysim.laws.components.vaiana_rosati import VaianaRosati as VaianaRosati
 from hysim.laws.components.menegotto_pinto import MenegottoPinto as MenegottoPinto
