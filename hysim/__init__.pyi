@@ -14,6 +14,7 @@ from hysim import rig as rig
 from hysim import signals as signals
 from hysim import vision as vision
 from hysim.records import Record as Record
+from hysim.records import signed_charge as signed_charge
 from hysim.files import load as load
 from hysim.files import list_columns as list_columns
 from hysim.files import load_ground_motion as load_ground_motion

@@ -11,7 +11,7 @@ from typing import Any, Self, TypeVar
 import numpy as np
 import numpy.typing as npt
 
-from hysim._basics.frozen import FloatArray, checked, wrong_axes
+from hysim._basics.frozen import FloatArray, checked, vectors, wrong_axes
 from hysim._basics.prefixes import power_of_ten
 from hysim._basics.printing import extent, listed, printed, quantity, summary_text
 from hysim._columns.channels import Channels, along, checked_channels, taken, value_in
@@ -376,6 +376,42 @@ class Record:
         if isinstance(place, (float, np.floating)) and 0.0 < place < 1.0:
             return round(place * len(self))
         raise TypeError(f"a place must be a sample's number or a fraction between 0 and 1, got {place!r}")
+
+
+def signed_charge(capacity: npt.ArrayLike, current: npt.ArrayLike) -> FloatArray:
+    """Charge that went into a cell, from a cycler's capacity that begins at zero again in each half cycle.
+
+    Parameters
+    ----------
+    capacity : array, shape (n,)
+        Charge that has gone in or out since the last beginning, not negative [any unit of charge].
+    current : array, shape (n,)
+        Positive where the cell is charged: its sign alone counts.
+
+    Returns
+    -------
+    array, shape (n,)
+        Zero at the first sample [unit of capacity].
+
+    Raises
+    ------
+    ValueError
+        If the lengths differ, or the capacity is negative or falls to something else than a new beginning.
+
+    Examples
+    --------
+    >>> import hysim as hs
+    >>> hs.signed_charge([0.0, 1.0, 2.0, 0.0, 0.5], [3.0, 3.0, 3.0, -3.0, -3.0]).tolist()
+    [0.0, 1.0, 2.0, 2.0, 1.5]
+    """
+    q, i = vectors(capacity=capacity, current=current)
+    steps = np.diff(q)
+    again = steps < 0.0
+    steps[again] = q[1:][again]
+    usual = float(np.abs(steps[~again]).max(initial=0.0))
+    if (q < 0.0).any() or (steps[again] > usual).any():
+        raise ValueError("capacity must count up from zero in each half cycle; a charge with a sign needs no more")
+    return np.append(0.0, np.cumsum(np.sign(i[1:]) * steps))
 
 
 def few_places(record: Record, most: int) -> npt.NDArray[np.intp]:

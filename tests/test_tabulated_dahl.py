@@ -48,8 +48,17 @@ def test_a_batch_has_the_bits_of_its_laws():
     assert_batch_has_the_bits_of_its_laws(hs.TabulatedDahl, sets, np.sin(np.linspace(0.0, 9.0, 60)), own_inputs=True)
 
 
+def test_a_capacity_that_begins_anew_becomes_a_signed_charge():
+    charge = hs.signals.extremes([0.0, 3.0, 1.0, 2.0], max_step=0.1)
+    current, turns = np.sign(np.diff(charge, prepend=-0.1)), (0, 30, 50)
+    capacity = np.abs(charge - charge[[max(t for t in turns if t <= k - (k > 0)) for k in range(charge.size)]])
+    assert capacity[31] == pytest.approx(0.1) and np.abs(hs.signed_charge(capacity, current) - charge).max() < 1e-12
+
+
 test_wrong_arguments_are_named = refused(
     (lambda: hs.TabulatedDahl(inputs=(0.0, 0.0)), "inputs must increase"),
     (lambda: hs.TabulatedDahl(inputs=(0.0, 1.0, 2.0)), "equally long"),
+    (lambda: hs.signed_charge([0.0, 1.0, -1.0], [1.0, 1.0, 1.0]), "count up from zero"),
+    (lambda: hs.signed_charge([0.0, 1.0, 2.0, 1.9], [1.0, 1.0, 1.0, 1.0]), "count up from zero"),
     (lambda: hs.TabulatedDahl(z0=2.0), "z0 must be from -1 to 1"),
 )
