@@ -37,7 +37,7 @@ def test_a_cell_is_identified_from_two_partial_cycles_and_predicted_on_a_third()
     cycles = [hs.signals.extremes(ends, max_step=0.01) for ends in ([0.0, 0.9, 0.2, 0.8], [1.0, 0.1, 0.7, 0.2])]
     recs = [hs.Record(u=u, y=CELL.response(u) + noise * rng.standard_normal(u.size)) for u in cycles]
     fit = hs.identify(hs.TabulatedDahl.over(*recs, nodes=9), recs)
-    assert fit.rmse == pytest.approx(noise, rel=0.1) and fit.estimates["rate"] == pytest.approx(20.0, rel=0.1)
+    assert (fit.rmse, fit.estimates["rate"]) == pytest.approx((noise, 20.0), rel=0.1)
     third = hs.signals.extremes([0.2, 0.7, 0.45, 0.85, 0.2], max_step=0.01)
     predicted = replace(fit.model, z0=CELL.z0, u0=None).response(third)
     assert np.sqrt(np.mean((predicted - CELL.response(third)) ** 2)) < 0.5 * noise
@@ -52,7 +52,8 @@ def test_a_capacity_that_begins_anew_becomes_a_signed_charge():
     charge = hs.signals.extremes([0.0, 3.0, 1.0, 2.0], max_step=0.1)
     current, turns = np.sign(np.diff(charge, prepend=-0.1)), (0, 30, 50)
     capacity = np.abs(charge - charge[[max(t for t in turns if t <= k - (k > 0)) for k in range(charge.size)]])
-    assert capacity[31] == pytest.approx(0.1) and np.abs(hs.signed_charge(capacity, current) - charge).max() < 1e-12
+    assert capacity[31] == pytest.approx(0.1)
+    assert np.abs(hs.signed_charge(capacity, current) - charge).max() < 1e-12
 
 
 test_wrong_arguments_are_named = refused(

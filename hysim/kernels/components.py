@@ -38,7 +38,7 @@ def lengthened(state: FloatArray, k: int, v: float, end: float, force: float) ->
 
 @inner
 def lost_share(energy: float, spent: float, capacity: float, exponent: float) -> float:
-    """Share of a strength that an excursion takes; `spent` is the energy of all, and a capacity of 0 is none."""
+    """Share of a strength that an excursion takes; `spent` is the energy of all; a capacity of 0 means no loss."""
     if capacity <= 0.0 or energy <= 0.0:
         return 0.0
     return (energy / (capacity - spent)) ** exponent if energy < capacity - spent else 1.0

@@ -124,7 +124,7 @@ class PeakOriented(Law):
 
     @property
     def known_slopes(self) -> tuple[float, float]:
-        """Zero, which none reaches where it hardens, and the elastic slope."""
+        """Zero and the elastic slope."""
         return min(0.0, self.stiffness), max(0.0, self.stiffness)
 
     @classmethod

@@ -106,6 +106,6 @@ class Slack(Law):
     def to_opensees(self) -> dict[str, float]:
         """The arguments of `from_opensees`; ValueError if there is a rod in the other direction."""
         if self.opposite_stiffness != 0.0:
-            raise ValueError("ElasticPPGap acts in one direction: put a second one with the opposite signs beside it")
+            raise ValueError("ElasticPPGap acts in one direction: put a second one with the opposite signs in parallel")
         E = self.stiffness
         return {"E": E, "Fy": E * self.yield_input, "gap": self.slack, "eta": self.hardening_ratio}

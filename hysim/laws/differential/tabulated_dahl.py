@@ -46,10 +46,10 @@ class TabulatedDahl(Law):
 
     Notes
     -----
-    For a battery u is the state of charge and y the voltage at rest, and the law is the one-state hysteresis of G.
-    L. Plett (J. Power Sources 134 (2004) 262) without a time: h does not change where the current is zero. For a joint u is
-    the angle and y the torque. The output is affine in both tables: `identify` searches the rate and the initial state
-    alone. It keeps the inputs of its start: ``hs.identify(hs.TabulatedDahl.over(record), record)``.
+    For a battery u is the state of charge and y the voltage at rest: the one-state hysteresis of G. L. Plett (J. Power
+    Sources 134 (2004) 262) without a time, so that h does not change where the current is zero. For a joint u is the
+    angle and y the torque. The output is affine in both tables: `identify` searches the rate and the initial state
+    alone, and keeps the inputs of its start, ``hs.identify(hs.TabulatedDahl.over(record), record)``.
 
     Examples
     --------
