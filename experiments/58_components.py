@@ -14,24 +14,32 @@ equations, with one Newmark step a sample, for some of the systems that the sear
 
 import sys
 from collections.abc import Callable, Mapping
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from scipy.optimize import brentq
 
 import hysim as hs
 from hysim.plot import Figure, figure
 
 sys.path.insert(0, str(Path(__file__).parent))
 from peers.contest import peer
-from results_folder import cpu_timed, wall_timed, write_results
+from results_folder import cpu_timed, median_and_worst, wall_timed, write_results
 
 RESULTS = Path(__file__).parent / "results" / "components"
-STEPS, CYCLES, REACH = (20, 2000), np.linspace(0.3, 1.0, 8), 4.0
+STEPS, CORNERS = (20, 2000), np.append(0.0, np.ravel([np.linspace(1.2, 4.0, 8), -np.linspace(1.2, 4.0, 8)], order="F"))
 TESTS, RIVALS, NOISE = 20, 3, 0.005  # of each of two laws, of them with rivals, and of the force's range
 AMPLITUDES = np.repeat([0.5, 1.0, 1.5, 2.0, 3.0, 4.0, 5.0, 6.0], 2)
 NONE = 1e9  # capacity of a mode that OpenSees cannot leave out
 IMK, FOLZ = hs.IbarraMedinaKrawinkler, hs.FolzFiliatrault
+OTHERS = hs.BoucWenBaberNoori, hs.Preisach
+HARDENING, DUCTILITY, SAMPLED = 0.05, 4.0, 10  # of the spectrum, and periods that OpenSees solves
+SOLUTION: dict[str, tuple[Any, ...]] = {
+    "constraints": ("Plain",), "numberer": ("Plain",), "system": ("ProfileSPD",), "test": ("NormUnbalance", 1e-10, 20),
+    "algorithm": ("Newton",), "integrator": ("Newmark", 0.5, 0.25), "analysis": ("Transient",),
+}  # fmt: skip
 Row = dict[str, Any]
 
 
@@ -44,7 +52,17 @@ def imk(a: Mapping[str, float]) -> tuple[Any, ...]:
     """Arguments of the pinching material."""
     modes = [a[f"Lambda_{mode}"] or NONE for mode in "SCAK"]
     side = a["Up"], a["Upc"], NONE, a["Fy"], a["FmaxFy"], a["ResF"]
-    return "IMKPinching", a["Ke"], *in_both(*side), *modes, *in_both(*in_both(a["c"])), 1.0, 1.0, a["kappaF"], a["kappaD"]
+    return (
+        "IMKPinching",
+        a["Ke"],
+        *in_both(*side),
+        *modes,
+        *in_both(*in_both(a["c"])),
+        1.0,
+        1.0,
+        a["kappaF"],
+        a["kappaD"],
+    )
 
 
 RULES: dict[Any, Callable[[Mapping[str, float]], tuple[Any, ...]]] = {
@@ -53,7 +71,7 @@ RULES: dict[Any, Callable[[Mapping[str, float]], tuple[Any, ...]]] = {
     hs.Slack(slack=0.3): lambda a: ("ElasticPPGap", *a.values(), "damage"),
     hs.OriginOriented(): lambda a: ("OriginCentered", *a.values()),
     hs.PeakOriented(): lambda a: (
-        "Hysteretic", *(1.0, 1.0, 1.05, 2.0, 1.5, 11.0, -1.0, -1.0, -1.05, -2.0, -1.5, -11.0), *(1.0, 1.0, 0.0, 0.0, 0.4)
+        "Hysteretic", 1.0, 1.0, 1.05, 2.0, 1.5, 11.0, -1.0, -1.0, -1.05, -2.0, -1.5, -11.0, 1.0, 1.0, 0.0, 0.0, 0.4
     ),
     IMK(**dict.fromkeys(("Lambda_s", "Lambda_c", "Lambda_k"), 60.0)): imk,
     FOLZ(knee_input=0.5, pinch_input=0.1, peak_input=3.0): lambda a: ("SAWS", *a.values()),
@@ -76,13 +94,12 @@ def theirs(ops: Any, words: tuple[Any, ...], u: np.ndarray) -> np.ndarray:
 
 def beside_opensees(ops: Any, law: Any, words: Callable[[Mapping[str, float]], tuple[Any, ...]]) -> Row:
     """Largest differences from the counterpart, in percent of the force's range."""
-    corners = np.append(0.0, REACH * np.ravel([CYCLES, -CYCLES], order="F"))
     row: Row = {"law": type(law).__name__, "material": words(law.to_opensees())[0]}
     for steps in STEPS:
-        u = growing(corners, steps)
+        u = growing(CORNERS, steps)
         y, other = law.response(u), theirs(ops, words(law.to_opensees()), u)
         row[f"difference_{steps}_percent"] = 100.0 * float(np.abs(y - other).max() / np.ptp(y))
-        row |= {"u": u.tolist(), "y": y.tolist(), "theirs": other.tolist()} if steps == STEPS[0] else {}
+        row |= {"theirs": np.round(other, 4).tolist()} if steps == STEPS[0] else {}
     return row
 
 
@@ -91,9 +108,9 @@ def simulated(family: Any, seed: int) -> tuple[Any, hs.Record]:
     rng = np.random.default_rng(seed)
     boxes = {
         IMK: {
-            "stiffness": (5.0, 20.0), "yield_input": (0.6, 1.2), "hardening_ratio": (0.01, 0.08), "cap_input": (3.0, 5.0),
-            "capping_ratio": (0.03, 0.15), "residual": (0.0, 0.3), "pinch_force": (0.15, 0.6), "pinch_input": (0.0, 0.5),
-            "Lambda_s": (30.0, 120.0), "Lambda_k": (30.0, 120.0),
+            "stiffness": (5.0, 20.0), "yield_input": (0.6, 1.2), "hardening_ratio": (0.01, 0.08),
+            "cap_input": (3.0, 5.0), "capping_ratio": (0.03, 0.15), "residual": (0.0, 0.3),
+            "pinch_force": (0.15, 0.6), "pinch_input": (0.0, 0.5), "Lambda_s": (30.0, 120.0), "Lambda_k": (30.0, 120.0),
         },
         FOLZ: {
             "stiffness": (5.0, 20.0), "knee_input": (0.4, 1.0), "pinch_input": (0.05, 0.2), "peak_input": (3.0, 8.0),
@@ -122,3 +139,85 @@ def calibrated(family: Any, seed: int, rivals: tuple[Any, ...]) -> list[Row]:
             row["numbers_off_percent"] = 100.0 * float(np.median(off))
         rows.append(row)
     return rows
+
+
+def their_ductility(ops: Any, period: float, strength: float, ground: np.ndarray, step: float) -> float:
+    """Ductility of one bilinear oscillator in OpenSees, one step a sample."""
+    w, peak = 2.0 * np.pi / period, 0.0
+    ops.wipe()
+    ops.model("basic", "-ndm", 1, "-ndf", 1)
+    for node in (1, 2):
+        ops.node(node, 0.0)
+    ops.fix(1, 1)
+    ops.mass(2, 1.0)
+    ops.uniaxialMaterial("Steel01", 1, strength, w * w, HARDENING)
+    ops.element("zeroLength", 1, 1, 2, "-mat", 1, "-dir", 1)
+    ops.rayleigh(0.1 * w, 0.0, 0.0, 0.0)  # 5 % of the critical damping
+    ops.timeSeries("Path", 1, "-dt", step, "-values", *ground.tolist())
+    ops.pattern("UniformExcitation", 1, 1, "-accel", 1)
+    for word, options in SOLUTION.items():
+        getattr(ops, word)(*options)
+    for _ in ground:
+        ops.analyze(1, step)
+        peak = max(peak, abs(ops.nodeDisp(2, 1)))
+    return peak * w * w / strength
+
+
+def spectrum(ops: Any, n_records: int, n_periods: int) -> Row:
+    """Seconds of a spectrum of constant ductility, and those of a loop in OpenSees from a sample of its systems."""
+    motions = [hs.signals.ground_motion(3.0, duration=30.0, sample_time=0.01, seed=k) for k in range(n_records)]
+    periods, law = np.geomspace(0.1, 3.0, n_periods), hs.Bilinear(hardening=HARDENING)
+    hs.response_spectrum(motions[:1], 0.01, periods[:1], law=law, ductility=DUCTILITY)  # compiles
+    found, seconds = wall_timed(hs.response_spectrum, motions, 0.01, periods, law=law, ductility=DUCTILITY)
+    offs, theirs_seconds = [], []
+    for k in range(0, n_periods, max(1, n_periods // SAMPLED)):
+        strength = found.pseudo_acceleration[0, k]
+
+        def excess(x: float, k: int = k) -> float:
+            return their_ductility(ops, periods[k], float(np.exp(x)), motions[0], 0.01) - DUCTILITY
+
+        around = np.log(strength) + np.array([-0.2, 0.2])
+        root, spent = wall_timed(brentq, excess, *around, xtol=1e-4)
+        theirs_seconds.append(spent)
+        offs.append(100.0 * abs(np.expm1(root - np.log(strength))))
+    return {
+        "spectrum_records": n_records, "spectrum_periods": n_periods, "spectrum_seconds": seconds,
+        "their_seconds_a_system": float(np.median(theirs_seconds)),
+        "their_seconds_in_all": float(np.median(theirs_seconds)) * n_records * n_periods,
+        "their_strength_off_percent": float(np.median(offs)), "their_strength_worst_off_percent": max(offs),
+    }  # fmt: skip
+
+
+def main(smoke: bool = False) -> list[Row]:
+    """Compare, calibrate and time, and unless it is a smoke run write table, figure and JSON."""
+    ops = peer("openseespy.opensees")
+    if ops is None:
+        return calibrated(FOLZ, 0, ())
+    rules = [beside_opensees(ops, law, words) for law, words in RULES.items()]
+    families = [(family, k) for family in (IMK, FOLZ) for k in range(1 if smoke else TESTS)]
+    tests = [row for family, k in families for row in calibrated(family, k, OTHERS if k < RIVALS and not smoke else ())]
+    numbers: Row = spectrum(ops, *((1, 2) if smoke else (20, 100))) | {"rules": rules}
+    for name in dict.fromkeys(row["law"] for row in tests):
+        own = [row for row in tests if row["law"] == name]
+        for what in ("error_percent", "seconds"):
+            numbers[f"{name}_{what}"] = median_and_worst(what, [row[what] for row in own])
+    for family in (IMK, FOLZ):
+        offs = [row["numbers_off_percent"] for row in tests if row["law"] == family.__name__]
+        numbers[f"{family.__name__}_numbers"] = median_and_worst("off_percent", offs)
+    return write_results(RESULTS, tests, partial(draw, rules), numbers, smoke=smoke)
+
+
+def draw(rules: list[Row], rows: list[Row]) -> Figure:
+    """Every rule over growing cycles, on top of its counterpart."""
+    canvas = figure(width=10.0, height=5.0)
+    u = growing(CORNERS, STEPS[0])
+    for ax, law, row in zip(canvas.subplots(2, 4).flat, RULES, rules, strict=True):
+        ax.plot(u, row["theirs"], color="#D55E00", lw=2.5, alpha=0.5, label="OpenSees")
+        ax.plot(u, law.response(u), color="k", lw=0.7, label="hysim")
+        ax.set(title=f"{row['law']}, {row['material']}", xticks=[-4, 0, 4])
+    canvas.legend(*ax.get_legend_handles_labels(), loc="outside lower center", ncols=2)
+    return canvas
+
+
+if __name__ == "__main__":
+    main()

@@ -1278,6 +1278,37 @@ def portfolio(result: Result) -> list[str]:
     ]
 
 
+def components(result: Result) -> list[str]:
+    """Rules of structural components beside OpenSees, calibration and spectra."""
+    laws = ("IbarraMedinaKrawinkler", "FolzFiliatrault", "BoucWenBaberNoori", "Preisach")
+    tests = [
+        {"law": law, **result[f"{law}_error_percent"], **result[f"{law}_seconds"], **result.get(f"{law}_numbers", {})}
+        for law in laws
+    ]
+    systems = result["spectrum_records"] * result["spectrum_periods"]
+    return [
+        by_row(
+            result["rules"],
+            ("law", "law", str),
+            ("material of OpenSees", "material", str),
+            ("difference with 20 steps a stroke [%]", "difference_20_percent", error_of),
+            ("with 2 000", "difference_2000_percent", error_of),
+        ),
+        by_row(
+            tests,
+            ("law, simulated tests with 0.5 % of noise", "law", str),
+            ("error, median [%]", "median_error_percent", number),
+            ("worst", "worst_error_percent", number),
+            ("CPU s", "median_seconds", number),
+            ("worst", "worst_seconds", number),
+        ),
+        f"The numbers of a law come back to {number(tests[0]['median_off_percent'], 2)} and "
+        f"{number(tests[1]['median_off_percent'], 2)} % in the median. A spectrum of constant ductility of {systems} "
+        f"oscillators takes {number(result['spectrum_seconds'], 2)} s. A loop in OpenSees would take "
+        f"{number(result['their_seconds_in_all'] / 60.0, 2)} min.",
+    ]
+
+
 def jiles_atherton(result: Result) -> list[str]:
     """How exact the law of magnetic cores is."""
     digits, there, back = result["digits"], *(result["invariant"][way] for way in ("forwards", "inverse"))
@@ -1407,6 +1438,7 @@ GROUPS: dict[str, tuple[Finding, ...]] = {
         work_precision,
         structures_work_precision,
         portfolio,
+        components,
         batch,
         cold_start,
         more_samples,

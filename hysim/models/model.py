@@ -4,8 +4,9 @@ A model is a specification. It is frozen and keyword-only, its numbers are finit
 compared by value. Evolving state is separate: it is passed in and returned.
 
 A family is also known by its name, however it is written: ``"bouc-wen"``, ``"BoucWen"``, ``"bouc_wen"``. `candidates`
-are what the registry offers to `hysim.compare`: every family that can be identified without being told more. One that
-is identified through a structure, or only from a start, names in a class method ``candidates()`` what is tried instead;
+are what the registry offers to `hysim.compare`: every family that can be identified without being told more, but
+structural components, which are laws of members with a virgin state and are tried where they are named. One that is
+identified through a structure, or only from a start, names in a class method ``candidates()`` what is tried instead;
 one that makes no sense without being told more names nothing.
 """
 
@@ -24,6 +25,7 @@ from hysim.models.protocols import Direct, Identifiable, Offering
 
 T = TypeVar("T")
 
+_BY_NAME = "hysim.laws.components"  # tried where they are named
 _LAWS = "hysim.laws."
 ROOMS = ("hysim.models.", _LAWS, "hysim.plants.")  # where hysim's own families are
 
@@ -148,7 +150,7 @@ def candidates() -> dict[str, Any]:
     families = every_family()
     collected: dict[str, Any] = {}
     for name in (*MODULE_OF, *(name for name in families if name not in MODULE_OF)):
-        if name in families:
+        if name in families and not MODULE_OF.get(name, "").startswith(_BY_NAME):
             collected |= _of_family(name, families[name])
     return collected
 
