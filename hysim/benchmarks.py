@@ -99,8 +99,7 @@ def noel_schoukens(
     periods : int
         Number of periods of the multisine.
     initial : {"periodic", "rest"}
-        Start of a multisine's record: one period after rest, when the transient has decayed (to 1e-12), or at rest.
-        A sweep begins at rest.
+        Start of a multisine's record: a period after rest (transient below 1e-12), or at rest. Sweeps begin at rest.
     noise : float
         Root mean square of white Gaussian noise up to 375 Hz, added to the output at 15 kHz, different in each
         period [m]; the filters pass 92 % of it. The benchmark's training noise is 8e-6.
@@ -170,8 +169,7 @@ def simulate_official(
         A multisine is periodic: of three periods from rest the second is returned. A sweep is computed from its
         formula, which agrees with its published samples to 1e-10.
     plant : BoucWenOscillator, optional
-        Another plant, such as an identified one, to simulate by the same recipe; its own method and number of steps
-        are ignored.
+        Another plant, such as an identified one, to simulate by the same recipe; its method and steps are ignored.
 
     Returns
     -------

@@ -207,8 +207,7 @@ def _unit_of(column: Any) -> str | None:
 def _times_of(value: Any) -> _Numbers | None:
     """Times that the index of a frame, a Series or a DataArray holds, and their unit; None if it is not one of times.
 
-    An index is one of times if it holds dates or time spans, is called t or time, or has no name and holds floats.
-    Other indexes number or name the rows.
+    An index is of times if it holds dates or time spans, is called t or time, or has no name and holds floats.
     """
     if isinstance(value, _Labelled) and len(value.dims) == 1:
         index, unit = value.get_index(value.dims[0]), _unit_of(value.coords.get(value.dims[0]))

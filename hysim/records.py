@@ -48,8 +48,8 @@ class Record:
         the index of `u` and `y`, where these are a Series of pandas or a DataArray of xarray: dates, time spans, an
         index called t or time, or floats without a name. Whole numbers without a name number the rows.
     units : mapping, optional
-        Labels of the units of ``"t"``, ``"u"``, ``"y"`` and the channels, which are not checked. By default of a Series
-        or a DataArray ``attrs["units"]``.
+        Units of ``"t"``, ``"u"``, ``"y"``, channels, not checked; by default a Series' or DataArray's
+        ``attrs["units"]``.
     resolution : float, optional
         Quantum of the output's sensor [unit of y].
     name : str, optional
@@ -177,9 +177,8 @@ class Record:
     def branches(self, tolerance: float = 0.0) -> tuple[Self, ...]:
         """Branches on which the input rises or falls, in the order of time; empty if the input is constant.
 
-        A plateau between two branches is divided in its middle; the sample in the very middle, and a reversal without a
-        plateau, belong to both. Reversals within the `tolerance`, as in `reversals`, do not end a branch, and are left
-        out at the record's ends.
+        A plateau between branches is divided in its middle; its middle sample, and a reversal without a plateau, belong
+        to both. Reversals within the `tolerance`, as in `reversals`, end no branch, and are left out at the ends.
 
         Examples
         --------
@@ -423,8 +422,7 @@ def few_places(record: Record, most: int) -> npt.NDArray[np.intp]:
 def several(records: Any, verb: str) -> tuple[Record, ...]:
     """One record or a sequence of them as a tuple; other arguments are errors that name the `verb`.
 
-    Tables of other libraries with the columns u and y are records, too. ValueError if the squares and quotients of a
-    record's numbers would not be numbers.
+    Tables of other libraries with columns u and y are records, too. ValueError if squares or quotients would overflow.
     """
     if (single := as_record(records, verb)) is not None:
         return (_of_ordinary_size(single, verb),)

@@ -38,8 +38,7 @@ class Simulation:
     z : array, shape (n,), or None
         Memory of a law that has one.
     signals : mapping
-        All signals by name, also those above: of shape (n,), or (n, m) where a plant has m masses, elements or
-        memories.
+        All signals by name, also those above: shape (n,), or (n, m) for a plant's m masses, elements or memories.
     units : mapping
         Labels of the units, by the signals' names.
     name : str

@@ -246,8 +246,7 @@ def second_process() -> Iterator[Executor]:
 def processes(number: int, begin: Callable[..., None], *arguments: Any) -> Iterator[Executor]:
     """Processes that end with the block, at once if it fails, and with this process in whatever way it ends.
 
-    Each calls `begin` first. On Linux they are forked, so that the arguments need not be pickled; BLAS then uses one
-    thread in each.
+    Each calls `begin` first. On Linux they are forked: arguments need not be pickled, and BLAS uses one thread in each.
     """
     before = {*multiprocessing.active_children()}
     context = multiprocessing.get_context("fork" if sys.platform.startswith("linux") else None)

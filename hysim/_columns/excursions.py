@@ -9,11 +9,10 @@ The level is the input at the first sample, where tests begin at rest, or the mi
 the greatest total length reach: the one with cycles of the larger total span. The record's first and last branch do not
 count there, since they may be incomplete. A turning point within the tolerance of the level counts as at the level.
 Between two samples the input is linear, and a cycle begins and ends between them where the input passes the level. Of
-several passages in one branch (noise, a pause) the middle one is taken.
-
-Source: ATC-24, Guidelines for Cyclic Seismic Testing of Components of Steel Structures, Applied Technology Council,
-1992, glossary ("excursion", "cycle"); FEMA 461 (2007) and ISO 16670 (2003) count their protocols in the same cycles.
-There the level is zero load, here it is a level of the input, so that every cycle of the input is closed.
+several passages in one branch (noise, a pause) the middle one is taken. Source: ATC-24, Guidelines for Cyclic Seismic
+Testing of Components of Steel Structures, Applied Technology Council, 1992, glossary ("excursion", "cycle"); FEMA 461
+(2007) and ISO 16670 (2003) count their protocols in the same cycles. There the level is zero load, here it is a level
+of the input, so that every cycle of the input is closed.
 """
 
 from itertools import pairwise

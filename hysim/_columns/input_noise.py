@@ -6,8 +6,7 @@ differences: O. Anderson, Die Korrelationsrechnung in der Konjunkturforschung, 1
 frequency passes for none, since more than 5 % of the span is not taken for noise.
 
 The path turns where it retreats by more than five standard deviations of a difference. Between these reversals it is
-monotone: the monotone path nearest to the samples (isotonic regression), which at a turning point goes no further than
-the mean of the samples about it.
+the monotone path nearest to the samples (isotonic regression), at a turning point no further than their mean there.
 """
 
 import math

@@ -9,8 +9,7 @@ frequency 1/q with such phases is searched on a grid by one Fourier transform; t
 straight line through the values against their whole numbers.
 
 A small enough step fits any values, and any step fits two. A step is accepted if chance would hardly fit as well: m
-values within a fraction e of q from whole steps do so with a probability of about (2 e)^(m - 2) for each of some span/q
-steps that could be tried.
+values within a fraction e of q from whole steps are so with probability about (2 e)^(m - 2) for each of some span/q.
 """
 
 import math

@@ -58,13 +58,11 @@ def compare(
     models : mapping, list, "all" or None
         Name to a model; to a result of `identify` or `discover`; to a class or structure, which is identified on the
         record; or, with several records, to a list of models or results, one for each of them. A name of a family, such
-        as ``"bouc-wen"``, stands for it, and a list of names or classes for a mapping. ``"all"``, or None, is
-        every family that can be identified without further arguments; those that cannot be identified on this record
-        are listed with the reason.
+        as ``"bouc-wen"``, stands for it, and a list of names or classes for a mapping. ``"all"``, or None, is every
+        family that needs no further arguments; those that this record cannot determine are listed with the reason.
     record_or_records : Record or sequence of Record
-        With at least one complete cycle of the input. Of several, which may differ in their channels, fit, rmse and
-        criteria are those of all; loops are compared on the last one, which alone `Comparison.record` holds. A record
-        that is given twice counts once.
+        With at least one complete cycle of the input. Of several, which may differ in channels, fit, rmse and criteria
+        are those of all; loops are compared on the last one, the `Comparison.record`. A record given twice counts once.
     cross_validate : {"auto", "loo", "cycles", None} or int
         Cross-validation of the classes and structures; see `identify`. ``"auto"`` leaves out one sample at a time on
         records of up to 200 samples, and one of 10 blocks on longer ones.

@@ -144,8 +144,7 @@ class Comparison:
     def ranked(self, criterion: str = "cv_rmse") -> tuple[ComparisonRow, ...]:
         """The rows by a measure, the smallest first; rows without the measure are left out.
 
-        `criterion` is one of ``"cv_rmse"``, ``"bic"``, ``"aic"``, ``"fpe"``, ``"rmse"`` and ``"test_rmse"``; any
-        other word is a ValueError.
+        `criterion` is ``"cv_rmse"``, ``"bic"``, ``"aic"``, ``"fpe"``, ``"rmse"`` or ``"test_rmse"``; else ValueError.
 
         Examples
         --------

@@ -9,8 +9,7 @@ bias, and sd the standard deviation of s,
     r = r_1 + (1 + 4 r_1) / N, from 0 to 0.99,    M = N (1 - r) / (1 + r), at least 5,
     T = mean(s) sqrt(M - 1) / sd,    M - 1 degrees of freedom,
 
-which is right if the correlation falls by the same factor from lag to lag. With the slowest J cosines of the record,
-which need no such assumption,
+right if the correlation falls by one factor per lag. Without this assumption, by the slowest J cosines of the record,
 
     B_j = sqrt(2 / N) sum_k s_k cos(pi j (k + 1/2) / N),    J = N^(2/3) / 4, at least 3,
     T = mean(s) sqrt(N) / sqrt(mean of B_j^2),    J degrees of freedom.
@@ -20,11 +19,10 @@ samples no difference could be shown, however large; a model whose median error 
 worse all the same. Differences below a thousandth of the typical error count as none. Several models are compared with
 the best one by Holm's correction. That was chosen by the same errors, which makes a small probability less remarkable.
 
-A mean of squared errors with 3 to 6 lags (Diebold and Mariano 1995) fails where one error is huge.
-
-Sources: F. Wilcoxon, Biometrics Bull. 1 (1945) 80 for signed ranks; F. W. Zwiers and H. von Storch, J. Climate 8
-(1995) 336 for M; F. H. C. Marriott and J. A. Pope, Biometrika 41 (1954) 390 for the bias; S. Holm, Scand. J. Stat. 6
-(1979) 65; E. Lazarus, D. J. Lewis, J. H. Stock and M. W. Watson, J. Bus. Econ. Stat. 36 (2018) 541 for the cosines.
+A mean of squared errors with 3 to 6 lags (Diebold and Mariano 1995) fails where one error is huge. Sources: F.
+Wilcoxon, Biometrics Bull. 1 (1945) 80 for signed ranks; F. W. Zwiers and H. von Storch, J. Climate 8 (1995) 336 for M;
+F. H. C. Marriott and J. A. Pope, Biometrika 41 (1954) 390 for the bias; S. Holm, Scand. J. Stat. 6 (1979) 65; E.
+Lazarus, D. J. Lewis, J. H. Stock and M. W. Watson, J. Bus. Econ. Stat. 36 (2018) 541 for the cosines.
 """
 
 import math
@@ -109,8 +107,7 @@ def diverged(errors: FloatArray, span: float) -> bool:
 def probability(a: FloatArray, b: FloatArray, *, tie: float = 0.0) -> float:
     """Two-sided probability of equally one-sided signed ranks if both models predicted equally well.
 
-    It is nan if fewer than 4 samples have both errors, and 1 if no difference is above `tie` [unit of y] and a
-    thousandth of the typical error.
+    nan if fewer than 4 samples have both errors, 1 if no difference exceeds `tie` [unit of y] and 0.001 typical errors.
     """
     return _tested(a, b, tie)[0]
 

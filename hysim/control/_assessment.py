@@ -30,8 +30,8 @@ class LoopAssessment:
     Parameters
     ----------
     stable : bool
-        Whether the linear loop is stable at the least and at the largest slope of the law, and the loop itself comes
-        to rest where the reference stops.
+        Whether the linear loop is stable at the law's least and largest slope, and the loop rests once the reference
+        does.
     message : str
         Why it is not stable; empty if it is.
     period : float
@@ -74,9 +74,8 @@ class LoopAssessment:
     def row(self, quantum: float | None = None) -> dict[str, float | bool | None]:
         """The columns that a table should give with every reduction: numbers, None where one is infinite or unknown.
 
-        They are ``"stable"``, ``"period"``, ``"tracking_rms"``, ``"limited_percent"``, ``"max_sensitivity"``,
-        ``"max_sensitivity_with_delay"`` and ``"volts_per_quantum"``, for a step `quantum` of the readings [unit of y],
-        by default the sensor's own.
+        ``"stable"``, ``"period"``, ``"tracking_rms"``, ``"limited_percent"``, ``"max_sensitivity"``,
+        ``"max_sensitivity_with_delay"``, ``"volts_per_quantum"``, for steps `quantum` [unit of y], else the sensor's.
         """
         step = self.closed.conditions["sensor_quantum"] if quantum is None else quantum
         numbers = {name: vars(self)[name] for name in _IN_A_ROW} | {"volts_per_quantum": self.command_jump * step}
@@ -215,8 +214,7 @@ class HysteresisAssessment:
     ----------
     hysteresis_reduction_percent, lag_reduction_percent : float
         100 (1 - W closed / W open) [%], W the largest width over the stroke of the true displacement against the
-        reference. The first is nan for a plant without a law, whose loop is lag; the second is nan with one. Both are
-        nan if the loop is not stable.
+        reference. The first is nan without a law (the loop is lag), the second with one, both if it is not stable.
     open_width, closed_width : float
         Largest widths [unit of y].
     open_lag_width, lag_width : float
@@ -308,8 +306,7 @@ class SquareWaveAssessment:
     open_peak_excess_percent, peak_excess_percent : float
         Largest displacement beyond the reference's range in the last period [% of the wave's height].
     reduction : VibrationReduction, or None
-        The step's figures over the last half period, if it lasts the open loop's t98 and five of its periods, and the
-        loop is stable.
+        Step figures over the last half period, if it lasts the open loop's t98 and 5 of its periods in a stable loop.
     open_y, closed, loop
         Displacement in open loop, shape (n,); the closed loop; and its judgement.
     """
@@ -421,8 +418,7 @@ def open_loop(plant: Any, reference: npt.ArrayLike, sample_time: float, samples_
 
     `plant` is an Actuator, a law or a linear plant, at rest at no voltage before the first sample. `reference` (n,)
     [unit of y] holds whole cycles of `samples_per_cycle`, and the sample at which the last one ends, each `sample_time`
-    apart [s]. Raises SimulationError if the plant diverges; ValueError if it has no gain, or the reference does not
-    hold whole cycles.
+    apart [s]. Raises SimulationError if the plant diverges; ValueError if it has no gain or the cycles are not whole.
 
     Examples
     --------

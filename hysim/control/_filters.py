@@ -22,12 +22,11 @@ without phase and vibration: y is the reference through the weights b_1 b_2, b_1
     damping   gain w / (s + w)                              integral resonant control
               gain w^2 / (s^2 + 2 zeta w s + w^2)           positive position feedback
 
-Each is discretised by s = w / tan(w h / 2) (z - 1) / (z + 1), which keeps its response at the frequency w.
-
-Sources: N. C. Singer and W. P. Seering, J. Dyn. Sys. Meas. Control 112 (1990); W. E. Singhose, W. P. Seering and
-N. C. Singer, J. Mech. Design 116 (1994), EI; M. Tomizuka, J. Dyn. Sys. Meas. Control 109 (1987), the inverse;
-A. J. Fleming, S. S. Aphale and S. O. R. Moheimani, IEEE Trans. Nanotechnology 9 (2010); J. L. Fanson and
-T. K. Caughey, AIAA Journal 28 (1990), the damping.
+Each is discretised by s = w / tan(w h / 2) (z - 1) / (z + 1), which keeps its response at the frequency w. Sources: N.
+C. Singer and W. P. Seering, J. Dyn. Sys. Meas. Control 112 (1990); W. E. Singhose, W. P. Seering and N. C. Singer, J.
+Mech. Design 116 (1994), EI; M. Tomizuka, J. Dyn. Sys. Meas. Control 109 (1987), the inverse; A. J. Fleming, S. S.
+Aphale and S. O. R. Moheimani, IEEE Trans. Nanotechnology 9 (2010); J. L. Fanson and T. K. Caughey, AIAA Journal 28
+(1990), the damping.
 """
 
 import math
@@ -221,9 +220,8 @@ class Shaper:
     def ei(cls, natural_frequency: float, damping_ratio: float, tolerance: float = 0.1, zeros: int = 2) -> Self:
         """Smallest residual of one mode, [rad/s] and [1], whose frequency lies in a band.
 
-        `tolerance` is the half width of the band relative to the frequency, from 0 to below 1, and `zeros` the number
-        of frequencies in it without vibration, at least 1, of which each takes half a period. A ValueError is raised if
-        a number is outside its range.
+        `tolerance` is the half width of the band relative to the frequency, from 0 to below 1, `zeros` the number of
+        frequencies in it without vibration, at least 1, half a period each. Other numbers raise ValueError.
 
         Examples
         --------

@@ -4,10 +4,9 @@ A controller follows r + c. With the linear response T from c to the measurement
 error at each frequency (`hysim.kernels.learning`), with l = gain q / T of the model. Where this is below one for all T
 the errors shrink: of plants whose natural frequencies and slopes are wrong by the `uncertainty`, and for the least and
 the largest slope of the model's law against the controller's along the stroke, each frozen. q ends where it would not
-learn: near a resonance that may lie 10 % off the error of the model is larger than the model.
-
-Sources: S. Arimoto et al., J. Robotic Systems 1 (1984) 123; D. A. Bristow et al., IEEE Control Systems 26(3) (2006) 96;
-S. Hara et al., IEEE Trans. Automatic Control 33 (1988) 659.
+learn: near a resonance that may lie 10 % off the error of the model is larger than the model. Sources: S. Arimoto et
+al., J. Robotic Systems 1 (1984) 123; D. A. Bristow et al., IEEE Control Systems 26(3) (2006) 96; S. Hara et al., IEEE
+Trans. Automatic Control 33 (1988) 659.
 """
 
 import functools
@@ -180,8 +179,7 @@ class RepetitiveControl(_Learning):
     uncertainty : float
         Relative error of natural frequencies and slopes for which errors must shrink.
     period : float
-        Of the reference [s], a whole number of samples. Where the low pass is longer than a period, it learns from the
-        errors of several periods before.
+        Of the reference [s], whole samples. Where the low pass is longer than a period, it learns from several periods.
 
     Raises
     ------
@@ -274,8 +272,7 @@ class IterativeLearning(_Learning):
     ) -> "LearnedTrials":
         """Run trials, and correct the reference after each.
 
-        A trial has a lead before the reference and one after it: corrections begin before the reference moves, and the
-        last ones need errors after it.
+        A trial has a lead before and after the reference: corrections begin before it, the last need later errors.
 
         Parameters
         ----------

@@ -147,8 +147,7 @@ def close_loop(
     ----------
     plant : Actuator, law, linear plant, creep, amplifier, cascade of laws that ends with a TransferFunction, Structure
         Or the result of a fit. At rest at `u0` before the first sample, creep included. A structure with
-        ``excitation="force"`` begins at its initial state; `influence` says where the controller's force acts, `output`
-        what the controller reads.
+        ``excitation="force"`` begins at its initial state; the controller acts by `influence` and reads `output`.
     controller : PID, TrackingController, InverseFeedforward, or anything with their ``compiled``
         At rest too. With a method ``ahead`` it gets the reference so many samples ahead, and at the end its last value.
     t : array, shape (n,)
@@ -161,8 +160,7 @@ def close_loop(
     substeps : int, optional
         Per sample, behind an amplifier that takes time; by default as in `Actuator.response`. A structure has its own.
     ground_acceleration : array, shape (n,), optional
-        Acceleration of the ground under a structure, linear between the samples; all masses move with the ground
-        [m/s^2].
+        Acceleration of the ground under a structure, linear between samples; all masses move with it [m/s^2].
     units : mapping, optional
         Labels of the units.
     progress : callable or False, optional

@@ -11,8 +11,7 @@ stable loop comes to rest. One whose remaining oscillation, without its drift, i
     1 % of the voltage that the reference asks for               where readings are continuous
     2 quanta of displacement, or nearly from limit to limit      where they are quantised
 
-and decays at less than half the rate of the linear loop is in a limit cycle. A loop that still moves without
-swinging is held longer.
+and decays at less than half the linear rate is in a limit cycle. One that moves without swinging is held longer.
 
 L is the loop's frequency response, the plant behind the hold times the controller. Its distance from -1 is one over
 the maximum sensitivity max |1 / (1 + L)|, for stable loops only: the poles of
@@ -93,8 +92,7 @@ class LinearLoop:
     sample_time : float
         Sample time of the controller [s].
     frequencies : array, optional
-        Where L is evaluated, increasing [rad/s]; by default 300, log-spaced up to pi / sample time, and more around
-        each resonance of the plant.
+        Where L is evaluated, increasing [rad/s]; by default 300, log-spaced to pi / sample time, more at resonances.
 
     Examples
     --------
@@ -289,8 +287,7 @@ def limit_cycle(
 ) -> str:
     """In words, how the loop moves on where it should be at rest; empty if it comes to rest.
 
-    `decay` is that of the slowest oscillation of the stable linear loop, per sample, and `asked` the range of the
-    voltage that the reference asks for.
+    `decay` is per sample, of the stable linear loop's slowest oscillation; `asked` is the reference's voltage range.
     """
     resting = resting.quiet()
     n = reference.size
@@ -382,8 +379,7 @@ def bandwidth(
     Raises
     ------
     SimulationError, ValueError
-        If the loop diverges, or is not stable as `hysim.control.assess_loop` has it; if the amplitude or the lowest
-        frequency is not positive.
+        If the loop diverges or is unstable (`hysim.control.assess_loop`), or amplitude or lowest frequency is not > 0.
 
     Examples
     --------

@@ -160,6 +160,10 @@ def _scratch(controller: Any, sample_time: float) -> int:
 def to_control(plant: Any, sample_time: float | None = None) -> Any:
     """A plant or a controller as a system of python-control.
 
+    Inputs and outputs of nonlinear systems are called u and y, and reference, measurement and u. ``Line(slope=1.0)`` as
+    an actuator's law keeps the limits of one without a law. A `TrackingController` with preview takes the reference
+    ``controller.ahead(sample_time)`` samples ahead of its time.
+
     Parameters
     ----------
     plant : TransferFunction, StateSpace, Modes, Actuator, law, BoucWenOscillator, PID, TrackingController or fit
@@ -182,14 +186,7 @@ def to_control(plant: Any, sample_time: float | None = None) -> Any:
     TypeError
         If the plant is none of these.
     ValueError
-        If a plant with a dead time, with a law, a pure derivative or a `TrackingController` is to stay continuous,
-        or the sample time is not positive.
-
-    Notes
-    -----
-    Inputs and outputs of nonlinear systems are called u and y, and reference, measurement and u. ``Line(slope=1.0)``
-    as an actuator's law keeps the limits of one without a law. A `TrackingController` with preview takes the
-    reference ``controller.ahead(sample_time)`` samples ahead of its time.
+        If a dead time, law, pure derivative or `TrackingController` is to stay continuous, or ``sample_time <= 0``.
 
     Examples
     --------

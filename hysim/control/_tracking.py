@@ -146,8 +146,7 @@ class TrackingController(SampledController):
     notch, damping : Notch and DampingLoop, optional
         Filter of the feedback's command, and a loop beside it.
     model : Actuator, optional
-        The feed-forward's plant with vibration and sensor delay: the feedback then corrects only the difference between
-        the measurement and the model's.
+        The feed-forward's plant, vibration and sensor delay included: feedback corrects only the difference from it.
     preview : bool
         Whether the reference is known ahead.
     limits : (float, float), optional

@@ -273,9 +273,8 @@ def tune(
     reference : array, shape (n,)
         [unit of y]
     controller : PID or TrackingController, optional
-        A template: the gains of its PID and damping loop that are not zero are tuned, everything else stays;
-        ``hs.PID(ki=1.0)`` asks for an integral alone. By default a PID in standard form, with its setpoint weight and a
-        derivative filter of a tenth of Td.
+        A template: nonzero gains of its PID and damping loop are tuned, the rest stays; ``hs.PID(ki=1.0)`` asks for an
+        integral alone. By default a standard-form PID with its setpoint weight and a derivative filter of Td / 10.
     objective : {"itae", "rms"}
         Measure of the error to minimise: for a step, for a periodic reference.
     limits : (float, float), optional

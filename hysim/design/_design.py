@@ -28,8 +28,7 @@ class InputDesign:
     t, u : array, shape (n_samples,)
         Times [s] and input [unit of u], which begins at zero.
     levels, holds : array, shape (n_levels,)
-        Turning points of the input [unit of u] and how long it is held there [s]; the last ones may lie beyond the end.
-        Empty if a usual input was the best one.
+        Turning points of the input [unit of u], holds there [s]; the last may lie past the end. Empty for a usual one.
     expected_stderr : mapping
         Names of the numbers to their standard errors, those of an efficient estimate [unit of each].
     covariance : array, shape (n_names, n_names)
@@ -38,8 +37,7 @@ class InputDesign:
         Names of the usual inputs to what they tell, in parts of what this one does: the ratio of the criterion, which
         is proportional to the number of samples.
     beside : mapping
-        Names of the usual inputs, and of those of your own, to the inputs, shape (n_samples,) each; for an actuator the
-        usual ones are the best of a few speeds.
+        Names of usual inputs, for an actuator the best of a few speeds, and of your own to inputs, shape (n_samples,).
     beside_stderr : mapping
         Their names to the standard errors that are expected of them, by name.
     criterion : str
@@ -177,9 +175,8 @@ def design_input(
 
     The input is a row of strokes between turning points, at some of which it is held: at the full slew for a law, and
     at many speeds for an actuator. They are drawn at random, and those of the best candidates are changed as long as
-    the Fisher information on the numbers grows: a search, which is not sure to find the best input. Noise is taken as
-    white, so that a pause is as good as any sample. The information depends on the numbers; begin with what is known of
-    them, and repeat.
+    the Fisher information on the numbers grows: a search that may miss the best input. Noise is taken as white, so that
+    a pause is as good as any sample. The information depends on the numbers; begin with what is known, and repeat.
 
     Parameters
     ----------
@@ -188,20 +185,16 @@ def design_input(
     limits : InputLimits or mapping
         amplitude, slew, duration, sample_time, and optionally centre.
     free : sequence of str, optional
-        Numbers to be identified, as in ``law.scalars``. Of an actuator as in `hysim.identify`, by default those that it
-        frees.
+        Numbers to identify, as in ``law.scalars``; of an actuator as in `hysim.identify`, by default all it frees.
     values : mapping, optional
         Names of an actuator's parameters to their values, such as the estimates of a first fit. What is not named has
         the number of the structure's law, or the start of its search; the frequencies of the modes must be named.
     noise : float, optional
-        Standard deviation of the output; by default that of the structure's sensor with its rounding, or one
-        [unit of y].
+        Standard deviation of the output [unit of y]; by default that of the structure's sensor with rounding, or one.
     criterion : {"D", "A", "E"}
-        The determinant of the information, the mean variance, or the largest one; A and E judge numbers in parts of
-        their sizes.
+        Determinant of the information, mean variance, or the largest; A and E judge numbers in parts of their sizes.
     highest_frequency : float, optional
-        Of the random-phase multisine that stands beside a design for an actuator; by default twice that of the fastest
-        mode [Hz].
+        Of the random-phase multisine beside an actuator's design [Hz]; by default twice that of the fastest mode.
     beside : mapping, optional
         Names to inputs of your own, (n_samples,) each, that are judged beside the usual ones.
     candidates, moves : int

@@ -1,7 +1,6 @@
 """Inputs by their turning points, and the usual inputs with which a design is compared.
 
-Strokes are an array (n_strokes, 3): the turning point about the centre, how long it is held [s], and the speed on the
-way to it in parts of the full slew.
+Strokes (n_strokes, 3): turning point about the centre, time held there [s], and speed on the way to it / full slew.
 """
 
 import math

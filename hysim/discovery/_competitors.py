@@ -11,8 +11,7 @@ weight minimises the generalised cross-validation
 
     GCV = (residual sum of squares / n) / (1 - degrees of freedom / n)^2.
 
-The state of a play before a record is unknown within its threshold of the first input: the difference between both
-ends is a column for that record alone.
+A play's initial state is unknown within its threshold of the first input: the ends' difference is a column per record.
 
 **The linear rival** of a law is a plant without hysteresis, but with dynamics, fitted to the same records:
 

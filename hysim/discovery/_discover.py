@@ -3,8 +3,7 @@
     z' = sum c_k phi_k(u', |u'|, u, z),    y = offset + feedthrough u + gain z
 
 Regression of the slope along the loading length, and PySINDy's optimizers from dense to sparse (`_slopes`), refinement
-by simulation error (`_refinement`), choice of one structure (`_selection`, `_search`), and the verdict on the records
-(`_judgement`).
+by simulation error (`_refinement`), choice of one structure (`_selection`, `_search`), and the verdict (`_judgement`).
 """
 
 import math
@@ -66,7 +65,10 @@ def discover(
 
     The slope of the memory along the loading length, dL = ``|du|``, is regressed on a library of terms by PySINDy.
     Structures are refined by their error in free run; of those that fit equally well the one of fewest parameters is
-    taken. Models without a law are fitted beside it, and all are judged on held-out samples.
+    taken. Models without a law are fitted beside it, and all are judged on held-out samples. Structures are compared by
+    the BIC of their free runs; residuals below 1e-4 strokes are no evidence. A warning says where the records may be
+    those of an oscillator, for which `discover_oscillator` is. Sources: S. L. Brunton, J. L. Proctor and J. N. Kutz,
+    PNAS 113 (2016); PySINDy 2.1.
 
     Parameters
     ----------
@@ -77,9 +79,8 @@ def discover(
         What is measured: the memory itself, y = z; or an output, y = offset + feedthrough u + gain z. By default both
         and a Duhem law are tried, and the one of lowest BIC is taken.
     library : {"bouc-wen", "duhem"} or sequence of str, optional
-        ``"bouc-wen"``, for z: ``u'`` and ``|u'|`` times z^j, and times ``|z|`` z^(j-1), j up to `degree`.
-        ``"duhem"``, for y: ``u'`` and ``|u'|`` times u^i y^j, i + j up to `degree`. Or the names of the terms:
-        ``["u'", "|u'| z", "u' |z|"]``.
+        ``"bouc-wen"``, for z: ``u'`` and ``|u'|`` times z^j, and times ``|z|`` z^(j-1), j up to `degree`. ``"duhem"``,
+        for y: ``u'`` and ``|u'|`` times u^i y^j, i + j up to `degree`. Or the terms: ``["u'", "|u'| z", "u' |z|"]``.
     degree : int, optional
         Highest degree of the library's monomials, by default 2. Not with a library of names.
     symmetry : {None, "odd", "even"}
@@ -89,8 +90,7 @@ def discover(
     optimizer : {"STLSQ", "SR3", "SSR", "FROLS"}
         PySINDy's optimizer that makes the path.
     derivative : {"auto", "smoothed", "weak"}
-        Slopes of smoothed branches, or the integral form, which needs none; by default the better one on held-out
-        samples.
+        Slopes of smoothed branches, or the integral form, without slopes; by default the better on held-out samples.
     initial : {"auto", "free", "rest"}
         Whether the memory at the first sample is fitted for each record, or zero. By default the lower BIC decides; a
         Duhem law begins at rest only in records that begin at u = 0.
@@ -123,13 +123,6 @@ def discover(
         to have a slope, there are no more samples than terms, or every law diverges.
     TypeError, ImportError
         If the first argument is not a record or a sequence of them; if `optimizer` needs one of PySINDy's extras.
-
-    Notes
-    -----
-    Structures are compared by the BIC of their free runs; residuals below 1e-4 strokes are no evidence. A warning says
-    where the records may be those of an oscillator, for which `discover_oscillator` is.
-
-    Sources: S. L. Brunton, J. L. Proctor and J. N. Kutz, PNAS 113 (2016); PySINDy 2.1.
 
     Examples
     --------

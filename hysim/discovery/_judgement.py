@@ -6,16 +6,14 @@ Models of three kinds are fitted to the same records and judged on samples that 
     lagging   a linear plant of one or two poles, or relaxations: memory that depends on time
     turning   the law, or a superposition of plays: memory that depends on the order of the extremes only
 
-The plays need no library: the verdict does not depend on whether the library has a good law. Better means an rmse on
-held-out samples below BETTER times the other's. A model explains the samples if its error is at most FACTOR times that
-on the fitted samples, where records or rates are left out, or else times the noise; or at most UNEXPLAINED times the
-error of a curve.
+The plays need no library: the verdict does not depend on whether it has a good law. Better means an rmse on held-out
+samples below BETTER times the other's. A model explains the samples if its error is at most FACTOR times that on the
+fitted samples, where records or rates are left out, else the noise; or at most UNEXPLAINED times a curve's.
 
 1. Neither a lagging nor a turning model is better than the still ones: "no structure found".
 2. One rate, or no time: "cannot be told from one rate".
 3. Several rates. Of the models that explain the held-out samples: "linear lag" if a lagging one is better than all
-   others, "rate-independent hysteresis" if a turning one is. Else "no structure found": hysteresis followed by a lag,
-   or noise.
+   others, "rate-independent hysteresis" if a turning one is. Else "no structure found": hysteresis and lag, or noise.
 4. If the law diverges in free run, on the records or on steady cycles over their range: "no structure found", unless
    the plays show at several rates that the records are hysteretic.
 

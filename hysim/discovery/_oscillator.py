@@ -425,11 +425,9 @@ def discover_oscillator(
     Raises
     ------
     ValueError
-        If a record has no even time, is too short, has a constant signal or is not that of a mass on springs, or an
-        option is unknown.
+        If a record has no even time, is too short, constant or not that of a mass on springs, or an option is unknown.
     TypeError
-        If the first argument is not a record or a sequence of them, `structure` is none, or a part of the plant no
-        number.
+        If the first argument is no record or sequence of them, `structure` is none, or a part of the plant no number.
 
     Examples
     --------

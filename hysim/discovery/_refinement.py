@@ -152,9 +152,8 @@ S = TypeVar("S", Terms, AnyExponent)
 class Candidate(Generic[S]):
     """A refined structure.
 
-    `unknowns` (size + n_records,) are its numbers and the y0 of each record, `residual` (n_samples,) is in strokes,
-    `jacobian` (n_samples, size + n_records) is its derivative. `settles` is whether the law comes to a steady loop
-    under a cyclic input.
+    `unknowns` (size + n_records,) are its numbers and each record's y0, `residual` (n_samples,) is in strokes,
+    `jacobian` (n_samples, size + n_records) is its derivative. `settles`: whether cyclic inputs end in a steady loop.
     """
 
     structure: S

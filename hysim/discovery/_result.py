@@ -1,11 +1,8 @@
 """The results of `discover` and `discover_oscillator`.
 
-The numbers of a structure become models: a Bouc-Wen law where the terms are one, else a Duhem law.
-
-    z' = A u' - beta |u'| |z|^(n-1) z - gamma u' |z|^n
-
-With y = feedthrough u + gain z only the products of gain with the others are determined: with a feedthrough A is 1,
-otherwise the memory is the output and the gain is 1.
+The numbers of a structure become models: a Bouc-Wen law where the terms are one, else a Duhem law. With y = feedthrough
+u + gain z only the products of gain with the numbers of the memory are determined: with a feedthrough A is 1, otherwise
+the memory is the output and the gain is 1.
 """
 
 import math
@@ -238,8 +235,8 @@ class Discovery(_Discovered):
         BoucWen or Duhem law of `equation`, refined by simulation error, from the initial state of the first record; and
         one for each record.
     coefficients : mapping
-        Term to coefficient, for instance ``"|u'| z"``. With a feedthrough a Bouc-Wen law is scaled so that ``"u'"`` has
-        the coefficient 1.
+        Term to coefficient, as ``"|u'| z"``. With a feedthrough a Bouc-Wen law is scaled to ``"u'"`` with coefficient
+        1.
     stderr : mapping
         Standard errors of the coefficients and of `parameters`; nan where the records do not determine them.
     equation : str
@@ -248,9 +245,8 @@ class Discovery(_Discovered):
         ``"rate-independent hysteresis"``, ``"linear lag"``, ``"cannot be told from one rate"`` or
         ``"no structure found"``; see `discover`.
     scores : mapping
-        ``"fit_percent"`` [%], ``"rmse"`` [unit of y], ``"bic"`` and ``"n_terms"`` of the law's free run;
-        ``"threshold"``, the largest one whose structure still has all terms of the law, ``"n_structures"`` refined, and
-        ``"condition"`` of the regression.
+        ``"fit_percent"`` [%], ``"rmse"`` [unit of y], ``"bic"`` and ``"n_terms"`` of the free run; ``"threshold"``, the
+        largest that keeps all the law's terms, ``"n_structures"`` refined, ``"condition"`` of the regression.
     n_parameters : int
         Number of fitted parameters, free initial states included.
     left_out : tuple of str
@@ -260,8 +256,7 @@ class Discovery(_Discovered):
     inclusion : mapping
         Term of the library to the share of an ensemble of sparse regressions that keeps it.
     path_n_terms, path_fit_percent, path_bic : array, shape (n_thresholds,)
-        The optimizer's path from dense to sparse, each structure refined on thinned records; a fit of -inf and a BIC of
-        inf where its free run diverges.
+        The optimizer's path from dense to sparse, each refined on thinned records; fit -inf, BIC inf if it diverges.
     message : str
         How the search ended.
     warnings : tuple of str
@@ -333,8 +328,7 @@ class OscillatorDiscovery(_Discovered):
     message, warnings
         As in `Discovery`.
     parameters : mapping
-        ``"mass"``, ``"damping"`` and ``"stiffness"`` of the plant, and ``"n"`` where it was free. Without a memory the
-        stiffness is that of all springs.
+        ``"mass"``, ``"damping"``, ``"stiffness"``, ``"n"`` where free. Without a memory stiffness is of all springs.
     initial : {"rest", "periodic"}
         Whether the records begin at rest, or in the steady motion under a periodic input.
     initial_states : tuple of mapping

@@ -22,12 +22,11 @@ their samples, the reversals among them; the best structures are then refined on
 
     minimise ||r + J (x' - x)||^2 over x' that are zero where a column is left out
 
-With C = (J^T J)^-1 and the optimum of all columns, leaving out column j costs x_j^2 / C_jj, moves the others by
--C_j x_j / C_jj, and turns C into C - C_j C_j^T / C_jj. The subsets of each size follow from those of one more column;
-of each size the `width` cheapest are followed, which with WIDTH are all up to 12 columns. A chain of sweeps adds small
-positive costs, so that nothing cancels where the residual is rounding.
-
-Source: G. M. Furnival and R. W. Wilson, Regressions by leaps and bounds, Technometrics 16 (1974) 499.
+With C = (J^T J)^-1 and the optimum of all columns, leaving out column j costs x_j^2 / C_jj, moves the others by -C_j
+x_j / C_jj, and turns C into C - C_j C_j^T / C_jj. The subsets of each size follow from those of one more column; of
+each size the `width` cheapest are followed, which with WIDTH are all up to 12 columns. A chain of sweeps adds small
+positive costs, so that nothing cancels where the residual is rounding. Source: G. M. Furnival and R. W. Wilson,
+Regressions by leaps and bounds, Technometrics 16 (1974) 499.
 """
 
 import itertools

@@ -78,6 +78,9 @@ def to_c(
 ) -> CSource:
     """A law, a plant or a controller as C99 without dependencies: one header, one source, and a worked `main`.
 
+    The functions are translated from those that Python compiles; compiled without contractions to fused operations, the
+    numbers agree to 1e-12 of the range, and to the bit where both C libraries do.
+
     Parameters
     ----------
     thing : model, result of a fit, or controller
@@ -88,10 +91,9 @@ def to_c(
     name : str
         Name of the files, and prefix of every public name in them; no keyword, function or header of C.
     u0, y0 : float, optional
-        Command and displacement at which a controller starts, at rest [unit of u], [unit of y]. By default the command
-        at which the memory of its law holds, which of an identified law is the first input of its record, and the
-        displacement of its model there; else 0. Laws and plants without an input of their own get their first input
-        where they run.
+        Command and displacement at which a controller starts at rest [units of u and y]. By default the command at
+        which its law's memory holds, which of an identified law is the first input of its record, and the displacement
+        of its model there; else 0. Laws and plants without an input of their own get their first input where they run.
 
     Returns
     -------
@@ -104,11 +106,6 @@ def to_c(
     ValueError
         If the name is no name in C, the sample time is not positive and finite, or missing where one is needed, or a
         step uses Python outside the subset that is translated; the message then names file and line.
-
-    Notes
-    -----
-    The functions are translated from those that Python compiles; compiled without contractions to fused operations,
-    the numbers agree to 1e-12 of the range, and to the bit where both C libraries do.
 
     Examples
     --------

@@ -68,6 +68,13 @@ def to_fmu(
 ) -> Path:
     """Write a model as a functional mock-up unit (FMU) for co-simulation, with its C sources.
 
+    A unit has an input, an output, the numbers of a law as tunable parameters, and where the model remembers its input
+    a fixed parameter ``u0``, the input at which it rests before the simulation. Its state can be saved, restored and
+    turned into bytes. The master sets the input at a communication point and reads the output at the next one: the
+    output is one communication step late. At the start it is the output for the input at the start. A sampled model is
+    computed at multiples of its sample time, whatever the communication step. Equal arguments give equal bytes.
+    Standard: https://fmi-standard.org, versions 2.0.5 and 3.0.2.
+
     Parameters
     ----------
     thing : model, result of a fit, or controller
@@ -104,18 +111,6 @@ def to_fmu(
         If a shared library is asked for and no compiler can make it.
     OSError
         If the file cannot be written, or the compiler fails.
-
-    Notes
-    -----
-    A unit has an input, an output, the numbers of a law as tunable parameters, and where the model remembers its input
-    a fixed parameter ``u0``, the input at which it rests before the simulation. Its state can be saved, restored and
-    turned into bytes.
-
-    The master sets the input at a communication point and reads the output at the next one: the output is one
-    communication step late. At the start it is the output for the input at the start. A sampled model is computed at
-    multiples of its sample time, whatever the communication step.
-
-    Equal arguments give equal bytes. Standard: https://fmi-standard.org, versions 2.0.5 and 3.0.2.
 
     Examples
     --------

@@ -1,8 +1,7 @@
 """Pages for a browser: a law's loop that follows sliders, in one HTML file that needs nothing else.
 
-The page computes with the step of the law, as WebAssembly; see `hysim.export._compilers`. Files of the folder `page`
-are its parts: markup, style, and script, joined in the order of `_PARTS`. `hysim explore` begins with a model of every
-family of laws, and some devices.
+The page computes with the law's step, as WebAssembly (`hysim.export._compilers`). Files of the folder `page` are its
+parts, joined in the order of `_PARTS`. `hysim explore` begins with a model of every family of laws, and some devices.
 """
 
 import base64

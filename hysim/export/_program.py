@@ -6,8 +6,7 @@ functions among its arguments: calls through function values are direct calls in
 their values, and are sought again until nothing changes. A vector is a pointer; where its length is used, an `int`
 follows it. What is never written to is `const`, and what is never used is left out.
 
-C evaluates the operands of an expression in any order; the subset therefore allows one call in an expression that
-writes to the state.
+C evaluates operands in any order; so the subset allows one call in an expression that writes to the state.
 """
 
 import ast
@@ -205,9 +204,8 @@ def program_of(
 
     A law that does not depend on time needs no `sample_time` [s]. A controller starts at rest at `u0` and `y0`, by
     default those of `start_of`. If `tunable`, the numbers of a law may still be changed in the program, where its
-    parameters follow from them by arithmetic. A TypeError is raised if the thing cannot be stepped, a ValueError if a
-    sample time is missing or a start is not finite, and an UntranslatableError if a step is outside the subset of
-    Python that is translated.
+    parameters follow from them by arithmetic. TypeError if the thing cannot be stepped, ValueError if a sample time is
+    missing or a start is not finite, UntranslatableError if a step is outside the translated subset of Python.
     """
     if sample_time is not None and not 0.0 < sample_time < math.inf:
         raise ValueError(f"sample_time must be positive and finite, got {sample_time}")

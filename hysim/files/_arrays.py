@@ -1,9 +1,8 @@
 """Arrays with names, as a table: the content of NPZ, NPY, MAT, HDF5 and MicroMag files.
 
-A column is an array with one axis that is longer than one; of an array with more, the columns are those along its
-first axis: ``x[2]`` of shape (n, 3), ``x[0,1]`` of shape (n, 3, 2). A name leads into structs and groups with a
-point or a slash. Text arrays ``u_units``, ``name`` and ``channels`` and a number `resolution` hold what is known
-beside the columns.
+A column is an array with one axis that is longer than one; of an array with more, the columns are those along its first
+axis: ``x[2]`` of shape (n, 3), ``x[0,1]`` of shape (n, 3, 2). A name leads into structs and groups with a point or a
+slash. Text arrays ``u_units``, ``name``, ``channels`` and a number `resolution` stand beside the columns.
 
 NumPy reads NPZ and NPY, SciPy each variable of a MAT file of version 5. What they do not check is checked before: the
 sizes that a file states, and structs, into which hysim goes itself, because `scipy.io.loadmat` follows cells in cells
@@ -199,8 +198,7 @@ def _path(name: str) -> str:
 def micromag(file: BinaryIO) -> Arrays:
     """Field `u` and moment `y` that a MicroMag 2900 or 3900 measured, and further columns, in their order.
 
-    Of first-order reversal curves these are the points at the calibrating field, each followed by a curve: a path of
-    the field. The header says the units.
+    Of reversal curves these are points at the calibrating field, each followed by a curve. The header says the units.
     """
     lines = file.read().decode("latin-1").splitlines()
     ends = any(line.startswith("MicroMag") and line.rstrip().endswith("ends") for line in lines[-3:])

@@ -144,8 +144,7 @@ def load_ground_motion(
     Four kinds of text are read, and what a file is follows from its content, not from its ending:
 
     - the AT2 files of PEER, whose header states NPTS and DT, in any of its spellings: ``NPTS=  4000, DT= .0050 SEC``,
-      ``NPTS=4000,    DT=0.0050SEC``, ``4000    0.0050    NPTS, DT``. Their values are in g unless the header states
-      another unit;
+      ``NPTS=4000,    DT=0.0050SEC``, ``4000    0.0050    NPTS, DT``. In g unless the header states another unit;
     - a column of times and one of accelerations, in any layout that `hysim.load` reads, with or without a header. Of
       several columns those called t or time, and acceleration, acc, a, ag or u are taken. So are two arrays of these
       names in an NPZ, MAT or HDF5 file;
@@ -187,9 +186,8 @@ def load_ground_motion(
     TypeError
         If `path` is neither a path nor an open file.
     ValueError
-        If the number of values is not the stated one, a line holds something else than its numbers, times are not
-        even, a value is missing, a unit is unknown, or the file is damaged. The message is one line that names the
-        file, the line and what to do.
+        If the number of values is not the stated one, a line holds anything but numbers, times are not even, a value is
+        missing, a unit is unknown, or the file is damaged. The message names file, line and what to do.
 
     Examples
     --------

@@ -1,8 +1,7 @@
 """HDF5 files, and MAT files of version 7.3, which are such files.
 
-Datasets are named by their path, ``group/displacement``. MATLAB stores arrays with their axes reversed, structs as
-groups and text as numbers, and marks them by attributes. Links to other files, and datasets whose values lie in other
-files, are not followed.
+Datasets are named by their path, ``group/displacement``. MATLAB stores arrays with axes reversed, structs as groups,
+text as numbers, marked by attributes. Links to other files, and datasets with values there, are not followed.
 
 h5py reads the file. Three things that its library does not check are checked before: sizes; compressed chunks, which
 may unpack into any amount of memory; and heaps, which hold texts of variable length. A heap is ``GCOL``, a version, its

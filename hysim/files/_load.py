@@ -105,8 +105,7 @@ def load(
     Parameters
     ----------
     path : str, path, open file or table
-        An open file of text or of bytes is read from its current position. A text, or an open file, may have 0.5 GB;
-        an array 2 GB.
+        An open file of text or bytes is read from its position on. A text or open file may have 0.5 GB, an array 2 GB.
     u, y : str or int, optional
         Columns of input and output, by name or by number from 0: the number of a column of a text or of a single array,
         else of an array (in HDF5 in the order of the names). By default those called u and y.
@@ -115,16 +114,14 @@ def load(
     on_missing : {"error", "drop", "split"}
         Where a chosen column has no value: raise, leave the sample out, or cut the record there into several.
     delimiter : str, optional
-        One character between the cells of a text, or a blank for any white space; by default tab, semicolon, comma or
-        white space is detected.
+        Character between cells; a blank is any white space. By default tab, semicolon, comma or blank is detected.
     decimal : {".", ","}, optional
         Decimal sign of a text; detected by default.
     thousands : str, optional
         Sign between thousands in a text. It need not be given if it is an apostrophe or a space, nor where a number can
         mean nothing else: ``1.000,5`` is 1000.5, but ``1.000`` is one unless ``thousands="."``.
     skip : int, optional
-        Number of lines at the top of a text that are neither samples nor names of columns, such as the header of
-        LabVIEW.
+        Number of lines at the top of a text that are neither samples nor column names, such as LabVIEW's header.
     encoding : str, optional
         Encoding of a text; by default UTF-8, or UTF-16 or UTF-32 after their byte order mark.
     units : mapping, optional
@@ -132,12 +129,10 @@ def load(
     resolution : float or "detect", optional
         Quantum of the output's sensor [unit of y], in place of the file's; or ``"detect"`` it from the values.
     name : str, optional
-        Name of the record; by default the one in the file or in the table's ``attrs``, or the file's name without its
-        ending.
+        Name of the record; by default that in the file or the table's ``attrs``, or the file's name without ending.
     channels : sequence of str, or mapping, optional
-        Further columns by their names, or names of channels to columns, by name or by number; a float is the value of a
-        channel that is constant: ``{"T": "temp", "current": 0.5}``. By default those that the file of
-        `hysim.save_record` names.
+        Further columns by name, or names of channels to columns, by name or number; a float is the value of a constant
+        channel: ``{"T": "temp", "current": 0.5}``. By default those that the file of `hysim.save_record` names.
     progress : callable or False, optional
         Called as ``progress(done, total)`` with numbers of bytes of a text, which is read three times.
         By default calls beyond 2 s report on the standard error; False turns this off.

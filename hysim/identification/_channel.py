@@ -97,8 +97,7 @@ def parameter_curve(fit: Identification, parameter: str) -> ParameterCurve:
     Returns
     -------
     ParameterCurve
-        Its values, band and coefficients; the covariance is that of the linearised model, whatever the method of the
-        fit's intervals.
+        Its values, band and coefficients; the covariance is of the linearised model, whatever the fit's intervals are.
 
     Raises
     ------

@@ -4,8 +4,7 @@
 returned in place of a search of few where its rms error in parts that are left out is lower by a clear part. It is made
 smoother until it is safe on cycles that the record does not have.
 
-**Without a family** every one that can be compared without further arguments is tried, those with fewer numbers to
-search for first, in two ways:
+**Without a family** every one that needs no further arguments is tried, those with fewer numbers first, in two ways:
 
     left out     cycles beyond the first of each record, in three folds; each is predicted by a fit to the others.
                  Without cycles to leave out, every fourth sample.

@@ -8,9 +8,8 @@ the loss in the model's output m, and the best sigma for the residuals at hand, 
 (`hysim.identification.marquardt`; the loss is linear in no other way in b, whose part of the step is not damped). Laws
 that nearly forget a parameter, or nearly diverge, have sums of squares like narrow bent valleys, with curvatures that
 differ by 1e9: there steps are bent (M. K. Transtrum and J. P. Sethna, arXiv:1201.5885, 2012), and the slopes of stiff
-coordinates are taken over shorter distances. A
-constraint "this parameter has that value" is kept by eliminating one coordinate, the pivot, from the step, and by
-bringing the pivot back onto the constraint after it.
+coordinates are taken over shorter distances. A constraint "this parameter has that value" is kept by eliminating one
+coordinate, the pivot, from the step, and by bringing the pivot back onto the constraint after it.
 """
 
 from dataclasses import dataclass, replace

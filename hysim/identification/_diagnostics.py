@@ -47,8 +47,7 @@ def fit_measures(y: FloatArray, residual: FloatArray, n_parameters: int) -> FitM
 def whiteness(residual: FloatArray, n_parameters: int) -> float:
     """Probability of residuals at least as correlated as these if they were white (Ljung and Box 1978).
 
-    Q = N (N + 2) sum over lags k of r_k^2 / (N - k) against chi^2; the lags are a fifth of the samples and at most 20.
-    nan where they are too few or all equal.
+    Q = N (N + 2) sum_k r_k^2 / (N - k) against chi^2, lags k to N / 5 or 20; nan if samples are too few or all equal.
     """
     from scipy.stats import chi2
 
@@ -66,8 +65,7 @@ def whiteness(residual: FloatArray, n_parameters: int) -> float:
 def rate_noise_warning(models: Sequence[Any], records: Sequence[Record]) -> str:
     """A sentence where noise of the input explains residuals of models that depend on time; else the empty text.
 
-    The noise is added to each input once more: what the output of its model then changes by, the noise that is in the
-    input already has done to the residuals.
+    Noise is added to each input once more: what the output changes by, the input's own noise has done to the residuals.
     """
     rng = np.random.default_rng(0)
     for model, record in zip(models, records, strict=True):

@@ -67,14 +67,12 @@ def identify(
     Parameters
     ----------
     model_or_class : model, model class, structure, result of a fit, or str
-        `hysim.BoucWen`, `hysim.TransferFunction.structure(poles=4, zeros=1)`, ..., or the name of a family, such as
-        ``"bouc-wen"``. The search begins at the defaults of a class, or at the values of an instance, such as a
-        `hysim.Structure`.
+        `hysim.BoucWen`, `hysim.TransferFunction.structure(poles=4, zeros=1)`, ..., or a family's name, as
+        ``"bouc-wen"``. The search begins at a class's defaults, or an instance's values, such as a `hysim.Structure`.
     record_or_records : Record, table, or sequence of them
-        Input and output, and for models with dynamics the time; of a `hysim.Structure` also `hysim.StructureRecord`.
-        A table, such as a DataFrame, has columns u and y, and t or an index of times; see `hysim.load`.
-        Several records share all parameters but the state at the first sample: where it is free, each has its own,
-        ``z0[0]``, ``z0[1]``, ...
+        Input and output, and for models with dynamics the time; of a `hysim.Structure` also `hysim.StructureRecord`. A
+        table, such as a DataFrame, has columns u and y, and t or an index of times; see `hysim.load`. Several records
+        share all parameters but the initial state: where free, each has its own, ``z0[0]``, ``z0[1]``, ...
     fixed : mapping, optional
         Parameters that are not free, and their values.
     free : sequence of str, optional
@@ -84,11 +82,10 @@ def identify(
         Name to (lower, upper), in place of the family's own box. That box is widened where the optimum stands at a side
         of it that is no limit of physics; an optimum which still does is reported by `Identification.success`.
     depends : mapping, optional
-        Name of a parameter to (channel, degree): the parameter is a polynomial of this degree in a channel of the
-        records, ``{"gain": ("T", 1)}``. It is identified by its values at degree + 1 places of the channel's range,
-        such as ``gain(T=20)`` and ``gain(T=60)``, each in the parameter's own box. The model is then a
-        `hysim.Dependent`. Where a channel varies along a record, each branch between two samples has the parameters of
-        the sample at its end.
+        Name of a parameter to (channel, degree): it is a polynomial of this degree in a channel of the records,
+        ``{"gain": ("T", 1)}``. It is identified by its values at degree + 1 places of the channel's range, such as
+        ``gain(T=20)`` and ``gain(T=60)``, each in the parameter's own box. The model is then a `hysim.Dependent`. Where
+        a channel varies along a record, each branch between two samples has the parameters of the sample at its end.
     initial : {"free", "rest", "still", "periodic"}, or one of them for each record, optional
         Whether the state at the first sample is identified, is rest at zero, is that of an input which stood still at
         its first value, or is what the cycle leaves behind with which the record begins. By default a single memory is
@@ -98,9 +95,8 @@ def identify(
         sized by the noise of the input. By default the filter is there where the input has noise and the law alone
         predicts parts that it was not fitted to worse. The filter is a part of the model.
     noise : {"gaussian", "quantised", "robust"}, optional
-        Noise of the output: normal; normal before a sensor that rounds to multiples of `Record.resolution`; or
-        Student's t with 4 degrees of freedom, for records with outliers. By default normal noise, or that of the sensor
-        of a `hysim.Actuator.structure`.
+        Noise of the output: normal; normal before rounding to multiples of `Record.resolution`; or Student's t with 4
+        degrees of freedom, for outliers. By default normal, or that of the sensor of a `hysim.Actuator.structure`.
     intervals : {"linear", "profile", "bootstrap"}
         Intervals at 95 %: from the standard errors, by the profile of the likelihood, or from 500 records drawn anew.
     cross_validate : {None, "loo", "cycles", "records"} or int, optional
@@ -110,12 +106,14 @@ def identify(
         Whether the law must be safe on smaller cycles: tried on minor loops, fading stairs and the record's path at
         smaller amplitudes, an admissible law leaves the band of the record by no more than half of the output's range,
         and lies in the region that its family names ``"admissible"``, if it names one. By default the best law is
-        returned where it is safe; otherwise the best admissible one where noise and creep allow its loss of fit. Where
-        they do not, the result is the best law, `success` is False, and the summary begins with ``UNSAFE``. True
-        returns the best admissible law whatever its fit, False the best law of all. See the notes.
+        returned where it is safe; otherwise the best admissible one where noise and creep allow its loss of fit: where
+        N_eff ln(V_admissible / V) <= 10, with V the mean squared residuals and N_eff the number of samples over the
+        correlation time of the best law's residual, and the rmse rises by at most a quarter. Where they do not, the
+        result is the best law, `success` is False, and the summary begins with ``UNSAFE``. True returns the best
+        admissible law whatever its fit, False the best law of all. `Identification.regions` holds the law that was not
+        returned: ``"unrestricted"``, or ``"admissible"``.
     weights : array, shape (n,), or one for each record, optional
-        Weight of each sample in the sum of squares, not negative; 0 leaves a sample out. Only their ratios count, and
-        the input of every sample is kept.
+        Weight of each sample in the sum of squares, not negative; 0 leaves it out. Only ratios count; inputs are kept.
     max_evaluations : int, optional
         Number of parameter sets on the whole record that the search may simulate, about. A search that ends by it is
         partial: `success` is False, and `message` says so.
@@ -142,12 +140,6 @@ def identify(
         has not the channel that a parameter depends on, or the records too few different values of it.
     TypeError
         If the first argument is not something that can be identified.
-
-    Notes
-    -----
-    Noise and creep allow a loss if N_eff ln(V_admissible / V) <= 10, with V the mean squared residuals and N_eff the
-    number of samples over the correlation time of the best law's residual, and if the rmse rises by at most a quarter.
-    `Identification.regions` holds the law that was not returned: ``"unrestricted"``, or ``"admissible"``.
 
     Examples
     --------

@@ -44,9 +44,8 @@ class Choice:
     family : str
         The chosen one.
     left_out, continued, beyond : mapping
-        By family, the rms error of parts that the fits leave out, and of the rest of the record after fits to its
-        beginning, until it leaves the inputs of that and from there on [unit of y]; nan where there is none of a kind,
-        inf where a fit failed or diverged.
+        By family, the rms error [unit of y] of parts that the fits leave out, and of the record's rest after fits to
+        its beginning, within its inputs and beyond; nan without such parts, inf where a fit failed or diverged.
     score : mapping
         By family, the geometric mean of these errors over the least of each, of which the last counts half; the best
         first. A family that was clearly worse in the first round has the errors of that.
@@ -170,9 +169,8 @@ class Identification(Stored):
     whiteness : float
         Probability of residuals at least as correlated if they were white (Ljung and Box); nan if unknown.
     success : bool
-        Whether the search converged, to an optimum that is not at a side of the search box, and the law is safe on
-        smaller cycles or was asked for by ``admissible=False``. It may be at a bound of physics, such as a damage that
-        does not heal, or at one that was given.
+        Whether the search converged to an optimum inside the search box, and the law is safe on smaller cycles or was
+        asked for by ``admissible=False``. It may be at a bound of physics (damage does not heal) or a given one.
     message : str
         How the search ended, which parameters are at a bound, and which the data do not determine.
     rivals : tuple of Candidate

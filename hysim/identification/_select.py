@@ -89,13 +89,11 @@ def select(
     Parameters
     ----------
     candidates : mapping or sequence
-        Name to what `identify` takes: a class, a model as the start, or a structure. In a sequence a class is named by
-        its name, anything else by its text.
+        Name to what `identify` takes: class, model or structure. In a sequence a class has its name, others their text.
     record_or_records : Record or sequence of Record
         As in `identify`, the same for all.
     criterion : {"bic", "aic", "fpe", "cv_rmse"}
-        Criterion of the ranking; the last needs `cross_validate`. Without noise the residual is rounding, and the
-        others mean nothing.
+        Criterion of the ranking; the last needs `cross_validate`. Of data without noise the others mean nothing.
     initial, noise, cross_validate, max_evaluations, seed, workers
         As in `identify`, the same for all. A fit that ends by `max_evaluations` is marked as partial.
     progress : callable or False, optional

@@ -161,10 +161,9 @@ def descend(
 ) -> Reached:
     """Descend from `x` (n_sets, n_x) until a step lowers the loss by at most `tolerance` + `relative` times the loss.
 
-    A set also ends where the remaining steps, each as good as the last one, would not bring it below `hopeless`. After
-    the first steps, `bend` is called with points, sets, J, dampings, what was evaluated at the points, and the trials:
-    it returns other ends of the steps, and the better ones count. From then on a set that no step lowers is not at
-    rest: its slopes are not good enough.
+    A set also ends where the remaining steps, if as good as the last, would not bring it below `hopeless`. After the
+    first steps `bend` is called with points, sets, J, dampings, values at the points, and trials: it returns other ends
+    of the steps, and the better count. From then on a set that no step lowers is not at rest: slopes are too coarse.
     """
     x, every, factors = x.copy(), np.arange(len(x)), np.array(schedule.factors)
     loss, evaluated = problem.evaluate(x, every)

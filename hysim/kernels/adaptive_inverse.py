@@ -4,12 +4,11 @@
     z_k     <- z_k + (dz/dtheta) K (m - y)
     u_k: the input at which the law of theta_k has the output r
 
-m is the measured output at the last command, y the law's own there, and g its derivatives by the numbers, which
-are the differences to copies of the law with one number a little larger each. The copies remember their own past, so
-that g holds what a number has done to the memory z, and the memory is moved with the numbers (an extended Kalman filter
-of numbers and memory, whose only uncertainty is that of the numbers). An error m - y beyond 5 standard deviations
-counts as 5 of them, so that one false measurement does not carry the numbers away; without a measurement (nan) P alone
-moves.
+m is the measured output at the last command, y the law's own there, and g its derivatives by the numbers, which are the
+differences to copies of the law with one number a little larger each. The copies remember their own past, so that g
+holds what a number has done to the memory z, and the memory is moved with the numbers (an extended Kalman filter of
+numbers and memory, whose only uncertainty is that of the numbers). An error m - y beyond 5 standard deviations counts
+as 5 of them, so that one false measurement does not carry the numbers away; without a measurement (nan) P alone moves.
 
 The parameters of the step are affine in the numbers, base + sum delta_i rates_i. `parameters` is (numbers p,
 parameters of the step q, places of the law's state s, places of the search, noise^2, drift^2 (p), differences h (p),

@@ -68,8 +68,7 @@ def langevin(x: float) -> tuple[float, float]:
 def aligned(x: float, p: float) -> tuple[float, float]:
     """m(x) and its slope for p other than 0, by Gauss' rule on the cosines that matter.
 
-    The exponent falls by _DEPTH from its maximum over at most two stretches of cosines, on each of which 32 points
-    leave out less than a rounding.
+    The exponent falls by _DEPTH on at most two stretches of cosines; 32 points on each leave out less than a rounding.
     """
     y = abs(x)
     top, first, last = stretches(y, p)

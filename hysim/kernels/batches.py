@@ -1,9 +1,8 @@
 """Many laws of one family at once, by the step with which loops take one of them.
 
 `parameters` is (n_sets, n_parameters) and `memory`, the front of the state before the first sample, (n_sets, n_memory):
-one law a row. The laws use one state in turn, of `scratch` places more than the memory. Each finds its first input and
-its memory there, a zero in the last place, and the rest of the scratch as the law before left it. `u` is (1, n_samples)
-or (n_sets, n_samples).
+one law a row. The laws use one state in turn, `scratch` places more than the memory. Each finds its first input, its
+memory, a zero in the last place, and the rest as left by the law before. `u` is (1 or n_sets, n_samples).
 """
 
 import math

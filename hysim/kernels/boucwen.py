@@ -12,9 +12,6 @@ so one flow, used twice around a zero crossing, is the whole law. It is elementa
 (`hysim.kernels.elementary`). For other n everything is measured in w* = |a/c|^(1/n), the value at which
 the two terms balance: then a and c are plus or minus one, and what is left is one function of n
 (`hysim.kernels.charts`). A memory that diverges is returned as `inf`.
-
-Layers: scalar functions first (no allocation, no exceptions), then the loops over a path and over a
-batch of laws, then `step`, the form in which closed loops and chains take the law.
 """
 
 import math

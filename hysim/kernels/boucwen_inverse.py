@@ -2,11 +2,10 @@
 
     y(u) = offset + P(u) + gain z(u),    dy/du = P'(u) + gain (A - |z|^n (gamma + beta sign(z du)))
 
-From one sample of the output to the next the input moves monotonically, along one branch of the law. The
-forward step (`hysim.kernels.boucwen.step`) and the slope above are exact there, so the input is the root of
-a scalar equation, found by Newton's method inside a bracket that closes on it. The residual is that of the
-output itself, not of its increment: nothing drifts, and the law's response to these inputs is the given
-output to rounding.
+From one sample of the output to the next the input moves monotonically, along one branch of the law. The forward step
+(`hysim.kernels.boucwen.step`) and the slope above are exact there, so the input is the root of a scalar equation, found
+by Newton's method inside a bracket that closes on it. The residual is that of the output itself, not of its increment:
+nothing drifts, and the law's response to these inputs is the given output to rounding.
 
 The slope must have one sign, `rising` = 1 or -1, along the whole branch, and at its beginning in the other
 direction too, or the output would not determine the direction of the input. On one side of z = 0 the memory's slope

@@ -12,9 +12,8 @@ gap the field in the core is less than the input by what the flux drops in the g
 
     h + gap y = u,    y = feedthrough h + saturation m
 
-which is a quadratic equation for h on either branch. Where a branch is steep and the gap wide, the equation tells the
-distance of the field from the branch's centre far better than the field itself, whose rounding the slope multiplies:
-the distance is kept beside the field.
+which is quadratic in h on either branch. Where a branch is steep and the gap wide, the field's distance from the
+branch's centre is known far better than the field, whose rounding the slope multiplies: it is kept beside the field.
 
 `parameters` is (offset, saturation, feedthrough, gap, coercivity, knee), `state` (u, z, excess, turn, h): z is the
 place between the branches from -1 to 1; the excess is |h| less the coercivity; the turn is 1 + r with the sign of the

@@ -19,8 +19,7 @@ is covered by charts, each with two polynomials, there (from w to T) and back (f
 
 Sixteen terms, eight near zero, leave out less than 2^-54 of w. Both the change of w and the end itself are returned: a
 short way by its change carries no more rounding than the sum at its end, and a decay by many decades keeps its digits,
-and its side of the balance, by its end. A chart depends on n and sigma alone: it does not matter which ones have been
-made before.
+and its side of the balance, by its end. A chart depends on n and sigma alone, not on which ones were made before.
 """
 
 import math

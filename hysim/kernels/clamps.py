@@ -13,8 +13,7 @@ over plays with through = 0, over stops with through = 1. The plays do not know 
 clamps of few are taken side by side at each sample; many are summed by the turns of the input, up to which any input
 leaves them in the order of their thresholds.
 
-The plays may also have a common weight that
-depends on the input, beside a polynomial of it (`bent_step`):
+The plays may also have a common weight that depends on the input, beside a polynomial of it (`bent_step`):
 
     y = offset + c_1 u + ... + c_n u^n + (weight + weight_slope u) sum_i m_i (z_i - u)
 """
@@ -41,8 +40,7 @@ def clamp(z: float, u: float, r: float) -> float:
 def batch(parameters: FloatArray, state: FloatArray, u: FloatArray, out: FloatArray) -> None:
     """Outputs of many laws into `out`, shape (n_sets, n_samples).
 
-    Parameters and states are those of `step`, one law a row; the positions in the state move along. `u` is
-    (1, n_samples) or (n_sets, n_samples).
+    Parameters and states as in `step`, one law a row; positions move along. `u` is (1 or n_sets, n_samples).
     """
     n_plays = state.shape[1] - 1
     terms = np.empty(n_plays)

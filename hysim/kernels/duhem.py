@@ -8,8 +8,7 @@ is one of two equations, or of four in a law with |z|,
     dz/du = f(u, z) = sum f_ij u^i z^j
 
 that `hysim.kernels.branch` integrates. The parameters are (offset, feedthrough, 2 or 4, rows, columns, law), with the
-polynomials f of the law one behind the other: where u rises, and where it falls; with |z|, each of the two for z >= 0
-and then for z <= 0.
+law's polynomials f where u rises and where it falls; with |z|, each for z >= 0 and then for z <= 0.
 """
 
 import math

@@ -3,8 +3,7 @@
     z_i  = min(max(z_i, u - r_i), u + r_i)
     y    = offset + feedthrough u + sum_i w_i L(z_i / field),    L(x) = coth x - 1 / x
 
-`parameters` is (offset, feedthrough, field, thresholds, weights), `state` the last u and the positions z_i, which are
-the reversible fields of the cells.
+`parameters` is (offset, feedthrough, field, thresholds, weights), `state` (u, z), z the reversible fields of the cells.
 """
 
 import math

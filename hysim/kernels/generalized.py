@@ -3,8 +3,7 @@
     dz/du = A - |z|^n psi
     psi = gamma + beta sgn(u' z) + b2 sgn(u' u) + b3 sgn(z u) + b4 sgn(u') + b5 sgn(z) + b6 sgn(u)
 
-While the direction of the input and the sign of u stay the same, with s = sgn(u') and e = sgn(u), psi is
-that of a Bouc-Wen law whose
+While s = sgn(u') and e = sgn(u) stay the same, psi is that of a Bouc-Wen law whose
 
     gamma' = gamma + s e b2 + s b4 + e b6,    beta' = beta + s e b3 + s b5
 

@@ -1,7 +1,6 @@
 """Inverses of laws as steps: `u = step(parameters, state, y)` returns the input at which the output is `y`.
 
-Every inverse holds a copy of its law, and moves it to the input within limits, so that it continues rightly where the
-input was limited:
+Every inverse moves a copy of its law to the input within limits, and so continues rightly where the input was limited:
 
     parameters    lowest and highest input, then what the inverse and the law need
     state         input at which the copy stands, output there, then what the inverse and the law remember
@@ -81,8 +80,7 @@ def line(parameters: FloatArray, state: FloatArray, y: float) -> float:
 def plays(parameters: FloatArray, state: FloatArray, y: float) -> float:
     """Inverse of a sum of plays by another one.
 
-    `parameters` are the limits, and then those of `clamps.step` of the inverse and of the law; `state` is (u, y), the
-    states of both, and room for one more.
+    `parameters` are limits and those of `clamps.step` of inverse and law; `state` is (u, y, both states, room for one).
     """
     parameters, state = borrowed(parameters), borrowed(state)
     n, m = (parameters.size - N_LIMITS) // 2, (state.size - N_PLACE) // 3
@@ -170,9 +168,8 @@ def _bracket(
 ) -> tuple[float, float, float, float]:
     """Two lengths with their errors. The second reaches the output; if no length does, its error is negative.
 
-    The output turns before `limit`. Where `ahead` is not zero, it is evaluated by this part of a length beyond each
-    end: where it falls there, the end is behind the turn. A `noise` of infinity stands for an output that rises in
-    steps of rounding.
+    The output turns before `limit`. Unless `ahead` is zero, it is evaluated this part of a length beyond each end:
+    where it falls there, the end is behind the turn. An infinite `noise` is an output that rises in steps of rounding.
     """
     low, low_error = 0.0, -gap
     high, too_far = min(guess, 0.5 * limit), limit

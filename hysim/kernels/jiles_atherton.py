@@ -3,19 +3,17 @@
     He = H + alpha (M_irr + w c (M_an - M_irr)),    M = c M_an(He) + (1 - c) M_irr
     dM_irr/dHe = (M_an(He) - M_irr) / (delta k),    zero where (M_an - M_irr) delta < 0,    delta = sgn(dH)
 
-w = 1 is an effective field with the whole magnetisation, w = 0 one with M_irr alone. Let x = He / a, m = M_an / Ms,
-z = M_irr / Ms, kappa = k / a and A = alpha Ms / a. In the frame that points along the field (x, m and z times delta)
-the branch has two parts. While z > m(x), z stands still, and it does so up to the x with m(x) = z. From there on it
-follows m as an exponential average,
+w = 1 is an effective field with the whole magnetisation, w = 0 one with M_irr alone. Let x = He / a, m = M_an / Ms, z =
+M_irr / Ms, kappa = k / a and A = alpha Ms / a. In the frame along the field (x, m and z times delta) z stands still
+while z > m(x); from there on it follows m as an exponential average,
 
     z(x) = z0 + int_x0^x (m(s) - z0) exp(-(x - s) / kappa) ds / kappa
 
-The integral is done by Gauss' rule on panels so short that its remainder is a rounding. A rule of n points on a panel
-of half length r leaves out less than (64 / 15) r max|f| R^(2 - 2 n) / (1 - R^-2) of an integrand f that is analytic
-within the ellipse about the panel of the semi-axes r (R + 1/R) / 2 and r (R - 1/R) / 2 (L. N. Trefethen, Approximation
-Theory and Approximation Practice, theorem 19.3). 4, 8 and 16 points are used up to R = 400, 19.3 and 4.4, where the
-ellipse keeps within 0.8 of the distance of the poles of m from the real axis, and the exponential grows on it by less
-than a factor of 14: 4e-17 is left out.
+Gauss' rule is used on panels so short that its remainder is a rounding. With n points on a panel of half length r it
+leaves out less than (64 / 15) r max|f| R^(2 - 2 n) / (1 - R^-2) of an f that is analytic within the ellipse about the
+panel of semi-axes r (R + 1/R) / 2 and r (R - 1/R) / 2 (L. N. Trefethen, Approximation Theory and Approximation
+Practice, theorem 19.3). 4, 8 and 16 points are used up to R = 400, 19.3 and 4.4, where the ellipse keeps within 0.8 of
+the distance of the poles of m from the real axis, and the exponential grows less than 14 times: 4e-17 is left out.
 
 What is known at a sample, H or B, is a sum of x, m and z,
 
@@ -24,8 +22,7 @@ What is known at a sample, H or B, is a sum of x, m and z,
 and x is its root, by Newton's method inside a bracket. H is of_x = 1, of_m = -A w c, of_z = -A (1 - w c). Its slope
 must be positive along the whole branch, or else the law jumps there; z follows m, so that its slope is never above the
 larger of what it is at the beginning and the steepest slope of m ahead, which settles the question for most branches at
-once; the others are gone in pieces on which it does. The output of a law that jumps is
-returned as `inf`.
+once; the others are gone in pieces on which it does. The output of a law that jumps is returned as `inf`.
 """
 
 import math

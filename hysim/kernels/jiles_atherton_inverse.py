@@ -2,9 +2,8 @@
 
     y = offset + feedthrough H + gain M,    H = a (x - A (w c m + (1 - w c) z)),    M = Ms (c m + (1 - c) z)
 
-y is a sum of x, m and z like H itself, so that the same search finds the effective field for it
-(`hysim.kernels.jiles_atherton`), and H follows. Feedthrough and gain have one sign: y then rises, or falls,
-along every branch.
+y is a sum of x, m and z like H: the same search finds the effective field (`hysim.kernels.jiles_atherton`), and H
+follows. Feedthrough and gain have one sign: y then rises, or falls, along every branch.
 """
 
 import math

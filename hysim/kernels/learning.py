@@ -5,8 +5,7 @@ A controller follows r + c in place of the reference r. From one repetition j to
     c_(j+1)[k] = sum_i q_i c_j[k + i] + sum_i l_i e_j[k + i],       i = -m ... m
 
 with the error e, the reference as the sensor would read it minus the measurement. q is a low pass without phase, and l
-the same low pass times the inverse of the model from c to the measurement. Both look m samples ahead, which the
-repetition before allows.
+the same times the inverse model from c to the measurement. Both look m samples ahead, in the repetition before.
 
 Where a command is at a limit, and as long as the sensor may show that, errors count as zero: corrections that cannot
 act would grow without end. Before a trial, which begins at rest, corrections and errors are zero. Corrections fade in
@@ -51,10 +50,9 @@ def learn(
 ) -> float:
     """The command of a controller whose reference is corrected.
 
-    `parameters` are a head (samples of a repetition, m, whole samples and part of one by which the sensor is late,
-    whether trials begin from rest, length of the inner state), q, l, the inner state at rest, and the inner parameters.
-    `state` is (command, sample, samples for which a limit counts, ring of references, corrections, errors, next
-    corrections of a trial, inner state).
+    `parameters` are (samples of a repetition, m, whole samples and part of one of sensor delay, whether trials begin
+    from rest, length of the inner state, q, l, inner state at rest, inner parameters). `state` is (command, sample,
+    samples for which a limit counts, ring of references, corrections, errors, a trial's next corrections, inner state).
     """
     parameters, state = borrowed(parameters), borrowed(state)
     period, reach, late = int(parameters[0]), int(parameters[1]), int(parameters[2])

@@ -8,9 +8,8 @@ which w is then taken as linear, from w_(j-1) to w_j. Either way the linear stag
     x_(j+1)  = A x_j + B_2 w_(j-2-d) + B_1 w_(j-1-d) + B_0 w_(j-d)
     y_j      = C x_j + D_2 w_(j-2-d) + D_1 w_(j-1-d)
 
-d is the number of whole sub-steps in the dead time; its remainder divides a sub-step between older and newer
-values, which the B hold. The first states do not look at the others, x_(j+1) = x_j + decline x_j + ...: they
-are the creep.
+d is the number of whole sub-steps in the dead time; its remainder divides a sub-step between older and newer values,
+which the B hold. The first states do not look at the others, x_(j+1) = x_j + decline x_j + ...: they are the creep.
 
 The sensor sees y some samples ago and a part of one. The part makes a second output, like y but taken
 within the sub-step in which that time lies:
@@ -39,8 +38,7 @@ With e = 1 - exp(-t / tau) both pieces of s have closed forms:
     ramp from s0 to s1 in the time t     v + (s0 - v) e + (s1 - s0) (1 - tau e / t)
     constant s1                          v + (s1 - v) e
 
-The chain without a controller is a step from the command to the displacement (`chain_step`, and `chain_start` at
-rest). Its parameters and state are
+Without a controller the chain is a step from command to displacement (`chain_step`, `chain_start` at rest). It has
 
     parameters   length of the law's state, 1 for an output at the end of the sample, quantum, the amplifier's six,
                  number of creep elements, order, d, sub-steps of a sample, the row for `output`, decline, A, B_0, B_1,
@@ -113,8 +111,7 @@ def advance(
 ) -> None:
     """The linear stage over one sub-step.
 
-    `x` is twice as long as the state. `A` has the rows after those of the creep, `B` is (B_0, B_1, B_2), both row
-    after row.
+    `x` is twice as long as the state. `A` has the rows after the creep's, `B` is (B_0, B_1, B_2), both row by row.
     """
     creeping, order = decline.size, x.size // 2
     for i in range(order):

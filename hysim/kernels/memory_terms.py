@@ -6,9 +6,8 @@ P is one polynomial in z for each direction s and each side of z = 0, so that pr
 covered; e, of the same four cases, multiplies one more power, which need not be whole; r is a relaxation in time,
 which a law that is independent of rate has not. Arrays of four cases are indexed [s > 0, z > 0].
 
-`along` uses the midpoint rule on every increment of y, for z and its sensitivities alike; `motion` the classical
-Runge-Kutta method on m y'' + c y' + k y + z = F. Neither ends steps at reversals: they serve regressions, whose
-numbers are refined elsewhere.
+`along` uses the midpoint rule on every increment of y, for z and sensitivities, `motion` the classical Runge-Kutta
+method on m y'' + c y' + k y + z = F. Neither ends steps at reversals: they serve regressions, refined elsewhere.
 """
 
 import math

@@ -308,8 +308,7 @@ def split_path(
 ) -> int:  # fmt: skip
     """States at the samples of `force` into `out`, (n_samples, 6): the first sample that is not finite, or -1.
 
-    `state`, (6,), is that at `last_force`, one sample before; `parameters`, (9,), is the plant; `work` is the
-    law's (`hysim.kernels.boucwen.prepare`).
+    `state` (6,) is one sample before, at `last_force`; `parameters` (9,) the plant; `work` the law's `boucwen.prepare`.
     """
     plant, current = unpacked(parameters, state)
     A, beta, gamma, n = plant[5:9]

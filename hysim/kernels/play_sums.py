@@ -7,9 +7,8 @@
 
     S_d(x) = max(x - d, 0) for d > 0,  min(x - d, 0) for d < 0,  x for d = 0
 
-Layers: scalar functions, then `step` and its inverse in the form in which loops take them. `parameters` is
-(offset, width, a_0 ... a_4 of the left envelope, of the right one, r_0 ..., w_0 ..., d_0 ..., c_0 ...), `state`
-the last input and the positions.
+Layers: scalar functions, then `step` and its inverse for loops. `parameters` is (offset, width, a_0 ... a_4 of the left
+envelope, of the right one, r_0 ..., w_0 ..., d_0 ..., c_0 ...), `state` the last input and the positions.
 """
 
 import math

@@ -140,8 +140,7 @@ def path(parameters: FloatArray, x: FloatArray, y: FloatArray, d: int, u: FloatA
 def batch(parameters: FloatArray, z0: FloatArray, u: FloatArray, out: FloatArray) -> None:
     """Outputs of many laws into `out`, shape (n_sets, n_samples).
 
-    `parameters` is (n_sets, n_parameters), `z0`, the inputs before the first sample, is (n_sets, n_past), `u` is
-    (1, n_samples) or (n_sets, n_samples).
+    `parameters` (n_sets, n_parameters), `z0` (n_sets, n_past), the inputs before, `u` (1 or n_sets, n_samples).
     """
     room = 1 + z0.shape[1] + u.shape[1]
     x, y, past = np.empty(room), np.empty(room), np.empty(z0.shape[1])

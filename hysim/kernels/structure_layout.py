@@ -132,8 +132,8 @@ class Plant(NamedTuple):
 class Steps(NamedTuple):
     """How a sample is divided.
 
-    Its length [s], the rate of the fastest mode [1/s], equal base steps, the most halvings of these (0 for none), and
-    the tolerance, a share of the drifts.
+    Length [s], rate of the fastest mode [1/s], equal base steps, most halvings of these (0: none), tolerance (share of
+    drifts).
     """
 
     sample_time: float

@@ -1,7 +1,6 @@
 """A sampled controller around a structure.
 
-The first load is the controller's force, which is held between samples; the others are linear between them. At each
-sample the controller reads
+The first load, the controller's force, is held between samples; the others are linear. At each sample it reads
 
     y = weights . (x, v, forces of the elements, force of the controller before the sample)
 

@@ -141,8 +141,7 @@ def turns(path: Path, middle: float, last: float) -> tuple[float, float, float, 
 def set_clock(state: FloatArray, duration: float, share: float, rate: float) -> None:
     """Tell a law that depends on the rate how long its next stroke takes, and how it ends.
 
-    `duration` is that of the step, zero for a law that does not depend on the rate; `rate` is for a step of length 1.
-    See `hysim.kernels.friction_rates`.
+    `duration` is the step's, zero for a rate-independent law; `rate` is for length 1 (`hysim.kernels.friction_rates`).
     """
     if duration > 0.0:
         state[1] = duration * share

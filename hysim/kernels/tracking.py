@@ -1,7 +1,6 @@
 """A feed-forward and a feedback in one sampled controller, one sample at a time.
 
-At each sample the controller gets the reference r of some samples ahead, and the measurement m of the displacement
-just before the new command:
+At each sample the controller gets the reference r some samples ahead, and a measurement m just before the command:
 
     target   s = sum p_i r_(-i)                        where the displacement is to be now
     drive    d = sum q_i r_(-i)                        what creep and law together are to give next
@@ -103,9 +102,8 @@ def invert(inverse: Step, parameters: FloatArray, state: FloatArray, reference: 
 def track(inverse: Step, parameters: FloatArray, state: FloatArray, reference: float, measurement: float) -> float:
     """The command within the limits.
 
-    The head is (lowest and highest command, number of taps, whether there is a feed-forward, whether there is a model,
-    its number of states that creep and of all states, its whole samples of dead time and of delay, and whether the
-    delay has a part of a sample too).
+    The head is (lowest and highest command, number of taps, whether there is a feed-forward, and a model, its numbers
+    of creep states and of all, its whole samples of dead time and of delay, whether the delay has a part of a sample).
     """
     parameters, state = borrowed(parameters), borrowed(state)
     lowest, highest, taps = parameters[0], parameters[1], int(parameters[2])

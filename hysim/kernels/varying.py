@@ -1,9 +1,8 @@
 """Laws whose parameters change along the input: each branch between two samples has those of the sample at its end.
 
 `parameters` is (n_sets * n_samples, n_parameters), the samples of the first set above those of the second. Behind the
-first n_memory places of the state, those of `memory` (n_sets, n_memory), is what a law has worked out from its
-parameters. Where these change the law's `resume` makes it ready for the new ones, or with `anew` the law's start does,
-and the memory is kept.
+first n_memory places of the state, those of `memory` (n_sets, n_memory), is what a law works out from its parameters.
+Where these change, `resume`, or with `anew` the start, makes it ready and keeps the memory.
 """
 
 import math

@@ -2,8 +2,7 @@
 
     dz/du = A - |z| (gamma + beta sgn(z du)) + delta u sgn(du)
 
-Let s be the direction of the input and L the length travelled from u_0. On one side of z = 0, with w = |z| there, and
-e = sgn(s z), this is
+With s the input's direction, L the length travelled from u_0, w = |z| and e = sgn(s z) on one side of z = 0, this is
 
     dw/dL = a + d L - c w,    a = e (A + s delta u_0),    d = e delta,    c = beta + e gamma
 

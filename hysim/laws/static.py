@@ -2,19 +2,17 @@
 
 Cubic smoothing spline through an output that scatters, its strength chosen by the inputs that are left out.
 
-The curve f minimises, over m groups of samples with equal inputs x_g (scaled to 0 ... 1), n_g samples and mean
-output y_g,
+The curve f minimises, over m groups of n_g samples with equal inputs x_g (scaled to 0 ... 1) and mean output y_g,
 
     sum_g n_g / N (y_g - f(x_g))^2 + strength * integral of f''^2 dx.
 
-With f = B c in cubic B-splines on even knots this is (B^T W B + strength P) c = B^T W y, banded. The strength is
-the one that predicts best what is left out: the groups between the first and the last, *in the order of their
-inputs*, are cut into contiguous blocks, and each block is predicted from the others. Loading and unloading lie in
-the same block, so that the spline averages them.
-
-Sources: P. J. Green and B. W. Silverman, Nonparametric Regression and Generalized Linear Models (1994), ch. 2 for the
-spline, section 3.3.4 for its degrees of freedom, the trace of the matrix that takes y to f; T. Hastie, J. R. Stat.
-Soc. B 58 (1996) 379 for fewer knots than groups; D. R. Roberts et al., Ecography 40 (2017) 913 for blocks.
+With f = B c in cubic B-splines on even knots this is (B^T W B + strength P) c = B^T W y, banded. The strength is the
+one that predicts best what is left out: the groups between the first and the last, *in the order of their inputs*, are
+cut into contiguous blocks, and each block is predicted from the others. Loading and unloading lie in the same block, so
+that the spline averages them. Sources: P. J. Green and B. W. Silverman, Nonparametric Regression and Generalized Linear
+Models (1994), ch. 2 for the spline, section 3.3.4 for its degrees of freedom, the trace of the matrix that takes y to
+f; T. Hastie, J. R. Stat. Soc. B 58 (1996) 379 for fewer knots than groups; D. R. Roberts et al., Ecography 40 (2017)
+913 for blocks.
 """
 
 import math

@@ -13,8 +13,7 @@ straight line, whose share is counted in `energy_outside`.
     secant_stiffness k = (y at max u - y at min u) / (max u - min u)
     equivalent_damping = |energy| / (4 pi E_S),    E_S = k a^2 / 2
 
-Sources: L. S. Jacobsen, Trans. ASME 52 (1930) 169; A. K. Chopra, Dynamics of Structures, section 3.9, for the
-equivalent damping of a cycle.
+Sources: L. S. Jacobsen, Trans. ASME 52 (1930) 169; A. K. Chopra, Dynamics of Structures, section 3.9, for the damping.
 """
 
 import math
@@ -87,15 +86,13 @@ class CycleMetrics:
     Parameters
     ----------
     start, stop, amplitude, mean_input, lowest_input, highest_input : array
-        ``u[start:stop]`` are the fewest samples that hold the cycle; half of the input's span, its middle and extremes
-        [unit of u].
+        ``u[start:stop]`` are the fewest samples of the cycle; the input's half span, middle and extremes [unit of u].
     max_width, stroke : array
         Largest width of the loop, and largest minus smallest output [unit of y].
     area : array
         Enclosed area, at least 0 [unit of y times unit of u].
     energy : array
-        Integral of y du over the cycle, which a force y on a displacement u dissipates; negative for a counterclockwise
-        loop [unit of y times unit of u].
+        Integral of y du, dissipated by a force y over u; negative if counterclockwise [unit of y times unit of u].
     secant_stiffness : array
         Slope of the line through the loop's ends [unit of y / unit of u].
     equivalent_damping : array

@@ -10,10 +10,9 @@ between their samples, y_l(u) and y_u(u).
     relative_width = max_width / stroke,    stroke = max y - min y
 
 A positive signed area is a counterclockwise loop, as of a piezoelectric actuator: unloading above loading. `area` is
-its magnitude. In a loop that crosses itself, such as a butterfly, the signed areas of its lobes cancel in part; each
-lobe has an area and a width of its own, the integral of w and max |w| between two zeros of w. If u is a displacement
-and y a force, with y+ and y- the forces at the largest and the smallest displacement (the mean of the two branches
-there) and D half the span of u,
+its magnitude. In a loop that crosses itself (a butterfly) the signed areas of its lobes cancel in part; each lobe has
+its own area and width, the integral of w and max |w| between two zeros of w. If u is a displacement and y a force, with
+y+ and y- the forces at the largest and smallest displacement (mean of both branches) and D half the span of u,
 
     energy             = integral of y du = -signed area         dissipated in a cycle; positive is clockwise
     secant_stiffness   = (y+ - y-) / (max u - min u)
@@ -21,10 +20,8 @@ there) and D half the span of u,
 
 The last is the damping ratio of the viscous oscillator that dissipates as much at its resonance. Energy and ratio are
 negative for a counterclockwise loop, where y lags u. The magnitude of the ratio is the same whichever of u and y is the
-force, if both have their extremes together.
-
-Sources: L. S. Jacobsen, Trans. ASME 52 (1930) 169, for the equivalence; FEMA 356 (2000), section 2.8.4, and ASCE 41 for
-the secant stiffness between the extremes of displacement, not of force.
+force, if both have their extremes together. Sources: L. S. Jacobsen, Trans. ASME 52 (1930) 169, for the equivalence;
+FEMA 356 (2000), section 2.8.4, and ASCE 41 for the secant stiffness between the extremes of displacement, not of force.
 
 Those of a magnetic loop, B over H:
 
@@ -105,8 +102,7 @@ class LoopMetrics:
     orientation : {"counterclockwise", "clockwise", "none"}
         Sense of the path in the plane of u (to the right) and y (up); "none" if the area is zero to rounding.
     closure_gap : float
-        Output at the cycle's end minus output at its start, of several cycles the mean [unit of y]. Positive for an
-        upward drift, 0 for a steady cycle.
+        Output at the cycle's end minus output at its start, the mean over cycles [unit of y]; 0 for a steady cycle.
     n_cycles : int
         Number of averaged cycles.
     energy : float
@@ -240,8 +236,7 @@ def loop_metrics(u: npt.ArrayLike, y: npt.ArrayLike, *, cycles: int = 1, toleran
     y : array, shape (n,)
         Output.
     cycles : int
-        Number of last complete cycles whose branches are averaged at their common inputs; all measures are those of
-        the averaged loop.
+        Number of last complete cycles whose branches are averaged at common inputs; all measures are of this loop.
     tolerance : float
         Reversals of the input smaller than this fraction of its span are ignored as noise.
 
@@ -252,8 +247,8 @@ def loop_metrics(u: npt.ArrayLike, y: npt.ArrayLike, *, cycles: int = 1, toleran
     Raises
     ------
     ValueError
-        If lengths differ, a value is not finite, there are fewer than 3 samples, the input is constant, or it has fewer
-        cycles than asked for.
+        If lengths differ, a value is not finite, the input is constant, or there are fewer than 3 samples or cycles
+        than asked.
 
     Examples
     --------
@@ -423,8 +418,7 @@ class MagneticMetrics:
     closure_gap : float
         Flux density at the end of the cycle less that at its beginning [T].
     noise : float
-        Standard deviation of a single flux density, from the width in the outer tenths about a cubic [T]; 0 of
-        few samples.
+        Standard deviation of one flux density, from the width in the outer tenths about a cubic [T]; 0 if few samples.
     n_cycles : int
         Number of averaged cycles.
     """

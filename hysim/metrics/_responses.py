@@ -23,9 +23,8 @@ and each reduction is 100 (1 - closed / open) %. Crossings are interpolated. A m
 A rate-independent law needs only the extremes of the input, two samples a cycle, to come to its steady cycle. The
 integral is a mean over n samples: its error is of the order 1 / n where the loop jumps between two of them, 1 / n^2
 where it has a kink, and smaller where it is smooth. The area is that of the polygon through the samples, which
-`loop_metrics` measures, times (2 pi / n) / sin(2 pi / n).
-
-Source: A. Gelb and W. E. Vander Velde, Multiple-Input Describing Functions and Nonlinear System Design, 1968.
+`loop_metrics` measures, times (2 pi / n) / sin(2 pi / n). Source: A. Gelb and W. E. Vander Velde, Multiple-Input
+Describing Functions and Nonlinear System Design, 1968.
 """
 
 import math

@@ -75,9 +75,9 @@ def fit_percent(y: npt.ArrayLike, y_model: npt.ArrayLike) -> float:
 def fpe(residual: npt.ArrayLike, n_parameters: int) -> float:
     """Final prediction error V (1 + d/N) / (1 - d/N) [unit of y, squared]; nan where d >= N.
 
-    `residual` is measured minus model, shape (N,) [unit of y], and `n_parameters` the number d of fitted parameters. A
-    ValueError is raised if there is no sample, a value is not finite or the number is negative. Source: H. Akaike, Ann.
-    Inst. Statist. Math. 21 (1969) 243.
+    `residual` is measured minus model, shape (N,) [unit of y], `n_parameters` the number d of fitted ones. ValueError
+    without samples, or if a value is not finite or the number negative. Source: H. Akaike, Ann. Inst. Statist. Math. 21
+    (1969) 243.
 
     Examples
     --------
@@ -91,8 +91,7 @@ def fpe(residual: npt.ArrayLike, n_parameters: int) -> float:
 def aic(residual: npt.ArrayLike, n_parameters: int) -> float:
     """Akaike's information criterion N ln V + 2 d; nan where d >= N, -inf where the residual is zero.
 
-    Arguments and errors are those of `fpe`. Source: H. Akaike, IEEE Trans. Autom. Control 19 (1974) 716, without the
-    constant that all models share.
+    Arguments and errors as in `fpe`. Source: H. Akaike, IEEE Trans. Autom. Control 19 (1974) 716, without the constant.
 
     Examples
     --------

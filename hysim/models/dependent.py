@@ -27,8 +27,7 @@ class Dependent:
     Parameters
     ----------
     law : model
-        A law, or a sum of laws and dashpots, with the other parameters; those that depend on a channel have any value
-        with which it is a law.
+        A law, or a sum of laws and dashpots, with the other parameters; dependent ones have any valid value.
     polynomials : tuple of ChannelPolynomial
         One for each parameter that depends on a channel.
 

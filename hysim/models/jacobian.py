@@ -5,10 +5,8 @@
 at steps h that fall by a factor of 8. Neville's rule eliminates the powers one after the other (the odd ones are those
 of |z| at z = 0, and of one-sided differences), and each sample takes the value whose neighbours in the scheme agree
 best with it: that of long steps where the output is smooth, of short ones where it has a kink nearby. Where laws exist
-on one side alone, (y(p + h) - y(p)) / h takes the place of D.
-
-Source: C. J. F. Ridders, Accurate computation of F'(x) and F'(x) F''(x), Advances in Engineering Software 4 (1982)
-75-76.
+on one side alone, (y(p + h) - y(p)) / h takes the place of D. Source: C. J. F. Ridders, Accurate computation of F'(x)
+and F'(x) F''(x), Adv. Eng. Software 4 (1982) 75.
 """
 
 from collections.abc import Iterable

@@ -1,9 +1,8 @@
 """The search spaces of several parts as one, and what the parts leave to the record.
 
-The names of a part begin with its label, as in ``"bouc_wen.beta"``. Coordinates stand one behind the other; the
-starts of the whole are the combinations of those of the parts. Columns of different parts that are the same whatever
-the coordinates, such as two offsets or the slopes of two lines, can be told only together: all of them but the last
-are held, unless the user says which.
+Names of a part begin with its label, as in ``"bouc_wen.beta"``. Coordinates stand one behind the other; starts are the
+combinations of the parts' starts. Columns of different parts that are always the same, such as two offsets or the
+slopes of two lines, can be told only together: all but the last are held, unless the user says which.
 """
 
 from collections.abc import Callable, Iterable, Mapping, Sequence

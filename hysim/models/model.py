@@ -112,8 +112,7 @@ def every_family() -> dict[str, type]:
 def families() -> dict[str, type[Any]]:
     """The families of hysim's laws by their names, in the order of the public names.
 
-    A family has the law that stands for it, ``family(**family.example.fields)``. Families of your own are not among
-    them.
+    A family's example law is ``family(**family.example.fields)``. Families of your own are not among them.
 
     Returns
     -------

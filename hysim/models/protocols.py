@@ -406,8 +406,7 @@ class Smoother(NamedTuple):
     def left_out(self, residual: FloatArray, folds: Sequence[npt.NDArray[np.intp]]) -> FloatArray:
         """Errors (n_samples,) of predictions by fits of the same smoothness without each fold; nan elsewhere.
 
-        `residual` (n_samples,) is that of the fit; the errors of a fold are (I - H)^-1 times it, H being the fold's
-        part of R R' W.
+        `residual` (n_samples,) is the fit's; the errors of a fold are (I - H)^-1 times it, H the fold's part of R R' W.
         """
         errors, root = np.full(residual.size, np.nan), np.sqrt(self.weights)
         for fold in folds:
@@ -470,8 +469,7 @@ def law_at(law: Any, sample_time: float) -> Any:
 class Doubt(NamedTuple):
     """A parameter that records may not determine, and what is to be done then.
 
-    It is not determined if its standard error is above `largest`, or unknown; the plant is then searched `without` it,
-    of which the remarks of that plant tell.
+    It is not determined if its standard error is above `largest` or unknown; the plant is then searched `without` it.
     """
 
     name: str

@@ -57,8 +57,7 @@ class SearchSpace:
     bounds : mapping
         The user's bounds on linear parameters, name to (lower, upper).
     state : tuple of str
-        Parameters, searched or linear, that describe the state at the first sample. Of several records each
-        has its own.
+        Parameters, searched or linear, of the state at the first sample; of several records each has its own.
     screened : int, optional
         Random points that a search should try beside the starts, where one evaluation is dear; 0 for none.
     drawn : tuple of two arrays, shape (n_x,) each, optional

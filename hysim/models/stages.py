@@ -81,8 +81,7 @@ BASE = Stage(word="", names=(), neutral={}, drawn=0, rounds=((4, 25),))
 class Simpler(NamedTuple):
     """A `family` to identify before a larger one, and how its parameters carry over.
 
-    `names` are its parameters' names in the larger family, `neutral` the values of the larger family's further
-    parameters.
+    `names` are its parameters' names in the larger family, `neutral` the values of that family's further ones.
     """
 
     family: Any

@@ -95,8 +95,7 @@ class Composite(ByStructure, Composable):
     def compiled(self, u0: float = 0.0, *, sample_time: float | None = None) -> CompiledLaw:
         """As compiled loops take it, after a first sample at `u0`, or at rest there as far as it depends on time.
 
-        Only what depends on time needs the `sample_time` [s], and raises ValueError without it; TypeError if a member
-        cannot be stepped.
+        Only what depends on time needs `sample_time` [s], else ValueError; TypeError if a member cannot be stepped.
         """
 
     @abstractmethod

@@ -17,8 +17,7 @@ Beside a stage that carries the gain, the gain at rest is one:
 
     G(s) = exp(-delay s) den_n (1 + q_(m-1) s/w + ... + q_0 (s/w)^m) / (s^n + den_1 s^(n-1) + ... + den_n)
 
-w = den_n^(1/n) is the mean of the poles' frequencies. The q are searched as asinh(q), which is of order one for zeros
-of any size and sign.
+w = den_n^(1/n) is the poles' mean frequency. The q are searched as asinh(q), of order one for any zeros.
 
 The lag of a transfer function that was fitted to a record may be hysteresis:
 

@@ -131,9 +131,8 @@ class Actuator:
         """The actuator of a fit, a law or a plant (see `hysim.close_loop`), kept within the inputs of its record.
 
         Its amplifier stops at the lowest and the highest voltage of the `record`, and its sensor reads in steps of the
-        record's resolution, unless the model's own amplifier and sensor have limits and a quantum. By default the range
-        is the one that the model was identified on, ``u_range``, and the resolution that of the fit; ValueError if the
-        range is not known.
+        record's resolution, unless the model's own amplifier and sensor have limits and a quantum. By default these are
+        the ``u_range`` that the model was identified on (ValueError if unknown) and the fit's resolution.
 
         Examples
         --------
@@ -173,9 +172,11 @@ class Actuator:
     ) -> ActuatorStructure:
         """An actuator for `hysim.identify`, on one or several records with time: law, creep, modes and delay at once.
 
-        Records of different rates tell the parts apart: a slow one shows the law and the creep, a fast one, whose
-        input has corners or steps, the modes and the delay. What the records do not determine is held, and the message
-        of the result says so.
+        Records of different rates tell the parts apart: a slow one shows law and creep, a fast one with corners or
+        steps the modes and the delay. What the records do not determine is held, and the result's message says so. A
+        record begins at rest, creep included, as every response does, and its input is held between the samples. A law
+        with a single memory has its own at the first sample of each record (``hysteresis.z0``); plays begin at rest at
+        zero unless ``initial=`` says otherwise.
 
         Parameters
         ----------
@@ -191,8 +192,7 @@ class Actuator:
         modes : int
             Resonances, from 0 to 3: ``vibration.natural_frequencies[k]`` [rad/s], ``vibration.damping_ratios[k]``, and
             of several ``vibration.gains[k]`` for k > 0. They are searched up to half the highest sampling rate. Of
-            several inputs up to 20, and each input has gains of its own, ``vibration.gains[k].u2``, which are relative
-            to its output at rest.
+            several inputs up to 20, each with its own gains ``vibration.gains[k].u2``, relative to its output at rest.
         amplifier : {"first-order"} or Amplifier, optional
             A time constant ``amplifier.time_constant`` [s] to be identified, or an amplifier that is known.
         delay : bool
@@ -211,19 +211,12 @@ class Actuator:
         -------
         ActuatorStructure
             For `hysim.identify`, `hysim.select` and `hysim.compare`. The model is an `Actuator` (of several inputs a
-            `MultiInputActuator`) whose `response` to each record's input is the fit (with a sensor that has a delay,
-            what its sensor sees).
+            `MultiInputActuator`) whose `response` to each record's input is the fit (as a delayed sensor reads it).
 
         Raises
         ------
         ValueError, TypeError
             If an argument is none of these; later of `hysim.identify`, if a record has not the channel of an input.
-
-        Notes
-        -----
-        A record begins at rest, creep included, as every response does, and its input is held between the samples. A
-        law with a single memory has its own at the first sample of each record (``hysteresis.z0``); plays begin at rest
-        at zero unless ``initial=`` says otherwise.
 
         Examples
         --------
@@ -278,8 +271,7 @@ class Actuator:
         At the first sample the law has its initial memory and everything is at rest, creep included. Only a `dynamic`
         actuator needs the `sample_time` [s]. `substeps` are those of a sample behind an amplifier that takes time, by
         default 4 to 64 of a quarter of its time constant. Raises SimulationError if a stage diverges; ValueError if `u`
-        is not finite or has not one axis, no time is given where one is needed, or the vibration cannot rest at the
-        first sample because it integrates.
+        is not finite or has not one axis, a needed time is missing, or the vibration integrates and cannot rest.
         """
         inputs = read_only(u, "u", ndim=1)
         if not self._moves or not inputs.size:
@@ -341,8 +333,7 @@ class Actuator:
         """Output of each stage at the samples of `u`, by name; arguments and errors as of `response`.
 
         There are ``"y"``, and for the stages that the actuator has ``"amplifier"`` (voltage), ``"hysteresis"``,
-        ``"creep"`` and ``"measurement"``; ``"z"`` for a law with a memory. A stage's signal is the response of a chain
-        that ends with it.
+        ``"creep"`` and ``"measurement"``; ``"z"`` for a law with a memory. A stage's signal is the response up to it.
         """
         parts = {"y": self}
         if self.creep is not None:

@@ -9,9 +9,8 @@ What is behind the law is linear: the output is affine in what the law is affine
 and those of the parts are searched. The search begins part by part (`hysim.models.protocols.PartByPart`): the law where
 the input is slow, the modes and the delay on the fastest record, beside a creep of 1 % a decade, and then all at once.
 
-A parameter counts as not determined if its standard error is larger than its use: 1 % a decade of creep (or half of
-it), a quarter of a frequency, two samples of a delay (or all of it). It is held where its part has no effect; a mode
-is left out.
+A parameter is undetermined if its standard error is above its use: 1 % a decade of creep (or half of it), a quarter of
+a frequency, two samples of a delay (or all of it). It is held where its part has no effect; a mode is left out.
 """
 
 import math

@@ -2,10 +2,9 @@
 
     m y'' + c y' + k y + z = F
 
-Both sides go through 1/D(s), D = m s^2 + c s + K of a linear plant, so that derivatives need not be taken of noise and
-the equation's error becomes about one of the displacement (Sanathanan and Koerner 1963, Steiglitz and McBride 1965).
-The nearest linear plant is that of the equation without z, D its last result. A period is filtered by its spectrum,
-any other record in time from rest.
+Both sides go through 1/D(s), D = m s^2 + c s + K of a linear plant: noise is not differentiated, and the equation's
+error becomes about one of the displacement (Sanathanan and Koerner 1963, Steiglitz and McBride 1965). The nearest
+linear plant is that without z, D its last result. A period is filtered by its spectrum, others in time from rest.
 
 A periodic input that holds no line above half its rate is brought to a higher one by its spectrum. So is one from rest,
 which goes on at both ends as linear prediction continues it (J. P. Burg, 1967), and fades. The output comes back by

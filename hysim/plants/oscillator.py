@@ -1,8 +1,7 @@
 """A mass on a linear and a hysteretic spring.
 
-A plant with memory inside the equation of motion has no closed form: it is integrated (`hysim.kernels.oscillator`), by
-default with steps that end where y' or z changes sign. Energy, for the Bouc-Wen law's force p(y) + gain z (A not 0),
-after Erlicher and Point (2004):
+A memory inside the equation of motion has no closed form: it is integrated (`hysim.kernels.oscillator`), by default in
+steps that end where y' or z changes sign. Energy, for the force p(y) + gain z (A not 0; Erlicher and Point 2004):
 
     work of the input = stored + lost in damping + lost in hysteresis
     stored            = m y'^2 / 2 + k y^2 / 2 + integral of p dy + gain z^2 / (2 A),  counted from the start
@@ -161,9 +160,8 @@ class BoucWenOscillator:
         Steps of order 6 that end at reversals, with the exact memory; the classical Runge-Kutta method;
         Newmark's constant average acceleration with the trapezoidal rule for z; Strang's splitting.
     substeps : int, optional
-        Steps between two samples, the one control of accuracy. By default as few as turn the phase of the
-        mode, whose stiffness is that of all springs at the start, by at most 0.1 rad each. Twice as many show
-        the remaining error.
+        Steps between two samples, the one control of accuracy. By default as few as turn the phase of the mode (all
+        springs at the start) by at most 0.1 rad each. Twice as many show the remaining error.
     initial_state : (float, float)
         Displacement [m] and velocity [m/s] at the first sample; empty for rest.
 

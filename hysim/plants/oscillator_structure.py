@@ -6,8 +6,7 @@ The law is that of Bouc and Wen with gain 1: a gain of the memory could not be t
 feedthrough from the stiffness. Stiffness and A are told apart by the memory's own curvature alone. The output is
 affine in no parameter: all are searched.
 
-The search begins from input and output alone. With the displacement y known, the equation of motion is linear in what
-multiplies known signals,
+The search begins with input and output: for known y the equation of motion is linear in what multiplies known signals,
 
     m y'' + c y' + k y + A w(y) = F,    dw/dy = 1 - |w|^n (g + b sign(w y')),
 

@@ -1,9 +1,8 @@
 """Continuous-time transfer functions, simulated and identified from sampled data.
 
 Where the input is held, the output of a sample may be taken at the start of the hold, before that sample's input has
-moved the states, or at its end. System identification tools take the start. A staircase that was read when each step
-had settled belongs to the end: taken as the start, each output must be explained by the step before, and is one sample
-too early for it.
+moved the states, or at its end. System identification tools take the start. A staircase read when each step had settled
+belongs to the end: taken as the start, each output must be explained by the step before, one sample too early.
 
 With den monic the output is affine in the numerator and in the initial state, the state of the observability form. The
 delay, where it is not known, is searched beside the denominator.
@@ -249,8 +248,7 @@ class TransferFunction(Composable):
     ) -> dict[str, "TransferFunctionStructure"]:
         """Candidates for `hysim.select`: a structure for every combination of the numbers and delays, by its name.
 
-        `zeros` below the number of poles are taken, by default all of them; the other arguments and the errors are
-        those of `structure`.
+        `zeros` below the number of poles are taken, by default all; other arguments and errors as in `structure`.
 
         Examples
         --------

@@ -211,8 +211,7 @@ def compare_evidence(
     method : {"bridge", "nested"}
         Bridge sampling from draws of emcee, or nested sampling by dynesty, which shares nothing with it but the
         likelihood, and takes 10 to 30 times as long for a larger error. Bridge sampling ends after 6000 steps of its
-        walkers: where they do not agree by then, the error is infinite, and `Evidence.sentence` says that the evidence
-        was not found.
+        walkers: where they do not agree by then, the error is infinite, and `Evidence.sentence` says so.
     live_points : int
         Of nested sampling: the error of ln Z falls with the root of their number.
     seed : int

@@ -1,9 +1,7 @@
 """The evidence Z, the mean of the likelihood over the prior, by nested sampling or by bridge sampling.
 
-**Nested sampling.** dynesty asks for one likelihood at a time. Here all walks that replace its next live points go on
-together, so that each of their steps is one evaluation of many sets: `_Together` has the walks of dynesty's ``rwalk``,
-and `_Pool` hands it all starts at once.
-
+**Nested sampling.** dynesty asks for one likelihood at a time. Here all walks for its next live points go on together,
+each step one evaluation of many sets: `_Together` has the walks of ``rwalk``, `_Pool` hands it all starts at once.
 Sources: J. Skilling, Bayesian Anal. 1 (2006) 833; J. S. Speagle, Mon. Not. R. Astron. Soc. 493 (2020) 3132.
 
 **Bridge sampling.** With draws q of the posterior p L / Z and draws of a proposal g, whose density is known,

@@ -1,8 +1,7 @@
 """Priors of the parameters: flat in the box of the search, or given.
 
-A parameter that the search moves has a flat prior in its coordinate, between the sides of the search box; (low, high)
-are other sides, and a distribution is one of the parameter itself. A linear parameter b of the column C(x) has a flat
-prior of what it adds to the output,
+A searched parameter has a flat prior in its coordinate, between the sides of the search box; (low, high) are other
+sides, a distribution is of the parameter itself. A linear parameter b of the column C(x) has one of what it adds,
 
     w = b s(x) / Y,    -reach <= w <= reach,    s(x) the span of C(x) over the samples, Y that of the measured output,
 

@@ -105,8 +105,7 @@ class Posterior:
     effective_samples : mapping
         Name to the number of independent draws whose mean would be as sure.
     rhat : mapping
-        Name to R-hat, the spread of all halves of the walkers' paths over the spread within them: near 1 where the
-        paths agree.
+        Name to R-hat, the spread of all halves of the walkers' paths over that within them: near 1 where paths agree.
     noise : {"gaussian", "quantised", "robust"}
     resolution : float or None
         Quantum of the sensor [unit of y].
@@ -213,8 +212,7 @@ class Posterior:
     def to_arviz(self) -> Any:
         """The draws as the installed arviz holds them: a DataTree, or InferenceData before arviz 1.0.
 
-        Chains are the walkers. The group ``posterior`` has the parameters, ``sample_stats`` has ``lp``. An ImportError
-        is raised without arviz.
+        Chains are walkers. Group ``posterior`` has the parameters, ``sample_stats`` ``lp``. ImportError without arviz.
         """
         posterior = {name: self.chains(name).T for name in self.names}
         stats = {"lp": self.log_density.reshape(-1, self.n_walkers).T}
@@ -345,8 +343,7 @@ def sample_posterior(
     record_or_records : Record or sequence of Record
         The records that the model was identified from, in the same order.
     noise : {"gaussian", "quantised", "robust"}, optional
-        As in `hysim.identify`; by default that of the fit. Its sigma is sampled. Rounded values have the probability of
-        their interval.
+        As in `identify`; by default the fit's. Sigma is sampled. Rounded values have their interval's probability.
     priors : mapping, optional
         Name of a free parameter, or ``"sigma"``, to (low, high) or a frozen distribution of scipy.stats. (low, high) is
         flat in the coordinate of the search, which is the logarithm where the search has one; linear parameters are

@@ -7,19 +7,16 @@ optimum to another; the others are moves of differential evolution along the dif
 The walkers begin in the proposal. Runs that double their length warm the ensemble up, until one is ten times as long as
 its correlation; after each, the proposal may be shaped anew by their paths. It is not changed any more then.
 
-**Diagnostics** are those of chains, shape (n_draws, n_chains), of one number. The numbers are replaced by the normal
-quantiles of their ranks, Phi^-1((rank - 3/8) / (n m + 1/4)), so that a parameter, its logarithm and a distribution
-without variance are judged alike. With W the mean variance within the chains, B/n the variance of their means and var =
-(n - 1)/n W + B/n,
+**Diagnostics** are of chains, shape (n_draws, n_chains), of one number, replaced by the normal quantiles of its ranks,
+Phi^-1((rank - 3/8) / (n m + 1/4)), so that a parameter, its logarithm and a distribution without variance are judged
+alike. With W the mean variance within the chains, B/n the variance of their means and var = (n - 1)/n W + B/n,
 
     R-hat = sqrt(var / W),    each chain cut into halves, which count as chains,
     rho_t = 1 - (W - mean of the autocovariances at lag t) / var,    tau = 1 + 2 sum rho_t,    effective = m n / tau.
 
-The sum ends before the first pair rho_2k + rho_2k+1 that is not positive, and pairs do not grow (Geyer).
-
-Sources: A. Gelman and others, Bayesian Data Analysis, 3rd edition, 2013, sections 11.4 and 11.5; A. Vehtari, A.
-Gelman, D. Simpson, B. Carpenter and P.-C. Buerkner, Bayesian Anal. 16 (2021) 667, for the ranks ("bulk" effective
-samples).
+The sum ends before the first pair rho_2k + rho_2k+1 that is not positive, and pairs do not grow (Geyer). Sources: A.
+Gelman and others, Bayesian Data Analysis, 3rd edition, 2013, sections 11.4 and 11.5; A. Vehtari, A. Gelman, D. Simpson,
+B. Carpenter and P.-C. Buerkner, Bayesian Anal. 16 (2021) 667, for the ranks ("bulk" effective samples).
 
 **Particles around the optima** that `identify` has found. A population from the prior may miss a narrow optimum, whose
 share of the prior is small and whose share of the posterior is not. So a small population begins at distances of all

@@ -1,10 +1,9 @@
 """The posterior density of all parameters, for many sets at once.
 
-A point is q = (x', e, s'): the coordinates of the search x and ln sigma, each as the quantile of the standard normal
-distribution at its place in the box, x = lower + (upper - lower) Phi(x'), so that a flat prior becomes a normal one and
-a box has no sides; and one number for each linear parameter. The output y(x, b) = C(x) b + e0(x) is linear in b. With
-the units of the prior (`hysim.posterior._priors`), its centre c and standard deviations d, and s the spread of the
-noise, the regression
+A point is q = (x', e, s'): the coordinates of the search x and ln sigma, each as the standard normal quantile of its
+place in the box, x = lower + (upper - lower) Phi(x'), so that a flat prior becomes a normal one and a box has no sides;
+and one number for each linear parameter. The output y(x, b) = C(x) b + e0(x) is linear in b. With the units of the
+prior (`hysim.posterior._priors`), its centre c and standard deviations d, and s the spread of the noise, the regression
 
     [C / s; 1 / d] w = [(y - e0) / s; c / d],    [C / s; 1 / d] = Q R,    w_0 = R^-1 (Q^T rhs)
 

@@ -1,8 +1,7 @@
 """Inputs for loop studies, exact to the bit at their extremes.
 
-Each function returns the samples of a signal, without times, in the unit of its arguments. A cycle starts at its lowest
-value (a sine at its mean), and all cycles of one amplitude have the same bits. A rate-independent law needs no times;
-`sample_times` computes them.
+Each function returns a signal's samples without times (`sample_times`), in the unit of its arguments. A cycle starts at
+its lowest value (a sine at its mean); all of one amplitude have the same bits. A rate-independent law needs no times.
 """
 
 from hysim.signals._cycles import (

@@ -38,9 +38,8 @@ def staircase(low: float, high: float, step: float, *, cycles: int = 1, samples_
 def triangle(low: float, high: float, *, cycles: int, samples_per_cycle: int) -> FloatArray:
     """Straight lines from low to high and back, sampled evenly.
 
-    `low` and `high` are both hit exactly [unit of u]. The result has shape (cycles * samples_per_cycle + 1,) [unit of
-    u], and starts and ends at low. A ValueError is raised if high is not above low, `cycles` is below 1, or
-    `samples_per_cycle` is odd or below 2.
+    `low` and `high` are both hit exactly [unit of u]. The result, shape (cycles * samples_per_cycle + 1,) [unit of u],
+    starts and ends at low. ValueError if high is not above low, `cycles` below 1, `samples_per_cycle` odd or below 2.
 
     Examples
     --------
@@ -58,10 +57,9 @@ def triangle(low: float, high: float, *, cycles: int, samples_per_cycle: int) ->
 def sine(amplitude: float, *, mean: float = 0.0, cycles: int, samples_per_cycle: int) -> FloatArray:
     """Samples of mean + amplitude sin(2 pi k / samples_per_cycle), from the mean to the mean.
 
-    `amplitude` is half the span, and `mean` the value in its middle [unit of u]. With a multiple of 4 as
-    `samples_per_cycle` both extremes are hit. A loop needs two `cycles`: it is measured from extreme to extreme. The
-    result has shape (cycles * samples_per_cycle + 1,) [unit of u]. A ValueError is raised if the amplitude is not
-    positive, or a count is below 1.
+    `amplitude` is half the span, `mean` its middle [unit of u]. With `samples_per_cycle` a multiple of 4 both extremes
+    are hit. A loop needs two `cycles`: it is measured from extreme to extreme. The result has shape (cycles *
+    samples_per_cycle + 1,) [unit of u]. ValueError if the amplitude is not positive or a count is below 1.
 
     Examples
     --------

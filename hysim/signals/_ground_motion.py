@@ -79,8 +79,7 @@ def ground_motion(
     Returns
     -------
     array, shape (n,) [unit of u]
-        Samples at 0, T, 2 T, ... up to the duration, n = floor(duration / sample_time) + 1; `sample_times` computes
-        their times.
+        Samples at 0, T, 2 T, ... up to the duration, n = floor(duration / sample_time) + 1 (see `sample_times`).
 
     Raises
     ------

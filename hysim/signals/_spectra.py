@@ -41,8 +41,7 @@ def multisine(
     mean : float
         [unit of u]
     phases : {"random", "schroeder"}
-        Uniformly random phases phi_k; or those of Schroeder, -pi m (m - 1) / n_lines for the m-th line, which keep the
-        peaks of a whole band of lines low.
+        Uniformly random phases phi_k; or Schroeder's, -pi m (m - 1) / n_lines for the m-th line, which keep peaks low.
     seed : int or numpy.random.Generator
         Seed of random phases.
 
@@ -106,14 +105,12 @@ def sweep(
         linear         p(t) = start t + (stop - start) t^2 / (2 D)
         logarithmic    p(t) = start D ((stop / start)^(t / D) - 1) / ln(stop / start)
 
-    The phase p, in turns, is computed from this closed form. The frequency would be `stop` one sample after the last.
-    Extremes lie between samples.
+    The phase p is in turns. The frequency would be `stop` one sample after the last. Extremes lie between samples.
 
     Parameters
     ----------
     start, stop : float
-        Frequencies, not negative and below half of the sampling rate 1 / T; positive and different for
-        ``"logarithmic"`` [1 / unit of t].
+        Frequencies from 0 to below 1 / (2 T) [1 / unit of t]; positive and different for ``"logarithmic"``.
     amplitude, mean : float
         Half the span, and the value in its middle [unit of u].
     n_samples : int

@@ -1,10 +1,9 @@
 """The verb `track_parameters`.
 
-The size of a drift is the one for which the errors of predictions one sample ahead are most likely. A walk that is
-too large follows the noise, and one that is too small comes late: both make these errors larger than the filter
-expects, or smaller. The logarithm of their likelihood (the prediction-error decomposition; A. C. Harvey, Forecasting,
-Structural Time Series Models and the Kalman Filter, 1989, section 3.4) is maximised over the sizes by steps along one
-size at a time, on a logarithmic scale.
+A drift's size is the one that makes the errors of one-sample predictions most likely. Too large a walk follows the
+noise, too small a one comes late: both make these errors larger or smaller than the filter expects. Their
+log-likelihood (the prediction-error decomposition; A. C. Harvey, Forecasting, Structural Time Series Models and the
+Kalman Filter, 1989, section 3.4) is maximised over the logarithms of the sizes, one at a time.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -35,8 +34,7 @@ class ParameterTrack:
     values, lower, upper : array, shape (n_samples, n_names)
         Estimates and their bands at 95 % [unit of each number].
     predicted, residual, expected_error : array, shape (n_samples,)
-        Output predicted one sample ahead, measured minus predicted, and the standard deviation that the filter
-        expected of it [unit of y].
+        Output predicted one sample ahead, measured minus predicted, and its expected standard deviation [unit of y].
     jumps : tuple of int
         Samples at which the errors had become too large for a drift; none for particles, of which some always jump.
     method : str

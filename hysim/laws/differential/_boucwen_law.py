@@ -4,18 +4,13 @@
     y = offset + c1 u + c2 u^2 + ... + gain z
 
 `A` and `gain` enter only as a product. With A > 0 and beta > 0 the loop of y runs clockwise for a positive gain (a
-restoring force) and counterclockwise for a negative one (a piezoelectric displacement).
+restoring force) and counterclockwise for a negative one (a piezoelectric displacement). Sources: R. Bouc 1967; Y. K.
+Wen, J. Eng. Mech. Div. 102 (1976); the classes after Ikhouane and Rodellar 2007.
 
-Sources: R. Bouc 1967; Y. K. Wen, J. Eng. Mech. Div. 102 (1976); the classes after Ikhouane and Rodellar 2007.
-
-Bounds of the memory and of the slope of a Bouc-Wen law, whatever its input.
-
-    dz/du = A - |z|^n (gamma + beta sign(z du))
-
-A branch on which w = |z| grows obeys w' = a - c w^n and ends at w = (a/c)^(1/n): with A > 0 the loading
-branch, a = A and c = beta + gamma; with A < 0 the unloading one, a = -A and c = beta - gamma. In the classes I
-to IV of Ikhouane and Rodellar (2007) this bounds the memory, or z0 does where it is larger. With |z| <= B
-the slope lies between its values at z = 0, and at B on both branches:
+**Bounds** of the memory and of the slope, whatever the input. A branch on which w = |z| grows obeys w' = a - c w^n and
+ends at w = (a/c)^(1/n): with A > 0 the loading branch, a = A and c = beta + gamma; with A < 0 the unloading one, a = -A
+and c = beta - gamma. In the classes I to IV of Ikhouane and Rodellar (2007) this bounds the memory, or z0 does where it
+is larger. With |z| <= B the slope lies between its values at z = 0, and at B on both branches:
 
     A,    A - (beta + gamma) B^n,    A + (beta - gamma) B^n
 """
@@ -221,9 +216,8 @@ class BoucWenLaw(BoucWenStep, MemoryLaw):
     def is_invertible(self, low: float = -np.inf, high: float = np.inf) -> bool:
         """Whether the slope keeps its sign for every input between `low` and `high`: its bounds have one sign.
 
-        This is sufficient for an inverse, not necessary: `inverse_response` looks at the one record that it is given.
-        For a piezoelectric stack by Low and Guo it reads alpha max(1, 2 beta / (beta + gamma)) < 1. A bound of zero to
-        rounding counts as zero.
+        This is sufficient, not necessary: `inverse_response` looks at the given record. For a piezoelectric stack by
+        Low and Guo it reads alpha max(1, 2 beta / (beta + gamma)) < 1. A bound of zero to rounding counts as zero.
         """
         bounds = self.slope_bounds(low, high)
         rounding = 1e-14 * (abs(self.gain * self.A) + float(np.abs(self.input_polynomial).max()))

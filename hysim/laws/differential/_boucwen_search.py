@@ -4,19 +4,17 @@ With U the span of the input and Z = |A| U, the law in z/Z and u/U has the shape
 
     loading   = (beta + gamma) Z^n / |A|      unloading = (beta - gamma) Z^n / |A|
 
-which act on different stretches of the path, and hold the thermodynamically admissible laws
-(-beta <= gamma <= beta) where both are >= 0. A positive loading coefficient l bends the branch over at
-z = Z / k with k = l^(1/n): the coordinate c measures this knee, is smooth and signed, and is of order one
-for every n,
+which act on different stretches of the path, and hold the thermodynamically admissible laws (-beta <= gamma <= beta)
+where both are >= 0. A positive loading coefficient l bends the branch over at z = Z / k with k = l^(1/n): the
+coordinate c measures this knee, is smooth and signed, and is of order one for every n,
 
     l = k (1 + |k|)^(n - 1),    k = sinh(c)
 
-The box is |k| <= 40 for both, n in [0.5, 10] on a log scale, z0/Z in [-1, 1], and open for the
-parameters in which the output is affine; the upper side of n is a limit, beyond the others `hysim.identify` searches
-where an optimum stands at them. The further shape coefficients b2 to b6 of the generalised law
-have the coordinates of beta; the forcing delta of Zhu and Wang is measured by what it adds to |A| where |u|
-is largest, in [-5, 5]. A parameter that the user bounds is its own coordinate, between these bounds; bounds from
-or to zero and infinity cut the box at zero.
+The box is |k| <= 40 for both, n in [0.5, 10] on a log scale, z0/Z in [-1, 1], and open for the parameters in which the
+output is affine; the upper side of n is a limit, beyond the others `hysim.identify` searches where an optimum stands at
+them. The further shape coefficients b2 to b6 of the generalised law have the coordinates of beta; the forcing delta of
+Zhu and Wang is measured by what it adds to |A| where |u| is largest, in [-5, 5]. A parameter that the user bounds is
+its own coordinate, between these bounds; bounds from or to zero and infinity cut the box at zero.
 """
 
 from collections.abc import Mapping

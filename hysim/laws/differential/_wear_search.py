@@ -14,8 +14,7 @@ its path, k the knee and l the shape coefficients of `hysim.laws.differential._b
     z0            z0 / z_u
     zeta_s, q     themselves
 
-The rates are not negative, since damage does not heal. A parameter that the user bounds is its own coordinate, between
-these bounds.
+Rates are not negative: damage does not heal. A parameter that the user bounds is its own coordinate within its bounds.
 """
 
 from collections.abc import Mapping

@@ -80,13 +80,21 @@ class BoucWenBaberNoori(MemoryLaw):
     u is the displacement, y the force, z the memory, and gain e the energy that the hysteretic spring has taken. The
     rates are those per unit of e, not per gain e as in some codes, so that the output stays affine in gain.
 
+    Integrated along monotone strokes to 1e-10 of the range (`hysim.kernels.branch`). A law that degrades is never in a
+    steady cycle. `identify` searches the Bouc-Wen law, then the wear, then the pinching, then ``lambda_``, and keeps of
+    them what lowers the BIC; a start that wears off or pinches, or ``free=`` or ``bounds=`` with one of its parameters,
+    keeps it in any case. Pinching is searched beside wear only: each stage begins where the one before ended, and wear
+    at a rate of zero costs no more than its two parameters in the BIC. For pinching alone, ``fixed={"delta_nu": 0.0,
+    "delta_eta": 0.0}`` leaves the wear out. It holds delta_a and delta_psi, whose work the other rates and psi nearly
+    do. Sources: T. T. Baber and Y. K. Wen, J. Eng. Mech. Div. 107 (1981); T. T. Baber and M. N. Noori, J. Eng. Mech.
+    111 (1985); G. C. Foliente, J. Struct. Eng. 121 (1995), for the form of the pinching.
+
     Parameters
     ----------
     A, beta, gamma, n : float
         As in `BoucWen`, of the law as it is new.
     delta_a, delta_nu, delta_eta : float
-        Rates at which slope, strength and stiffness are lost [1 / (unit of z unit of u); delta_a that times the unit
-        of A].
+        Rates of lost slope, strength and stiffness [1 / (unit of z unit of u); delta_a that times the unit of A].
     zeta_s : float
         Largest depth of the pinching, below 1 for a slope that stays positive; 0 for none.
     q : float
@@ -105,17 +113,6 @@ class BoucWenBaberNoori(MemoryLaw):
     ValueError
         If a parameter is not finite, n is not positive, there is no coefficient, or a law that pinches has
         beta + gamma or a width that is not positive.
-
-    Notes
-    -----
-    Integrated along monotone strokes to 1e-10 of the range (`hysim.kernels.branch`). A law that degrades is never in a
-    steady cycle. `identify` searches the Bouc-Wen law, then the wear, then the pinching, then ``lambda_``, and keeps of
-    them what lowers the BIC; a start that wears off or pinches, or ``free=`` or ``bounds=`` with one of its parameters,
-    keeps it in any case. Pinching is searched beside wear only: each stage begins where the one before ended, and wear
-    at a rate of zero costs no more than its two parameters in the BIC. For pinching alone, ``fixed={"delta_nu": 0.0,
-    "delta_eta": 0.0}`` leaves the wear out. It holds delta_a and delta_psi, whose work the other rates and psi nearly
-    do. Sources: T. T. Baber and Y. K. Wen, J. Eng. Mech. Div. 107 (1981); T. T. Baber and M. N. Noori, J. Eng. Mech.
-    111 (1985); G. C. Foliente, J. Struct. Eng. 121 (1995), for the form of the pinching.
 
     Examples
     --------
@@ -235,8 +232,7 @@ class BoucWenBaberNoori(MemoryLaw):
     def to_opensees(self) -> dict[str, float]:
         """The arguments of `from_opensees`, with Ao = A.
 
-        Raises ValueError if the law pinches, has an offset, an initial memory, more than one input coefficient, or no
-        stiffness.
+        ValueError if the law pinches, has an offset, initial memory, more than one input coefficient, or no stiffness.
         """
         if self.zeta_s != 0.0:
             raise ValueError(f"the material does not pinch, got zeta_s = {self.zeta_s:g}: see to_opensees_bwbn")
@@ -273,8 +269,7 @@ class BoucWenBaberNoori(MemoryLaw):
     def to_opensees_bwbn(self) -> dict[str, float]:
         """The arguments of `from_opensees_bwbn`, with Ao = A.
 
-        Raises ValueError if the law degrades, has an offset, an initial memory, more than one input coefficient, or no
-        stiffness.
+        ValueError if the law degrades, has an offset, initial memory, more than one input coefficient, or no stiffness.
         """
         for name in ("delta_a", "delta_nu", "delta_eta"):
             if (rate := self.scalars[name]) != 0.0:

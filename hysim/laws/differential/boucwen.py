@@ -14,18 +14,15 @@ Ours is  y = offset + feedthrough u + gain z,  z' = A u' - beta |u'| |z|^(n-1) z
                          k2 = alphaL E, k3 = alphaNL E, u_y = fy / E, q_d = fy - k2 u_y - k3 u_y^mu
     suanPan BoucWen      sigma = a E u + (1 - a) fy z,  z' as BoucWenOriginal with gamma = 1 - beta
 
-Measuring the memory in another unit, z = unit w, leaves the output as it is; a negative unit turns A and
-gamma round:
+Measuring the memory in another unit, z = unit w, leaves the output as it is; a negative unit turns A and gamma round:
 
     A -> A / unit    beta -> beta |unit|^(n-1)    gamma -> sign(unit) gamma |unit|^(n-1)    gain -> unit gain
 
-The way out chooses the unit, and with it one member of all the parameter sets with the same response.
-
-Sources: Y. K. Wen, J. Eng. Mech. Div. 102 (1976); T. S. Low and W. Guo, J. Microelectromech. Syst. 4 (1995);
-F. Ikhouane and J. Rodellar, Systems with Hysteresis (2007), for the normalised form; J. P. Noel and
-M. Schoukens, Hysteretic benchmark with a dynamic nonlinearity (2016); the OpenSees command manual,
-uniaxialMaterial BoucWen (Haukaas and Der Kiureghian 2003) and BoucWenOriginal;
-suanPan, material BoucWen.
+The way out chooses the unit, and with it one member of all the parameter sets with the same response. Sources: Y. K.
+Wen, J. Eng. Mech. Div. 102 (1976); T. S. Low and W. Guo, J. Microelectromech. Syst. 4 (1995); F. Ikhouane and J.
+Rodellar, Systems with Hysteresis (2007), for the normalised form; J. P. Noel and M. Schoukens, Hysteretic benchmark
+with a dynamic nonlinearity (2016); the OpenSees command manual, uniaxialMaterial BoucWen (Haukaas and Der Kiureghian
+2003) and BoucWenOriginal; suanPan, material BoucWen.
 
 Laws that are Bouc-Wen laws with n = 1 and gamma = 0 under other names: everything is evaluated as such a law.
 """
@@ -53,6 +50,9 @@ from hysim.models.tables import Tables
 class BoucWen(BoucWenLaw):
     """Symmetric Bouc-Wen law, ``dz/du = A - |z|^n (gamma + beta sign(z du))``, ``y = offset + feedthrough u + gain z``.
 
+    beta + gamma < 0 is legal (the field's benchmark has it): z then has no bound that is independent of the input, and
+    for n > 1 a long enough stretch of the input takes it to infinity.
+
     Parameters
     ----------
     A : float
@@ -75,11 +75,6 @@ class BoucWen(BoucWenLaw):
     ------
     ValueError
         If a parameter is not finite, or n is not positive.
-
-    Notes
-    -----
-    beta + gamma < 0 is legal (the field's benchmark has it): z then has no bound that is independent
-    of the input, and for n > 1 a long enough stretch of the input takes it to infinity.
 
     Examples
     --------
@@ -205,9 +200,8 @@ class BoucWen(BoucWenLaw):
     ) -> Self:
         """The force of the system-identification benchmark of Noel and Schoukens (2016), ``y = z``.
 
-        ``z' = alpha u' - beta (gamma |u'| |z|^(nu-1) z + delta u' |z|^nu)``: alpha is the stiffness of the memory
-        [unit of z / unit of u]. Our beta is their beta gamma, our gamma their beta delta. Mass, damping and stiffness
-        belong to the oscillator.
+        ``z' = alpha u' - beta (gamma |u'| |z|^(nu-1) z + delta u' |z|^nu)``: alpha is the memory's stiffness [unit of z
+        / unit of u]. Our beta is beta gamma, our gamma beta delta. Mass, damping and stiffness are the oscillator's.
 
         Examples
         --------

@@ -82,8 +82,7 @@ class BoucWenInverse:
     def compiled(self, y0: float | None = None, *, u0: float | None = None, limits: Limits = UNLIMITED) -> CompiledLaw:
         """The inverse as compiled loops take it, ``u = step(parameters, state, y)``, nan where no input has the output.
 
-        The law rests, its memory at z0, at the output `y0` or the input `u0`, by default zero. Its copy of the law
-        moves between the `limits` of the input.
+        The law rests, memory at z0, at output `y0` or input `u0`, by default zero; its copy moves within `limits`.
         """
         if y0 is not None and u0 is None:
             return self.begun(at_rest(self.law, float(y0)), limits)

@@ -13,12 +13,11 @@ from hysim.models.tables import Tables
 class ColemanHodgdon(EquivalentBoucWen):
     """Backlash-like Duhem law, ``y' = alpha |u'| (c u + offset - y) + B u'``.
 
-    Whatever the direction, y is drawn to the line offset + c u, and in the end runs beside it at the distance
-    ``|B - c| / alpha``. Above that line the law is Dahl's, ``y = offset + c u + z`` with
-    ``z' = (B - c) u' - alpha |u'| z``, and is evaluated exactly as the Bouc-Wen law with n = 1, A = B - c, beta = alpha
-    and gamma = 0. The loop runs counterclockwise where B < c, as a piezoelectric displacement does. Sources: B. D.
-    Coleman and M. L. Hodgdon, Int. J. Eng. Sci. 24 (1986); C.-Y. Su et al., IEEE Trans. Autom. Control 45 (2000), for
-    the backlash-like form.
+    Whatever the direction, y is drawn to the line offset + c u, and ends up at the distance ``|B - c| / alpha``. Above
+    that line the law is Dahl's, ``y = offset + c u + z`` with ``z' = (B - c) u' - alpha |u'| z``, and is evaluated
+    exactly as the Bouc-Wen law with n = 1, A = B - c, beta = alpha and gamma = 0. The loop runs counterclockwise where
+    B < c, as a piezoelectric displacement does. Sources: B. D. Coleman and M. L. Hodgdon, Int. J. Eng. Sci. 24 (1986);
+    C.-Y. Su et al., IEEE Trans. Autom. Control 45 (2000), for the backlash-like form.
 
     Parameters
     ----------

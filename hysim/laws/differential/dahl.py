@@ -15,9 +15,8 @@ _STARTS = ((0.03, 0.5), (0.1, 0.5), (0.3, 0.7), (1.0, 1.5))  # coulomb / stiffne
 class Dahl(EquivalentBoucWen):
     """Dahl friction, ``F' = stiffness (u' - |u'| F / coulomb)`` and ``y = offset + F``.
 
-    u is the displacement and F the friction force; Dahl's exponent is 1. It is the Bouc-Wen law with A = stiffness,
-    beta = stiffness / coulomb, n = 1 and gamma = 0. Source: P. R. Dahl, A solid friction model, Aerospace Corporation
-    1968.
+    u is the displacement, F the force; Dahl's exponent is 1. It is the Bouc-Wen law with A = stiffness, beta =
+    stiffness / coulomb, n = 1 and gamma = 0. Source: P. R. Dahl, A solid friction model, Aerospace Corporation 1968.
 
     Parameters
     ----------

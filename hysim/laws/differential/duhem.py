@@ -178,9 +178,10 @@ class Duhem(Law):
         Bouc-Wen, n = 2    p = A - gamma z^2,    q = -beta |z| z
 
     dz/du is p + q where u rises and p - q where it falls: the law has hysteresis exactly if q is not zero. Without
-    feedthrough and offset the memory z is the output. It is integrated to 1e-10 of the range
-    (`hysim.kernels.branch`). Sources: P.
-    Duhem 1897; B. D. Coleman and M. L. Hodgdon, Int. J. Eng. Sci. 24 (1986).
+    feedthrough and offset the memory z is the output. It is integrated to 1e-10 of the range (`hysim.kernels.branch`).
+    Without u0 and state the `inverse_response` begins at rest at u = 0, the output at y0: the law that comes from there
+    has the wanted output to 1e-12 of its range, and so has its `response` if that begins at y0. Sources: P. Duhem 1897;
+    B. D. Coleman and M. L. Hodgdon, Int. J. Eng. Sci. 24 (1986).
 
     Parameters
     ----------
@@ -199,11 +200,6 @@ class Duhem(Law):
     ------
     ValueError
         If an array is empty, has not two axes, or a number is not finite.
-
-    Notes
-    -----
-    Without u0 and state the `inverse_response` begins at rest at u = 0, the output at y0: the law that comes from there
-    has the wanted output to 1e-12 of its range, and so has its `response` if that begins at y0.
 
     Examples
     --------
@@ -265,9 +261,8 @@ class Duhem(Law):
     ) -> Self:
         """The law by its two slopes, ``z' = f1(u, z) u'`` where u rises and ``z' = f2(u, z) u'`` where it falls.
 
-        Element [i, j] of `ascending` (f1) and `descending` (f2) multiplies ``u^i z^j``
-        [unit of y^(1-j) / unit of u^(i+1)]; the shapes may differ. Then p = (f1 + f2) / 2 and q = (f1 - f2) / 2. Errors
-        are those of the constructor.
+        Element [i, j] of `ascending` (f1) and `descending` (f2) multiplies ``u^i z^j`` [unit of y^(1-j) / unit of
+        u^(i+1)]; the shapes may differ. Then p = (f1 + f2) / 2 and q = (f1 - f2) / 2. Errors as in the constructor.
 
         Examples
         --------

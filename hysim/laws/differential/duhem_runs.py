@@ -1,7 +1,6 @@
 """Free runs of many polynomial Duhem laws at once.
 
-Each law runs on its own memory from its first output, y = feedthrough u + z, whatever a record says
-(`hysim.kernels.duhem`).
+Each law runs (`hysim.kernels.duhem`) on its own memory from its first output, y = feedthrough u + z, not a record's.
 """
 
 from collections.abc import Sequence

@@ -28,15 +28,17 @@ class GeneralizedBoucWen(MemoryLaw):
     A loop in the (u, z) plane has six sectors by the signs of u', z and u; psi is one number in each.
 
     ``dz/du = A - |z|^n psi`` with ``psi = gamma + beta sgn(u' z) + b2 sgn(u' u) + b3 sgn(z u) + b4 sgn(u') +
-    b5 sgn(z) + b6 sgn(u)``, and ``y = offset + sum c_k u^k + gain z``
+    b5 sgn(z) + b6 sgn(u)``, and ``y = offset + sum c_k u^k + gain z``. Exact for every n. On an input of one sign only
+    the sums gamma + b6, b3 + b5 and b2 + b4 can be told (differences for a negative one): `identify` then holds b6, b3
+    and b2. No class of stability is known for the general case. Source: J. Song and A. Der Kiureghian, J. Eng. Mech.
+    132 (2006).
 
     Parameters
     ----------
     A, beta, gamma, n : float
         As in `BoucWen`; beta is their beta_1, and theirs has no gamma.
     b2, b3, b4, b5, b6 : float
-        Their beta_2 to beta_6 [unit of z^(1-n) / unit of u]. The loop is symmetric about its centre if b4, b5
-        and b6 are zero.
+        Their beta_2 to beta_6 [unit of z^(1-n) / unit of u]. The loop is point symmetric if b4, b5 and b6 are zero.
     gain, offset, z0, input_coefficients
         As in `PolynomialBoucWen`.
 
@@ -44,12 +46,6 @@ class GeneralizedBoucWen(MemoryLaw):
     ------
     ValueError
         If a parameter is not finite, n is not positive, or there is no coefficient.
-
-    Notes
-    -----
-    Exact for every n. On an input that keeps its sign only the sums gamma + b6, b3 + b5 and b2 + b4 can be told
-    (differences for a negative one): `identify` then holds b6, b3 and b2. No class of stability is known for the
-    general case. Source: J. Song and A. Der Kiureghian, J. Eng. Mech. 132 (2006).
 
     Examples
     --------

@@ -14,10 +14,8 @@ of one sign, which lose no digits when the loop is narrow or the memory saturate
     coercive input = beta  int_0^L  w^n / (A - e w^n) dl
     energy         = 4 beta  int_0^L  w^(n+1) / (A - e w^n) dl
 
-w(l) is evaluated exactly, L is the root of w_c(L) = w_e(2 X - L), and the integrals are Gauss-Legendre sums
-on intervals that shrink towards both ends, where w^n is not analytic. A law with A < 0 is the law
-(-A, beta, -gamma) of the input -u.
-
+w(l) is exact, L is the root of w_c(L) = w_e(2 X - L), and the integrals are Gauss-Legendre sums on intervals that
+shrink towards both ends, where w^n is not analytic. A law with A < 0 is the law (-A, beta, -gamma) of the input -u.
 Sources: Ikhouane and Rodellar 2007, chapter 3, for the limit cycle; the integrals of one sign are ours.
 """
 
@@ -64,8 +62,7 @@ class LimitCycle:
 def limit_cycle(A: float, beta: float, gamma: float, n: float, amplitude: float) -> LimitCycle:
     """Compute the steady loop, good to 1e-13 of each quantity where |beta| is above 1e-3 |gamma|.
 
-    Raises ValueError if the amplitude is not positive, or A = 0: such a memory dies out, and SimulationError if the
-    memory diverges within one stroke.
+    ValueError if the amplitude is not positive or A = 0 (the memory dies out); SimulationError if it diverges.
     """
     if not 0.0 < amplitude < math.inf:
         raise ValueError(f"amplitude must be positive and finite, got {amplitude}")

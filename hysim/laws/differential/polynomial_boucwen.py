@@ -17,8 +17,7 @@ class PolynomialBoucWen(BoucWenLaw):
     A, beta, gamma, n, gain, offset, z0 : float
         As in `BoucWen`; z is driven by u itself.
     input_coefficients : sequence of float
-        (c1, c2, ...) [unit of y / (unit of u)^k]; c1 is the feedthrough. Their number is the degree
-        that `identify` fits.
+        (c1, c2, ...) [unit of y / (unit of u)^k]; c1 is the feedthrough, their number the degree that `identify` fits.
 
     Raises
     ------

@@ -156,8 +156,7 @@ def symmetric(terms: Iterable[Term], symmetry: str | None) -> tuple[Term, ...]:
     """The terms of an odd law, whose response to -u is -y, or of an even one, whose response to -u is y.
 
     With u and z, u' changes its sign and ``|u'|`` does not: an odd law has of u' the monomials that are even in (u, z)
-    and of ``|u'|`` those that are odd; an even one has of u' those that are odd in u and of ``|u'|`` those that are
-    even.
+    and of ``|u'|`` those that are odd; an even one of u' those odd in u and of ``|u'|`` those that are even.
 
     Raises ValueError if `symmetry` is not None, "odd" or "even".
     """

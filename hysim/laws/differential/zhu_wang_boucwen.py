@@ -24,8 +24,9 @@ class ZhuWangBoucWen(MemoryLaw):
     ``dz/du = A - |z|^n (gamma + beta sgn(z du)) + delta u sgn(du)``, ``y = offset + sum c_k u^k + gain z``
 
     The last term steepens the rising branch and flattens the falling one where delta u > 0, and the other way round
-    where delta u < 0. It is odd: a loop about u = 0 stays point symmetric, one on the voltages of a piezoelectric
-    actuator does not.
+    where delta u < 0. It is odd: a loop about u = 0 stays point symmetric, one on a piezo actuator's voltages does not.
+    Exact for n = 1, and otherwise integrated to 1e-10 of the range (`hysim.kernels.branch`). No class of stability is
+    known: the forcing delta u grows with the input.
 
     Parameters
     ----------
@@ -41,11 +42,6 @@ class ZhuWangBoucWen(MemoryLaw):
     ------
     ValueError
         If a parameter is not finite, n is not positive, or there is no coefficient.
-
-    Notes
-    -----
-    Exact for n = 1, and otherwise integrated to 1e-10 of the range (`hysim.kernels.branch`). No class of stability is
-    known: the forcing delta u grows with the input.
 
     Examples
     --------

@@ -20,7 +20,10 @@ class ElasticBacklash(RatedLaw):
 
     u is the twist between the two sides, b the part of it that the gap takes, x the twist of the shaft. In the gap the
     shaft, without load, untwists as x' = -(stiffness / damping) x, so that contact ends before the shaft has no twist,
-    and neither side ever pulls. Without damping it is a dead zone, which has no memory.
+    and neither side ever pulls. Without damping it is a dead zone, which has no memory. The physical model of M.
+    Nordin, J. Galic and P.-O. Gutman, New models for backlash and gear play, Int. J. Adaptive Control and Signal
+    Processing 11 (1997) 49-63; reviewed by M. Nordin and P.-O. Gutman, Controlling mechanical systems with backlash,
+    Automatica 38 (2002) 1633-1649. Before the first sample the shaft rests.
 
     Parameters
     ----------
@@ -39,12 +42,6 @@ class ElasticBacklash(RatedLaw):
     ------
     ValueError
         If a number is not finite, the stiffness is not positive, or damping or half gap are negative.
-
-    Notes
-    -----
-    The physical model of M. Nordin, J. Galic and P.-O. Gutman, New models for backlash and gear play, Int. J. Adaptive
-    Control and Signal Processing 11 (1997) 49-63; reviewed by M. Nordin and P.-O. Gutman, Controlling mechanical
-    systems with backlash, Automatica 38 (2002) 1633-1649. Before the first sample the shaft rests.
 
     Examples
     --------

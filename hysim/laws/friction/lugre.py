@@ -22,8 +22,11 @@ class LuGre(RatedLaw):
         z' = v - sigma0 |v| z / g(v),    F = offset + sigma0 z + sigma1 z' + sigma2 v
         g(v) = coulomb + (breakaway - coulomb) exp(-|v / stribeck_velocity|^stribeck_exponent)
 
-    u is the displacement, v its velocity, F the friction force. Between samples the displacement is linear; z is exact
-    then, however stiff the bristles are.
+    u is the displacement, v its velocity, F the friction force. Between samples u is linear and z exact, however stiff
+    the bristles. With sigma1 = sigma2 = 0 and breakaway = coulomb it is `hysim.Dahl`, and does not depend on the rate.
+    Sources: C. Canudas de Wit, H. Olsson, K. J. Astrom and P. Lischinsky, A new model for control of systems with
+    friction, IEEE Trans. Automatic Control 40 (1995) 419-425; for the damping that falls with the speed H. Olsson,
+    Control systems with friction, Lund Institute of Technology (1996).
 
     Parameters
     ----------
@@ -42,8 +45,7 @@ class LuGre(RatedLaw):
     stribeck_exponent : float
         Positive; 2 in the source, 1 is Tustin's.
     damping_velocity : float
-        Speed v_d over which the damping of the bristles falls, sigma1 exp(-(v / v_d)^2); 0, the default, where it does
-        not [unit of u / s].
+        Speed v_d over which the bristles' damping falls, sigma1 exp(-(v / v_d)^2) [unit of u / s]; 0: it does not.
     offset : float
         Output at rest without bent bristles [unit of y].
     z0 : float
@@ -54,14 +56,6 @@ class LuGre(RatedLaw):
     ValueError
         If a number is not finite, one of sigma0, coulomb, breakaway, stribeck_velocity and stribeck_exponent is not
         positive, or damping_velocity is negative.
-
-    Notes
-    -----
-    Sources: C. Canudas de Wit, H. Olsson, K. J. Astrom and P. Lischinsky, A new model for control of systems with
-    friction, IEEE Trans. Automatic Control 40 (1995) 419-425; for the damping that falls with the speed H. Olsson,
-    Control systems with friction, Lund Institute of Technology (1996).
-
-    With sigma1 = sigma2 = 0 and breakaway = coulomb it is `hysim.Dahl`, and does not depend on the rate.
 
     Examples
     --------

@@ -26,6 +26,11 @@ class GeneralizedMaxwellSlip(RatedLaw):
 
     u is the displacement, v its velocity. It has the hysteresis with nonlocal memory of sticking contacts, which LuGre
     has not, and the frictional lag of slipping ones. Between samples the displacement is linear, and the force exact.
+    Source: F. Al-Bender, V. Lampaert and J. Swevers, The generalized Maxwell-slip model: a novel model for friction
+    simulation and compensation, IEEE Trans. Automatic Control 50 (2005) 1883-1887. Their weights are alpha_i, their
+    attraction is C. Where g does not depend on the speed it is `hysim.MaxwellSlip`, as it is without a lag (a very
+    large attraction) for forces that follow g(v). `hysim.identify` takes the number of elements and their weights from
+    the law that it starts with.
 
     Parameters
     ----------
@@ -54,15 +59,6 @@ class GeneralizedMaxwellSlip(RatedLaw):
     ------
     ValueError
         If lengths differ, a number is not finite, or one that must be positive is not.
-
-    Notes
-    -----
-    Source: F. Al-Bender, V. Lampaert and J. Swevers, The generalized Maxwell-slip model: a novel model for friction
-    simulation and compensation, IEEE Trans. Automatic Control 50 (2005) 1883-1887. Their weights are alpha_i, their
-    attraction is C. Where g does not depend on the speed it is `hysim.MaxwellSlip`, as it is without a lag (a very
-    large attraction) for forces that follow g(v).
-
-    `hysim.identify` takes the number of elements and their weights from the law that it starts with.
 
     Examples
     --------

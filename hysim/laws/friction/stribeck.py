@@ -22,9 +22,10 @@ class StribeckFriction(RatedLaw):
         F = offset + sqrt(2 e) (breakaway - coulomb) exp(-(v / v_s)^2) v / v_s + coulomb tanh(v / v_c) + viscous v
         v_s = sqrt(2) breakaway_velocity,    v_c = breakaway_velocity / 10
 
-    v = u' is constant between samples; at a sample it is that of the stroke which ends there. Friction at rest is a
-    slow creep: a force below the breakaway force moves a mass at a speed below the breakaway velocity. `hysim.LuGre`
-    sticks.
+    v = u' is constant between samples; at a sample that of the stroke which ends there. Friction at rest is a slow
+    creep: a force below the breakaway force moves a mass at a speed below the breakaway velocity. `hysim.LuGre` sticks.
+    The formula and the two velocities are those of the block Translational Friction of Simscape, MathWorks, whose
+    parameters these are.
 
     Parameters
     ----------
@@ -43,11 +44,6 @@ class StribeckFriction(RatedLaw):
     ------
     ValueError
         If a number is not finite, or the breakaway velocity is not positive.
-
-    Notes
-    -----
-    The formula and the two velocities are those of the block Translational Friction of Simscape, MathWorks, whose
-    parameters these are.
 
     Examples
     --------

@@ -32,11 +32,17 @@ class Chan(BranchLaw):
         rising   m = min(lower + r, upper),    falling  m = max(upper - r, lower)
         upper    = (h + coercivity) / (|h + coercivity| + knee),    lower = (h - coercivity) / (|h - coercivity| + knee)
 
-    with ``knee = coercivity (1 / squareness - 1)``; r is the distance from the branch where the input has turned last,
-    at most the distance of the branches. Before its first turn a field that moves away from zero keeps its place
-    between the branches: from the demagnetised state it goes along the initial curve, the mean of both. u is the field
-    H and y the flux density B, or current and flux linkage; h is the field in the core. A stroke is the solution of a
-    quadratic equation.
+    with ``knee = coercivity (1 / squareness - 1)``; r is the distance from the branch where the input last turned, at
+    most that of the branches. Before its first turn a field that moves away from zero keeps its place between the
+    branches: from the demagnetised state it goes along the initial curve, the mean of both. u is the field H and y the
+    flux density B, or current and flux linkage; h is the field in the core. A stroke solves a quadratic equation.
+
+    The branches, the initial curve as their mean, and symmetric loops by translated branches are documented for LTspice
+    and in the paper. The bound of a translated branch by the limiting loop is ours. LTspice closes loops that are not
+    symmetric by another construction (US patent 7 502 723); here they creep from cycle to cycle until they touch the
+    limiting loop, and one that lies far on one side of h = 0 then has no area. `hysim.identify` holds the gap, and the
+    offset: a translated loop is the same one wherever it lies. Sources: J. H. Chan and others, IEEE Trans. CAD 10
+    (1991) 476; LTspice help, "L. Inductor".
 
     Parameters
     ----------
@@ -60,17 +66,6 @@ class Chan(BranchLaw):
     ValueError
         If a number is not finite, coercivity is not positive, squareness is not between 0 and 1, z0 not between -1 and
         1, the gap is negative, or saturation or feedthrough are negative beside a gap.
-
-    Notes
-    -----
-    The branches, the initial curve as their mean, and symmetric loops by translated branches are documented for LTspice
-    and in the paper. The bound of a translated branch by the limiting loop is ours. LTspice closes loops that are not
-    symmetric by another construction (US patent 7 502 723); here they creep from cycle to cycle until they touch the
-    limiting loop, and one that lies far on one side of h = 0 then has no area. `hysim.identify` holds the gap, and the
-    offset: a translated loop is the same one wherever it lies.
-
-    Sources: J. H. Chan, A. Vladimirescu, X.-C. Gao, P. Liebmann and J. Valainis, IEEE Trans. CAD 10 (1991) 476;
-    LTspice help, "L. Inductor".
 
     Examples
     --------

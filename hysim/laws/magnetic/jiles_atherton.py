@@ -36,11 +36,10 @@ Ours is  He = H + alpha M,  M = c M_an(He) + (1 - c) M_irr,  dM_irr/dHe = (M_an 
     JAmodel         the bulk form with (a, k, c, Ms, alpha, Kan, psi): anisotropy = Kan cos(2 psi) / (mu0 Ms a)
     pinning in J    k / mu0 in the papers that measure k in joule per ampere and square metre, that is, in tesla
 
-Sources: D. C. Jiles and D. L. Atherton, J. Magn. Magn. Mater. 61 (1986); D. C. Jiles, J. B. Thoelke and M. K. Devine,
-IEEE Trans. Magn. 28 (1992); A. J. Bergqvist, IEEE Trans. Magn. 32 (1996); R. Venkataraman and P. S. Krishnaprasad, IEEE
-Conf. Decision and Control 2000, for the bulk form; R. Szewczyk, JAmodel (github.com/romanszewczyk/JAmodel), ModelType
-2. The form of the circuit simulators is the one that is quoted for PSpice (core, level 2) and Micro-Cap; we have not
-seen their manuals.
+Sources: D. C. Jiles and D. L. Atherton, J. Magn. Magn. Mater. 61 (1986); D. C. Jiles and others, IEEE Trans. Magn. 28
+(1992); A. J. Bergqvist, IEEE Trans. Magn. 32 (1996); R. Venkataraman and P. S. Krishnaprasad, IEEE Conf. Decision and
+Control 2000, for the bulk form; R. Szewczyk, JAmodel (github.com/romanszewczyk/JAmodel), ModelType 2. The form of the
+circuit simulators is quoted for PSpice (core, level 2) and Micro-Cap; we have not seen their manuals.
 """
 
 import math
@@ -273,7 +272,13 @@ class JilesAtherton(Law):
     By default ``feedthrough = gain = mu0``, and y is B in tesla; with ``feedthrough=0, gain=1`` it is M. Where the rate
     would be negative it is zero, as in all present uses. Sources: D. C. Jiles and D. L. Atherton, J. Magn. Magn. Mater.
     61 (1986); J. H. B. Deane, IEEE Trans. Magn. 30 (1994), for the clip; A. Ramesh, D. C. Jiles and J. M. Roderick,
-    IEEE Trans. Magn. 32 (1996), for the anisotropy.
+    IEEE Trans. Magn. 32 (1996), for the anisotropy. Between two samples H moves monotonically. The law is evaluated in
+    He, in which it is linear, by quadratures whose remainder is bounded by a rounding: good to 1e-13 of the range,
+    whatever the samples. The bulk form ``dM/dHe = c M_an' + (M_an - M) / (delta k)`` is the same law; see
+    `from_jamodel`, `from_total` and `from_circuit` for others. Where alpha is so large that H would fall while He
+    rises, the magnetisation jumps: `response` raises SimulationError there. A law with ``alpha Ms < 3 a`` (and no
+    anisotropy) does not jump from a state that an input has led to. `identify` holds the feedthrough mu0 in records
+    whose units are A/m and T, and frees it in others.
 
     Parameters
     ----------
@@ -285,8 +290,7 @@ class JilesAtherton(Law):
         Coupling of the magnetisation to the effective field; negative for a core with a gap, alpha - N for a
         demagnetising factor N and the outer field.
     k : float
-        Pinning, near the coercive field of a soft material, positive [A/m]. It is mu0 k in papers that give it in
-        tesla.
+        Pinning, near the coercive field of a soft material, positive [A/m]; mu0 k in papers that give it in tesla.
     c : float
         Reversible part of the magnetisation, from 0 to 1.
     anisotropy : float
@@ -308,17 +312,7 @@ class JilesAtherton(Law):
     ------
     ValueError
         If a number is not finite; Ms, a or k is not positive; c or reversible_feedback is not between 0 and 1; or
-        ``reversible_feedback alpha c dM_an/dHe`` comes to 1 at He = 0: the reversible magnetisation would not be
-        unique.
-
-    Notes
-    -----
-    Between two samples H moves monotonically. The law is evaluated in He, in which it is linear, by quadratures whose
-    remainder is bounded by a rounding: good to 1e-13 of the range, whatever the samples. The bulk form
-    ``dM/dHe = c M_an' + (M_an - M) / (delta k)`` is the same law; see `from_jamodel`, `from_total` and `from_circuit`
-    for others. Where alpha is so large that H would fall while He rises, the magnetisation jumps: `response` raises
-    SimulationError there. A law with ``alpha Ms < 3 a`` (and no anisotropy) does not jump from a state that an input
-    has led to. `identify` holds the feedthrough mu0 in records whose units are A/m and T, and frees it in others.
+        ``reversible_feedback alpha c dM_an/dHe`` is 1 at He = 0: the reversible magnetisation is not unique.
 
     Examples
     --------

@@ -2,9 +2,8 @@
 
 Base of the laws between two branches of one curve, a coercivity to either side of the middle.
 
-Both branches go from -saturation to saturation; the upper one is at the remanence where the input is zero, and crosses
-zero at -coercivity. The place z between the branches is -1 on the lower one and 1 on the upper one; at z = 0 the law
-is demagnetised where the input is zero.
+Both branches go from -saturation to saturation; the upper one has the remanence at zero input and crosses zero at
+-coercivity. The place z is -1 on the lower and 1 on the upper one; at z = 0 and zero input the law is demagnetised.
 """
 
 import math
@@ -130,8 +129,7 @@ class Tellinen(BranchLaw):
     Raises
     ------
     ValueError
-        If a number is not finite, coercivity is not positive, squareness is not between 0 and 1, or z0 not between
-        -1 and 1.
+        If a number is not finite, coercivity not positive, squareness not between 0 and 1, or z0 not between -1 and 1.
 
     Examples
     --------
@@ -169,6 +167,9 @@ class Tellinen(BranchLaw):
     def from_modelica(cls, *, Js: float, Br: float, Hc: float, K: float = 1.0) -> Self:
         """The law of a ``GenericHystTellinenSoft`` of the Modelica Standard Library, demagnetised.
 
+        Two guards of that model against division by zero are left out here, where nothing is divided: branches Js /
+        1000 further apart, and a share of the slope of at least 0.01.
+
         Parameters
         ----------
         Js, Br : float
@@ -187,11 +188,6 @@ class Tellinen(BranchLaw):
         ------
         ValueError
             If the numbers are no pair of branches.
-
-        Notes
-        -----
-        Two guards of that model against division by zero are left out here, where nothing is divided: branches Js /
-        1000 further apart, and a share of the slope of at least 0.01.
 
         Examples
         --------

@@ -23,17 +23,15 @@ class TellinenTable(Law):
         y        = offset + feedthrough u + m
         rising   m' = (upper - m) / (upper - lower) lower',    falling  m' = (m - lower) / (upper - lower) upper'
 
-    As `Tellinen`, with branches of any shape; beyond the table they are level. Every stroke is evaluated exactly, piece
-    by piece. Source: J. Tellinen, IEEE Trans. Magn. 34 (1998) 2200; the Modelica Standard Library has such tables in
-    ``GenericHystTellinenTable``.
+    As `Tellinen`, with branches of any shape, level beyond the table. Every stroke is exact, piece by piece. Source: J.
+    Tellinen, IEEE Trans. Magn. 34 (1998) 2200; the Modelica Standard Library's ``GenericHystTellinenTable``.
 
     Parameters
     ----------
     inputs : sequence of float, length n
         Increasing, at least two [unit of u].
     lower, upper : sequence of float, length n
-        The branches along which the input rises and falls, neither falling, the upper one nowhere below the lower one
-        [unit of y].
+        Branches of a rising and a falling input, neither falling, the upper nowhere below the lower one [unit of y].
     feedthrough : float
         Slope dy/du beside the branches [unit of y / unit of u].
     offset : float
@@ -44,8 +42,7 @@ class TellinenTable(Law):
     Raises
     ------
     ValueError
-        If a number is not finite, lengths differ, the inputs do not increase, a branch falls, the branches cross, or z0
-        is not between -1 and 1.
+        If a number is not finite, lengths differ, inputs do not increase, branches fall or cross, or z0 is beyond +-1.
 
     Examples
     --------

@@ -5,8 +5,7 @@
     y      = offset + feedthrough u + sum_i w_i (u - z_i)        stops
 
 The positions z_i are the memory; z0 is where they stand before the first sample, which pushes them like any other. A
-stop is a play of the negative weight beside a line, so that with c = feedthrough + sum w_i for stops every law of
-`Clamps` is
+stop is a play of the negative weight beside a line, so with c = feedthrough + sum w_i for stops every law is
 
     y = offset + c u + sum_i v_i z_i,    v_i = w_i or -w_i
 """
@@ -47,8 +46,7 @@ class Elements:
 class Bank(Elements, ByStructure):
     """Several plays or stops, whose fields are tuples.
 
-    A family of which the input pushes the plays in another way than `Clamps` says so in `pushing`, one with another
-    output of them in `outputs_of_one`.
+    A family that pushes its plays otherwise than `Clamps` has `pushing`, one with another output `outputs_of_one`.
     """
 
     thresholds_name: ClassVar[str] = "thresholds"
@@ -218,8 +216,7 @@ class Clamps(Elements, Law):
             peak      = c X + sum v (X - r)         mid_width = 2 |sum v min(r, X - r)|
             energy    = -4 sum v r (X - r)          over the plays with r < X
 
-        The energy is positive for a loop that runs clockwise. Raises ValueError if the amplitude is not positive and
-        finite.
+        Energy is positive for a clockwise loop. ValueError if the amplitude is not positive and finite.
 
         Examples
         --------

@@ -1,8 +1,7 @@
 """The search for the parameters of a bank of plays, stops or relays.
 
-The output is affine in the weights, the feedthrough and the offset. A bank has its thresholds given, by default evenly
-over half the span of the input. A threshold that the user frees is searched between the middles of the gaps to its
-neighbours, so that their order stays.
+The output is affine in weights, feedthrough and offset. Thresholds are given, by default evenly over half the input's
+span. One that the user frees is searched between the middles of the gaps to its neighbours: their order stays.
 
 One-signed weights are those of the classical operator, of one density: all elements past the threshold zero turn the
 loop in one sense. Without it least squares fit noise by weights of alternating sign, and such a law may have no
@@ -20,8 +19,7 @@ One holds for every record that begins at rest or at a turning point of its cycl
 faded or grew before the record need more. Any other steady cycle is ``"periodic"``: the positions that the cycle leaves
 behind. By default the record decides, also how many former turning points there are.
 
-Once the input has moved by twice the largest threshold all of this is forgotten: what follows is the same for every
-past, and for weights of any sign.
+Once the input has moved by twice the largest threshold all of this is forgotten, for weights of any sign.
 
 Behind dead zones the output is affine in their weights for given weights of the plays,
 
@@ -325,8 +323,7 @@ def with_offset(*columns: FloatArray) -> FloatArray:
 def rows_of(tables: Tables) -> FloatArray:
     """Rows as the kernels take them: offset, width, envelopes, thresholds, weights, and then the dead zones.
 
-    Of the width, the envelopes `left` and `right`, and the dead zones there may be none in the tables; a right envelope
-    without coefficients is the left one.
+    Width, envelopes `left` and `right`, dead zones may be absent; `right` without coefficients is the left one.
     """
     offset = tables["offset"]
     left = tables.get("left", np.tile(IDENTITY, (len(offset), 1)))

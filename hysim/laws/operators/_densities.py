@@ -22,7 +22,6 @@ what a smooth law leaves of a clean record is no noise, but follows the curves. 
 part gives the cells of all strengths at once.
 
 The state before a record, all relays down or what the record itself leaves, is the one of the lower left-out error.
-
 Source: P. H. C. Eilers, B. D. Marx, Statist. Sci. 11 (1996), for differences as a penalty on many coefficients.
 """
 
@@ -258,8 +257,7 @@ def roughness(n: int) -> FloatArray:
 def linear_between(cells: int, n: int) -> FloatArray:
     """Table B (n (n + 1) / 2, cells (cells + 1) / 2) from weights of coarse cells to weights on `n` intervals.
 
-    The density is linear between the centres of the cells off the diagonal, and goes on linearly beyond them; so do the
-    weights per length along the diagonal.
+    The density is linear between, and beyond, the centres of cells off the diagonal; so are weights per length on it.
     """
     rows, columns = np.tril_indices(n)
     if cells >= n:

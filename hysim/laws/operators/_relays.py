@@ -1,15 +1,13 @@
 """Laws of relays.
 
-A relay R_ab is up (1) once the input has reached a, and down (-1) once it has reached b < a. The relays stand on
-the pairs of N intervals between N + 1 levels L_0 < ... < L_N, an upper one i and a lower one j <= i, with the weights
-w_ij, row by row: w_00, w_10, w_11, w_20, ... The Everett function E(a, b), the weight of all relays between b and a,
-at the levels is
+A relay R_ab is up (1) once the input has reached a, and down (-1) once it has reached b < a. The relays stand on pairs
+of N intervals between N + 1 levels L_0 < ... < L_N, an upper i and a lower j <= i, with weights w_ij, row by row: w_00,
+w_10, w_11, w_20, ... The Everett function E(a, b), the weight of all relays between b and a, at the levels is
 
     E(L_m, L_n) = sum of w_ij over i < m, j >= n
 
-All relays are down before the inputs z0, which come before the first sample. From there on the input leaves a
-staircase in the plane of the pairs (a, b), relays below it up and above it down, whose corners are its dominant
-extremes; see `hysim.kernels.preisach`.
+All relays are down before the inputs z0, which precede the first sample. From there the input leaves a staircase in the
+plane (a, b), relays below it up and above it down, with corners at its dominant extremes (`hysim.kernels.preisach`).
 
 The search for the parameters of a law of relays.
 
@@ -328,9 +326,8 @@ class RelayLaw(ByStructure, Law):
         """Levels for `hysim.identify`: equal `intervals` of the span of the input, or the `levels` [unit of u].
 
         Where none of these options is given, four intervals are compared with a smooth density, and what predicts
-        left-out parts better is returned: the density if its error is less than nine tenths of the grid's. With a
-        `smoothness` it is the density, by that strength of the penalty or, for ``"auto"``, by the best; see
-        `Preisach.smoothed`.
+        left-out parts better is returned: the density if its error is less than nine tenths of the grid's. With
+        `smoothness` it is the density, of that penalty or, for ``"auto"``, the best (`Preisach.smoothed`).
 
         N intervals have N (N + 1) / 2 weights; one loop between two inputs determines 2 N - 1 combinations of them.
         With `one_signed` all weights off the diagonal have the sign of the record's loop, positive for a

@@ -27,8 +27,10 @@ class EnergyPlays(Bank, Law):
     ``z_i(k) = min(max(z_i(k-1), u_k - r_i), u_k + r_i)`` is the reversible field of cell i, what a pinning force r_i
     leaves of the input, and ``L(x) = coth x - 1 / x`` the anhysteretic curve of all cells. u is the field H and y the
     flux density B. A cell dissipates r_i per unit of its magnetisation, whatever the path: with weights that are not
-    negative no cycle yields energy, see `dissipated`. Inner loops are closed and wiped out, as those of plays.
-    Sources: A. Bergqvist, Physica B 233 (1997) 342; F. Henrotte, A. Nicolet and K. Hameyer, COMPEL 25 (2006) 71.
+    negative no cycle yields energy, see `dissipated`. Inner loops are closed and wiped out, as those of plays. A law
+    without cells, the default, is a line; as a start of `hysim.identify` it leaves the cells to the record, as
+    ``EnergyPlays.structure()`` does. Sources: A. Bergqvist, Physica B 233 (1997) 342; F. Henrotte, A. Nicolet and K.
+    Hameyer, COMPEL 25 (2006) 71.
 
     Parameters
     ----------
@@ -48,13 +50,7 @@ class EnergyPlays(Bank, Law):
     Raises
     ------
     ValueError
-        If lengths differ, a number is not finite, the field is not positive, or the thresholds are negative or do not
-        increase.
-
-    Notes
-    -----
-    A law without cells, the default, is a line; as a start of `hysim.identify` it leaves the cells to the record, as
-    ``EnergyPlays.structure()`` does.
+        If lengths differ, a number is not finite, the field not positive, or thresholds negative or not increasing.
 
     Examples
     --------
@@ -158,8 +154,7 @@ class EnergyPlays(Bank, Law):
         Returns
         -------
         array, shape (n_samples,)
-            [unit of u times unit of y]; of a steady cycle the increase is its area. Never falls where no weight is
-            negative.
+            [unit of u times unit of y]; a steady cycle adds its area. Never falls where no weight is negative.
 
         Raises
         ------

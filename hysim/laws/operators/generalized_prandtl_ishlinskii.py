@@ -33,7 +33,9 @@ class GeneralizedPrandtlIshlinskii(Bank, PlaySum):
         y      = offset + sum_i w_i z_i,    gamma(u) = a_0 tanh(a_1 u + a_2) + a_3 + a_4 u,    increasing
 
     A rising input pushes the plays along the left envelope, a falling one along the right one; the tanh lets the loop
-    saturate, and two different envelopes make the rising branch another curve than the falling one.
+    saturate, and two different envelopes make the rising branch another curve than the falling one. Sources: M. Al
+    Janaideh, S. Rakheja and C.-Y. Su, IEEE/ASME Trans. Mechatronics 16 (2011), for the law and its inverse, with the
+    envelopes a_0 tanh(a_1 u + a_2) + a_3 and a_4 u + a_3; the sum of the two is ours.
 
     Parameters
     ----------
@@ -44,21 +46,14 @@ class GeneralizedPrandtlIshlinskii(Bank, PlaySum):
     left : sequence of float, length 5
         a_0 ... a_4 of the envelope along which a rising input pushes; by default gamma(u) = u.
     right : sequence of float, length 5 or 0
-        Those of a falling one; empty for the same. Where gamma_left - gamma_right exceeds 2 r, the play of the
-        threshold r follows the left envelope.
+        Those of a falling one; empty: the same. Where gamma_left - gamma_right > 2 r, play r follows the left envelope.
     offset, z0
         As in `PrandtlIshlinskii` [unit of y, unit of gamma].
 
     Raises
     ------
     ValueError
-        If lengths differ, a number is not finite, thresholds are negative or do not increase, or an envelope
-        does not increase.
-
-    Notes
-    -----
-    Sources: M. Al Janaideh, S. Rakheja and C.-Y. Su, IEEE/ASME Trans. Mechatronics 16 (2011), for the law and its
-    inverse, with the envelopes a_0 tanh(a_1 u + a_2) + a_3 and a_4 u + a_3; the sum of the two is ours.
+        If lengths differ, a number is not finite, a threshold is negative, thresholds or an envelope do not rise.
 
     Examples
     --------
@@ -106,11 +101,10 @@ class GeneralizedPrandtlIshlinskii(Bank, PlaySum):
         """Plays and envelopes for `hysim.identify`; `plays`, `thresholds` and `one_signed` as of `PrandtlIshlinskii`.
 
         One envelope is searched, or with ``envelopes=2`` also the ``lead`` in skew of the right one before the left
-        one. It takes the ends of the record's input to themselves, so that thresholds mean what they mean for
-        `PrandtlIshlinskii`: ``bend`` is the part of the tanh passed on half the stroke (none for a straight envelope),
-        ``skew`` the place of its middle. Envelopes `left` and `right` that are given, 5 coefficients each, are not
-        searched. Raises ValueError or TypeError as `PrandtlIshlinskii.structure`, if `envelopes` is not 1 or 2, or an
-        envelope does not increase.
+        one. It maps the ends of the record's input to themselves: thresholds are those of `PrandtlIshlinskii`; ``bend``
+        is the part of the tanh passed on half the stroke (none for a straight envelope), ``skew`` the place of its
+        middle. Envelopes `left` and `right` that are given, 5 coefficients each, are not searched. Raises ValueError or
+        TypeError as `PrandtlIshlinskii.structure`, if `envelopes` is not 1 or 2, or an envelope does not increase.
 
         Examples
         --------

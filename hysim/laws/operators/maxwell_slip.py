@@ -21,7 +21,10 @@ class MaxwellSlip(Bank, Clamps):
         F = offset + feedthrough u + sum_i k_i (u - z_i),    z_i = min(max(z_i, u - d_i), u + d_i)
 
     u is the displacement, z_i the block to which spring i is fixed, F the force. An element holds at most the force k_i
-    d_i. The law is a sum of stops; the loop of a positive stiffness runs clockwise.
+    d_i. The law is a sum of stops; the loop of a positive stiffness runs clockwise. A law without elements, the
+    default, is a line; as a start of `hysim.identify` it leaves the elements to the record, as
+    ``MaxwellSlip.structure()`` does. Sources: M. Goldfarb and N. Celanovic, IEEE Control Systems 17 (1997); W. D. Iwan,
+    J. Appl. Mech. 33 (1966).
 
     Parameters
     ----------
@@ -40,13 +43,6 @@ class MaxwellSlip(Bank, Clamps):
     ------
     ValueError
         If lengths differ, a number is not finite, or an elongation is negative.
-
-    Notes
-    -----
-    Sources: M. Goldfarb and N. Celanovic, IEEE Control Systems 17 (1997); W. D. Iwan, J. Appl. Mech. 33 (1966).
-
-    A law without elements, the default, is a line; as a start of `hysim.identify` it leaves the elements to
-    the record, as ``MaxwellSlip.structure()`` does.
 
     Examples
     --------
@@ -93,9 +89,8 @@ class MaxwellSlip(Bank, Clamps):
     ) -> BankStructure:
         """Elements for `hysim.identify`: their number, slipping in even steps up to half the input's span, or `slips`.
 
-        With `one_signed` every stiffness has the sign of the record's loop, positive for a clockwise one; by default
-        the BIC decides. Raises ValueError or TypeError if the number is not a positive int, or an elongation is not a
-        finite number [unit of u].
+        With `one_signed` every stiffness has the sign of the record's loop, positive if clockwise; by default the BIC
+        decides. ValueError or TypeError if the number is not a positive int, or an elongation [unit of u] not finite.
         """
         return super().structure(plays=elements, thresholds=slips, one_signed=one_signed)
 

@@ -119,8 +119,7 @@ class ModifiedPrandtlIshlinskii(Bank, PlaySum):
     def inverted(self, y: FloatArray, u0: float | None, state: State | None) -> FloatArray:
         """The inverse of S, then that of the plays, exact to rounding.
 
-        Raises ValueError also if z0 holds positions that no input leads to; one for a law that is not invertible names
-        the weight.
+        ValueError also if no input leads to the positions z0; one for a law that is not invertible names the weight.
         """
         if (refusal := self.refusal()) is not None:
             raise ValueError(refusal)

@@ -43,9 +43,15 @@ class ParametricPrandtlIshlinskii(Law):
         z_k  = min(max(z_k, u - r_k), u + r_k),    m_k ~ the integral of w over the thresholds of play k,  sum m_k = 1
 
     Eight numbers describe loops of all sizes. The slope dy/du right after a reversal is that of the polynomial less
-    weight + weight_slope u, and returns to it as the plays are pushed one after the other. Sources: M. Al Janaideh, S.
-    Rakheja and C.-Y. Su, IEEE/ASME Trans. Mechatronics 16 (2011), for a parametric density; P. Krejci and K. Kuhnen,
-    IEE Proc. Control Theory Appl. 148 (2001), for the law.
+    weight + weight_slope u, and returns to it as the plays are pushed one after the other.
+
+    As a start of `hysim.identify` the class leaves the reach to the record, the span of the input, and what was before
+    it: the cycle between the lowest and the highest input, on the branch in whose direction the record moves first, or
+    plays that all stand at zero or at the first input, where that fits clearly better (the BIC of a few densities is
+    lower by 10). With ``initial="rest"`` all plays stand at zero before the first sample, with ``"free"`` they have
+    made one stroke from there, to ``z0[1]``. Sources: M. Al Janaideh, S. Rakheja and C.-Y. Su, IEEE/ASME Trans.
+    Mechatronics 16 (2011), for a parametric density; P. Krejci and K. Kuhnen, IEE Proc. Control Theory Appl. 148
+    (2001), for the law.
 
     Parameters
     ----------
@@ -62,8 +68,7 @@ class ParametricPrandtlIshlinskii(Law):
     input_coefficients : sequence of float
         (c_1, c_2, ...) [unit of y / (unit of u)^k]. Their number is the degree that `identify` fits.
     reach : float
-        Largest threshold, positive where there is a weight [unit of u]. Loops up to the amplitude `reach` widen by the
-        density, larger ones no more.
+        Largest threshold, positive where there is a weight [unit of u]. Loops widen with the amplitude up to `reach`.
     plays : float
         Their number, whole and positive.
     z0 : sequence of float
@@ -74,14 +79,6 @@ class ParametricPrandtlIshlinskii(Law):
     ValueError
         If a number is not finite, the exponent is not above -1, the decay is not positive, the reach is negative or
         zero beside a weight, the number of plays is not whole and positive, or z0 is empty.
-
-    Notes
-    -----
-    As a start of `hysim.identify` the class leaves the reach to the record, the span of the input, and what was before
-    it: the cycle between the lowest and the highest input, on the branch in whose direction the record moves first, or
-    plays that all stand at zero or at the first input, where that fits clearly better (the BIC of a few densities is
-    lower by 10). With ``initial="rest"`` all plays stand at zero before the first sample, with ``"free"`` they have
-    made one stroke from there, to ``z0[1]``.
 
     Examples
     --------

@@ -1,8 +1,7 @@
 """The Prandtl-Ishlinskii law: a weighted sum of plays, and its exact inverse.
 
 The slope after a reversal grows through the sums s_i = w_0 + ... + w_i. Where r_0 = 0 and all s_i have one sign the
-output is monotone in the input, and the inverse is a law of the same kind (with s_-1 = 0, and the sum for i = 0 left
-out)
+output is monotone in the input, and the inverse is of the same kind (with s_-1 = 0, and the sum for i = 0 left out)
 
     w'_0 = 1 / w_0,    w'_i = -w_i / (s_i s_(i-1))
     r'_i = |sum_(j<=i) w_j (r_i - r_j)|
@@ -33,8 +32,10 @@ class PrandtlIshlinskii(Bank, Clamps):
     """Prandtl-Ishlinskii law, ``y = offset + sum w_i z_i`` over plays of the thresholds r_i.
 
     ``z_i(k) = min(max(z_i(k-1), u_k - r_i), u_k + r_i)``. Positive weights give the counterclockwise loops of
-    piezoelectric stacks, negative ones beside a large w_0 the clockwise ones of a force. Sources: K. Kuhnen, European
-    J. Control 9 (2003), for the inverse; P. Krejci and K. Kuhnen, IEE Proc. Control Theory Appl. 148 (2001).
+    piezoelectric stacks, negative ones beside a large w_0 the clockwise ones of a force. A law without plays, the
+    default, is a constant; as a start of `hysim.identify` it leaves the plays to the record, as
+    ``PrandtlIshlinskii.structure()`` does. Sources: K. Kuhnen, European J. Control 9 (2003), for the inverse; P. Krejci
+    and K. Kuhnen, IEE Proc. Control Theory Appl. 148 (2001).
 
     Parameters
     ----------
@@ -51,11 +52,6 @@ class PrandtlIshlinskii(Bank, Clamps):
     ------
     ValueError
         If lengths differ, a number is not finite, or the thresholds are negative or do not increase.
-
-    Notes
-    -----
-    A law without plays, the default, is a constant; as a start of `hysim.identify` it leaves the plays to
-    the record, as ``PrandtlIshlinskii.structure()`` does.
 
     Examples
     --------

@@ -2,18 +2,16 @@
 
     y = offset + sum over a > b of w(a, b) R_ab[u],    R_ab = 1 once u has reached a, -1 once it has reached b
 
-Half of what the output changes by between the turning points a > b is the Everett function, the weight of the relays
-that switch on the way,
+Half the output's change between the turning points a > b is the Everett function, the weight of relays that switch,
 
     E(a, b) = integral of w over b < b' < a' < a,    y = y_0 + 2 (E(x_1, x_0) - E(x_1, x_2) + E(x_3, x_2) - ...)
 
 along the dominant extremes x_k of the input; a larger one wipes out smaller ones. The two laws hold the same table of
 weights over pairs of intervals between levels, and agree where the input stops at levels only. The inverse runs the
 same recursion on the outputs: as E is monotone, the dominant extremes of the output are those of the input. Each stroke
-ends on a piece on which y is linear, so that it is exact.
-
-Sources: F. Preisach, Z. Phys. 94 (1935); D. H. Everett, Trans. Faraday Soc. 51 (1955); I. D. Mayergoyz,
-Mathematical Models of Hysteresis, 1991, for first-order reversal curves and the interpolation of E.
+ends on a piece on which y is linear, so that it is exact. Sources: F. Preisach, Z. Phys. 94 (1935); D. H. Everett,
+Trans. Faraday Soc. 51 (1955); I. D. Mayergoyz, Mathematical Models of Hysteresis, 1991, for first-order reversal curves
+and the interpolation of E.
 """
 
 import math
@@ -58,8 +56,7 @@ class PreisachRelays(RelayLaw):
     levels : sequence of float, length N + 1
         L_0 < L_1 < ... [unit of u].
     weights : sequence of float, length N (N + 1) / 2
-        w_ij for j <= i, row by row [unit of y]: that of the relay which goes up where the input reaches L_(i+1), and
-        down where it reaches L_j.
+        w_ij for j <= i, row by row [unit of y]: of the relay that goes up at L_(i+1) and down at L_j.
     offset : float
         Mean of the outputs of all relays up and of all down [unit of y].
     z0 : sequence of float
@@ -95,8 +92,9 @@ class Preisach(RelayLaw):
     """Preisach law of a density that is even between levels; its output is continuous.
 
     Each weight of `PreisachRelays` is spread evenly over its pair of intervals, along the diagonal over one interval
-    with itself. The output is piecewise linear in the input, with the slope of the diagonal's weight just after a
-    reversal.
+    with itself. The output is piecewise linear in the input, with the diagonal weight's slope after a reversal. A law
+    without relays, the default, is a constant; as a start of `hysim.identify` it leaves the levels to the record, as
+    ``Preisach.structure()`` does.
 
     Parameters
     ----------
@@ -114,11 +112,6 @@ class Preisach(RelayLaw):
     ------
     ValueError
         If lengths do not fit, a number is not finite, or the levels do not increase.
-
-    Notes
-    -----
-    A law without relays, the default, is a constant; as a start of `hysim.identify` it leaves the levels to the
-    record, as ``Preisach.structure()`` does.
 
     Examples
     --------
@@ -143,8 +136,7 @@ class Preisach(RelayLaw):
         """The law with the Everett function [unit of y] at the pairs of levels (n_levels,) [unit of u].
 
         Element [m, n] of `everett` (n_levels, n_levels), m > n, is half of what the output loses from the turning point
-        at level m down to level n; the others are not read. Raises ValueError if the shape does not fit, or as the
-        constructor.
+        at level m down to level n; others are not read. ValueError if the shape does not fit, or as the constructor.
         """
         grid, table = read_only(levels, "levels", ndim=1), read_only(everett, "everett", ndim=2, finite=False)
         if table.shape != (grid.size, grid.size):
@@ -229,8 +221,7 @@ class Preisach(RelayLaw):
         Raises
         ------
         ValueError
-            If the input does not turn, or levels do not reach the input at which the curves end: the lowest one, or,
-            for curves that rise, the highest.
+            If the input does not turn, or levels do not reach the curves' end: lowest input, or highest if they rise.
 
         Examples
         --------

@@ -44,15 +44,15 @@ class RateDependentPrandtlIshlinskii(Bank, Placed):
         rho_i(k) = r_i + beta |u'_k| for r_i > 0,  0 for r_0 = 0        u'_k = (u_k - u_(k-1)) / sample_time
         z_i(k)   = max(u_k - rho_i(k), min(u_k + rho_i(k), z_i(k-1)))
 
-    The input moves evenly from one sample to the next; at the first sample it stands still. Sources: M. Al Janaideh and
-    P. Krejci, IEEE/ASME Trans. Mechatronics 18 (2013), for the law and the analytic inverse; M. Al Janaideh, P. Krejci
-    and G. A. Monteiro, Applications of Mathematics (2023).
+    The input moves evenly from one sample to the next; at the first sample it stands still. `hysim.identify` searches
+    for beta, and takes a structure as of `PrandtlIshlinskii.structure`. Sources: M. Al Janaideh and P. Krejci,
+    IEEE/ASME Trans. Mechatronics 18 (2013), for the law and the analytic inverse; M. Al Janaideh, P. Krejci and G. A.
+    Monteiro, Applications of Mathematics (2023).
 
     Parameters
     ----------
     thresholds : sequence of float, length n_plays
-        r_i at rest, not negative and increasing [unit of u]. The play of threshold zero is the input itself at
-        every speed.
+        r_i at rest, not negative and increasing [unit of u]. The play of threshold zero is the input at every speed.
     weights : sequence of float, length n_plays
         w_i, of any sign [unit of y / unit of u].
     beta : float
@@ -66,10 +66,6 @@ class RateDependentPrandtlIshlinskii(Bank, Placed):
     ------
     ValueError
         If lengths differ, a number is not finite, beta or a threshold is negative, or the thresholds do not increase.
-
-    Notes
-    -----
-    `hysim.identify` searches for beta, and takes a structure as of `PrandtlIshlinskii.structure`.
 
     Examples
     --------
@@ -135,8 +131,7 @@ class RateDependentPrandtlIshlinskii(Bank, Placed):
         Raises
         ------
         ValueError
-            If u is not finite or has not one axis, the sample time is not positive, or the speed is negative or of
-            another length.
+            If u is not finite or has not one axis, sample time is not positive, or speed negative or of another length.
         """
         law = self.at(sample_time)
         if speed is None:

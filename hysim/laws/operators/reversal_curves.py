@@ -22,15 +22,13 @@ degree in both, by least squares with weights (1 - |x|^3)^3 in the distances x i
 
     (s + 1 + g (a - b) / 2 d) d                 d: distance of neighbouring curves, s: smoothing, g: its growth
 
-so that the far, weak part of a diagram may be smoother than the ridge along its diagonal. s and g are the smoothest of
-a table whose error at curves that are left out, every fifth in turn, is the least within its standard error. Standard
-errors are those of the local residuals.
+so that the far, weak part of a diagram may be smoother than its ridge. s and g are the smoothest of a table whose error
+at left-out curves, every fifth in turn, is the least within its standard error. Standard errors are of local residuals.
 
 Outputs at the lowest input, where each rise begins, show a drift: where they move more than their differences from
-curve to curve say (J. von Neumann, Ann. Math. Statist. 12, 1941), their running mean is subtracted.
-
-Sources: R. J. Harrison, J. M. Feinberg, Geochem. Geophys. Geosyst. 9, Q05016 (2008), for local regression on curves;
-R. Egli, Glob. Planet. Change 110 (2013), for a smoothing that grows.
+curve to curve say (J. von Neumann, Ann. Math. Statist. 12, 1941), their running mean is subtracted. Sources: R. J.
+Harrison, J. M. Feinberg, Geochem. Geophys. Geosyst. 9, Q05016 (2008), for local regression on curves; R. Egli, Glob.
+Planet. Change 110 (2013), for a smoothing that grows.
 """
 
 import math
@@ -77,8 +75,8 @@ class Forc:
         Weight of relays over area, and its standard error, at upper thresholds along axis 0 and lower ones along axis
         1, both at `levels` [unit of y / unit of u^2].
     smoothing, growth : float
-        Reach of the local regression in distances of neighbouring curves, beyond the first one, and what it gains in
-        each of these from the diagonal on.
+        Reach of the local regression beyond the first curve, and its gain per curve from the diagonal on [curve
+        distances].
     left_out : float
         Rms error of the outputs at curves left out, every fifth in turn [unit of y]; nan for a given smoothing.
     stroke : float
@@ -155,8 +153,7 @@ class Forc:
 def forc(record: Record, *, smoothing: float | Literal["auto"] = "auto", tolerance: float = TOLERANCE) -> Forc:
     """The density of relays from first-order reversal curves: half the mixed derivative, by local regression.
 
-    Outputs at the extreme where the curves begin, the calibration points of a magnetometer, show a drift, which is
-    subtracted.
+    A drift, shown by outputs at the extreme where curves begin (a magnetometer's calibration points), is subtracted.
 
     Parameters
     ----------
@@ -176,8 +173,7 @@ def forc(record: Record, *, smoothing: float | Literal["auto"] = "auto", toleran
     Raises
     ------
     ValueError
-        If the input never falls, there are fewer than 10 curves to choose a smoothing by, or `smoothing` is not
-        positive.
+        If the input never falls, there are fewer than 10 curves for its choice, or `smoothing` is not positive.
 
     Examples
     --------
@@ -253,8 +249,8 @@ def everett_from_curves(
 ) -> tuple[FloatArray, FloatArray, float]:
     """Levels, E at the pairs of them (upper, lower), and the output at the lowest input.
 
-    E is zero above the diagonal, and beyond the curves as at their ends. Of a record turned by 180 degrees E(a, b) is
-    E(-b, -a).
+    E is zero above the diagonal, beyond the curves as at their ends; for a record turned by 180 degrees it is E(-b,
+    -a).
     """
     if _begins_at_the_top(record, tolerance):
         own = None if levels is None else -read_only(levels, "levels", ndim=1)[::-1]

@@ -3,9 +3,8 @@
     rising:   v = max(v, u), until v - u > threshold; then v = u, falling
     falling:  v = min(v, u), until u - v > threshold; then v = u, rising
 
-The output v follows the running extreme of the input and turns only once the input has retreated by more than the
-threshold. Noise below half the threshold then makes no reversal. It is the turning-point (rainflow) filter of fatigue
-analysis, run causally.
+The output v follows the input's running extreme and turns only once it has retreated by more than the threshold. Noise
+below half the threshold makes no reversal. This is the causal turning-point (rainflow) filter of fatigue analysis.
 """
 
 from typing import Any, ClassVar
