@@ -37,6 +37,16 @@ def lengthened(state: FloatArray, k: int, v: float, end: float, force: float) ->
 
 
 @inner
+def dissipated(area: float, force: float, stiffness: float) -> float:
+    """Energy of an excursion whose force falls to zero; below 1e-12 of its work it is rounding, and counts as zero.
+
+    Below c = 1 the shares of elastic excursions would grow out of rounding.
+    """
+    energy = area - 0.5 * force * force / stiffness if stiffness > 0.0 else 0.0
+    return energy if energy > 1e-12 * area else 0.0
+
+
+@inner
 def lost_share(energy: float, spent: float, capacity: float, exponent: float) -> float:
     """Share of a strength that an excursion takes; `spent` is the energy of all; a capacity of 0 means no loss."""
     if capacity <= 0.0 or energy <= 0.0:

@@ -5,23 +5,27 @@ is
 
     B(x) = max(residual, min(F (1 + a (x - F)), R - capping_ratio x)),    F = 1, R so that both meet at the cap
 
-An excursion begins at f = 0 and goes to the largest point so far in its direction, (X, B(X)): straight, or first by
+An excursion begins at f = 0 and goes to the largest point so far in its direction, (X, B(X)), X >= 1 at first, and on
+along B: straight, or first by
 
-    the break point at x_b = (1 - pinch_input) (X - B(X) / K),   on the line from the begin to (X, pinch_force B(X)),
-    the last peak on this side, if it is below the largest one and the way by it is steeper.
+    the break point at x_b = (1 - pinch_input) (X - B(X) / K),   on the line from the begin to (X, pinch_force B(X)), if
+    pinch_force < 1, K > 0, and it is beyond the begin;
+    then the last peak on this side, if there is one, ahead of this and higher, lower than B(X), and the way by it is
+    steeper. The peaks are the tips of excursions that have ended.
 
 With E the energy of the excursion and S that of all so far, this one included, each mode j with Lambda_j > 0 has
 
-    beta_j = (E / (Lambda_j - S))^c
+    beta_j = (E / (Lambda_j - S))^c,    0 where E = 0, and 1 where E reaches Lambda_j - S
 
 From the tip of an excursion the force falls with the slope (1 - beta_k) K, where E is what is lost if it falls to zero
-with K. At zero, K becomes that slope, and in the direction which begins
+with K. At zero, K := (1 - beta_k) K, and in the direction which begins, E now being what was lost,
 
     F := (1 - beta_s) F,    R := (1 - beta_c) R,    X := (1 + beta_a) X
 
 Where a beta of the last three reaches 1, the capacity is exhausted and the force is zero from then on. F is not below
 the residual. The slope of unloading is not below that from the begin of the excursion to its tip, nor such that the
-excursion would deliver energy.
+excursion would deliver energy. An E below 1e-12 of the work up to the tip is rounding, and counts as 0: with c < 1 the
+betas of elastic excursions would grow out of it.
 """
 
 from typing import ClassVar, Self
@@ -29,7 +33,7 @@ from typing import ClassVar, Self
 import numpy as np
 
 from hysim._basics.frozen import FloatArray
-from hysim.kernels.components import lengthened, lost_share
+from hysim.kernels.components import dissipated, lengthened, lost_share
 from hysim.models.law import Law, Packed
 from hysim.models.model import Example, family
 from hysim.models.parameters import Parameter
@@ -122,7 +126,7 @@ class IbarraMedinaKrawinkler(Law):
     further_memory = 18
     workspace = 3
     example = Example(
-        dict.fromkeys(_CAPACITIES, 60.0) | {"pinch_force": 0.25},
+        dict.fromkeys(_CAPACITIES, 60.0) | {"cap_input": 2.0, "capping_ratio": 0.4, "residual": 0.4},
         (-4.0, 4.0),
         title="Ibarra-Medina-Krawinkler: pinched joint",
         group="Devices",
@@ -158,13 +162,13 @@ class IbarraMedinaKrawinkler(Law):
         v, k, tip, f, exponent = s * u / parameters[1], 9 if s > 0.0 else 14, state[3], state[4], parameters[12]
         if v < tip:
             high, area, stiffness = f, state[5], 1.0 - state[7]
-            energy = area - 0.5 * high * high / stiffness if stiffness > 0.0 else 0.0
+            energy = dissipated(area, high, stiffness)
             stiffness *= 1.0 - lost_share(energy, state[6] + energy, parameters[10], exponent)
             slope = max(stiffness, high / (tip - state[2]), 0.5 * high * high / area) if high > 0.0 else 1.0
             f = high - slope * (tip - v)
             if f < 0.0:
                 state[k], state[k + 1], state[k + 2] = max(state[k], tip - 1.0), tip, high
-                energy = area - 0.5 * high * high / slope
+                energy = dissipated(area, high, slope)
                 state[6], state[7] = state[6] + energy, 1.0 - stiffness
                 s, v, tip, k, f = -s, -v, high / slope - tip, 23 - k, 0.0
                 state[2], state[3], state[4], state[5] = tip, tip, 0.0, 0.0
@@ -182,10 +186,12 @@ class IbarraMedinaKrawinkler(Law):
             hardening = parameters[2] * strength
             rest = strength - hardening * strength
             top = max(least, min(rest + hardening * peak, cap - falling * peak))
-            at, low, residual = begin, 0.0, peak - top / (1.0 - state[7]) if state[7] < 1.0 else begin
+            at, low, pinch = begin, 0.0, begin
+            if state[7] < 1.0:
+                pinch = (1.0 - parameters[7]) * (peak - top / (1.0 - state[7]))
             state[19], state[20], state[21] = begin, 0.0, 0.0
-            if begin < (1.0 - parameters[7]) * residual:
-                at = (1.0 - parameters[7]) * residual
+            if begin < pinch and parameters[6] < 1.0:
+                at = pinch
                 low = parameters[6] * top * (at - begin) / (peak - begin)
                 lengthened(state, 19, v, at, low)
             last, force = state[k + 1], state[k + 2]
