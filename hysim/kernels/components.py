@@ -67,7 +67,7 @@ def on_envelope(p: FloatArray, v: float, largest: float) -> float:
     """Force at v over the stiffness: on the pinched line, then on the way to the envelope, then on the envelope."""
     line = p[2] + p[7] * v
     if largest == 0.0:
-        return line if v < p[10] else envelope(p, v)
+        return min(line, envelope(p, p[10])) if v < p[10] else envelope(p, v)
     target = p[9] * largest
     if v >= target:
         return envelope(p, v)

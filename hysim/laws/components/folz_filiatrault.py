@@ -5,12 +5,15 @@ All over the stiffness. On each side, in the direction of loading, the envelope 
     E(v) = (knee_input + r_1 v) (1 - exp(-v / knee_input))                  up to peak_input
     E(v) = max(0, E(peak_input) + r_2 (v - peak_input))                     beyond
 
-Up to where it meets the pinched line, E(v) = pinch_input + r_4 v, a virgin law is elastic along it. An excursion then
-begins on the pinched line, and goes from there with the slope (knee_input / D)^alpha, at most 1, to the envelope at D =
-beta times the largest v from which this envelope was left, and along it; no force before D is above E(D). On a side
-that was not loaded yet it goes to the envelope where both meet. From the tip of an excursion the force falls with the
-slope r_3 until it meets the path of the excursion in the other direction, and comes back on the same line if the input
-does.
+Up to D, where it meets the pinched line, E(D) = pinch_input + r_4 D, or has its peak if that comes first, a virgin law
+is elastic along it. An excursion then goes to the envelope at D, and along it, by the path
+
+    P(v) = min(E(D), max(pinch_input + r_4 v, E(D) - min(1, (knee_input / D)^alpha) (D - v)))       before D
+
+where D = beta times the largest v from which this envelope was left: the largest tip beyond D of an excursion that has
+ended. On a side without one the path is min(E(D), pinch_input + r_4 v) up to the D of the virgin law. From the tip of
+an excursion the force falls with the slope r_3 until it meets the path of the excursion in the other direction, and
+comes back on the same line if the input does.
 """
 
 from typing import ClassVar, Self
@@ -49,8 +52,8 @@ class FolzFiliatrault(Law):
     peak_input : float
         Input Delta_u of the peak, positive [unit of u].
     r_1, r_2, r_3, r_4 : float
-        Slopes over the stiffness: of the envelope before the peak, from 0 to below 1, and after it, negative; of
-        unloading, at least 1; and of the pinched line, from 0 to below 1.
+        Slopes over the stiffness: of the envelope before the peak, from 0 to 0.5, above which it would be steeper than
+        the stiffness, and after it, negative; of unloading, at least 1; and of the pinched line, from 0 to below 1.
     alpha : float
         Exponent with which the slope of reloading fades, not negative.
     beta : float
@@ -64,7 +67,8 @@ class FolzFiliatrault(Law):
     Notes
     -----
     The law is virgin at u = 0, from where it comes to the first sample. The output is proportional to the stiffness.
-    The pinched lines store energy: what is said of no path delivering energy holds for closed cycles alone.
+    The pinched lines store energy: what is said of no path delivering energy holds for closed cycles alone, and for
+    these up to inputs u where the envelope at beta u has not fallen below r_4 u - pinch_input.
 
     Source: B. Folz and A. Filiatrault, J. Struct. Eng. 127 (2001) 361; the envelope is that of R. O. Foschi.
 
@@ -94,13 +98,18 @@ class FolzFiliatrault(Law):
     units: ClassVar = dict.fromkeys(("r_1", "r_2", "r_3", "r_4", "alpha", "beta"), "1")
     initial: ClassVar[tuple[str, ...]] = ()
     further_memory = 5
-    example = Example({"r_4": 0.03}, (-8.0, 8.0), title="Folz-Filiatrault: nailed timber", group="Devices")
+    example = Example(
+        {"peak_input": 5.0, "r_2": -0.1, "r_4": 0.03, "beta": 1.2},
+        (-8.0, 8.0),
+        title="Folz-Filiatrault: nailed timber",
+        group="Devices",
+    )
     searched = (
         Parameter("stiffness", unit="y/u", affine=True),
         Parameter("knee_input", 1e-3, 2.0, unit="h", log=True),
         Parameter("pinch_input", 1e-4, 1.0, unit="h", log=True),
         Parameter("peak_input", 1e-2, 3.0, unit="h", log=True),
-        Parameter("r_1", 0.0, 0.9, physical=(True, True)),
+        Parameter("r_1", 0.0, 0.5, physical=(True, True)),
         Parameter("r_2", -1.0, -1e-3, physical=(False, True)),
         Parameter("r_3", 1.0, 5.0, physical=(True, False)),
         Parameter("r_4", 0.0, 0.9, physical=(True, True)),
@@ -142,7 +151,7 @@ class FolzFiliatrault(Law):
         """Refuse numbers outside their limits."""
         super().check(tables)
         for name, within, limits in (
-            ("r_1", tables["r_1"] < 1.0, "below 1"),
+            ("r_1", tables["r_1"] <= 0.5, "at most 0.5"),
             ("r_2", tables["r_2"] < 0.0, "below 0"),
             ("r_3", tables["r_3"] >= 1.0, "at least 1"),
             ("r_4", tables["r_4"] < 1.0, "below 1"),
