@@ -1,5 +1,6 @@
 """The origin-oriented law."""
 
+import math
 from typing import ClassVar, Self
 
 from hysim._basics.frozen import FloatArray
@@ -76,9 +77,16 @@ class OriginOriented(Law):
         return min(self.hardening, self.stiffness), max(self.hardening, self.stiffness)
 
     @classmethod
-    def from_opensees(cls, *, f1: float, e1: float, f2: float, e2: float) -> Self:
+    def from_opensees(
+        cls, *, f1: float, e1: float, f2: float, e2: float, f3: float | None = None, e3: float | None = None
+    ) -> Self:
         """The material ``uniaxialMaterial OriginCentered``, whose third point lies on the line through both others."""
-        return cls(stiffness=f1 / e1, hardening=(f2 - f1) / (e2 - e1), yield_input=e1)
+        hardening = (f2 - f1) / (e2 - e1)
+        if f3 is not None and e3 is not None and not math.isclose(f3, f2 + hardening * (e3 - e2), rel_tol=1e-9):
+            raise ValueError(
+                f"the third point must lie on the line through both others, got f3 = {f3:g} at e3 = {e3:g}"
+            )
+        return cls(stiffness=f1 / e1, hardening=hardening, yield_input=e1)
 
     def to_opensees(self) -> dict[str, float]:
         """The arguments of `from_opensees`, and a third point far out on the same line, after which it is flat."""

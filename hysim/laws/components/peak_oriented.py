@@ -5,14 +5,14 @@ and goes to the largest point so far in this direction, (X, B(X)), and on along
 
     B(x) = min(x, 1 + a (x - 1)),    X >= 1 at first
 
-If the last peak on this side is below the largest one, and the way by it is steeper, it goes by that. From the tip of
-an excursion the force falls with the slope
+If there is a last peak on this side, ahead and below the largest one, and the way by it is steeper, it goes by that.
+The peaks are the tips of excursions that have ended. From the tip of an excursion the force falls with the slope
 
     K = max(X^-unloading, B(X) / X)
 
-to zero, where an excursion in the other direction begins, and comes back on the same line if the input does. K is not
-below the slope from the peak to the origin, so that the line meets f = 0 between the peaks of both sides, and no path
-delivers energy.
+with the largest X including this tip, to zero, where an excursion in the other direction begins, and comes back on the
+same line if the input does. K is not below the slope from the peak to the origin, so that the line meets f = 0 between
+the peaks of both sides, and no path delivers energy.
 """
 
 from typing import ClassVar, Self
@@ -118,9 +118,10 @@ class PeakOriented(Law):
     def check(cls, tables: Tables) -> None:
         """Refuse numbers outside their limits."""
         super().check(tables)
-        for name, most in (("hardening_ratio", 1.0), ("unloading", 1.0)):
-            if not (tables[name] <= most).all():
-                raise ValueError(f"{name} must be at most {most:g}, got {tables[name].max()}")
+        if not (tables["hardening_ratio"] < 1.0).all():
+            raise ValueError(f"hardening_ratio must be below 1, got {tables['hardening_ratio'].max()}")
+        if not (tables["unloading"] <= 1.0).all():
+            raise ValueError(f"unloading must be at most 1, got {tables['unloading'].max()}")
 
     @property
     def known_slopes(self) -> tuple[float, float]:

@@ -28,7 +28,7 @@ class Slack(Law):
     opposite_stiffness : float
         That of an equal rod which takes a negative input; 0 if there is none.
     slack : float
-        Input from which a rod takes force [unit of u].
+        Input from which a rod takes force; below zero where it is prestressed [unit of u].
     yield_input : float
         Further input at which it yields, positive [unit of u].
     hardening_ratio : float
@@ -41,8 +41,9 @@ class Slack(Law):
 
     Notes
     -----
-    The law is virgin at u = 0, from where it comes to the first sample. Every path dissipates. The output is affine in
-    both stiffnesses. With no slack and both rods it is the brace that is effective in tension alone.
+    The law is virgin at u = 0, from where it comes to the first sample. Every path dissipates where the slack is not
+    negative; a prestressed rod gives back what it stores at u = 0. The output is affine in both stiffnesses. With no
+    slack and both rods it is the brace that is effective in tension alone.
 
     Examples
     --------
@@ -64,7 +65,10 @@ class Slack(Law):
     further_memory = 2
     units: ClassVar = {"hardening_ratio": "1"}
     example = Example(
-        {"opposite_stiffness": 1.0, "slack": 0.3}, (-4.0, 4.0), title="Slack: braces of rod", group="Devices"
+        {"opposite_stiffness": 1.0, "slack": 0.3, "hardening_ratio": 0.1},
+        (-4.0, 4.0),
+        title="Slack: braces of rod",
+        group="Devices",
     )
     searched = (
         Parameter("stiffness", unit="y/u", affine=True),
@@ -81,8 +85,8 @@ class Slack(Law):
         unit, b = parameters[3], parameters[4]
         v, w = u - parameters[2], -u - parameters[2]
         state[0] = u
-        state[1] = max(state[1], (1.0 - b) * (v - unit))
-        state[2] = max(state[2], (1.0 - b) * (w - unit))
+        state[1] = max(state[1], (1.0 - b) * (max(u, 0.0) - parameters[2] - unit))
+        state[2] = max(state[2], (1.0 - b) * (max(-u, 0.0) - parameters[2] - unit))
         return float(parameters[0] * max(0.0, v - state[1]) - parameters[1] * max(0.0, w - state[2]))
 
     @classmethod
