@@ -7,6 +7,7 @@ import subprocess
 
 import numpy as np
 import pytest
+from component_rules import PATHS
 from strategies import refused
 
 import hysim as hs
@@ -48,6 +49,7 @@ LAWS = {
     "MenegottoPinto": hs.MenegottoPinto(a1=0.1),
     "JilesAtherton": hs.JilesAtherton(),
     "Line": hs.Line(slope=1.0),
+    **{name: getattr(hs, name)() for name in PATHS},
 }
 POSITIVE = (
     "n",
