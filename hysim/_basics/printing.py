@@ -28,6 +28,7 @@ _PICTURES = {
     "Sweep": 'hs.plot.parallel_coordinates(study, "output")',
     "SobolIndices": 'hs.plot.sensitivities(indices, "output")',
     "Fragility": "hs.plot.fragility(curve)",
+    "ResponseSpectrum": "hs.plot.spectrum(spectrum)",
     "LoopMetrics": "hs.plot.width(metrics)",
 }
 """Functions that draw a result, by the name of its class."""

@@ -12,7 +12,7 @@ from hysim.plot._comparisons import comparison, identification, loops, residuals
 from hysim.plot._loops import animate, cycles, minor_loops, width
 from hysim.plot._outcomes import describing_function, displacement, fragility, parameter, selection, track, trade_off
 from hysim.plot._posterior import corner, evidence, prediction
-from hysim.plot._records import element_loops, history, loop, response, signals, traces
+from hysim.plot._records import element_loops, history, loop, response, signals, spectrum, traces
 from hysim.plot._style import DIVERGING, FORMATS, SEQUENTIAL, figure, house_style, panels, save_svg, to_bytes, to_svg
 from hysim.plot._sweeps import forc, heat_map, ida, parallel_coordinates, quantile_bands, residual_map, sensitivities
 
@@ -53,6 +53,7 @@ __all__ = [
     "selection",
     "sensitivities",
     "signals",
+    "spectrum",
     "to_bytes",
     "to_svg",
     "traces",

@@ -1,4 +1,4 @@
-"""Pictures of records and simulations: the loop, and the signals against time."""
+"""Pictures of records and simulations: the loop, and the signals against time; and spectra of earthquakes."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any, Protocol, runtime_checkable
@@ -6,11 +6,12 @@ from typing import Any, Protocol, runtime_checkable
 import numpy as np
 from matplotlib.axes import Axes
 
-from hysim._basics.frozen import FloatArray
+from hysim._basics.frozen import FloatArray, check_choice
 from hysim._basics.prefixes import in_unit, label
 from hysim._basics.results import model_of
 from hysim.control import ClosedLoop
 from hysim.models.protocols import Responding
+from hysim.plants.structures.spectrum import ResponseSpectrum
 from hysim.plot._style import MANY, MEASURED, POINTS, AxesArray, joined, line, one, several, upright
 from hysim.records import Record, as_record
 from hysim.simulation import Simulation, columns_of, free_run, has_elements
@@ -19,6 +20,11 @@ _DRAWN = {"zoh": "steps-post", "foh": "default"}
 _MOST_NAMED = 8  # lines of a panel that a legend has room for
 _ELEMENTS_IN_A_ROW = 3
 _ARROW = 0.03  # its length along the input, of the span
+_FRACTILES = (0.16, 0.5, 0.84)
+_TABLES = {
+    "pseudo_acceleration": "Pseudo-acceleration", "displacement": "Peak displacement", "ductility": "Ductility",
+    "reduction_factor": "Reduction factor", "elastic_acceleration": "Elastic pseudo-acceleration",
+}  # fmt: skip
 
 
 class InputOutput(Protocol):
@@ -270,6 +276,42 @@ def response(run: ClosedLoop, ax: Axes | None = None) -> Axes:
     if not np.array_equal(run.measurement, run.y):
         series["measurement"] = (run.t, run.measurement)
     return traces(series, ax, units=run.units)
+
+
+def spectrum(
+    result: ResponseSpectrum | Mapping[str, ResponseSpectrum],
+    ax: Axes | None = None,
+    *,
+    quantity: str = "pseudo_acceleration",
+    unit: str = "",
+) -> Axes:
+    """Draw a table of a response spectrum over the periods: its median, and a band from the 16 to the 84 % fractile.
+
+    `result` is one of `hysim.response_spectrum`, or a mapping of names to some. `quantity` is the name of the table,
+    such as ``"displacement"`` or ``"ductility"``, and `unit` a label of its unit. Fractiles are the smallest values
+    that so many records do not exceed; a line ends where the motion of the median diverges.
+
+    Examples
+    --------
+    >>> import hysim as hs
+    >>> quake = hs.signals.ground_motion(3.0, duration=8.0, sample_time=0.02)
+    >>> result = hs.response_spectrum(quake, 0.02, [0.2, 0.5, 1.0])
+    >>> hs.plot.spectrum(result, hs.plot.figure().add_subplot(), quantity="displacement", unit="m").get_ylabel()
+    'Peak displacement [m]'
+    """
+    check_choice("quantity", quantity, _TABLES)
+    results = result if isinstance(result, Mapping) else {"median": result}
+    with one(ax) as axes:
+        for k, (name, each) in enumerate(results.items()):
+            order = np.argsort(each.periods)
+            tables = {**vars(each), "displacement": each.displacement, "reduction_factor": each.reduction_factor}
+            low, median, high = np.quantile(tables[quantity][:, order], _FRACTILES, axis=0, method="inverted_cdf")
+            shade = {"alpha": 0.2, "linewidth": 0.0, "color": line(k)["color"]}
+            axes.fill_between(each.periods[order], low, high, where=np.isfinite(high), **shade)
+            axes.plot(each.periods[order], median, label=name, **line(k))
+        axes.set(xlabel="Period [s]", ylabel=in_unit(_TABLES[quantity], unit))
+        axes.legend()
+    return axes
 
 
 def _arrows(ax: Axes, result: InputOutput, colour: Any) -> None:
