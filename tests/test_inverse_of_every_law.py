@@ -73,6 +73,9 @@ LAWS = {
         upper=(-1.0, -0.6, 0.5, 0.9, 1.0),
         feedthrough=0.3,
     ),
+    "TabulatedDahl": hs.TabulatedDahl(
+        inputs=(-2.0, 0.0, 2.0), centre=(-2.0, 0.0, 2.0), amplitude=(0.1, 0.2, 0.1), rate=2.0
+    ),
     "Chan": hs.Chan(saturation=2.0, coercivity=0.4, squareness=0.6, feedthrough=0.5, offset=0.1, z0=0.3),
     "Chan, behind a gap": hs.Chan(saturation=9.0, coercivity=0.4, squareness=0.6, feedthrough=0.5, gap=0.4),
     "EnergyPlays": hs.EnergyPlays(thresholds=(0.0, 0.2), weights=(2.0, 3.0), field=0.8, feedthrough=0.2),

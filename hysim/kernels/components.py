@@ -51,7 +51,7 @@ def lost_share(energy: float, spent: float, capacity: float, exponent: float) ->
     """Share of a strength that an excursion takes; `spent` is the energy of all; a capacity of 0 means no loss."""
     if capacity <= 0.0 or energy <= 0.0:
         return 0.0
-    return (energy / (capacity - spent)) ** exponent if energy < capacity - spent else 1.0
+    return float((energy / (capacity - spent)) ** exponent) if energy < capacity - spent else 1.0
 
 
 @inner
@@ -59,7 +59,7 @@ def envelope(p: FloatArray, v: float) -> float:
     """Envelope of Foschi, an exponential knee on a line, and a line that falls to zero, over the stiffness."""
     t = min(v, p[3])
     force = (p[1] + p[4] * t) * -math.expm1(-t / p[1]) + p[5] * (v - t)
-    return max(force, 0.0)
+    return float(max(force, 0.0))
 
 
 @inner
@@ -67,10 +67,10 @@ def on_envelope(p: FloatArray, v: float, largest: float) -> float:
     """Force at v over the stiffness: on the pinched line, then on the way to the envelope, then on the envelope."""
     line = p[2] + p[7] * v
     if largest == 0.0:
-        return min(line, envelope(p, p[10])) if v < p[10] else envelope(p, v)
+        return float(min(line, envelope(p, p[10]))) if v < p[10] else envelope(p, v)
     target = p[9] * largest
     if v >= target:
         return envelope(p, v)
     top = envelope(p, target)
     slope = min(1.0, (p[1] / target) ** p[8])
-    return min(top, max(line, top - slope * (target - v)))
+    return float(min(top, max(line, top - slope * (target - v))))

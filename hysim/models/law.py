@@ -617,7 +617,7 @@ class Law(Placed, Searched, ABC):
         ValueError if an affine parameter moves the memory: it is not known yet where the others are searched; or if
         the law remembers more than its initial memory.
         """
-        if self.packed[1].size > 1 + len(self.initial_names):
+        if self.further_memory:
             raise ValueError('the memory of this law is more than its initial force: use initial="free" or "rest"')
         names, u = self.initial_names, np.append(record.u, record.u[0])
         turns = record.reversals()

@@ -90,7 +90,7 @@ class OriginOriented(Law):
 
     def to_opensees(self) -> dict[str, float]:
         """The arguments of `from_opensees`, and a third point far out on the same line, after which it is flat."""
-        e1, points = self.yield_input, {}
+        e1, points = self.yield_input, dict[str, float]()
         for k, e in enumerate((e1, 2.0 * e1, 1e6 * e1), 1):
             points |= {f"f{k}": self.stiffness * e1 + self.hardening * (e - e1), f"e{k}": e}
         return points
