@@ -9,7 +9,7 @@ from strategies import assert_batch_has_the_bits_of_its_laws, assert_cut_or_step
 
 import hysim as hs
 
-HISTORIES = int(os.environ.get("HYSIM_HISTORIES", "40"))
+HISTORIES = int(os.environ.get("HYSIM_HISTORIES", "100"))
 of_each = pytest.mark.parametrize("name", PATHS)
 
 
