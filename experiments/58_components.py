@@ -214,7 +214,7 @@ def draw(rules: list[Row], rows: list[Row]) -> Figure:
     for ax, law, row in zip(canvas.subplots(2, 4).flat, RULES, rules, strict=True):
         ax.plot(u, row["theirs"], color="#D55E00", lw=2.5, alpha=0.5, label="OpenSees")
         ax.plot(u, law.response(u), color="k", lw=0.7, label="hysim")
-        ax.set(title=f"{row['law']}, {row['material']}", xticks=[-4, 0, 4])
+        ax.set(title=row["material"], xticks=[-4, 0, 4])
     canvas.legend(*ax.get_legend_handles_labels(), loc="outside lower center", ncols=2)
     return canvas
 

@@ -78,7 +78,8 @@ class MenegottoPinto(Law):
     Each reversal starts a new curve and forgets the one that it left, however small it is, as in OpenSees's Steel02:
     after a small interruption the output runs above the curve without interruption. The rounding of a solver would so
     keep a frame from yielding. Therefore a way back of less than `least_reversal` stays on the old curve, and the new
-    one begins at its end. For an input with more noise put a `ReversalFilter` before the law. With least_reversal=0
+    one begins at its end. For an input with more noise put a `ReversalFilter` before the law; for
+    a structure whose tolerance is above its default 1e-8 let it be 100 times the tolerance. With least_reversal=0
     the outputs are those of Steel02, but for a z0 beyond the asymptote, from where they run parallel to it.
 
     The slope dy/du lies between hardening and stiffness; where both have one sign there is an inverse. The output is
