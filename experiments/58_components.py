@@ -10,11 +10,15 @@ the noisy force, in percent of its range, and that of a number the median over t
 
 A spectrum of constant ductility is that of a bilinear law for 100 periods in 20 earthquakes; OpenSees solves the same
 equations, with one Newmark step a sample, for some of the systems that the search asks for.
+
+``python experiments/58_components.py FOLDER`` identifies measured records of steel and of a damper, which are public
+and not part of hysim, and adds them to the result.
 """
 
 import sys
 from collections.abc import Callable, Mapping
 from functools import partial
+from itertools import product
 from pathlib import Path
 from typing import Any
 
@@ -26,7 +30,7 @@ from hysim.plot import Figure, figure
 
 sys.path.insert(0, str(Path(__file__).parent))
 from peers.contest import peer
-from results_folder import cpu_timed, median_and_worst, wall_timed, write_results
+from results_folder import cpu_timed, median_and_worst, stored_result, wall_timed, write_files, write_results
 
 RESULTS = Path(__file__).parent / "results" / "components"
 STEPS, CORNERS = (20, 2000), np.append(0.0, np.ravel([np.linspace(1.2, 4.0, 8), -np.linspace(1.2, 4.0, 8)], order="F"))
@@ -188,6 +192,23 @@ def spectrum(ops: Any, n_records: int, n_periods: int) -> Row:
     }  # fmt: skip
 
 
+def measured(folder: Path) -> list[Row]:
+    """Errors and seconds on three steel coupons and a magnetorheological damper, whose files stand in a folder."""
+    recs = {
+        "damper": hs.load(
+            folder / "mr_damper_labcontrol/data_simulation_4.2_MRdamper.mat", u="x_F[0]", y="x_F[2]", t=False
+        )
+    }
+    for k in (1, 2, 3):
+        recs[f"steel {k}"] = hs.load(folder / f"steel_resspylab/example_{k}.csv", u="e_true", y="Sigma_true")
+    rows = []
+    for (name, rec), law in product(recs.items(), (hs.Bilinear, hs.MenegottoPinto, hs.VaianaRosati, *OTHERS)):
+        fit, seconds = cpu_timed(hs.identify, law, rec)
+        error = 100.0 * fit.rmse / float(np.ptp(rec.y))
+        rows.append({"record": name, "law": law.__name__, "error_percent": error, "seconds": seconds})
+    return rows
+
+
 def main(smoke: bool = False) -> list[Row]:
     """Compare, calibrate and time, and unless it is a smoke run write table, figure and JSON."""
     ops = peer("openseespy.opensees")
@@ -220,4 +241,8 @@ def draw(rules: list[Row], rows: list[Row]) -> Figure:
 
 
 if __name__ == "__main__":
-    main()
+    if len(sys.argv) > 1:  # the measured records alone, beside what is stored
+        stored = stored_result(RESULTS) | {"measured": measured(Path(sys.argv[1]))}
+        write_files(RESULTS, stored.pop("rows"), partial(draw, stored["rules"]), stored)
+    else:
+        main()

@@ -1302,6 +1302,7 @@ def components(result: Result) -> list[str]:
             ("CPU s", "median_seconds", number),
             ("worst", "worst_seconds", number),
         ),
+        crossed("error [%] on measured records", result["measured"], "record", "law", "error_percent", "{:.1f}".format),
         f"The numbers of a law come back to {number(tests[0]['median_off_percent'], 2)} and "
         f"{number(tests[1]['median_off_percent'], 2)} % in the median. A spectrum of constant ductility of {systems} "
         f"oscillators takes {number(result['spectrum_seconds'], 2)} s on two cores. A loop in OpenSees with one step a "
