@@ -24,7 +24,7 @@ NOT_RATE_INDEPENDENT = {
 }
 """Between two samples the input of these, or a channel, is held, or goes on a line: with more it is another input."""
 INVERSES = {"BoucWenInverse"}  # under the laws that it inverts
-ELSEWHERE = {"MenegottoPinto", "VaianaRosati", *PATHS}  # drawn in the tests of these families
+ELSEWHERE = {"MenegottoPinto", "TabulatedDahl", "VaianaRosati", *PATHS}  # drawn in the tests of these families
 SEARCHED = {"Chan", "CustomLaw", "EnergyPlays", "Line", "MaxwellSlip", "ParametricPrandtlIshlinskii", "Play",
             "PreisachRelays", "Stop", "Tellinen", "TellinenTable"}  # fmt: skip
 """Laws whose only inverse is the search on their step, as a sum's is; `test_inverse_of_every_law.py` has them."""

@@ -44,6 +44,7 @@ LAWS = {
     "Chan": hs.Chan(gap=0.2),
     "EnergyPlays": hs.EnergyPlays(**PLAYS, field=0.3),
     "Dahl": hs.Dahl(),
+    "TabulatedDahl": hs.TabulatedDahl(),
     "ColemanHodgdon": hs.ColemanHodgdon(),
     "VaianaRosati": hs.VaianaRosati(f_0=(0.4, 0.3), gamma_1=0.2),
     "MenegottoPinto": hs.MenegottoPinto(a1=0.1),
