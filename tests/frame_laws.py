@@ -77,6 +77,16 @@ KINKED = {
         z0=(0.0,),
     ),
     "MaxwellSlip": hs.MaxwellSlip(stiffness=(40.0, 40.0), slips=(0.01, 0.03), feedthrough=20.0),
+    "Bilinear": hs.Bilinear(stiffness=100.0, hardening=20.0, yield_input=0.02),
+    "FlagShape": hs.FlagShape(stiffness=100.0, hardening=20.0, activation=0.02),
+    "Slack": hs.Slack(stiffness=70.0, opposite_stiffness=70.0, slack=0.01, yield_input=0.02) + SPRING,
+    "OriginOriented": hs.OriginOriented(stiffness=100.0, hardening=20.0, yield_input=0.02),
+    "PeakOriented": hs.PeakOriented(stiffness=100.0, hardening_ratio=0.2, yield_input=0.02),
+    "IbarraMedinaKrawinkler": hs.IbarraMedinaKrawinkler(stiffness=100.0, yield_input=0.02, cap_input=0.2, Lambda_s=1.0),
+    "FolzFiliatrault": hs.FolzFiliatrault(stiffness=100.0, knee_input=0.03, pinch_input=0.005, peak_input=0.3),
+    "TabulatedDahl": hs.TabulatedDahl(
+        inputs=(-0.1, 0.0, 0.1), centre=(-6.0, 0.0, 6.0), amplitude=(1.0, 2.0, 1.0), rate=40.0
+    ),
     "TellinenTable": hs.TellinenTable(
         inputs=(-0.1, -0.02, 0.0, 0.02, 0.1),
         lower=(-1.0, -0.9, -0.3, 0.7, 1.0),

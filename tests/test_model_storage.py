@@ -195,7 +195,7 @@ def test_an_array_of_the_caller_stays_the_callers():
         ("{}", "does not hold a model"),
         (
             '{"family": "Ising", "parameters": {}}',
-            "family 'Ising'; there are Actuator, AdaptiveInverse, Amplifier, BoucWen, ",
+            "family 'Ising'; there are Actuator, AdaptiveInverse, Amplifier, Bilinear, BoucWen, ",
         ),
         ('{"family": "BoucWen", "parameters": {"bta": 1}}', "bta"),
         ('{"family": "BoucWen", "parameters": {"beta": NaN}}', "beta must be finite"),
