@@ -44,7 +44,9 @@ LAWS = {
     "Slack": hs.Slack(opposite_stiffness=2.0, slack=-9.0, yield_input=5.0, hardening_ratio=0.2),
     "OriginOriented": hs.OriginOriented(hardening=0.5),
     "PeakOriented": hs.PeakOriented(hardening_ratio=0.5),
-    "IbarraMedinaKrawinkler": hs.IbarraMedinaKrawinkler(hardening_ratio=0.5, pinch_force=0.5, Lambda_s=9.0),
+    "IbarraMedinaKrawinkler": hs.IbarraMedinaKrawinkler(
+        hardening_ratio=0.5, pinch_force=0.5, **dict.fromkeys(("Lambda_s", "Lambda_c", "Lambda_k", "Lambda_a"), 9.0)
+    ),
     "FolzFiliatrault": hs.FolzFiliatrault(r_1=0.5, r_4=0.2),
     "JilesAtherton": hs.JilesAtherton(Ms=1.0, a=0.4, alpha=0.5, k=0.3, gain=1.0, feedthrough=0.2, offset=0.1),
     "Line": hs.Line(offset=0.2, slope=-0.7),

@@ -51,6 +51,9 @@ LAWS = {
     "JilesAtherton": hs.JilesAtherton(),
     "Line": hs.Line(slope=1.0),
     **{name: getattr(hs, name)() for name in PATHS},
+    "IbarraMedinaKrawinkler": hs.IbarraMedinaKrawinkler(
+        **dict.fromkeys(("Lambda_s", "Lambda_c", "Lambda_k", "Lambda_a"), 9.0)
+    ),
 }
 POSITIVE = (
     "n",
