@@ -35,7 +35,7 @@ from hysim.records import Record
 
 Bounds = tuple[FloatArray, FloatArray]
 
-_MOST_STEPS = 400  # between two samples: to end at zero of the memory can take 250, more are steps of the law
+_MOST_STEPS = 150  # between two samples: to end at zero of the memory can take 110, more are steps of the law
 
 
 Name = Term | str
