@@ -42,7 +42,7 @@ class Slack(Law):
     Notes
     -----
     The law is virgin at u = 0, from where it comes to the first sample. Every path dissipates where the slack is not
-    negative; a prestressed rod gives back what it stores at u = 0. The output is affine in both stiffnesses. With no
+    negative; a prestressed rod returns what it stores at u = 0. The output is affine in both stiffnesses. With no
     slack and both rods it is the brace that is effective in tension alone.
 
     Examples

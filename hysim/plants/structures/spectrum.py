@@ -25,7 +25,7 @@ from hysim.plants.structures.structure import Structure, shear_frame
 _PHASE = 0.18  # of an elastic oscillator in a step: peaks between its ends then err by less than 1e-10
 _TOLERANCE = 1e-8  # ductilities err by less than 1e-6; coarser steps make small reversals, after which steel is elastic
 _AT_REST, _EQUAL = 1e-8, 1e-3  # stroke by yield_input; difference of the slopes to both sides
-_STEP, _MOST = math.log(1.2), math.log(1e8)  # of a scale; half the step misses as many crossings, about 4 of 1000
+_STEP, _MOST = math.log(1.2), math.log(1e8)  # of a scale; half the step was tried, and misses as many crossings
 _CLOSE, _NARROW = 1e-6, 1e-10  # in ln(ductility); in ln(scale) where the ductility jumps
 _DIVERGED = 1e6  # times the elastic displacement; down to periods of 1 ms the weakest oscillators follow the ground
 
