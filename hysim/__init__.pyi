@@ -134,6 +134,8 @@ from hysim.laws.friction.lugre import LuGre as LuGre
 from hysim.laws.friction.stribeck import StribeckFriction as StribeckFriction
 from hysim.laws.friction.maxwell import GeneralizedMaxwellSlip as GeneralizedMaxwellSlip
 from hysim.laws.friction.backlash import ElasticBacklash as ElasticBacklash
+from hysim.laws.magnetic.core_field import CoreField as CoreField
+from hysim.laws.magnetic.core_field import condition as condition
 from hysim.laws.magnetic.excess_loss import ExcessLoss as ExcessLoss
 from hysim.laws.custom import CustomLaw as CustomLaw
 from hysim.plants.oscillator import BoucWenOscillator as BoucWenOscillator

@@ -27,6 +27,7 @@ OTHERS = {
     "Structure": hs.Structure(mass=1.0, stiffness=4.0, damping=0.1),
     "Dashpot": hs.Dashpot(),
     "ExcessLoss": hs.ExcessLoss(),
+    "CoreField": hs.CoreField(),
     "SingleValued": hs.SingleValued(u=[-1.0, 0.0, 1.0], y=[-1.5, 0.0, 2.0]),
     "PreisachRelays": hs.PreisachRelays(levels=(-1.0, 0.5, 1.0), weights=(1.0, 0.5, 1.0)),
     "ElasticBacklash": hs.ElasticBacklash(half_gap=0.1),

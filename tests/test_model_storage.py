@@ -42,6 +42,7 @@ NUMBERS = [
     (hs.Chan(coercivity=1 / 3, gap=1e-17), "gap"),
     (hs.EnergyPlays(thresholds=(0.0, 1 / 3), weights=(0.1, 0.2), field=1e-17), "weights"),
     (hs.ExcessLoss(c=1 / 3), "c"),
+    (hs.CoreField(size=1 / 3, weights=(0.1, 1e-17, 0.0, 0.0, 0.0, 0.7)), "weights"),
     (hs.Dashpot(c=0.7), "c"),
     (hs.LuGre(sigma1=0.7), "sigma1"),
     (hs.StribeckFriction(viscous=0.7), "viscous"),

@@ -21,6 +21,7 @@ NOT_RATE_INDEPENDENT = {
     *("TransferFunction", "Dashpot", "ExcessLoss", "Actuator", "MultiInputActuator", "BoucWenOscillator"),
     *("Structure", "Dependent"),
     *("LuGre", "StribeckFriction", "GeneralizedMaxwellSlip", "ElasticBacklash"),  # test_friction.py has them
+    "CoreField",  # test_core_field.py has it
 }
 """Between two samples the input of these, or a channel, is held, or goes on a line: with more it is another input."""
 INVERSES = {"BoucWenInverse"}  # under the laws that it inverts

@@ -19,7 +19,7 @@ from hysim.export._compilers import FOLDER, c_source, compiled, mark, module_of
 from hysim.export._page import LARGEST, Shown, page_text, presets, to_page
 from hysim.export._page_model import output_of, steps_of
 from hysim.laws.dashpot import RatePart
-from hysim.laws.friction.rated_law import RatedLaw
+from hysim.laws.friction.rated_law import TimedLaw
 from hysim.models.model import every_family
 from hysim.paper.reproduction import browser_page
 
@@ -180,7 +180,7 @@ def test_modules_compute_what_python_computes(models, name):
     for law in _parts(shown.model):
         if isinstance(law, RatePart):
             continue
-        law = law.at_sample_time(0.01) if isinstance(law, RatedLaw) else law
+        law = law.at_sample_time(0.01) if isinstance(law, TimedLaw) else law
         expected = law.response(u)
         np.testing.assert_allclose(by_module(law, u), expected, rtol=0.0, atol=1e-12 * np.ptp(expected))
 

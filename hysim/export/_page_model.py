@@ -22,7 +22,7 @@ from hysim.export._compilers import Kernels, kernels_of, module_of
 from hysim.export._packing import packing
 from hysim.kernels import clamps, energy_plays, play_sums
 from hysim.laws.dashpot import RatePart
-from hysim.laws.friction.rated_law import RatedLaw
+from hysim.laws.friction.rated_law import TimedLaw
 from hysim.laws.operators.rate_dependent_prandtl_ishlinskii import RateDependentPrandtlIshlinskii
 from hysim.laws.static import SingleValued
 from hysim.models.law import Law
@@ -195,7 +195,7 @@ def _law(thing: Any, u: FloatArray, parts: Parts) -> tuple[dict[str, Any], list[
     node, names = _node(law, type(thing), parts), list(law.scalars)
     free = [names[place] for place in node["free"] if names[place] != _CLOCK]
     parts.timed |= law is not thing
-    if isinstance(thing, RatedLaw):
+    if isinstance(thing, TimedLaw):
         node["fields"] = [each for each in node["fields"] if each[0] != _CLOCK]
         return node | {"clock": names.index(_CLOCK)}, sliders_of(law, free, coarse, names)
     if not isinstance(thing, RateDependentPrandtlIshlinskii):
@@ -209,7 +209,7 @@ def _law(thing: Any, u: FloatArray, parts: Parts) -> tuple[dict[str, Any], list[
 
 def _at(thing: Any, sample_time: float) -> Any:
     """A law that depends on the rate of its input, at a sample time; other laws unchanged."""
-    if isinstance(thing, RatedLaw):
+    if isinstance(thing, TimedLaw):
         return thing.at_sample_time(sample_time)
     return thing.at(1.0) if isinstance(thing, RateDependentPrandtlIshlinskii) else thing
 

@@ -197,14 +197,15 @@ def _fitted_again(
 
 
 def _width(fit: DirectFit, record: Record, sigma: float) -> Width | None:
-    """The largest width of the loop, zero of a law without memory; None without a loop."""
+    """The largest width of the loop, between bounds that are nan where they are not known; None without a loop."""
     rows, output = LoopRows(record.u), free_run(fit.models[0], record).y
     try:
         value = float(rows.max_width(output[np.newaxis])[0])
     except ValueError:  # there is no complete cycle
         return None
     if fit.smoother is None:
-        return Width(value=0.0, lower=0.0, upper=0.0)
+        bound = 0.0 if value == 0.0 else float("nan")
+        return Width(value=value, lower=bound, upper=bound)
     own = fit.smoother.samples < len(record)
     places, every = fit.smoother.samples[own], np.arange(len(record))
     slope = rows.max_width_slopes(

@@ -31,7 +31,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class RatedLaw(Subject, Placed, ABC):
+class TimedLaw(Subject, Placed, ABC):
     """A law that depends on the rate of its input, and so on time.
 
     A family is a subclass under the decorator `hysim.family`.
@@ -41,15 +41,12 @@ class RatedLaw(Subject, Placed, ABC):
     step : kernel
         ``step(parameters, state, u) -> y`` after an even stroke of one sample, the first parameter; the others are the
         fields but for the initial memory, in their order. The state is the last input and the memory.
-    rated_step : kernel
-        Likewise, the stroke being described in the state; see `hysim.kernels.friction_rates`.
     initial, searched, starts, screened
         As of `hysim.Law`; parameters may have the units ``"v"``, the highest speed of the record, and ``"r"``, the
         speed of an output that follows the input.
     """
 
     step: ClassVar[Any]
-    rated_step: ClassVar[Any]
     initial: ClassVar[tuple[str, ...]] = ("z0",)
     searched: ClassVar[tuple[Parameter, ...]] = ()
     starts: ClassVar[tuple[Mapping[str, float], ...]] = ()
@@ -67,11 +64,6 @@ class RatedLaw(Subject, Placed, ABC):
     def further(cls, tables: Tables) -> int:
         """Numbers of the memory that begin at zero, after those that are fields."""
         return 0
-
-    @property
-    def viscosity(self) -> float:
-        """Coefficient of the dashpot that the rated step leaves out."""
-        return 0.0
 
     @classmethod
     def candidates(cls) -> dict[str, Any]:
@@ -150,17 +142,6 @@ class RatedLaw(Subject, Placed, ABC):
         """The law as compiled loops take it, at rest at the input `u0`; ValueError without a sample time [s]."""
         return self.at_sample_time(needed_time(self, sample_time)).compiled(u0)
 
-    def rated(self) -> Startable:
-        """The law as an element of a structure takes it, without the dashpot of `viscosity`.
-
-        Before the first stroke its duration is infinite: the law is at rest, at zero where it has a `u0`.
-        """
-        law = self.at_sample_time(1.0)
-        parameters, memory = law.packed[0], np.array(law.packed[1] if self.u0 is None else law.state_at(0.0))
-        state = np.concatenate([memory[:1], np.zeros(N_RATED - 1), memory[1:]])
-        state[1] = np.inf
-        return Startable(type(self).rated_step, parameters, state, stepping.start)
-
     @classmethod
     def responses(
         cls,
@@ -200,10 +181,39 @@ class RatedLaw(Subject, Placed, ABC):
         return self.with_scalars(parameters)
 
 
+@dataclass(frozen=True, kw_only=True, eq=False)
+class RatedLaw(TimedLaw):
+    """A law that depends on the rate of its input, and may be an element of a structure.
+
+    Attributes
+    ----------
+    rated_step : kernel
+        As `TimedLaw.step`, the stroke being described in the state; see `hysim.kernels.friction_rates`.
+    """
+
+    rated_step: ClassVar[Any]
+
+    @property
+    def viscosity(self) -> float:
+        """Coefficient of the dashpot that the rated step leaves out."""
+        return 0.0
+
+    def rated(self) -> Startable:
+        """The law as an element of a structure takes it, without the dashpot of `viscosity`.
+
+        Before the first stroke its duration is infinite: the law is at rest, at zero where it has a `u0`.
+        """
+        law = self.at_sample_time(1.0)
+        parameters, memory = law.packed[0], np.array(law.packed[1] if self.u0 is None else law.state_at(0.0))
+        state = np.concatenate([memory[:1], np.zeros(N_RATED - 1), memory[1:]])
+        state[1] = np.inf
+        return Startable(type(self).rated_step, parameters, state, stepping.start)
+
+
 class AtSampleTime(Law):
     """A rate-dependent law at one sample time; `family` says what it is."""
 
-    family: ClassVar[type[RatedLaw]]
+    family: ClassVar[type[TimedLaw]]
 
     @classmethod
     def check(cls, tables: Tables) -> None:
@@ -224,7 +234,7 @@ class AtSampleTime(Law):
 
 
 @functools.cache
-def _kind_at_sample_time(family: type[RatedLaw]) -> type[Law]:
+def _kind_at_sample_time(family: type[TimedLaw]) -> type[Law]:
     """The laws of a family at one sample time: ``sample_time``, then the fields of the family."""
     named = [each for each in fields(cast(Any, family)) if each.name not in last_names(family)]
     defaults = {each.name: each.default for each in named if each.default is not MISSING}
