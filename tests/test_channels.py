@@ -215,6 +215,31 @@ def test_parameters_along_an_input_are_those_of_the_sample_at_the_end_of_each_br
     np.testing.assert_allclose(model.response(u, channels={"T": channel}), expected, rtol=1e-12, atol=1e-13)
 
 
+def test_friction_that_depends_on_the_velocity_follows_a_channel_along_a_record():
+    """With the same friction at every speed LuGre is Dahl's law, whose varying parameters are those of a `Law`."""
+    load = np.linspace(20.0, 60.0, U.size)
+    levels = [polynomial(name, 0.3, 0.8) for name in ("coulomb", "breakaway")]
+    bristles = hs.Dependent(law=hs.LuGre(sigma0=5.0, stribeck_velocity=1.0), polynomials=tuple(levels))
+    dahl = hs.Dependent(law=hs.Dahl(stiffness=5.0), polynomials=(levels[0],))
+    y = bristles.response(U, 0.1, channels={"T": load})
+    np.testing.assert_allclose(y, dahl.response(U, channels={"T": load}), atol=1e-12)
+    with pytest.raises(ValueError, match="a LuGre moves in time: give sample_time"):
+        bristles.response(U, channels={"T": load})
+    rec = hs.Record(u=U, y=y, t=0.1 * np.arange(U.size), channels={"T": load})
+    known = {**bristles.law.scalars, "breakaway": 0.5, "stribeck_velocity": 1e-9}  # no peak at any speed
+    depends, free = {"coulomb": ("T", 1)}, ("coulomb", "sigma2")
+    fit = hs.identify(hs.LuGre, rec, fixed={k: v for k, v in known.items() if k not in free}, depends=depends)
+    found = [fit.estimates[name] for name in ("coulomb(T=20)", "coulomb(T=60)", "sigma2")]
+    np.testing.assert_allclose(found, [0.3, 0.8, 0.0], atol=1e-6)
+
+
+def test_the_name_of_a_tuple_stands_for_all_its_numbers():
+    law = hs.TabulatedDahl(rate=3.0)
+    recs = [record(dataclasses.replace(law, amplitude=(0.1 * T, 0.2 * T)), T) for T in SUPPLIES]
+    fit = hs.identify(law, recs, depends={"amplitude": ("T", 1)})
+    np.testing.assert_allclose(fit.model.at(T=3.0).amplitude, [0.3, 0.6], rtol=1e-6)
+
+
 def test_a_state_that_depends_on_the_parameters_is_refused():
     law = hs.ParametricPrandtlIshlinskii(z0=(0.5, -0.2))
     model = hs.Dependent(law=law, polynomials=(polynomial("reach", 0.5, 1.0),))

@@ -84,8 +84,9 @@ def identify(
     depends : mapping, optional
         Name of a parameter to (channel, degree): it is a polynomial of this degree in a channel of the records,
         ``{"gain": ("T", 1)}``. It is identified by its values at degree + 1 places of the channel's range, such as
-        ``gain(T=20)`` and ``gain(T=60)``, each in the parameter's own box. The model is then a `hysim.Dependent`. Where
-        a channel varies along a record, each branch between two samples has the parameters of the sample at its end.
+        ``gain(T=20)`` and ``gain(T=60)``, each in the parameter's own box. The name of a tuple stands for all its
+        numbers. The model is then a `hysim.Dependent`. Where a channel varies along a record, each branch between two
+        samples has the parameters of the sample at its end.
     initial : {"free", "rest", "still", "periodic"}, or one of them for each record, optional
         Whether the state at the first sample is identified, is rest at zero, is that of an input which stood still at
         its first value, or is what the cycle leaves behind with which the record begins. By default a single memory is

@@ -159,9 +159,10 @@ class DependentStructure(Subject):
     def over(self, records: Sequence[Record]) -> "DependentStructure":
         """The structure with places for the channels of these records; ValueError for unknown names or few values."""
         space = self.law.search_space(max(records, key=lambda record: float(np.ptp(record.u))))
-        spans = {}
-        for name, (channel, degree) in self.depends.items():
-            if name not in (known := (*space.names, *space.held)):
+        known, spans = (*space.names, *space.held), {}
+        depends = {each: pair for name, pair in self.depends.items() for each in _numbers_of(name, known)}
+        for name, (channel, degree) in depends.items():
+            if name not in known:
                 raise ValueError(f"depends names {name!r}; the parameters are {among(name, known)}")
             if name in space.state:
                 raise ValueError(f"{name!r} is the state at the first sample of a record, and depends on no channel")
@@ -174,7 +175,7 @@ class DependentStructure(Subject):
                     f"the records have {different.size}"
                 )
             spans[name] = (float(different[0]), float(different[-1]))
-        structure = replace(self, spans=spans, columns=space.columns)
+        structure = replace(self, depends=depends, spans=spans, columns=space.columns)
         for record in records:
             varying = [name for name in structure.at if name in space.columns and structure._channel(name, record).ndim]
             check_memory_is_its_own(self.law, varying, record)
@@ -304,6 +305,11 @@ class DependentStructure(Subject):
 
     def _with(self, law: Any) -> "DependentStructure":
         return self if law is self.law else replace(self, law=law)
+
+
+def _numbers_of(name: str, known: Sequence[str]) -> list[str]:
+    """The name; of a field that is a tuple the names of its numbers."""
+    return [each for each in known if each.startswith(f"{name}[")] or [name]
 
 
 def _comes_near_zero(at: tuple[float, ...], values: FloatArray) -> npt.NDArray[np.bool_]:

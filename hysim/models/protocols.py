@@ -204,6 +204,14 @@ class Sampled(Protocol):
 
 
 @runtime_checkable
+class Timed(Protocol):
+    """A model that depends on time, and is a law of a step at each sample time."""
+
+    def at_sample_time(self, sample_time: float) -> Any:
+        """The law for one sample time [s]; ValueError if that is not positive."""
+
+
+@runtime_checkable
 class Remembering(Protocol):
     """A law whose memory is a number, or a tuple of them, at each sample."""
 

@@ -30,7 +30,7 @@ from hysim.models.joint_space import columns_beside
 from hysim.models.law import Law
 from hysim.models.model import family
 from hysim.models.parts import labels, own, response_of
-from hysim.models.protocols import Identifiable, Sampled
+from hysim.models.protocols import Identifiable, Sampled, Timed, needed_time
 from hysim.models.search_space import Parameters
 from hysim.models.sum import Sum, SumStructure
 from hysim.models.tables import tables_of
@@ -158,6 +158,7 @@ def columns_along(
         ]
         return columns_beside(blocks, replace(subject, parts=known).regressors({}, record) if known else 0.0)
     law = subject() if isinstance(subject, type) else subject
+    law = law.at_sample_time(record.sample_time) if isinstance(law, Timed) else law
     if not isinstance(law, Law) or isinstance(law, Sampled):
         raise _cannot_vary(varying, law)
     n_sets = len(next(iter(varying.values())))
@@ -175,8 +176,9 @@ def response_along(
         named = zip(labels(model.parts), model.parts, strict=True)
         parts = [response_along(part, own(series, name), u, sample_time) for name, part in named]
         return np.asarray(np.sum(parts, axis=0))
-    if isinstance(model, Law) and not isinstance(model, Sampled):
-        y = paths(model, {**model.scalars, **{name: each[np.newaxis] for name, each in series.items()}}, u)[0]
+    law = model.at_sample_time(needed_time(model, sample_time)) if isinstance(model, Timed) else model
+    if isinstance(law, Law) and not isinstance(law, Sampled):
+        y = paths(law, {**law.scalars, **{name: each[np.newaxis] for name, each in series.items()}}, u)[0]
         if not np.isfinite(y).all():
             raise SimulationError("the output diverges where the parameters vary along the input")
         return np.asarray(y)
