@@ -84,6 +84,9 @@ from hysim.laws.operators.reversal_curves import forc as forc
 from hysim.laws.operators.reversal_curves import Forc as Forc
 from hysim.metrics import magnetic_metrics as magnetic_metrics
 from hysim.metrics import MagneticMetrics as MagneticMetrics
+from hysim.metrics import Steinmetz as Steinmetz
+from hysim.sweeps import loss_map as loss_map
+from hysim.sweeps import LossMap as LossMap
 from hysim.models.law import Law as Law
 from hysim.models.jacobian import Jacobian as Jacobian
 from hysim.models.model import families as families

@@ -30,6 +30,7 @@ _PICTURES = {
     "Fragility": "hs.plot.fragility(curve)",
     "ResponseSpectrum": "hs.plot.spectrum(spectrum)",
     "LoopMetrics": "hs.plot.width(metrics)",
+    "LossMap": "hs.plot.loss_map(result)",
 }
 """Functions that draw a result, by the name of its class."""
 

@@ -8,7 +8,7 @@ new pyplot figure in the house style; too few Axes are a ValueError. They return
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from hysim.plot._comparisons import comparison, identification, loops, residuals, widths
+from hysim.plot._comparisons import comparison, core_error, identification, loops, loss_map, residuals, widths
 from hysim.plot._loops import animate, cycles, minor_loops, width
 from hysim.plot._outcomes import describing_function, displacement, fragility, parameter, selection, track, trade_off
 from hysim.plot._posterior import corner, evidence, prediction
@@ -24,6 +24,7 @@ __all__ = [
     "Figure",
     "animate",
     "comparison",
+    "core_error",
     "corner",
     "cycles",
     "describing_function",
@@ -40,6 +41,7 @@ __all__ = [
     "identification",
     "loop",
     "loops",
+    "loss_map",
     "minor_loops",
     "panels",
     "parallel_coordinates",

@@ -1,23 +1,24 @@
-"""Pictures of comparisons and identifications: loops, residuals, loop widths and profiles of the likelihood."""
+"""Pictures of comparisons, identifications and core losses: loops, residuals, widths, profiles, and errors."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from contextlib import AbstractContextManager
 from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.patches import Polygon
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from hysim import metrics
-from hysim._basics.frozen import FloatArray
+from hysim._basics.frozen import FloatArray, read_only
 from hysim._basics.prefixes import in_unit, label, printed
 from hysim.comparison import Comparison, ComparisonRow
 from hysim.identification import Identification
 from hysim.plot._style import GUIDE, MANY, MEASURED, POINTS, AxesArray, grid_of, joined, line, one, scattered, several
 from hysim.records import Record
 from hysim.simulation import free_run, models_on
+from hysim.sweeps import LossMap
 
 _FILLED: dict[str, Any] = {"markeredgewidth": 0.8}
 _OPEN = _FILLED | {"markerfacecolor": "white"}
@@ -25,6 +26,7 @@ _UNLOADING = "#56B4E9"  # of many samples, which have no open markers
 _TIGHT: dict[str, Any] = {"borderaxespad": 0.1, "columnspacing": 1.0, "handlelength": 1.2, "handletextpad": 0.3}
 _SAME = 1e-6  # of the output's range: largest difference of two runs of one model
 _SHOWN = 4  # models in a figure, unless names are chosen
+_BINS = 40  # of a histogram
 
 
 def loops(comparison: Comparison, axes: Sequence[Axes] | AxesArray | None = None) -> AxesArray:
@@ -114,6 +116,62 @@ def comparison(
                 ax.set_ylim(ends[:, 0].min(), ends[:, 1].max())
             column[0].legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=2, fontsize="small", **_TIGHT)
     return grid
+
+
+def loss_map(result: LossMap, ax: Axes | None = None, *, plane: int = 0) -> Axes:
+    """Draw the loss density of a `hysim.loss_map` over the amplitude, a line for each frequency, on logarithmic axes.
+
+    `plane` is the number of a bias, and of the channels' values, in the order of ``result.energy``.
+
+    Examples
+    --------
+    >>> import hysim as hs
+    >>> core = hs.MaxwellSlip(stiffness=(40.0, 20.0), slips=(0.1, 0.3)) + hs.Dashpot(c=0.02)
+    >>> result = hs.loss_map(core, [0.2, 0.4, 0.8], [50.0, 400.0])
+    >>> hs.plot.loss_map(result, ax=hs.plot.figure().add_subplot()).get_xlabel()
+    'Amplitude [T]'
+    """
+    losses = result.loss.reshape(*result.loss.shape[:2], -1)[:, :, plane]
+    with one(ax) as axes:
+        for k, (frequency, loss) in enumerate(zip(result.frequencies, losses.T, strict=True)):
+            axes.loglog(result.amplitudes, loss, label=f"{frequency:.4g} Hz", **line(k))
+        axes.set(xlabel="Amplitude [T]", ylabel="Loss density [W/m³]")
+        axes.legend()
+    return axes
+
+
+def core_error(
+    errors: Mapping[str, ArrayLike] | ArrayLike, axes: Sequence[Axes] | AxesArray | None = None
+) -> AxesArray:
+    """Draw the distribution of relative errors over sequences, with its mean, 95th percentile and maximum.
+
+    `errors`, shape (n_sequences,), are fractions, such as those of `hysim.metrics.sequence_relative_error`, or a
+    mapping from names of models to them; the models stand side by side. Magnitudes are drawn. The percentile is that of
+    the MagNet Challenges: of n errors, the k-th smallest is at (k - 1/2) / n. The result has shape (n_models,). A
+    ValueError is raised if a model has no errors, or one is not finite.
+
+    Examples
+    --------
+    >>> import hysim as hs
+    >>> errors = {"static": [0.2, 0.3, 0.4], "with eddy currents": [0.05, 0.1, 0.12]}
+    >>> [ax.get_title() for ax in hs.plot.core_error(errors, hs.plot.figure().subplots(1, 2))]
+    ['static', 'with eddy currents']
+    """
+    named = errors if isinstance(errors, Mapping) else {"": errors}
+    percent = {name: 100.0 * np.abs(read_only(each, "errors", ndim=1)) for name, each in named.items()}
+    if not percent or not all(each.size for each in percent.values()):
+        raise ValueError("core_error needs at least one error of each model")
+    bins = np.linspace(0.0, max(float(each.max()) for each in percent.values()) or 1.0, _BINS + 1)
+    with several(axes, len(percent), height=3.0, columns=len(percent), sharey=True) as drawn:
+        for ax, (name, each) in zip(drawn, percent.items(), strict=True):
+            ax.hist(each, bins, weights=np.full(each.size, 100.0 / each.size), color=POINTS)
+            places = each.mean(), np.percentile(each, 95.0, method="hazen"), each.max()
+            for k, (word, place) in enumerate(zip(("mean", "95th percentile", "maximum"), places, strict=True)):
+                ax.axvline(place, label=f"{word} {place:.3g} %", **line(k))
+            ax.set(title=name, xlabel="Relative error [%]")
+            ax.legend()
+        drawn[0].set_ylabel("Share of the sequences [%]")
+    return drawn
 
 
 def identification(

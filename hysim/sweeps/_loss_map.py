@@ -1,0 +1,160 @@
+"""Core loss over amplitude, frequency and bias of the flux density, and over channels such as the temperature.
+
+    energy(A, f, b, ...) = integral of H dB over a cycle of B = b + A w(f t)    [J/m^3]
+    loss = f energy                                                             [W/m^3]
+
+of the steady cycle of a model with the input B and the output H. B is linear between its samples. H of a `Dashpot` or
+an `ExcessLoss` is then constant between them, and its integral exact; the integral of other parts of a sum is by the
+trapezoidal rule.
+"""
+
+import itertools
+import math
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from hysim._basics.frozen import FloatArray, check_positive, frozen, read_only
+from hysim._basics.printing import aligned, extent, printed, summary_text
+from hysim._basics.results import model_of
+from hysim.errors import SimulationError
+from hysim.laws.dashpot import RatePart
+from hysim.models.dependent import Dependent
+from hysim.models.parts import check_parts, response_of
+from hysim.models.sum import Sum
+from hysim.signals import sine
+
+_SAMPLES = 1000  # of a cycle: its polygon misses 2e-6 of the eddy current loss under a sine
+_CYCLES = tuple(2**k for k in range(2, 11))  # of each of the successive runs
+_STEADY = 1e-8  # of the span of H: largest difference between the last cycle and that in the middle of a run
+
+
+@printed
+@frozen
+class LossMap:
+    """Result of `hysim.loss_map`: core loss over amplitude, frequency, bias and channels.
+
+    Parameters
+    ----------
+    amplitudes, frequencies, bias : array
+        Amplitudes [T], frequencies [Hz] and means [T] of the flux density.
+    channels : mapping
+        Name of each channel to its values.
+    energy : array, shape (n_amplitudes, n_frequencies, n_bias, ...)
+        Loss per cycle, with an axis for each channel behind the others [J/m^3].
+    """
+
+    amplitudes: FloatArray
+    frequencies: FloatArray
+    bias: FloatArray
+    channels: Mapping[str, FloatArray]
+    energy: FloatArray
+
+    @property
+    def loss(self) -> FloatArray:
+        """Loss density, of the shape of `energy` [W/m^3]."""
+        return np.asarray(np.einsum("af...,f->af...", self.energy, self.frequencies))
+
+    def __str__(self) -> str:
+        table = [["B [T]", *(f"{f:.4g} Hz" for f in self.frequencies)]]
+        first = self.loss.reshape(*self.energy.shape[:2], -1)[..., 0]
+        table += [[f"{a:.4g}", *(f"{loss:.4g}" for loss in row)] for a, row in zip(self.amplitudes, first, strict=True)]
+        others = {"bias [T]": self.bias, **self.channels}
+        place = ", ".join(f"{name} = {extent(values)}" for name, values in others.items())
+        return summary_text([f"LossMap [W/m^3]: {place}", *aligned(table)])
+
+
+def loss_map(
+    model: Any,
+    amplitudes: npt.ArrayLike,
+    frequencies: npt.ArrayLike,
+    *,
+    bias: npt.ArrayLike = (0.0,),
+    channels: Mapping[str, npt.ArrayLike] | None = None,
+    waveform: npt.ArrayLike | None = None,
+) -> LossMap:
+    """Core loss of a model from the flux density B to the field H, over a grid of amplitudes and frequencies.
+
+    Each loss is that of the steady cycle: the model begins with its own memory, and the cycle is repeated until H
+    repeats. Most laws of cores lead from H to B. Their static field is their inverse, which
+    `hysim.PrandtlIshlinskii.inverse` and `hysim.BoucWen.inverse` return as a model; for other laws, give an object with
+    a method ``response(B)`` that returns ``law.inverse_response(B)``.
+
+    Parameters
+    ----------
+    model : model or result of a fit
+        From B [T] to H [A/m]: a law, a `hysim.Sum` with `hysim.Dashpot` and `hysim.ExcessLoss`, or a `hysim.Dependent`
+        of such a model.
+    amplitudes : array, shape (n_amplitudes,)
+        Positive amplitudes of B, by which the waveform is multiplied [T].
+    frequencies : array, shape (n_frequencies,)
+        Positive frequencies of the cycle [Hz].
+    bias : array, shape (n_bias,)
+        Values that are added to the waveform [T].
+    channels : mapping, optional
+        Each channel of a `hysim.Dependent` model to values (n,).
+    waveform : array, shape (n,), optional
+        One cycle for amplitude 1 and bias 0, whose last sample is the first one again, as in `hysim.signals`; by
+        default a sine of 1000 samples.
+
+    Returns
+    -------
+    LossMap
+
+    Raises
+    ------
+    TypeError
+        If the model has no response, or channels are given to one that is not a `hysim.Dependent`.
+    ValueError
+        If an amplitude or a frequency is not positive, a number is not finite, the waveform does not end where it
+        begins, a channel is missing or unknown, or every loss is negative, as of a model from H to B.
+    SimulationError
+        If the field does not repeat within 1024 cycles, or diverges.
+
+    Examples
+    --------
+    >>> import hysim as hs
+    >>> core = hs.MaxwellSlip(stiffness=(40.0, 20.0), slips=(0.1, 0.3)) + hs.Dashpot(c=0.02)
+    >>> print(hs.loss_map(core, [0.5, 1.0], [50.0, 100.0]))
+    LossMap [W/m^3]: bias [T] = 0
+    B [T]  50 Hz  100 Hz
+    0.5    806.7    2107
+    1       2547    7068
+    """
+    model = model_of(model)
+    check_parts((model,), "model")
+    grid = {"amplitudes": amplitudes, "frequencies": frequencies, "bias": bias}
+    swings, rates, means = (read_only(np.atleast_1d(values), name, ndim=1) for name, values in grid.items())
+    others = {name: read_only(np.atleast_1d(values), name, ndim=1) for name, values in (channels or {}).items()}
+    check_positive(amplitudes=swings.min(initial=math.inf), frequencies=rates.min(initial=math.inf))
+    if others and not isinstance(model, Dependent):
+        raise TypeError(f"a {type(model).__name__} depends on no channel: give a hysim.Dependent, or no channels")
+    wave = sine(1.0, cycles=1, samples_per_cycle=_SAMPLES) if waveform is None else read_only(waveform, ndim=1)
+    if wave.size < 3 or wave[0] != wave[-1]:
+        raise ValueError("waveform must be one cycle that ends where it begins: append its first sample to it")
+    energies = []
+    for point in itertools.product(*(each.tolist() for each in others.values())):
+        law = model.at(**dict(zip(others, point, strict=True))) if isinstance(model, Dependent) else model
+        cycles = itertools.product(swings, rates, means)
+        energies += [_energy(law, b + a * wave, 1.0 / (f * (wave.size - 1))) for a, f, b in cycles]
+    shape = [each.size for each in (*others.values(), swings, rates, means)]
+    energy = np.moveaxis(np.reshape(energies, shape), [-3, -2, -1], [0, 1, 2])
+    if energy.max(initial=-math.inf) < 0.0:
+        raise ValueError("every loss is negative, as of a model from H to B: give one from B to H, as law.inverse() is")
+    return LossMap(amplitudes=swings, frequencies=rates, bias=means, channels=others, energy=energy)
+
+
+def _energy(model: Any, cycle: FloatArray, sample_time: float) -> float:
+    """Integral of H dB over the steady cycle."""
+    if isinstance(model, Sum):
+        return sum(_energy(part, cycle, sample_time) for part in model.parts)
+    n = cycle.size - 1
+    for cycles in _CYCLES:
+        H = response_of(model, np.append(np.tile(cycle[:-1], cycles), cycle[-1]), sample_time)
+        change = H[-n:] - H[(cycles // 2 - 1) * n + 1 : cycles // 2 * n + 1]
+        if np.abs(change).max() <= _STEADY * np.ptp(H[-n:]):
+            means = H[-n:] if isinstance(model, RatePart) else 0.5 * (H[-n - 1 : -1] + H[-n:])
+            return float(means @ np.diff(cycle))
+    raise SimulationError(f"the field does not repeat within {cycles} cycles from {cycle.min():g} to {cycle.max():g} T")
