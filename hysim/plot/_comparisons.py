@@ -26,7 +26,7 @@ _UNLOADING = "#56B4E9"  # of many samples, which have no open markers
 _TIGHT: dict[str, Any] = {"borderaxespad": 0.1, "columnspacing": 1.0, "handlelength": 1.2, "handletextpad": 0.3}
 _SAME = 1e-6  # of the output's range: largest difference of two runs of one model
 _SHOWN = 4  # models in a figure, unless names are chosen
-_BINS = 40  # of a histogram
+_BINS, _BARS = 40, 0.68  # of a histogram, and the part of its height below the legend
 
 
 def loops(comparison: Comparison, axes: Sequence[Axes] | AxesArray | None = None) -> AxesArray:
@@ -136,7 +136,7 @@ def loss_map(result: LossMap, ax: Axes | None = None, *, plane: int = 0) -> Axes
         for k, (frequency, loss) in enumerate(zip(result.frequencies, losses.T, strict=True)):
             axes.loglog(result.amplitudes, loss, label=f"{frequency:.4g} Hz", **line(k))
         axes.set(xlabel="Amplitude [T]", ylabel="Loss density [W/m³]")
-        axes.legend()
+        axes.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=3, **_TIGHT)
     return axes
 
 
@@ -167,9 +167,9 @@ def core_error(
             ax.hist(each, bins, weights=np.full(each.size, 100.0 / each.size), color=POINTS)
             places = each.mean(), np.percentile(each, 95.0, method="hazen"), each.max()
             for k, (word, place) in enumerate(zip(("mean", "95th percentile", "maximum"), places, strict=True)):
-                ax.axvline(place, label=f"{word} {place:.3g} %", **line(k))
-            ax.set(title=name, xlabel="Relative error [%]")
-            ax.legend()
+                ax.axvline(place, 0.0, _BARS, label=f"{word} {place:.3g} %", **line(k))
+            ax.set(title=name, xlabel="Relative error [%]", ymargin=1.0 / _BARS - 1.0)
+            ax.legend(loc="upper left", **_TIGHT)
         drawn[0].set_ylabel("Share of the sequences [%]")
     return drawn
 
