@@ -6,7 +6,7 @@
 of the steady cycle of a model with the input B and the output H. B is linear between its samples. H of a `Dashpot` or
 an `ExcessLoss` is then constant between them, and its integral exact; the integral of other parts of a sum is by the
 trapezoidal rule. A law without time is brought to its steady cycle by the turning points of B alone, which leave the
-memory of the whole cycle: driven by B, some laws need 10 000 cycles.
+memory of the whole cycle, and by one whole cycle: driven by B, some laws need 10 000.
 """
 
 import itertools
@@ -152,10 +152,10 @@ def _energy(model: Any, cycle: FloatArray, sample_time: float) -> float:
     if isinstance(model, Sum):
         return sum(_energy(part, cycle, sample_time) for part in model.parts)
     period = cycle[:-1] if needs_time(model) else cycle[[first for first, _ in turns(cycle, 0.0).plateaus[:-1]]]
-    n = cycle.size
     for cycles in (each for each in _CYCLES if each * period.size <= _LONGEST):
-        H = response_of(model, np.append(np.tile(period, cycles), cycle), sample_time)
-        field, earlier = H[-n:], H[:-n].reshape(cycles, -1)
+        path = np.concatenate([np.tile(period, cycles), cycle[:-1], cycle])
+        H = response_of(model, path, sample_time)
+        field, earlier = H[-cycle.size :], H[: cycles * period.size].reshape(cycles, -1)
         if np.abs(earlier[-1] - earlier[cycles // 2]).max() <= _STEADY * np.ptp(field):
             means = field[1:] if isinstance(model, RatePart) else 0.5 * (field[1:] + field[:-1])
             return float(means @ np.diff(cycle))
