@@ -186,13 +186,13 @@ class CoreField(TimedLaw):
         """The fit of the default structure."""
         return cls.structure().fitted(records, weights)
 
-    def state_along(self, record: Record) -> FloatArray:
-        """Stops and lags s_i, d_j at the samples of a record, shape (n_samples, m + n)."""
-        return self.at_sample_time(record.sample_time).remembered(record.u)
+    def memory(self, u: npt.ArrayLike, sample_time: float) -> FloatArray:
+        """Stops and lags s_i, d_j at the samples of `u`, shape (n_samples, m + n); see `response`."""
+        return self.at_sample_time(sample_time).remembered(u)
 
     def terms(self, record: Record) -> FloatArray:
         """What the weights multiply at the samples of a record, shape (n_samples, n_weights)."""
-        state = self.state_along(record)
+        state = self.memory(record.u, record.sample_time)
         m, x = len(self.thresholds), record.u[:, np.newaxis] / self.size
         ahead = state[:, m:] / self.lag_sizes if self.lags else state[:, m:]
         stops = state[:, :m] / self.thresholds if m else state[:, :m]
@@ -307,7 +307,7 @@ class CoreFieldStructure:
         lags = records[0].sample_time * _LAGS if self.lags is None else np.array(self.lags)
         weights = (0.0,) * (kernels.N_POWERS * (self.stops + 2 * lags.size) + kernels.N_ALONE)
         law = self.law(size=size, thresholds=thresholds, lags=lags, lag_sizes=np.ones(lags.size), weights=weights)
-        ahead = np.concatenate([law.state_along(record)[:, self.stops :] for record in records])
+        ahead = np.concatenate([law.memory(record.u, record.sample_time)[:, self.stops :] for record in records])
         return replace(law, lag_sizes=np.sqrt(np.mean(ahead**2, axis=0)))
 
     def _places(self, records: Sequence[Record]) -> tuple[float, ...]:
