@@ -1311,6 +1311,30 @@ def components(result: Result) -> list[str]:
     ]
 
 
+def cores(result: Result) -> list[str]:
+    """The field of a core by its flux density, with and without a known begin, and cells."""
+    return [
+        by_row(
+            result["rows"],
+            ("cores differ by [%]", "differ_percent", number),
+            ("law", "model", str),
+            ("error, mean [%]", "mean_percent", error_of),
+            ("95th percentile", "high_percent", error_of),
+            ("worst", "worst_percent", error_of),
+            ("CPU s", "seconds", number),
+        ),
+        by_row(
+            result["measured"],
+            ("measured loops", "core", str),
+            ("error, mean of the amplitudes [%]", "mean_percent", number),
+            ("worst", "worst_percent", number),
+        ),
+        f"The third cycle of a cell is predicted to {number(result['median_cell_error_over_noise'], 3)} times the "
+        f"noise in the median and {number(result['worst_cell_error_over_noise'], 3)} at worst; the interval at 95 % holds "
+        f"the rate of {result['rates_in_interval']} of 100 cells.",
+    ]
+
+
 def jiles_atherton(result: Result) -> list[str]:
     """How exact the law of magnetic cores is."""
     digits, there, back = result["digits"], *(result["invariant"][way] for way in ("forwards", "inverse"))
@@ -1441,6 +1465,7 @@ GROUPS: dict[str, tuple[Finding, ...]] = {
         structures_work_precision,
         portfolio,
         components,
+        cores,
         batch,
         cold_start,
         more_samples,

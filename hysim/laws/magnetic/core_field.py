@@ -216,8 +216,9 @@ def _root(values: FloatArray) -> FloatArray:
 def condition(model: Any, known: Record) -> CoreField:
     """A core's law with its weights corrected by a stretch that is known, to predict what follows.
 
-    The weights of the law are taken times a gain, which is free, and each of them is then normal with the standard
-    deviation `CoreField.spread` times that of the noise: the most likely ones are those of a Bayesian update.
+    The weights of the law are taken times a gain, and a constant is added, both free; each weight is then normal with
+    the standard deviation `CoreField.spread` times that of the noise. The most likely ones are those of a Bayesian
+    update.
 
     Parameters
     ----------
@@ -364,11 +365,12 @@ def corrected(own: FloatArray, terms: FloatArray, y: FloatArray, spread: float) 
     """Weights (n,) near a multiple of their `own` values, by terms (n_samples, n) and the field y there.
 
     They are ``g own + d`` with the least ``|y - terms (g own + d)|^2 + |d / spread|^2`` over the gain g and changes d.
+    The constant is free, too, since stops that the sequence does not move to their ends leave one.
     """
-    rows = np.column_stack([terms @ own, spread * terms])
-    ridge = np.diag(np.append(0.0, np.ones(own.size)))
-    solution = np.linalg.lstsq(rows.T @ rows + ridge, rows.T @ y, rcond=None)[0]
-    return np.asarray(solution[0] * own + spread * solution[1:])
+    rows = np.column_stack([terms @ own, terms[:, 0], spread * terms])
+    ridge = np.diag(np.append([0.0, 0.0], np.ones(own.size)))
+    gain, constant, *changes = np.linalg.lstsq(rows.T @ rows + ridge, rows.T @ y, rcond=None)[0]
+    return np.asarray(gain * own + spread * np.array(changes) + constant * np.eye(own.size)[0])
 
 
 class _Normal(NamedTuple):
