@@ -18,6 +18,7 @@ fitted to the loops of all amplitudes of a core.
 
 import sys
 from collections.abc import Sequence
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -87,13 +88,10 @@ def predicted(records: Sequence[hs.Record], others: Sequence[hs.Record]) -> list
 
 
 def summary(errors: Sequence[float]) -> Row:
-    """Mean, 95th percentile and largest error [%]."""
-    high = float(np.percentile(errors, 95.0, method="hazen"))
-    return {
-        "mean_percent": 100.0 * float(np.mean(errors)),
-        "high_percent": 100.0 * high,
-        "worst_percent": 100.0 * max(errors),
-    }
+    """Median, mean, 95th percentile and largest error [%]."""
+    percent = 100.0 * np.array(errors)
+    measures = {"median": np.median, "mean": np.mean, "high": partial(np.percentile, q=95.0, method="hazen")}
+    return {f"{name}_percent": float(of(percent)) for name, of in {**measures, "worst": np.max}.items()}
 
 
 def cell(rng: np.random.Generator) -> Row:
