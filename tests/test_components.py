@@ -80,7 +80,7 @@ def test_without_pinching_the_law_of_ibarra_is_the_peak_oriented_one_and_elastic
     assert law.response(u) == pytest.approx(u, abs=1e-15)
 
 
-LIMITS = """Bilinear isotropic 1 below 1, Bilinear z0 -1.1 at most 1, FlagShape loss 2.1 at most 2,
+LIMITS = """Bilinear isotropic 1 below 1, Bilinear z0 -1.1 of a size of at most 1, FlagShape loss 2.1 at most 2,
 Slack hardening_ratio 1 below 1, PeakOriented hardening_ratio 1 below 1, PeakOriented unloading 1.1 at most 1,
 IbarraMedinaKrawinkler residual 1.1 at most 1, IbarraMedinaKrawinkler c 0 positive, FolzFiliatrault r_1 0.6 at most 0.5,
 FolzFiliatrault r_3 0.9 at least 1"""
@@ -91,6 +91,7 @@ test_wrong_arguments_are_named = refused(
         for n, f, x, text in CASES
     ),
     (lambda: hs.Bilinear(offset=1.0).to_opensees(), "no offset and no z0"),
+    (lambda: hs.Bilinear(hardening=1.0).to_opensees(), "needs hardening below stiffness"),
     (lambda: hs.Slack(opposite_stiffness=1.0).to_opensees(), "acts in one direction"),
     (lambda: hs.OriginOriented.from_opensees(f1=1.0, e1=1.0, f2=2.0, e2=3.0, f3=3.0, e3=4.0), "third point must lie"),
     (lambda: hs.IbarraMedinaKrawinkler(capping_ratio=0.0).to_opensees(), "has a cap beyond the yield point"),

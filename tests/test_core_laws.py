@@ -274,7 +274,7 @@ def test_a_core_of_modelica_comes_back():
 test_what_is_no_core_is_refused = refused(
     (lambda: hs.Tellinen(coercivity=0.0), "coercivity must be positive, got 0.0"),
     (lambda: hs.Chan(squareness=1.0), "squareness, remanence over saturation, must be between 0 and 1, got 1.0"),
-    (lambda: hs.Tellinen(z0=-1.5), "z0 must be from -1"),
+    (lambda: hs.Tellinen(z0=-1.5), "z0 must be of a size of at most 1"),
     (lambda: hs.Chan(gap=-0.1), "gap must not be negative"),
     (lambda: hs.identify(hs.Chan, noisy(CORES[0]), bounds={"gap": (0.0, 1.0)}), "gap of a Chan cannot be searched"),
     (lambda: hs.Chan(gap=0.1, saturation=-1.0), "saturation must not be negative with a gap"),
@@ -286,7 +286,7 @@ test_what_is_no_core_is_refused = refused(
     (lambda: hs.TellinenTable(lower=(1.0, -1.0)), "branch lower must not fall"),
     (lambda: hs.TellinenTable(upper=(-2.0, 1.0)), "upper must not lie below"),
     (lambda: hs.TellinenTable(inputs=(0.0,)), "equally long and hold two points"),
-    (lambda: hs.TellinenTable(z0=2.0), "z0 must be from -1"),
+    (lambda: hs.TellinenTable(z0=2.0), "z0 must be of a size of at most 1"),
     (lambda: hs.EnergyPlays(field=0.0), "field must be positive"),
     (lambda: hs.EnergyPlays(thresholds=(0.5, 0.1), weights=(1.0, 1.0)), "thresholds must increase"),
     (lambda: hs.Dashpot.eddy_currents(conductivity=-1.0, thickness=1.0), "conductivity must not be negative"),

@@ -61,5 +61,5 @@ test_wrong_arguments_are_named = refused(
     (lambda: hs.TabulatedDahl(inputs=(0.0, 1.0, 2.0)), "equally long"),
     (lambda: hs.signed_charge([0.0, 1.0, -1.0], [1.0, 1.0, 1.0]), "count up from zero"),
     (lambda: hs.signed_charge([0.0, 1.0, 2.0, 1.9], [1.0, 1.0, 1.0, 1.0]), "count up from zero"),
-    (lambda: hs.TabulatedDahl(z0=2.0), "z0 must be from -1 to 1"),
+    (lambda: hs.TabulatedDahl(z0=2.0), "z0 must be of a size of at most 1"),
 )

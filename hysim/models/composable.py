@@ -65,7 +65,8 @@ class Composable:
 class Placed(Composable):
     """Base class of laws: where the initial memory holds, and where the law was identified.
 
-    A family lists fields whose numbers must be `positive`, or `not_negative`.
+    A family lists fields whose numbers must be `positive`, or `not_negative`, or `within` other limits, such as
+    ``{"z0": ("of a size of at most", 1.0)}``.
 
     Parameters
     ----------
@@ -80,6 +81,7 @@ class Placed(Composable):
     u0: float | None = field(default=None, metadata=LAST)
     positive: ClassVar[tuple[str, ...]] = ()
     not_negative: ClassVar[tuple[str, ...]] = ()
+    within: ClassVar[Mapping[str, tuple[str, float]]] = {}
     # Any, so that type checkers take BoucWen(**parameters) with a dict of floats
     u_range: Any = field(default=None, compare=False, metadata={**LAST, "kind": tuple[float, ...] | None})
 

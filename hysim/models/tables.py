@@ -1,7 +1,7 @@
 """The numbers of laws: one name for each, and tables of every field over sets of laws."""
 
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from typing import Any
 
 import numpy as np
@@ -34,6 +34,14 @@ def arguments_of(scalars: Mapping[str, float]) -> dict[str, Any]:
     return arguments
 
 
+_WITHIN: Mapping[str, Callable[[FloatArray, float], npt.NDArray[np.bool_]]] = {
+    "below": np.less,
+    "at most": np.less_equal,
+    "at least": np.greater_equal,
+    "of a size of at most": lambda values, bound: np.abs(values) <= bound,
+}
+
+
 def check_signs(tables: Tables, positive: Iterable[str], not_negative: Iterable[str]) -> None:
     """A ValueError for the first field of these with a number that is not positive, or negative."""
     for name in positive:
@@ -42,6 +50,14 @@ def check_signs(tables: Tables, positive: Iterable[str], not_negative: Iterable[
     for name in not_negative:
         if not (tables[name] >= 0.0).all():
             raise ValueError(f"{name} must not be negative, got {tables[name].min()}")
+
+
+def check_within(tables: Tables, within: Mapping[str, tuple[str, float]]) -> None:
+    """A ValueError for the first field of these with a number that is not, say, ``("at most", 1.0)``."""
+    for name, (word, bound) in within.items():
+        is_wrong = ~_WITHIN[word](tables[name], bound)
+        if is_wrong.any():
+            raise ValueError(f"{name} must be {word} {bound:g}, got {tables[name][is_wrong][0]}")
 
 
 def tables_of(

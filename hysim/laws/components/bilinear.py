@@ -3,14 +3,11 @@
 import math
 from typing import ClassVar, Self
 
-import numpy as np
-
 from hysim._basics.frozen import FloatArray
 from hysim.models.law import Law
 from hysim.models.model import Example, family
 from hysim.models.parameters import Parameter
 from hysim.models.stages import Stage
-from hysim.models.tables import Tables
 
 
 @family
@@ -67,6 +64,7 @@ class Bilinear(Law):
     offset: float = 0.0
     z0: float = 0.0
 
+    within: ClassVar = {"isotropic": ("below", 1.0), "z0": ("of a size of at most", 1.0)}
     positive = ("yield_input",)
     not_negative = ("isotropic",)
     further_memory = 1
@@ -94,15 +92,6 @@ class Bilinear(Law):
         state[0], state[1] = u, z
         return float(parameters[4] + parameters[1] * u + (parameters[0] - parameters[1]) * parameters[2] * z)
 
-    @classmethod
-    def check(cls, tables: Tables) -> None:
-        """Refuse numbers outside their limits."""
-        super().check(tables)
-        if not (tables["isotropic"] < 1.0).all():
-            raise ValueError(f"isotropic must be below 1, got {tables['isotropic'].max()}")
-        if not (np.abs(tables["z0"]) <= 1.0).all():
-            raise ValueError(f"the size of z0 must be at most 1, got {np.abs(tables['z0']).max()}")
-
     @property
     def known_slopes(self) -> tuple[float, float]:
         """Those of the hardening and of the elastic line."""
@@ -119,7 +108,11 @@ class Bilinear(Law):
         return cls(stiffness=E, hardening=E * H_kin / (E + H_kin), yield_input=sigmaY / E, isotropic=isotropic)
 
     def to_opensees(self) -> dict[str, float]:
-        """The arguments of `from_opensees`; ValueError if the law has an offset or an initial z."""
+        """The arguments of `from_opensees`; ValueError if the law has an offset, an initial z, or no bend."""
+        if not self.hardening < self.stiffness:
+            raise ValueError(
+                f"Hardening needs hardening below stiffness, got {self.hardening:g} and {self.stiffness:g}"
+            )
         if self.offset != 0.0 or self.z0 != 0.0:
             raise ValueError(f"Hardening has no offset and no z0, got {self.offset:g} and {self.z0:g}")
         E = self.stiffness

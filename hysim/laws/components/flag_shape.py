@@ -10,7 +10,6 @@ from hysim._basics.frozen import FloatArray
 from hysim.models.law import Law
 from hysim.models.model import Example, family
 from hysim.models.parameters import Parameter
-from hysim.models.tables import Tables
 
 
 @family
@@ -59,6 +58,7 @@ class FlagShape(Law):
     activation: float = 1.0
     loss: float = 0.8
 
+    within: ClassVar = {"loss": ("at most", 2.0)}
     positive = ("activation",)
     not_negative = ("loss",)
     initial: ClassVar[tuple[str, ...]] = ()
@@ -81,13 +81,6 @@ class FlagShape(Law):
         z = min(z, min(1.0, max(x, parameters[3] - 1.0)))
         state[0], state[1], state[2] = u, x, z
         return float(parameters[1] * u + (parameters[0] - parameters[1]) * parameters[2] * z)
-
-    @classmethod
-    def check(cls, tables: Tables) -> None:
-        """Refuse numbers outside their limits."""
-        super().check(tables)
-        if not (tables["loss"] <= 2.0).all():
-            raise ValueError(f"loss must be at most 2, got {tables['loss'].max()}")
 
     @property
     def known_slopes(self) -> tuple[float, float]:

@@ -119,6 +119,7 @@ class IbarraMedinaKrawinkler(Law):
     Lambda_a: float = 0.0
     c: float = 1.0
 
+    within: ClassVar = dict.fromkeys(_SHARES, ("at most", 1.0))
     positive = ("yield_input", "c")
     not_negative = ("capping_ratio", *_SHARES, *_CAPACITIES)
     units: ClassVar = dict.fromkeys(("capping_ratio", *_SHARES, "c"), "1")
@@ -207,14 +208,6 @@ class IbarraMedinaKrawinkler(Law):
             state[3], state[4], state[5] = v, f, state[21]
         state[0], state[1] = u, s
         return float(parameters[0] * parameters[1] * (s * f)) if state[8] == 0.0 else 0.0
-
-    @classmethod
-    def check(cls, tables: Tables) -> None:
-        """Refuse numbers outside their limits."""
-        super().check(tables)
-        for name in _SHARES:
-            if not (tables[name] <= 1.0).all():
-                raise ValueError(f"{name} must be at most 1, got {tables[name].max()}")
 
     @classmethod
     def pack(cls, tables: Tables) -> Packed:

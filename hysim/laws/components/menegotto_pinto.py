@@ -28,7 +28,6 @@ from hysim.models.law import Law
 from hysim.models.model import Example, family
 from hysim.models.parameters import Parameter
 from hysim.models.stages import Stage
-from hysim.models.tables import Tables
 
 
 @family
@@ -111,6 +110,7 @@ class MenegottoPinto(Law):
     offset: float = 0.0
     z0: float = 0.0
 
+    within: ClassVar = {"cR1": ("below", 1.0)}
     positive = ("yield_input", "R0", "cR2", "a2", "a4")
     not_negative = ("cR1", "a1", "a3", "least_reversal")
     further_memory = 8
@@ -163,13 +163,6 @@ class MenegottoPinto(Law):
             state[9] = max(furthest, u) if s > 0.0 else min(furthest, u)
         state[0] = u
         return float(parameters[11] + parameters[1] * u + (parameters[0] - parameters[1]) * unit * state[1])
-
-    @classmethod
-    def check(cls, tables: Tables) -> None:
-        """Refuse numbers outside their limits."""
-        super().check(tables)
-        if not (tables["cR1"] < 1.0).all():
-            raise ValueError(f"cR1 must be below 1, got {tables['cR1'].max()}")
 
     @property
     def known_slopes(self) -> tuple[float, float]:

@@ -23,7 +23,6 @@ from hysim.models.law import Law
 from hysim.models.model import Example, family
 from hysim.models.parameters import Parameter
 from hysim.models.stages import Stage
-from hysim.models.tables import Tables
 
 
 @family
@@ -71,6 +70,7 @@ class PeakOriented(Law):
     yield_input: float = 1.0
     unloading: float = 0.4
 
+    within: ClassVar = {"hardening_ratio": ("below", 1.0), "unloading": ("at most", 1.0)}
     positive = ("yield_input",)
     not_negative = ("hardening_ratio", "unloading")
     units: ClassVar = {"hardening_ratio": "1", "unloading": "1"}
@@ -113,15 +113,6 @@ class PeakOriented(Law):
             state[3], state[4] = v, f
         state[0], state[1] = u, s
         return float(parameters[0] * unit * (s * f))
-
-    @classmethod
-    def check(cls, tables: Tables) -> None:
-        """Refuse numbers outside their limits."""
-        super().check(tables)
-        if not (tables["hardening_ratio"] < 1.0).all():
-            raise ValueError(f"hardening_ratio must be below 1, got {tables['hardening_ratio'].max()}")
-        if not (tables["unloading"] <= 1.0).all():
-            raise ValueError(f"unloading must be at most 1, got {tables['unloading'].max()}")
 
     @property
     def known_slopes(self) -> tuple[float, float]:

@@ -6,7 +6,6 @@ from hysim._basics.frozen import FloatArray
 from hysim.models.law import Law
 from hysim.models.model import Example, family
 from hysim.models.parameters import Parameter
-from hysim.models.tables import Tables
 
 
 @family
@@ -59,6 +58,7 @@ class Slack(Law):
     yield_input: float = 1.0
     hardening_ratio: float = 0.02
 
+    within: ClassVar = {"hardening_ratio": ("below", 1.0)}
     positive = ("yield_input",)
     not_negative = ("hardening_ratio",)
     initial: ClassVar[tuple[str, ...]] = ()
@@ -88,13 +88,6 @@ class Slack(Law):
         state[1] = max(state[1], (1.0 - b) * (max(u, 0.0) - parameters[2] - unit))
         state[2] = max(state[2], (1.0 - b) * (max(-u, 0.0) - parameters[2] - unit))
         return float(parameters[0] * max(0.0, v - state[1]) - parameters[1] * max(0.0, w - state[2]))
-
-    @classmethod
-    def check(cls, tables: Tables) -> None:
-        """Refuse numbers outside their limits."""
-        super().check(tables)
-        if not (tables["hardening_ratio"] < 1.0).all():
-            raise ValueError(f"hardening_ratio must be below 1, got {tables['hardening_ratio'].max()}")
 
     @property
     def known_slopes(self) -> tuple[float, float]:

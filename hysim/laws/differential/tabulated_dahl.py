@@ -66,6 +66,7 @@ class TabulatedDahl(Law):
     z0: float = 0.0
 
     positive = ("rate",)
+    within: ClassVar = {"z0": ("of a size of at most", 1.0)}
     units: ClassVar = {"inputs": "u", "centre": "y", "amplitude": "y", "z0": "1"}
     example = Example(
         {"inputs": (-1.0, 0.0, 1.0), "centre": (-1.0, 0.0, 1.0), "amplitude": (0.1, 0.4, 0.1)},
@@ -102,8 +103,6 @@ class TabulatedDahl(Law):
             )
         if not (np.diff(tables["inputs"]) > 0.0).all():
             raise ValueError("inputs must increase")
-        if not (np.abs(tables["z0"]) <= 1.0).all():
-            raise ValueError(f"z0 must be from -1 to 1, got {tables['z0'].ravel()}")
 
     @classmethod
     def pack(cls, tables: Tables) -> Packed:

@@ -40,6 +40,7 @@ class BranchLaw(Law):
     z0: float
 
     positive = ("coercivity",)
+    within: ClassVar = {"z0": ("of a size of at most", 1.0)}
     units: ClassVar[Mapping[str, str]] = {"squareness": "1", "z0": "1"}
     states: ClassVar[tuple[str, ...]] = ("rest", "periodic", "free")
     searched: ClassVar[tuple[Parameter, ...]] = (
@@ -65,8 +66,6 @@ class BranchLaw(Law):
         wrong = squareness[~((squareness > 0.0) & (squareness < 1.0))]
         if wrong.size:
             raise ValueError(f"squareness, remanence over saturation, must be between 0 and 1, got {wrong[0]}")
-        if not (abs(tables["z0"]) <= 1.0).all():
-            raise ValueError(f"z0 must be from -1 (lower branch) to 1 (upper branch), got {tables['z0'].ravel()}")
 
     @property
     @abstractmethod

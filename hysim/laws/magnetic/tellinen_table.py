@@ -70,6 +70,7 @@ class TellinenTable(Law):
         title="Magnetic core: Tellinen's branches from a table",
     )  # fmt: skip
     step = staticmethod(kernels.step)
+    within: ClassVar = {"z0": ("of a size of at most", 1.0)}
     searched = (
         Parameter("feedthrough", unit="y/u", affine=True),
         Parameter("offset", unit="y", affine=True),
@@ -79,6 +80,7 @@ class TellinenTable(Law):
     @classmethod
     def check(cls, tables: Tables) -> None:
         """Refuse what is no pair of branches, or no place between them."""
+        super().check(tables)
         inputs, lower, upper = (tables[name] for name in ("inputs", "lower", "upper"))
         if not inputs.shape[1] == lower.shape[1] == upper.shape[1] >= 2:
             sizes = f"{inputs.shape[1]}, {lower.shape[1]} and {upper.shape[1]}"
@@ -90,8 +92,6 @@ class TellinenTable(Law):
                 raise ValueError(f"the branch {name} must not fall")
         if (lower > upper).any():
             raise ValueError("the branch upper must not lie below the branch lower")
-        if not (abs(tables["z0"]) <= 1.0).all():
-            raise ValueError(f"z0 must be from -1 (lower branch) to 1 (upper branch), got {tables['z0'].ravel()}")
 
     @classmethod
     def pack(cls, tables: Tables) -> Packed:
