@@ -233,6 +233,23 @@ def test_wrong_weights_are_named(weights, message):
     assert_refused(message, hs.identify, hs.SingleValued, hs.Record(u=u, y=u), weights=weights)
 
 
+def test_the_energy_decides_and_the_intervals_are_those_for_errors_of_the_output():
+    """In closed form for a line; a law with memory loses less work than the one that fits the output best."""
+    rng, u = np.random.default_rng(2), hs.signals.triangle(-1.0, 1.5, cycles=3, samples_per_cycle=60)
+    works = [np.append(0.0, np.cumsum(np.diff(u) * 0.5 * (c[1:] + c[:-1]))) for c in np.eye(u.size)]
+    work, columns = np.array(works).T, np.column_stack([np.ones_like(u), u])
+    y = columns @ [0.3, 2.0] + 0.1 * rng.standard_normal(u.size)
+    fit, back = hs.identify(hs.Line, hs.Record(u=u, y=y), weights="energy"), np.linalg.pinv(work @ columns) @ work
+    np.testing.assert_allclose([fit.estimates[name] for name in ("offset", "slope")], back @ y, rtol=1e-9)
+    stderr = np.sqrt(np.sum(fit.residual**2) / (u.size - 2) * np.sum(back**2, axis=1))
+    np.testing.assert_allclose([fit.stderr[name] for name in ("offset", "slope")], stderr, rtol=1e-6)
+    record = hs.Record(u=u, y=hs.Dahl(stiffness=3.0, coulomb=0.8).response(u) + 0.1 * rng.standard_normal(u.size))
+    by_output, by_energy = (hs.identify(hs.Dahl, record, weights=each).residual for each in (None, "energy"))
+    assert np.sum((work @ by_energy) ** 2) < 0.95 * np.sum((work @ by_output) ** 2)
+    assert_refused("no cross_validate", hs.identify, hs.Dahl, record, weights="energy", cross_validate="cycles")
+    assert_refused("searched for", hs.identify, hs.SingleValued, record, weights="energy")
+
+
 @pytest.mark.parametrize("source", ["spoilt.csv", "-"])
 def test_the_command_line_takes_weights_from_a_column(source, tmp_path, monkeypatch, capsys):
     u = hs.signals.triangle(-1.0, 1.0, cycles=2, samples_per_cycle=40)

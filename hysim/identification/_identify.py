@@ -7,7 +7,7 @@ degrees of freedom, rounded; it has none by name.
 import inspect
 from collections.abc import Mapping, Sequence
 from dataclasses import MISSING, fields, replace
-from typing import Any, Protocol, runtime_checkable
+from typing import Any, Literal, Protocol, runtime_checkable
 
 import numpy as np
 import numpy.typing as npt
@@ -53,7 +53,7 @@ def identify(
     intervals: str = "linear",
     cross_validate: str | int | None = None,
     admissible: bool | None = None,
-    weights: npt.ArrayLike | Sequence[npt.ArrayLike] | None = None,
+    weights: npt.ArrayLike | Sequence[npt.ArrayLike] | Literal["energy"] | None = None,
     max_evaluations: int | None = None,
     seed: int = 0,
     workers: int | None = None,
@@ -113,8 +113,10 @@ def identify(
         result is the best law, `success` is False, and the summary begins with ``UNSAFE``. True returns the best
         admissible law whatever its fit, False the best law of all. `Identification.regions` holds the law that was not
         returned: ``"unrestricted"``, or ``"admissible"``.
-    weights : array, shape (n,), or one for each record, optional
+    weights : array, shape (n,), or one for each record, or "energy", optional
         Weight of each sample in the sum of squares, not negative; 0 leaves it out. Only ratios count; inputs are kept.
+        ``"energy"`` takes the squared error of the work from the first sample, the integral of y du, in place of that
+        of y. It is searched for from the optimum for y; the intervals are those for independent errors of y.
     max_evaluations : int, optional
         Number of parameter sets on the whole record that the search may simulate, about. A search that ends by it is
         partial: `success` is False, and `message` says so.
@@ -178,11 +180,18 @@ def identify(
         check_choice("noise", noise, ("gaussian", "quantised", "robust"))
     if not isinstance(seed, (int, np.integer)) or seed < 0:
         raise ValueError(f"seed must be an integer from 0 on, got {seed!r}")
-    shares = _weights(weights, records)
+    energy = isinstance(weights, str)
+    if energy:
+        check_choice("weights", weights, ("energy",))
+        if noise not in (None, "gaussian") or intervals != "linear" or cross_validate is not None:
+            raise ValueError('weights="energy" goes with normal noise, linear intervals and no cross_validate')
+    shares = None if energy else _weights(weights, records)
     if max_evaluations is not None:
         check_count("max_evaluations", max_evaluations)
     with at_most(workers), one_blas_thread():
         if isinstance(model_or_class, Direct) and depends is None:
+            if energy:
+                raise ValueError('weights="energy" is for models that are searched for')
             refuse(model_or_class, options, noise or "gaussian", intervals)
             fit = in_one_step(model_or_class, records, shares, left_out(cross_validate, records), seed, admissible)
             doubts = [swapped_columns(records)]
@@ -206,11 +215,10 @@ def identify(
                 choice = choice._replace(problems=[replace(each, ends=ends) for each in choice.problems])
             searched = [in_units_of_noise(each, seed) for each in choice.problems]
             folds = left_out(cross_validate, records)
-            is_plain = (options == _freedom({}, (), {}), initial, noise or "gaussian", intervals)
+            is_plain = (options == _freedom({}, (), {}) and not energy, initial, noise or "gaussian", intervals)
             rival = family.in_one_step() if is_plain == (True, None, "gaussian", "linear") else None
-            fit = _searched(
-                searched, noise or "gaussian", intervals, folds, seed, progress or None, treatment, admissible, rival
-            )
+            kind, shown = noise or "gaussian", progress or None
+            fit = _searched(searched, kind, intervals, folds, seed, shown, treatment, admissible, rival, energy=energy)
             fit = replace(fit, message="; ".join(filter(None, (fit.message, choice.sentence))))
             if all(type(record) is Record for record in records):  # not in units of sensors, nor weighted by a verb
                 fit = as_measured(fit, records, shares, treatment)
@@ -251,6 +259,8 @@ def _searched(
     treatment: Treated,
     admissible: bool | None,
     rival: Any | None,
+    *,
+    energy: bool,
 ) -> Identification:
     problem = problems[0]
     n_samples, n_names = problem.n_samples, len(problem.space.names)
@@ -268,6 +278,9 @@ def _searched(
         noise_model = noise_model.at_least(squares[0].cost, n_samples - len(problem.space.names))
     best = Search(problem, noise_model, seed, treatment)
     search, likely, named, remark = choose(best, best.likely(squares), admissible)
+    if energy:
+        search, likely = search.on_energy(likely[0])
+        remark = "; ".join(filter(None, (remark, "the work along the records fits best")))
     plain = squares[0].x if search is best else likely[0].theta[: problem.n_x]
     result, likely = search.described(likely, intervals, plain)
     message = "; ".join(filter(None, (result.message, remark, stages_in_words(problems, problem.stage))))

@@ -131,6 +131,18 @@ class Problem:
         """First sample of each record, and the number of samples."""
         return [0, *np.cumsum([len(part.record) for part in self.parts]).tolist()]
 
+    @property
+    def pieces(self) -> list[tuple[Record, slice]]:
+        """Each record, and its samples among those of all."""
+        return [(part.record, slice(a, b)) for part, a, b in zip(self.parts, self.cuts, self.cuts[1:], strict=False)]
+
+    def work(self, values: FloatArray) -> FloatArray:
+        """Integral over the input from the first sample of each record, of values (n_samples, n) in its output."""
+        from scipy.integrate import cumulative_trapezoid
+
+        works = [cumulative_trapezoid(values[own], record.u, axis=0, initial=0.0) for record, own in self.pieces]
+        return np.concatenate(works)
+
     def thinned(self, samples: int) -> "Problem | None":
         """This problem on about so many samples of each record: all reversals, and others evenly between them.
 

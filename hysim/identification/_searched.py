@@ -16,7 +16,7 @@ from hysim.identification._problem import Problem
 from hysim.identification._profile import Profile, profiles, threshold
 from hysim.identification._result import Candidate, Identification, Width
 from hysim.identification._search import PERFECT, Optimum, polish
-from hysim.identification._uncertainty import Uncertainty, uncertainty
+from hysim.identification._uncertainty import Uncertainty, by_energy, uncertainty
 from hysim.identification.forms import sentences
 from hysim.records import Record
 
@@ -24,6 +24,7 @@ LEVEL = 0.95
 TAILS = (0.025, 0.975)
 N_BOOTSTRAP = 500
 N_DISTURBED = 20  # records with other noise of the input: a spread to a sixth
+_INSIDE, _STEP = 1e-9, 1e-6  # of the box: the solver begins inside, and takes such differences
 _SAME = 1e-6  # relative difference of two costs that are the same
 _FAINT = 0.3  # quanta: noise below does not spread the rounding
 _EXACT = 100.0  # smallest sigmas: below, nothing is left to explain
@@ -44,6 +45,7 @@ class Search:
     noise: Noise
     seed: int
     treatment: Treated
+    by_energy: bool = False
 
     @property
     def descent(self) -> Descent:
@@ -61,6 +63,33 @@ class Search:
             if not distinct or (not perfect and loss - distinct[-1].loss > 0.5 * self.problem.y.size * _SAME):
                 distinct.append(LocalOptimum(reached.theta[k], loss, sigma, squares[k].converged))
         return distinct
+
+    def on_energy(self, best: LocalOptimum) -> tuple["Search", list[LocalOptimum]]:
+        """The search and the optimum near the `best` one whose work along the records has the least squared error.
+
+        The linear parameters are solved for at each point, as those of the output are.
+        """
+        from scipy.optimize import least_squares, lsq_linear
+
+        problem, n_x = self.problem, self.problem.n_x
+        box, width = problem.linear_box(), problem.space.upper - problem.space.lower
+
+        def solved(x: FloatArray) -> tuple[FloatArray, FloatArray]:
+            columns, fixed_part = problem.split(x[np.newaxis])
+            works = problem.work(np.column_stack([columns[0], problem.y - fixed_part[0]])) / problem.scale
+            size = np.linalg.norm(works[:, -1]) or 1.0
+            found = lsq_linear(works[:, :-1], works[:, -1] / size, bounds=np.array(box) / size)
+            return found.x * size, found.fun * size
+
+        x = best.theta[:n_x]
+        if n_x:
+            inside = np.clip(x, problem.space.lower + _INSIDE * width, problem.space.upper - _INSIDE * width)
+            limits = problem.space.lower, problem.space.upper
+            x = least_squares(lambda x: solved(x)[1], inside, bounds=limits, x_scale=width, diff_step=_STEP).x
+        theta = np.append(x, solved(x)[0])
+        reached = self.descent.run(theta[np.newaxis], tolerance=1e-9, steps=0)
+        optimum = LocalOptimum(theta, float(reached.loss[0]), float(reached.sigma[0]), best.converged)
+        return replace(self, by_energy=True), [optimum]
 
     def candidate(self, theta: FloatArray) -> Candidate:
         problem = self.problem
@@ -101,6 +130,8 @@ class Search:
         residual, sigma = self.residual(best.theta)[np.newaxis], np.full((1, 1), best.sigma)
         curvature = self.noise.terms(residual, sigma).curvature[0]
         known = uncertainty(self.problem, best.theta, curvature)
+        if self.by_energy:
+            return by_energy(known, self.problem, best.theta, best.sigma)
         if not self.treatment.noises or known.slopes is None:
             return known
         return known.with_disturbances(self._by_input_noise(best.theta), curvature * self.problem.weights)

@@ -108,6 +108,33 @@ def uncertainty(problem: Problem, theta: FloatArray, curvature: FloatArray) -> U
     )
 
 
+def by_energy(known: Uncertainty, problem: Problem, theta: FloatArray, sigma: float) -> Uncertainty:
+    """What is `known`, for an optimum of the work T y: errors e of the output move it by ``(T J)^+ T e``."""
+    if known.slopes is None:
+        return known
+    x, n_samples, n_names = theta[: problem.n_x], problem.n_samples, len(problem.space.names)
+    moves = np.append(~np.logical_or(*problem.space.at_sides(x)), np.ones(theta.size - x.size, dtype=bool))
+    slopes = np.where(moves, known.slopes, 0.0)
+    norms = np.linalg.norm(slopes, axis=0)
+    norms[norms == 0.0] = 1.0
+    to_work = np.asarray(np.linalg.pinv(problem.work(slopes / norms), rcond=_SINGULAR).T, dtype=np.float64)
+    moved = np.concatenate([_transposed(record.u, to_work[own]) for record, own in problem.pieces])
+    spread = sigma * np.sqrt(n_samples / (n_samples - n_names)) * moved.T / norms[:, np.newaxis]
+    of_names = named_slopes(problem, theta[np.newaxis])[0] @ spread
+    covariance = np.where(np.isnan(known.covariance), np.nan, of_names @ of_names.T)
+    output = np.linalg.norm(slopes @ spread, axis=1)
+    return replace(
+        known, covariance=covariance, of_theta=spread @ spread.T, with_names=spread @ of_names.T, output=output
+    )
+
+
+def _transposed(u: FloatArray, values: FloatArray) -> FloatArray:
+    """What the transposed integral by the trapezoidal rule makes of values (n_samples, n)."""
+    later = np.cumsum(values[::-1], axis=0)[::-1][1:]
+    halves = 0.5 * np.diff(u)[:, np.newaxis] * later
+    return np.pad(halves, ((0, 1), (0, 0))) + np.pad(halves, ((1, 0), (0, 0)))
+
+
 def output_slopes(problem: Problem, theta: FloatArray, *, refined: bool = True) -> FloatArray:
     """dm/dtheta, (n_samples, n_theta), refined where the output bends within the step of a difference."""
     slopes, share = _differences(problem, theta, 1.0), _SHARE
