@@ -141,11 +141,12 @@ def page_text(models: Mapping[str, Shown], record: Record | None = None, *, titl
         "record": None if record is None else _record(record),
     }
     folder = files("hysim.export").joinpath("page")
+    lines = (line for name in _PARTS for line in folder.joinpath(f"{name}.js").read_text(encoding="utf-8").splitlines())
     return Template(folder.joinpath("page.html").read_text(encoding="utf-8")).substitute(
         title=escape(title or next(iter(models))),
         version=__version__,
         style=folder.joinpath("page.css").read_text(encoding="utf-8").strip(),
-        script="\n".join(folder.joinpath(f"{name}.js").read_text(encoding="utf-8").strip() for name in _PARTS),
+        script="\n".join(line for line in lines if not line.lstrip().startswith("//")),
         packs=",\n".join(f"(() => {{\n{pack.strip()}\nreturn pack{k};\n}})()" for k, pack in enumerate(packs)),
         data=_json_for_script(json.dumps(data, separators=(",", ":"), ensure_ascii=False)),
     )

@@ -21,7 +21,6 @@ from hysim.export._c import plain
 from hysim.export._compilers import Kernels, kernels_of, module_of
 from hysim.export._packing import packing
 from hysim.kernels import clamps, energy_plays, play_sums
-from hysim.laws.dashpot import RatePart
 from hysim.laws.friction.rated_law import TimedLaw
 from hysim.laws.operators.rate_dependent_prandtl_ishlinskii import RateDependentPrandtlIshlinskii
 from hysim.laws.static import SingleValued
@@ -171,14 +170,7 @@ def node_of(thing: Any, u: FloatArray, parts: Parts, prefix: str = "") -> dict[s
     if isinstance(thing, SingleValued):
         return {"knots": [thing.u.tolist(), thing.y.tolist()], "name": "hs.SingleValued", "fields": []}
     first = len(parts.values)
-    if isinstance(thing, RatePart):
-        size = 2.0 * abs(thing.c) or 1.0
-        parts.values.append(thing.c)
-        parts.timed, sliders = True, [slider("c", thing.c, -size, size, places=[0])]
-        words = {"name": _name(type(thing)), "fields": [["c", first, 1.0]], "output": output_of(type(thing))}
-        node = {"rate": first, "power": thing.power, **words}
-    else:
-        node, sliders = _law(thing, u, parts)
+    node, sliders = _law(thing, u, parts)
     parts.show(sliders, first, prefix)
     return node
 

@@ -14,10 +14,10 @@ _HEAD = 3
 
 @signed_kernel(float64(CONSTANTS, VECTOR, float64))
 def excess(parameters: FloatArray, state: FloatArray, u: float) -> float:
-    """The root of the velocity with its sign, `parameters` (c, sample time) and `state` (last u)."""
-    velocity = (u - state[0]) / parameters[1]
+    """The root of the velocity with its sign, `parameters` (sample time, c) and `state` (last u)."""
+    velocity = (u - state[0]) / parameters[0]
     state[0] = u
-    return float(parameters[0] * math.copysign(math.sqrt(abs(velocity)), velocity))
+    return float(parameters[1] * math.copysign(math.sqrt(abs(velocity)), velocity))
 
 
 @signed_kernel(float64(CONSTANTS, VECTOR, float64))

@@ -55,10 +55,10 @@ def line(parameters: FloatArray, state: FloatArray, u: float) -> float:
 
 @signed_kernel(float64(CONSTANTS, VECTOR, float64))
 def dashpot(parameters: FloatArray, state: FloatArray, u: float) -> float:
-    """The damper, `parameters` (c, sample time) and `state` (last u)."""
+    """The damper, `parameters` (sample time, c) and `state` (last u)."""
     rise = u - state[0]
     state[0] = u
-    return float(parameters[0] * (rise / parameters[1]))
+    return float(parameters[1] * (rise / parameters[0]))
 
 
 # ---------------------------------------------------------------------------------- starts

@@ -51,10 +51,6 @@ function response(node, values, u, steps, sampleTime) {
     return node.cascade.reduce((signal, stage) => response(stage, values, signal, steps, sampleTime), u);
   }
   if (node.knots) return Float64Array.from(u, (value) => interpolated([value], ...node.knots)[0]);
-  if ("rate" in node) {
-    const velocities = u.map((value, k) => (value - u[Math.max(k - 1, 0)]) / sampleTime);
-    return velocities.map((v) => values[node.rate] * Math.sign(v) * Math.abs(v) ** node.power);
-  }
   const { first, free, per_time: perTime = [], clock, sizes } = node;
   const number = (place) => (place === clock ? sampleTime : values[first + place] / (perTime.includes(place) ? sampleTime : 1));
   const fields = free.map(number);

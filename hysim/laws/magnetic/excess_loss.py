@@ -3,9 +3,7 @@
 import math
 from typing import Self
 
-import numpy as np
-
-from hysim._basics.frozen import FloatArray, check_not_negative
+from hysim._basics.frozen import check_not_negative
 from hysim.kernels import core_losses as losses
 from hysim.laws.dashpot import RatePart
 from hysim.models.model import Example, family
@@ -38,13 +36,7 @@ class ExcessLoss(RatePart):
     c: float = 1.0
 
     example = Example({"c": 2.0})
-    power = 0.5
     step = staticmethod(losses.excess)
-
-    @staticmethod
-    def of_velocity(velocity: FloatArray) -> FloatArray:
-        """The root of the velocity, with its sign."""
-        return np.asarray(np.copysign(np.sqrt(np.abs(velocity)), velocity))
 
     @classmethod
     def from_bertotti(cls, *, conductivity: float, cross_section: float, V0: float) -> Self:
