@@ -489,3 +489,29 @@ def test_the_parts_beside_a_line_are_identified_together():
     fit = hs.identify(hs.Sum.structure(hs.Line, hs.Dashpot, hs.ExcessLoss), record)
     assert fit.estimates["dashpot.c"] == pytest.approx(0.01, rel=1e-6)
     assert fit.estimates["excess_loss.c"] == pytest.approx(0.4, rel=1e-6)
+
+
+# ---------------------------------------------------------------------------------- driven by B
+
+
+SATURATED = [
+    hs.Tellinen(saturation=-0.45, coercivity=15.0, squareness=0.33, offset=0.1),
+    hs.TellinenTable(inputs=(-50.0, 0.0, 50.0), lower=(-0.45, -0.1, 0.45), upper=(-0.45, 0.1, 0.45), offset=0.1),
+    hs.EnergyPlays(thresholds=(0.0, 20.0), weights=(0.25, 0.2), field=15.0, offset=0.1),
+    hs.JilesAtherton(Ms=0.9, a=35.0, k=22.0, alpha=70.0, c=0.3, gain=0.5, feedthrough=0.0, offset=0.1),
+]
+
+
+@pytest.mark.parametrize("law", SATURATED)
+def test_an_output_beyond_saturation_is_named_with_what_is_reached(law):
+    reached = law.response([0.0, 90.0, -400.0, 5.0])
+    assert law.response(law.inverse_response(reached)) == pytest.approx(reached, abs=1e-12)
+    message = r"sample 1 \(y = 0.56\): its outputs lie between -0.35 and 0.55, and 2 of 4 samples lie beyond"
+    assert_refused(message, law.inverse_response, [0.1, 0.56, 0.0, -0.36], error=hs.SimulationError)
+
+
+def test_cells_that_stand_still_at_first_move_by_twice_the_smallest_force_after_a_turn():
+    law = hs.EnergyPlays(thresholds=(5.0, 20.0), weights=(0.2, 0.25), field=15.0)
+    u = law.inverse_response(y := [0.0, 0.2, 0.3, 0.3 - 1e-9, 0.1])
+    assert law.response(u) == pytest.approx(y, abs=1e-15)
+    assert u[2] - u[3] == pytest.approx(10.0, abs=1e-5)

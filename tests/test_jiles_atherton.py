@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from magnetic_evolution import loop_of, steady_cycle
 from magnetic_reference import Core, Exact, runge_kutta, strokes
-from strategies import COMPILER, assert_refused, needs_compiler, refused
+from strategies import COMPILER, needs_compiler, refused
 
 import hysim as hs
 from hysim.models.search_space import Freedom
@@ -153,11 +153,6 @@ def test_the_inverse_is_the_same_in_c(tmp_path):
     (tmp_path / "inverse.h").write_text(program.header)
     strict = ["-std=c99", "-Wall", "-Wextra", "-Werror", "-fsyntax-only"]
     subprocess.run([COMPILER, *strict, "inverse.c"], cwd=tmp_path, check=True)
-
-
-def test_an_output_beyond_saturation_has_no_input():
-    law = magnet()
-    assert_refused("no inverse at sample 1", law.inverse_response, [0.0, 1.7e6], error=hs.SimulationError, u0=0.0)
 
 
 def test_a_core_that_is_cut_by_a_gap_has_alpha_less_the_demagnetising_factor():

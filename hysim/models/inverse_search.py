@@ -12,13 +12,14 @@ from hysim._basics.parallel import in_pieces
 from hysim.errors import SimulationError
 from hysim.kernels import inverses as kernels
 from hysim.kernels.stepping import drive
-from hysim.models.protocols import UNLIMITED, CompiledLaw, Limits, StepwiseInvertible, Stretched
+from hysim.models.protocols import UNLIMITED, CompiledLaw, Limits, Saturating, StepwiseInvertible, Stretched
 
 _REACH, _WIDER = 1e-6, 16.0  # how far at most the output is looked at to either side of the first input; the ratio
 _SHORTEST = 2.0**-46  # of the first input, or this number
 _NEXT_TO_NOTHING = 1e-150
 _HIDDEN, _FARTHEST = 2.0**-44, 1e150  # part of the output by which rounding may hide a rise: it is then sought further
 _FLAT = 1e-6  # of the highest slope: one that is flatter somewhere is looked at, as one that turns
+_ROUNDING = 1e-12  # of the largest output: what the sum that an output is may miss of the saturation
 _LINEAR = 0.1  # part by which rises over once, twice and four times a length are no multiples of each other
 
 Unreached = Callable[[int, float, CompiledLaw], str]
@@ -46,6 +47,8 @@ def searched_inverse(
 
     with np.errstate(all="ignore"):
         reached, slope = output(u), _slope(output, u)
+    if slope == 0.0 and isinstance(law, Saturating):
+        slope = _steepest(law)
     if slope == 0.0:
         raise ValueError(f"the law has no inverse: its output does not rise or fall through u = {u:g}")
     places = law.memory_places if isinstance(law, Stretched) else ((0, forward.state.size),)
@@ -65,6 +68,12 @@ def one_signed(slopes: tuple[float, float]) -> bool:
     return slopes[0] * slopes[1] > 0.0 and _FLAT * most < least and most < np.inf
 
 
+def _steepest(law: Saturating) -> float:
+    """Steepest slope of a law that saturates and so stands still somewhere, zero if it may rise and fall."""
+    low, high = law.known_slopes
+    return max(low, high, key=abs) if low * high >= 0.0 and max(map(abs, law.output_bounds)) < math.inf else 0.0
+
+
 def inverse_response(inverse: CompiledLaw, y: FloatArray, unreached: Unreached | None = None) -> FloatArray:
     """Inputs for the outputs `y`, by steps of the inverse; SimulationError if no input gives an output."""
     u = np.empty(y.size)
@@ -73,6 +82,19 @@ def inverse_response(inverse: CompiledLaw, y: FloatArray, unreached: Unreached |
     if lost >= 0:
         raise SimulationError((unreached or not_reached)(lost, float(y[lost]), inverse))
     return u
+
+
+def check_reached(y: FloatArray, bounds: tuple[float, float]) -> None:
+    """Raise a SimulationError for the first of the outputs `y` that a law does not reach at any input."""
+    low, high = bounds
+    room = _ROUNDING * max(map(abs, bounds))
+    beyond = np.flatnonzero((y < low - room) | (y > high + room))
+    if beyond.size:
+        raise SimulationError(
+            f"the law has no inverse at sample {beyond[0]} (y = {y[beyond[0]]:g}): its outputs lie between {low:g} and "
+            f"{high:g}, and {beyond.size} of {y.size} samples lie beyond; limit y to 99 % of this range by numpy.clip, "
+            "or take a law with a feedthrough, a slope at saturation"
+        )
 
 
 def not_reached(sample: int, y: float, inverse: CompiledLaw) -> str:

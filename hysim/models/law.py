@@ -27,7 +27,7 @@ from hysim.kernels.stepping import Start, Step, drive
 from hysim.models.batch import Batch, Reduction, Sets
 from hysim.models.compiled_step import compiled_start, compiled_step, pointer, start_pointer
 from hysim.models.composable import Placed
-from hysim.models.inverse_search import inverse_at_rest, inverse_response, not_reached, searched_inverse
+from hysim.models.inverse_search import check_reached, inverse_at_rest, inverse_response, not_reached, searched_inverse
 from hysim.models.parameters import Parameter, declared_space
 from hysim.models.protocols import UNLIMITED, CompiledLaw, Limits, Searched, Startable
 from hysim.models.search_space import ALL_FREE, Freedom, Parameters, SearchSpace
@@ -235,6 +235,11 @@ class Law(Placed, Searched, ABC):
     @property
     def known_slopes(self) -> tuple[float, float]:
         """Lowest and highest slope dy/du over every input that begins with the initial memory, infinite if unknown."""
+        return -math.inf, math.inf
+
+    @property
+    def output_bounds(self) -> tuple[float, float]:
+        """Lowest and highest output that inputs lead to, infinite where there is no limit or it is not known."""
         return -math.inf, math.inf
 
     @property
@@ -535,6 +540,7 @@ class Law(Placed, Searched, ABC):
 
     def inverted(self, y: FloatArray, u0: float | None, state: State | None) -> FloatArray:
         """Input for outputs `y` that are not empty; `u0` and `state` as of `inverse_response`."""
+        check_reached(y, self.output_bounds)
         return inverse_response(self.inverse_begun(y, u0, state), y, self.unreached)
 
     def inverse_begun(self, y: FloatArray, u0: float | None, state: State | None) -> CompiledLaw:

@@ -153,6 +153,15 @@ class Stretched(Protocol):
 
 
 @runtime_checkable
+class Saturating(Stretched, Protocol):
+    """A law that also says between which outputs it stays."""
+
+    @property
+    def output_bounds(self) -> tuple[float, float]:
+        """Lowest and highest output that inputs lead to, infinite where there is no limit or it is not known."""
+
+
+@runtime_checkable
 class Placeable(Protocol):
     """A model whose initial memory holds at an input, and that knows the range of inputs of its record."""
 

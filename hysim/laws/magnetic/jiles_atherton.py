@@ -462,6 +462,12 @@ class JilesAtherton(Law):
         """Whether gain and feedthrough have one sign, and are not both zero: y rises, or falls, along every branch."""
         return self.gain * self.feedthrough >= 0.0 and self.gain + self.feedthrough != 0.0
 
+    @property
+    def output_bounds(self) -> tuple[float, float]:
+        """The saturation on both sides of the offset; no limit with a feedthrough."""
+        size = abs(self.gain) * self.Ms if self.feedthrough == 0.0 else math.inf
+        return self.offset - size, self.offset + size
+
     def inverse_begun(self, y: FloatArray, u0: float | None, state: State | None) -> CompiledLaw:
         """By the search for the effective field, from the input that gives the first output with M_irr at z0."""
         if not self.is_invertible():

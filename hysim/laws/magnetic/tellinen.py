@@ -83,6 +83,12 @@ class BranchLaw(Law):
         ends = self.feedthrough, self.feedthrough + self.saturation / self.bend
         return min(ends), max(ends)
 
+    @property
+    def output_bounds(self) -> tuple[float, float]:
+        """The saturation on both sides of the offset; no limit with a feedthrough."""
+        size = abs(self.saturation) if self.feedthrough == 0.0 else math.inf
+        return self.offset - size, self.offset + size
+
     def search_space(self, record: Record, freedom: Freedom = ALL_FREE) -> SearchSpace:
         """The declared box, with a feedthrough that is not negative unless the user's bounds say so."""
         space = super().search_space(record, freedom)

@@ -1,5 +1,6 @@
 """Tellinen's law between two tabulated branches."""
 
+import math
 from typing import Any, ClassVar, Self
 
 import numpy as np
@@ -109,6 +110,12 @@ class TellinenTable(Law):
         """From that of the feedthrough alone to that of a branch where it is steepest."""
         slopes = np.diff([self.lower, self.upper], axis=1) / np.diff(self.inputs)
         return self.feedthrough, self.feedthrough + float(slopes.max())
+
+    @property
+    def output_bounds(self) -> tuple[float, float]:
+        """The ends of the table; no limit with a feedthrough."""
+        ends = (self.lower[0], self.upper[-1]) if self.feedthrough == 0.0 else (-math.inf, math.inf)
+        return self.offset + ends[0], self.offset + ends[1]
 
     @classmethod
     def from_loop(cls, record: Record, *, nodes: int = 64, cycles: int = 1, feedthrough: float = 0.0) -> Self:

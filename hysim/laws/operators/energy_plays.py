@@ -1,5 +1,6 @@
 """Energy-based plays: cells of dry friction, each followed by an anhysteretic curve."""
 
+import math
 from dataclasses import replace
 from typing import ClassVar
 
@@ -142,6 +143,12 @@ class EnergyPlays(Bank, Law):
         steepest = [weight / (3.0 * self.field) for weight in self.weights]
         low, high = (sum(side(slope, 0.0) for slope in steepest) for side in (min, max))
         return self.feedthrough + low, self.feedthrough + high
+
+    @property
+    def output_bounds(self) -> tuple[float, float]:
+        """The weights on both sides of the offset; no limit with a feedthrough."""
+        size = sum(map(abs, self.weights)) if self.feedthrough == 0.0 else math.inf
+        return self.offset - size, self.offset + size
 
     def dissipated(self, u: npt.ArrayLike) -> FloatArray:
         """Energy that the cells have turned into heat since the first sample, ``sum_i r_i w_i |dL_i|``.

@@ -310,13 +310,11 @@ class Preisach(RelayLaw):
         past = state[1:] if state is not None else self.past if u0 is None else (*self.past, u0)
         return self.inverse_from(past, room=y.size)
 
-    def unreached(self, sample: int, y: float, inverse: CompiledLaw) -> str:
-        """Message with the outputs between which the law saturates."""
+    @property
+    def output_bounds(self) -> tuple[float, float]:
+        """Outputs where all relays are down, and where all are up."""
         bound = abs(float(self.everett[-1, 0]))
-        return (
-            f"the law has no inverse at sample {sample} (y = {y:g}): it saturates at {self.offset - bound:g} and "
-            f"{self.offset + bound:g}"
-        )
+        return self.offset - bound, self.offset + bound
 
     def compiled_inverse(self, u0: float, limits: Limits = UNLIMITED, sample_time: float = math.inf) -> CompiledLaw:
         return self.inverse_from((*self.past, u0), limits, room=_ROOM)
