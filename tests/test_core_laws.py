@@ -515,3 +515,9 @@ def test_cells_that_stand_still_at_first_move_by_twice_the_smallest_force_after_
     u = law.inverse_response(y := [0.0, 0.2, 0.3, 0.3 - 1e-9, 0.1])
     assert law.response(u) == pytest.approx(y, abs=1e-15)
     assert u[2] - u[3] == pytest.approx(10.0, abs=1e-5)
+
+
+@pytest.mark.parametrize("law", [CORES[0], hs.Chan(coercivity=0.4, offset=0.3, z0=0.2)])
+def test_columns_by_one_run_are_those_by_one_run_each(law):
+    record, z0 = hs.Record(u=walk(5), y=walk(6)), {"z0": np.array([-0.4, 0.8])}
+    np.testing.assert_allclose(law.regressors(z0, record), hs.Law.regressors(law, z0, record), atol=1e-12)
