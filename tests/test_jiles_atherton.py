@@ -318,3 +318,7 @@ test_bounds_that_make_no_box_are_refused = refused(
     ({"alpha": (0.0, np.inf)}, "'alpha' must be finite"),
     call=lambda bounds: box(Freedom(bounds=bounds)),
 )
+
+
+def test_no_core_falls_at_saturation():
+    assert box(Freedom()).bounds == {"feedthrough": (0.0, math.inf)}

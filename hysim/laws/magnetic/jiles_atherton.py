@@ -135,6 +135,8 @@ def search_space(
     at_rest = ("z0",) if freedom.starts_at_rest() else ()
     held = freedom.held(scalars, redundant=alone, at_rest=at_rest)
     bounds = freedom.limits(scalars, held)
+    if "feedthrough" not in held and "gain" in held and held["gain"] > 0.0:  # no core falls at saturation
+        bounds = {"feedthrough": (0.0, np.inf), **bounds}
     limits = {name: pair for name, pair in bounds.items() if name in _BOX}
     for name, pair in limits.items():
         if not np.isfinite(pair).all() or (name in _LOGS and pair[0] <= 0.0):
