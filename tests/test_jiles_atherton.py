@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from magnetic_evolution import loop_of, steady_cycle
 from magnetic_reference import Core, Exact, runge_kutta, strokes
-from strategies import COMPILER, needs_compiler, refused
+from strategies import COMPILER, needs_compiled, needs_compiler, refused
 
 import hysim as hs
 from hysim.models.search_space import Freedom
@@ -322,3 +322,40 @@ test_bounds_that_make_no_box_are_refused = refused(
 
 def test_no_core_falls_at_saturation():
     assert box(Freedom()).bounds == {"feedthrough": (0.0, math.inf)}
+
+
+# ---------------------------------------------------------------------------------- numbers of a data sheet
+
+SHEET = {"Hc": 15.0, "Br": 0.17, "Bs": 0.47, "Hs": 1200.0, "mu_i": 2300.0}
+
+
+def test_the_numbers_of_a_data_sheet_are_those_of_a_steady_loop():
+    core = hs.JilesAtherton(Ms=4e5, a=50.0, alpha=2.8e-4, k=47.0, c=0.7)
+    own = replace(core, offset=3.0, gain=2.0, z0=9.0, u0=1.0).to_datasheet(Hs=200.0)
+    B = core.response([0.0, 1e-6, *[200.0, -200.0] * 30, 200.0, 0.0, -own["Hc"]])
+    assert B[[1, -3, -2, -1]] == pytest.approx([MU0 * 1e-6 * own["mu_i"], own["Bs"], own["Br"], 0.0], rel=1e-6)
+
+
+@needs_compiled
+@pytest.mark.parametrize("seed", range(10))
+def test_a_law_is_found_by_the_numbers_of_its_loop(seed):
+    rng = np.random.default_rng([seed, 44])
+    (Ms, a, k), coupling = 10.0 ** rng.uniform([5.0, 1.0, 0.5], [6.3, 3.0, 3.5]), rng.uniform(0.0, 2.9)
+    law = hs.JilesAtherton(Ms=Ms, a=a, alpha=coupling * a / Ms, k=k, c=rng.uniform(0.02, 0.9))
+    numbers = law.to_datasheet(Hs=max(a, k) * rng.uniform(2.0, 50.0))
+    assert hs.JilesAtherton.from_datasheet(**numbers).scalars == pytest.approx(law.scalars, rel=1e-4)
+    numbers["coupling"] = 2.0
+    assert hs.JilesAtherton.from_datasheet(**numbers).to_datasheet(Hs=numbers["Hs"]) == pytest.approx(numbers, rel=1e-4)
+
+
+@needs_compiled
+def test_numbers_that_no_law_has_are_named():
+    with pytest.warns(hs.HysimWarning, match=r"Br is 0\.00\d+, not 0.001, .*: no Jiles-Atherton law"):
+        hs.JilesAtherton.from_datasheet(**{**SHEET, "Br": 0.001})
+
+
+test_numbers_of_no_core_are_refused = refused(
+    ({"Br": 0.469}, "Br < Bs - mu0 Hs"),
+    ({"Bs": 470.0}, r"< 5 \[T\].*Bs = 470"),
+    call=lambda numbers: hs.JilesAtherton.from_datasheet(**{**SHEET, **numbers}),
+)

@@ -43,6 +43,7 @@ circuit simulators is quoted for PSpice (core, level 2) and Micro-Cap; we have n
 """
 
 import math
+import warnings
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import ClassVar, Self
@@ -50,7 +51,8 @@ from typing import ClassVar, Self
 import numpy as np
 import numpy.typing as npt
 
-from hysim._basics.frozen import FloatArray, read_only
+from hysim._basics.frozen import FloatArray, check_positive, read_only
+from hysim.errors import HysimWarning
 from hysim.kernels import jiles_atherton as kernels
 from hysim.kernels import jiles_atherton_inverse as inverse
 from hysim.models.inverse_search import first_input
@@ -96,6 +98,13 @@ _LEAST = 1e-12  # of 1 - alpha Ms m0 / a
 _TURN = 12.0  # twice the stability at which alpha Ms s / a is 1
 _SMALLEST = 1e-3  # of the width: a for a coupling that is given, and nearly as large
 _SCREENED = 1024
+_COUPLING, _JUMPS = 2.0, 3.0  # alpha Ms / a by default, 2.2 and 2.3 in papers, and where a law without pinning jumps
+_DATASHEET_BOX = np.array([[0.0, -5.0, -5.0, 0.0], [4.0, 7.0, 7.0, 0.99]])  # logarithms of Ms, a and k; c
+_DATASHEET_STARTS = ((0.05, 0.0, 0.2, 0.2), (0.05, -1.2, 0.2, 0.7), (0.05, 1.1, 0.2, 0.7), (0.05, 2.3, 1.0, 0.2))
+_MET, _MISSED, _NOTHING = 1e-4, 0.02, 1e-9  # relative errors of its numbers: no further start, a warning, the least
+_MOST = 5.0  # of a magnetisation [T]: iron with cobalt has 2.5
+_TOGETHER = "no Jiles-Atherton law with these numbers was found; check their units, A/m and T"
+_STROKES = np.append(0.0, np.tile([1.0, -1.0], 20)[:-1])  # after them a loop is steady
 
 
 def _check_isotropic(law: "JilesAtherton", whose: str) -> None:
@@ -448,6 +457,94 @@ class JilesAtherton(Law):
         Kan = self.anisotropy * MU0 * self.Ms * self.a
         axis = {"Kan": abs(Kan), "psi": 0.0 if Kan >= 0.0 else 0.5 * math.pi}
         return {"a": self.a, "k": self.k, "c": self.c, "Ms": self.Ms, "alpha": self.alpha, **axis}
+
+    @classmethod
+    def from_datasheet(
+        cls, *, Hc: float, Br: float, Bs: float, Hs: float, mu_i: float, coupling: float = _COUPLING
+    ) -> Self:
+        """The law whose steady loop has the numbers of a data sheet, by least squares from several starts.
+
+        Four numbers leave one of the five constants open, for which `coupling` stands. One loop says little of smaller
+        ones; see `hysim.identify`.
+
+        Parameters
+        ----------
+        Hc, Br : float
+            Coercive field [A/m] and remanence [T] of the loop between -Hs and Hs.
+        Bs, Hs : float
+            Flux density [T] at the tip of this loop, where the field is Hs [A/m].
+        mu_i : float
+            Initial permeability of the demagnetised core, over mu0.
+        coupling : float
+            ``alpha Ms / a``, below 3: 2.3 for the steel of 1986, negative for a core with a gap.
+
+        Returns
+        -------
+        JilesAtherton
+            A `hysim.HysimWarning` names the numbers that it has in their place, if one is missed by more than 2 %.
+
+        Raises
+        ------
+        ValueError, TypeError
+            If they are not finite numbers with Hc below Hs, Br below Bs - mu0 Hs, which no core has above 5 T, mu_i
+            above 1 and the coupling below 3.
+
+        Examples
+        --------
+        >>> import hysim as hs
+        >>> core = hs.JilesAtherton.from_datasheet(Hc=15.0, Br=0.17, Bs=0.47, Hs=1200.0, mu_i=2300.0)
+        >>> {name: round(value, 3) for name, value in core.to_datasheet(Hs=1200.0).items()}
+        {'Hc': 15.0, 'Br': 0.17, 'Bs': 0.47, 'Hs': 1200.0, 'mu_i': 2300.0, 'coupling': 2.0}
+        """
+        from scipy.optimize import least_squares
+
+        asked = {"Hc": Hc, "Br": Br, "Bs": Bs, "Hs": Hs, "mu_i": mu_i, "coupling": coupling}
+        numbers = read_only([*asked.values()], ", ".join(asked), ndim=1)
+        Hc, Br, Bs, Hs, mu_i, coupling = numbers.tolist()
+        if not (0.0 < Hc < Hs and 0.0 < Br < Bs - MU0 * Hs < _MOST and mu_i > 1.0 and coupling < _JUMPS):
+            raise ValueError(
+                f"a core has 0 < Hc < Hs [A/m], 0 < Br < Bs - mu0 Hs < {_MOST:g} [T], mu_i > 1 and coupling < "
+                f"{_JUMPS:g}, got {', '.join(f'{name} = {value}' for name, value in asked.items())}"
+            )
+
+        def constants(x: FloatArray) -> dict[str, float]:
+            Ms, a, k = (np.exp(x[:3]) * [Bs / MU0 - Hs, Hc, Hc]).tolist()
+            return {"Ms": Ms, "a": a, "alpha": coupling * a / Ms, "k": k, "c": float(x[3])}
+
+        def missed(x: FloatArray) -> FloatArray:
+            own = [*cls(**constants(x)).to_datasheet(Hs=Hs).values()]
+            return np.log(np.maximum(np.array(own[:-1]) / numbers[:-1], _NOTHING))
+
+        fits = (least_squares(missed, start, bounds=_DATASHEET_BOX, max_nfev=100) for start in _DATASHEET_STARTS)
+        best = next(fits)
+        while np.abs(best.fun).max() > _MET and (other := next(fits, None)) is not None:
+            best = min(best, other, key=lambda fit: float(fit.cost))
+        core = cls(**constants(best.x))
+        if np.abs(best.fun).max() > _MISSED:
+            own = core.to_datasheet(Hs=Hs)
+            errors = ", ".join(
+                f"{name} is {own[name]:.4g}, not {asked[name]:.4g}" for name in ("Hc", "Br", "Bs", "mu_i")
+            )
+            warnings.warn(f"{errors}: {_TOGETHER}", HysimWarning, stacklevel=2)
+        return core
+
+    def to_datasheet(self, *, Hs: float) -> dict[str, float]:
+        """The arguments of `from_datasheet`: numbers of the steady loop between -Hs and Hs [A/m], in A/m and T.
+
+        Gain, feedthrough, offset and z0 of the law do not count. ValueError if Hs is not positive and finite.
+        """
+        check_positive(Hs=Hs)
+        core = self.placed(None).with_scalars({"gain": MU0, "feedthrough": MU0, "offset": 0.0, "z0": 0.0})
+        B, tip = core.advance(Hs * _STROKES)
+        chi = self.c * self.Ms / self.a * float(initial_slope(np.array(self.anisotropy)))
+        return {
+            "Hc": -float(core.inverse_response([0.0], state=tip)[0]),
+            "Br": float(core.advance([0.0], tip)[0][0]),
+            "Bs": float(B[-1]),
+            "Hs": float(Hs),
+            "mu_i": 1.0 + chi / (1.0 - self.reversible_feedback * self.alpha * chi),
+            "coupling": self.alpha * self.Ms / self.a,
+        }
 
     def magnetisation(self, u: npt.ArrayLike) -> FloatArray:
         """Magnetisation M at the samples of the field `u`, shape (n_samples,) [A/m]; errors as of `response`."""
