@@ -1,5 +1,8 @@
 """The field of a core by its flux density: against parts of other laws, its fit, and the update by a known stretch."""
 
+import importlib
+from pathlib import Path
+
 import numpy as np
 import pytest
 import scipy.signal
@@ -107,6 +110,18 @@ def test_without_noise_it_is_found_again():
     fit = hs.identify(structure, record_of(core, u))
     np.testing.assert_allclose(fit.residual[200:], 0.0, atol=1e-4)
     assert fit.loop_width is None or fit.loop_width.value > 0.0
+
+
+def test_sequences_in_the_layout_of_the_magnet_challenge_are_predicted(tmp_path, monkeypatch):
+    monkeypatch.syspath_prepend(Path(__file__).parents[1] / "experiments")
+    experiment, rng = importlib.import_module("59_cores"), np.random.default_rng(0)
+    records = [experiment.sequence(rng, 0.0) for _ in range(6)]
+    columns = {"B": [each.u for each in records], "H": [each.y for each in records]}
+    for name, rows in (columns | {"T": [[each.channels["T"]] for each in records]}).items():
+        np.savetxt(tmp_path / f"3C90_1_{name}.csv", rows, delimiter=",")
+    found = {row["model"]: row for row in experiment.measured(tmp_path)}
+    assert {row["core"] for row in found.values()} == {"3C90_1"}
+    assert found["with lags, told the begin"]["worst_percent"] < 40.0
 
 
 @pytest.mark.parametrize(
