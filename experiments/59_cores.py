@@ -13,7 +13,7 @@ third one, whose initial state alone is fitted.
 ``python experiments/59_cores.py FOLDER`` takes measured data that are not part of hysim. Sequences in the layout of the
 MagNet Challenge 2 are files with one sequence a row and no header, NAME_B.csv [T], NAME_H.csv [A/m] and NAME_T.csv
 [degC], sampled at 16 MHz; every third row is predicted. Otherwise it is the folder of `measured_cores`: one law is
-fitted to the loops of all amplitudes of a core.
+fitted to the loops of all amplitudes of a core, and another to a cell, whose error is relative to the range.
 """
 
 import sys
@@ -133,6 +133,13 @@ def measured(folder: Path) -> list[Row]:
         halves = [[values[values.size // 2 :] for values in pair] for pair in pairs]
         errors = [round(float(hs.metrics.sequence_relative_error(*half)), 5) for half in halves]
         rows.append({"core": material, "model": "static", "seconds": seconds, "errors": errors} | summary(errors))
+    file = folder / "cell_pocv" / "Tesla_4680_pOCV.txt"
+    if file.exists():  # a charge and a discharge, at rest
+        capacity, current = (hs.load(file, u=name, y="Ewe/V", t=False) for name in ("Capacity/mA.h", "I/mA"))
+        record = hs.Record(u=hs.signed_charge(capacity.u, current.u), y=capacity.y)
+        fit, seconds = cpu_timed(hs.identify, hs.TabulatedDahl.over(record, nodes=24), record)
+        error = fit.rmse / float(np.ptp(record.y))
+        rows.append({"core": "cell", "model": "24 nodes", "seconds": seconds, "errors": [error]} | summary([error]))
     return rows
 
 

@@ -1326,7 +1326,7 @@ def cores(result: Result) -> list[str]:
         ),
         by_row(
             result["measured"],
-            ("measured loops", "core", str),
+            ("measured loops, and a cell", "core", str),
             ("error, mean of the amplitudes [%]", "mean_percent", number),
             ("worst", "worst_percent", number),
         ),
