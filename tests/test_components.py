@@ -35,17 +35,20 @@ def history(rng, size=40):
 
 @of_each
 def test_a_law_is_its_rule_however_a_stroke_is_sampled_and_delivers_at_most_what_was_stored(name):
-    rng = np.random.default_rng(11)
+    rng, off = np.random.default_rng(11), []
     for _ in range(HISTORIES):
         law, u = drawn(name, rng), history(rng)
         y, (expected, walks) = law.response(u), walked(law, u)
-        # rounding alone; a share of a small energy, or of what a capacity has left, enlarges that of the energy
-        assert np.abs(y - expected).max() <= (1e-6 if name.startswith("Ibarra") else 1e-12) * np.ptp(y)
+        off.append(np.abs(y - expected).max() / max(np.ptp(y), 1e-300))
         between = u[:-1] + rng.random(u.size - 1) * np.diff(u)
         finer = law.response(np.append(np.column_stack([u[:-1], between]), u[-1]))[::2]
         sums = name in ("Bilinear", "FlagShape")  # their z is a sum over the samples, which is rounded at each
         assert np.abs(finer - y).max() <= (1e-13 * np.ptp(y) if sums else 0.0)
         assert name == "FolzFiliatrault" or all(w.least >= -1e-10 * (1.0 + w.work) for w in walks)
+    # rounding alone; a share of a small energy, or of what a capacity has left, enlarges that of one in a thousand
+    n = HISTORIES // 1000 if name.startswith("Ibarra") else 0
+    assert sorted(off)[-1 - n] <= 1e-12
+    assert max(off) <= 1e-6
 
 
 def test_closed_cycles_of_a_nail_deliver_no_energy_where_its_envelope_is_above_the_pinched_line():
