@@ -5,6 +5,8 @@ import pytest
 from strategies import assert_refused, refused
 
 import hysim as hs
+from hysim.identification._problem import problem
+from hysim.models.search_space import ALL_FREE
 
 LAW = hs.BoucWen(beta=1.4, gamma=-0.6, feedthrough=0.7, gain=-0.5, offset=0.2)
 CYCLE = hs.signals.triangle(-1.0, 1.0, cycles=1, samples_per_cycle=40)
@@ -15,6 +17,16 @@ def record(z0=0.1, noise=0.005, seed=0, u=INPUT):
     rng = np.random.default_rng(seed)
     y = hs.BoucWen(beta=1.4, gamma=-0.6, feedthrough=0.7, gain=-0.5, offset=0.2, z0=z0).response(u)
     return hs.Record(u=u, y=y + noise * rng.standard_normal(u.size))
+
+
+def test_sets_that_are_the_same_for_a_record_are_evaluated_once_with_the_same_bits():
+    together = problem(LAW, [record(seed=k) for k in range(3)], ALL_FREE, "free")
+    rng = np.random.default_rng(4)
+    x = rng.uniform(together.space.lower, together.space.upper, (5, together.n_x)).repeat(3, axis=0)
+    x[1::3, -1], x[2::3, 0] = together.space.lower[-1], together.space.lower[0]
+    alone = [together.split(each[np.newaxis]) for each in x]
+    for found, expected in zip(together.split(x), zip(*alone, strict=True), strict=True):
+        np.testing.assert_array_equal(found, np.concatenate(expected))
 
 
 def test_the_same_record_twice_halves_the_variances():

@@ -257,7 +257,7 @@ class Problem:
 
     def chunks(self, n_sets: int) -> list[slice]:
         """Sets that are evaluated at once."""
-        size = max(1, _CHUNK // self.y.size)
+        size = max(1, _CHUNK * len(self.parts) // self.y.size)  # many sets are the same for a record
         return [slice(k, k + size) for k in range(0, n_sets, size)]
 
     def _solve(self, x: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -298,26 +298,36 @@ class Problem:
             columns[:, self.cuts[-1] :] = self.below.columns
         for k, part in enumerate(self.parts):
             samples = slice(self.cuts[k], self.cuts[k + 1])
-            parameters = self.parameters(x, k)
+            different, places_of = self._different(x, part)
+            parameters = self.parameters(x[different], k)
             missing = [~np.isfinite(parameters[name]) for name in self.own.state if part.before]
             parameters |= {name: np.nan_to_num(parameters[name]) for name in self.own.state if part.before}
             with np.errstate(over="ignore", invalid="ignore"):
                 regressors = self.family.regressors(parameters, part.record)
                 if regressors.shape[-1] != len(self.own.columns) + 1:
                     raise ValueError("this model has other parameters for each record: identify it on one at a time")
-                fixed_part[:, samples] = regressors[..., -1]
+                rest = regressors[..., -1]
                 for place, name in enumerate(self.own.columns):
                     if name in self.own.held:
                         steady = part.before is not None and name in self.own.state
                         value = parameters[name][:, np.newaxis] if steady else self.own.held[name]
-                        fixed_part[:, samples] += value * regressors[..., place]
+                        rest = rest + value * regressors[..., place]
             for diverged in missing:  # there is no steady cycle
-                fixed_part[diverged, samples] = np.inf
+                rest[diverged] = np.inf
+            fixed_part[:, samples] = rest[places_of]
             places = [place for place, name in enumerate(self.own.columns) if name in self.own.linear]
             for place, column in zip(places, part.linear.tolist(), strict=True):
                 if column >= 0:
-                    columns[:, samples, column] = regressors[..., place]
+                    columns[:, samples, column] = regressors[..., place][places_of]
         return columns, fixed_part
+
+    def _different(self, x: FloatArray, part: Part) -> tuple[Any, Any]:
+        """Sets of which no two are the same for a record, and the place of each set among them."""
+        own = part.coordinates[part.coordinates >= 0]
+        if own.size == self.n_x:
+            return slice(None), slice(None)
+        _, first, places = np.unique(x[:, own], axis=0, return_index=True, return_inverse=True)
+        return first, places.ravel()
 
     def parameters(self, x: FloatArray, k: int = 0) -> dict[str, FloatArray]:
         """The family's parameters, (n_sets,) each, for the record `k`; those that are linear are left out."""
