@@ -286,7 +286,7 @@ class CoreFieldStructure:
         paths = [normal.solutions(fold)[0] for fold in range(len(normal.squares))]
         errors = [normal.errors(path, fold) for fold, path in enumerate(paths)]
         best = int(np.argmin(np.sum(errors, axis=0)))
-        if len(records) > 1:
+        if len(records) > 1 and self.known > 0.0:
             of_rest = [path[best] for path in paths]
             every = zip(records, shares, folds, strict=True)
             costs = [self._conditioned(law, at, record, share, of_rest[own[0]]) for record, share, own in every]
@@ -374,9 +374,7 @@ def corrected(own: FloatArray, terms: FloatArray, y: FloatArray, spread: float) 
 
 
 class _Normal(NamedTuple):
-    """Normal equations of the folds: F' P F (n_folds, n, n), F' P y (n_folds, n), y' P y (n_folds,), and
-    the sum of P.
-    """
+    """Normal equations of the folds, F' P F (n_folds, n, n), F' P y (n_folds, n), y' P y (n_folds,); the sum of P."""
 
     gram: FloatArray
     right: FloatArray
