@@ -46,10 +46,9 @@ class AdaptiveInverse(WithoutFeedback):
 
     Raises
     ------
-    TypeError
-        If the law is none that a step describes.
-    ValueError
-        If a name is unknown, the lengths differ, a drift or the noise is not positive, or the law has no inverse.
+    TypeError, ValueError
+        If the law is none that a step describes; if a name is unknown, lengths differ, a drift or the noise is not
+        positive, or the law has no inverse.
 
     Examples
     --------

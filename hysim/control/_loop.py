@@ -172,11 +172,9 @@ def close_loop(
 
     Raises
     ------
-    SimulationError
-        If the loop diverges, or passes 1e100; it names the time.
-    TypeError, ValueError
-        If the plant is not one, times are uneven, lengths differ, the plant cannot rest at `u0`, or options of an
-        actuator are given for a structure, or the other way round.
+    SimulationError, TypeError, ValueError
+        If the loop diverges, or passes 1e100, with the time; if the plant is not one, times are uneven, lengths differ,
+        the plant cannot rest at `u0`, or options of an actuator are given for a structure or the other way round.
 
     Examples
     --------
