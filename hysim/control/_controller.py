@@ -278,7 +278,6 @@ class PID(SampledController):
         return u, (last, integral, derivative, weighted)
 
     def frequency_response(self, frequency: npt.ArrayLike, sample_time: float) -> npt.NDArray[np.complex128]:
-        """Response from the negative measurement to the command at frequencies [rad/s], not zero with an integral."""
         z = np.exp(1j * np.asarray(frequency, dtype=float) * sample_time)
         lag = self.derivative_filter + sample_time
         derivative = self.kd / lag * (z - 1.0) / (z - self.derivative_filter / lag)

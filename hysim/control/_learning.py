@@ -129,7 +129,6 @@ class _Learning(SteppedController):
         return limits_of(self.controller)
 
     def ahead(self, sample_time: float) -> int:
-        """Samples by which the reference must be known ahead, as of the controller."""
         return preview(self.controller, sample_time)
 
     def condition(self, sample_time: float) -> LearningCondition:

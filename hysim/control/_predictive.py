@@ -104,7 +104,6 @@ class PredictiveControl(SteppedController):
         return as_actuator(self.model).u0
 
     def ahead(self, sample_time: float) -> int:
-        """Samples by which the reference must be known ahead."""
         return self._samples(sample_time) if self.preview else 0
 
     def _samples(self, sample_time: float) -> int:

@@ -190,7 +190,6 @@ class TrackingController(SampledController):
                 raise ValueError("the model's law and amplifier must be those of the feedforward")
 
     def ahead(self, sample_time: float) -> int:
-        """Samples by which the reference must be known ahead, for the filters and the hold."""
         if not self.preview:
             return 0
         shaped = self._shaped(sample_time)

@@ -105,7 +105,6 @@ class RatePart(Subject, Composable):
         return np.stack([of_one, np.zeros_like(of_one)], axis=-1)[np.newaxis]
 
     def assemble(self, parameters: Mapping[str, float]) -> Self:
-        """The part with this parameter."""
         return self.with_scalars(parameters)
 
 
@@ -136,7 +135,6 @@ class Dashpot(RatePart):
 
     @staticmethod
     def of_velocity(velocity: FloatArray) -> FloatArray:
-        """The velocity itself."""
         return velocity
 
     @classmethod

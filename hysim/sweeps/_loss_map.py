@@ -142,7 +142,6 @@ def loss_map(
 
 
 def _energy(model: Any, cycle: FloatArray, sample_time: float) -> float:
-    """Integral of H dB over the steady cycle."""
     if isinstance(model, Sum):
         return sum(_energy(part, cycle, sample_time) for part in model.parts)
     period = cycle[:-1] if needs_time(model) else cycle[[first for first, _ in turns(cycle, 0.0).plateaus[:-1]]]

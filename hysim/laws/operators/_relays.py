@@ -229,7 +229,6 @@ class RelayLaw(ByStructure, Law):
 
     @classmethod
     def check(cls, tables: Tables) -> None:
-        """Refuse levels and weights that are no relays."""
         check_relays(tables["levels"], tables["weights"])
 
     @classmethod
@@ -279,7 +278,6 @@ class RelayLaw(ByStructure, Law):
         return y, (float(inputs[-1]) if y.size else before, *x[1 : d + 1].tolist())
 
     def remembering(self, u0: float, memory: State) -> Any:
-        """The law after these extremes."""
         return type(self)(**{**self.arguments, "z0": memory}, u0=u0)
 
     @property

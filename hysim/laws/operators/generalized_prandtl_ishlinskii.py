@@ -83,7 +83,6 @@ class GeneralizedPrandtlIshlinskii(Bank, PlaySum):
 
     @classmethod
     def check(cls, tables: Tables) -> None:
-        """Refuse elements that are no plays, and envelopes that do not increase."""
         super().check(tables)
         _check_envelopes(tables["left"], tables["right"])
 
@@ -125,7 +124,6 @@ class GeneralizedPrandtlIshlinskii(Bank, PlaySum):
 
     @classmethod
     def pushing(cls, parameters: Parameters, record: Record) -> Tables:
-        """The envelopes."""
         return {side: table_of(side, parameters) for side in ("left", "right")}
 
     @classmethod
@@ -139,7 +137,6 @@ class GeneralizedPrandtlIshlinskii(Bank, PlaySum):
         return left | named("right", right)
 
     def as_structure(self) -> BankStructure:
-        """The structure with the thresholds and envelopes of this law, or with free ones by default."""
         left, right = (self.left, self.right) if self.thresholds else ((), ())
         one_signed = None if self.is_one_signed() else False
         return self.structure(thresholds=self.thresholds, one_signed=one_signed, left=left, right=right)

@@ -85,7 +85,6 @@ class ModifiedPrandtlIshlinskii(Bank, PlaySum):
 
     @classmethod
     def check(cls, tables: Tables) -> None:
-        """Refuse elements that are no plays or no dead zones."""
         super().check(tables)
         check_dead_zones(tables["dead_zones"], tables["dead_zone_weights"])
 
@@ -133,7 +132,6 @@ class ModifiedPrandtlIshlinskii(Bank, PlaySum):
         return self.plays.inverted(x, u0, state)
 
     def as_structure(self) -> BankStructure:
-        """The structure with the thresholds of this law, or with the default thresholds."""
         own, known = named("weights", self.weights), self.dead_zones if self.thresholds else ()
         return replace(super().as_structure(), own=own, dead_zones=known)
 

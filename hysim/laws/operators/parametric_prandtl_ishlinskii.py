@@ -119,7 +119,6 @@ class ParametricPrandtlIshlinskii(Law):
 
     @classmethod
     def check(cls, tables: Tables) -> None:
-        """Refuse what is no density or no number of plays."""
         super().check(tables)
         exponent, reach, plays = (tables[name] for name in ("exponent", "reach", "plays"))
         idle = (tables["weight"] == 0.0) & (tables["weight_slope"] == 0.0)

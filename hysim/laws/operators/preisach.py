@@ -306,12 +306,10 @@ class Preisach(RelayLaw):
         return low * high > 0.0
 
     def inverse_begun(self, y: FloatArray, u0: float | None, state: State | None) -> CompiledLaw:
-        """In closed form, after the inputs before the first sample."""
         past = state[1:] if state is not None else self.past if u0 is None else (*self.past, u0)
         return self.inverse_from(past, room=y.size)
 
     def unreached(self, sample: int, y: float, inverse: CompiledLaw) -> str:
-        """Message with the outputs between which the law saturates."""
         bound = abs(float(self.everett[-1, 0]))
         return (
             f"the law has no inverse at sample {sample} (y = {y:g}): it saturates at {self.offset - bound:g} and "

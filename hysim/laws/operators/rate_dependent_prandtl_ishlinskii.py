@@ -98,7 +98,6 @@ class RateDependentPrandtlIshlinskii(Bank, Placed):
 
     @classmethod
     def pushing(cls, parameters: Parameters, record: Record) -> Tables:
-        """The growth of the thresholds with the step of the input."""
         beta = np.reshape(parameters["beta"], (-1, 1))
         n_sets = len(table_of("thresholds", parameters))
         return {"width": np.broadcast_to(beta / record.sample_time, (n_sets, 1))}
