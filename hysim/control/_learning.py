@@ -173,10 +173,9 @@ class RepetitiveControl(_Learning):
         Lowest and highest reference, along which slopes are taken [unit of y].
     cutoff : float, optional
         Corner of the low pass [rad/s]; by default the highest at which the errors shrink.
-    gain : float
-        Part of the error that is corrected at once.
-    uncertainty : float
-        Relative error of natural frequencies and slopes for which errors must shrink.
+    gain, uncertainty : float
+        Part of the error that is corrected at once, and relative error of natural frequencies and slopes for which
+        errors must shrink.
     period : float
         Of the reference [s], whole samples. Where the low pass is longer than a period, it learns from several periods.
 

@@ -45,10 +45,8 @@ class PredictiveControl(SteppedController):
     ----------
     model : Actuator, law or fit
         What it drives; an amplifier must act at once.
-    horizon : float
-        Time over which it predicts [s], at most 200 samples.
-    effort : float
-        Weight of changes of the law's output beside errors of the displacement.
+    horizon, effort : float
+        Time over which it predicts [s], at most 200 samples, and weight of the law output's changes against errors.
     limits : (float, float), optional
         Lowest and highest command [unit of u].
     rate : float, optional

@@ -132,10 +132,8 @@ class Modes:
 
     Parameters
     ----------
-    natural_frequencies : sequence of float
-        Positive [rad/s].
-    damping_ratios : sequence of float
-        Not negative.
+    natural_frequencies, damping_ratios : sequence of float
+        Positive [rad/s], and not negative.
     gains : sequence of float
         Static gains; their sum is the gain at rest [unit of y / unit of the input].
     delay : float

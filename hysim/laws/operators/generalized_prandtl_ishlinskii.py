@@ -60,10 +60,9 @@ class GeneralizedPrandtlIshlinskii(Bank, PlaySum):
     >>> import hysim as hs
     >>> envelope = (1.0, 2.0, 0.0, 0.0, 0.0)
     >>> law = hs.GeneralizedPrandtlIshlinskii(thresholds=(0.0, 0.5), weights=(1.0, 1.0), left=envelope)
-    >>> law.response([0.0, 1.0, 0.5, -1.0]).round(6).tolist()
-    [0.0, 1.428055, 1.225622, -1.428055]
-    >>> law.inverse_response(law.response([0.0, 1.0, 0.5, -1.0])).round(6).tolist()
-    [0.0, 1.0, 0.5, -1.0]
+    >>> y = law.response([0.0, 1.0, 0.5, -1.0])
+    >>> y.round(6).tolist(), law.inverse_response(y).round(6).tolist()
+    ([0.0, 1.428055, 1.225622, -1.428055], [0.0, 1.0, 0.5, -1.0])
     """
 
     thresholds: tuple[float, ...] = ()

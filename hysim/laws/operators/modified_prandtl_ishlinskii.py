@@ -47,10 +47,8 @@ class ModifiedPrandtlIshlinskii(Bank, PlaySum):
         Thresholds d_j, increasing [unit of x]. That of threshold zero is x itself.
     dead_zone_weights : sequence of float, length n_zones
         c_j, of any sign [unit of y / unit of x].
-    offset : float
-        Output at rest at u = 0 [unit of y].
-    z0 : float or sequence of float, length n_plays
-        Positions before the first sample, which pushes them [unit of u].
+    offset, z0
+        As in `PrandtlIshlinskii` [unit of y, unit of u].
 
     Raises
     ------
@@ -63,10 +61,8 @@ class ModifiedPrandtlIshlinskii(Bank, PlaySum):
     >>> law = hs.ModifiedPrandtlIshlinskii(
     ...     thresholds=(0.0, 0.5), weights=(1.0, 2.0), dead_zones=(0.0, 1.0), dead_zone_weights=(1.0, 0.5)
     ... )
-    >>> law.response([0.0, 1.0, 0.5, -1.0]).tolist()
-    [0.0, 2.5, 1.75, -2.0]
-    >>> law.inverse_response([0.0, 2.5, 1.75, -2.0]).tolist()
-    [0.0, 1.0, 0.5, -1.0]
+    >>> law.response([0.0, 1.0, 0.5, -1.0]).tolist(), law.inverse_response([0.0, 2.5, 1.75, -2.0]).tolist()
+    ([0.0, 2.5, 1.75, -2.0], [0.0, 1.0, 0.5, -1.0])
     """
 
     thresholds: tuple[float, ...] = ()

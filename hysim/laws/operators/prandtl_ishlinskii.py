@@ -33,9 +33,8 @@ class PrandtlIshlinskii(Bank, Clamps):
 
     ``z_i(k) = min(max(z_i(k-1), u_k - r_i), u_k + r_i)``. Positive weights give the counterclockwise loops of
     piezoelectric stacks, negative ones beside a large w_0 the clockwise ones of a force. A law without plays, the
-    default, is a constant; as a start of `hysim.identify` it leaves the plays to the record, as
-    ``PrandtlIshlinskii.structure()`` does. Sources: K. Kuhnen, European J. Control 9 (2003), for the inverse; P. Krejci
-    and K. Kuhnen, IEE Proc. Control Theory Appl. 148 (2001).
+    default, is a constant; `hysim.identify` takes it as ``PrandtlIshlinskii.structure()``. Sources: K. Kuhnen, European
+    J. Control 9 (2003), for the inverse; P. Krejci and K. Kuhnen, IEE Proc. Control Theory Appl. 148 (2001).
 
     Parameters
     ----------
@@ -57,10 +56,8 @@ class PrandtlIshlinskii(Bank, Clamps):
     --------
     >>> import hysim as hs
     >>> law = hs.PrandtlIshlinskii(thresholds=(0.0, 0.5), weights=(1.0, 2.0))
-    >>> law.response([0.0, 1.0, 0.5, -1.0]).tolist()
-    [0.0, 2.0, 1.5, -2.0]
-    >>> law.inverse_response([0.0, 2.0, 1.5, -2.0]).tolist()
-    [0.0, 1.0, 0.5, -1.0]
+    >>> law.response([0.0, 1.0, 0.5, -1.0]).tolist(), law.inverse_response([0.0, 2.0, 1.5, -2.0]).tolist()
+    ([0.0, 2.0, 1.5, -2.0], [0.0, 1.0, 0.5, -1.0])
     """
 
     units: ClassVar = {"thresholds": "u", "weights": "y/u", "offset": "y", "z0": "u"}
