@@ -246,10 +246,8 @@ class Record:
 
         Parameters
         ----------
-        order : int
-            Degree of the polynomial.
-        tolerance : float
-            As in `reversals`.
+        order, tolerance : int, and float
+            Degree of the polynomial, and what is ignored as in `reversals`.
 
         Returns
         -------

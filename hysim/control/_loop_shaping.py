@@ -110,10 +110,9 @@ def loop_shaping(
         Lowest and highest reference, along which slopes are taken [unit of y].
     bandwidth, max_sensitivity : float
         Up to which errors are to be small [rad/s], and M, the sensitivity that is accepted beyond.
-    effort : float
-        Weight of the command, times the plant's gain, against that of errors.
-    disturbance : float
-        Part of the plant's output range that a disturbance of the command causes.
+    effort, disturbance : float
+        Weight of the command, times the plant's gain, against that of errors, and part of the plant's output range that
+        a disturbance of the command causes.
     variations : sequence of plants
         On which the controller is checked too.
     limits : (float, float), optional

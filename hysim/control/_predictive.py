@@ -51,10 +51,9 @@ class PredictiveControl(SteppedController):
         Lowest and highest command [unit of u].
     rate : float, optional
         Largest rate of the command [unit of u / s].
-    output_limits : (float, float), optional
-        Lowest and highest displacement, which are exceeded where nothing else is possible [unit of y].
-    softness : float
-        Weight of a displacement beyond these limits beside errors.
+    output_limits, softness : (float, float), optional, and float
+        Lowest and highest displacement, which are exceeded where nothing else is possible [unit of y], and weight of
+        what is beyond them against errors.
     model_error, drift : float
         What is expected of the law's output and of the disturbance: error, and change, in a sample, in units of the
         sensor's noise. Small numbers trust the model, and damp less of what it does not know.

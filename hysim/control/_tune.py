@@ -176,10 +176,8 @@ class Tuning:
         Trials within the bound on the noise that no other beats in both objective and sensitivity, most robust first.
     trials : tuple of Trial
         Every controller that was simulated.
-    success : bool
-        Whether a controller within the bounds was found.
-    message : str
-        Extent of the search, distance to the bounds, and number of samples with limited voltage.
+    success, message : bool, and str
+        Whether a controller within the bounds was found; extent of the search, distance to the bounds, limited samples.
     """
 
     controller: Any

@@ -44,10 +44,9 @@ class CustomLaw(Law):
 
     Raises
     ------
-    TypeError
-        If `step` takes other arguments, or does not compile to one number.
-    ValueError
-        If a name is given twice or is unknown, or a number is not finite.
+    TypeError, ValueError
+        If `step` takes other arguments or does not compile to one number; if a name is given twice or is unknown, or a
+        number is not finite.
 
     Examples
     --------

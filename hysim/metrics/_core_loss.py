@@ -179,10 +179,8 @@ def normalised_energy_error(
 
     Parameters
     ----------
-    u : array, shape (n,) or (n_sequences, n)
-        Input, the flux density [unit of u].
-    y, y_model : array of the same shape
-        Measured and modelled output, the field, in the predicted part of the sequences [unit of y].
+    u, y, y_model : array, shape (n,) or (n_sequences, n)
+        Flux density [unit of u], and measured and modelled field [unit of y], in the predicted part of the sequences.
     loss : float or array, shape (n_sequences,), optional
         Measured energy, of any sign; by default the integral of y du over these samples [unit of y times unit of u].
 

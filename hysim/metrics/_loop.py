@@ -80,10 +80,8 @@ class LoopMetrics:
         Area over input span, and the width's magnitude at mid span [unit of y].
     area : float
         Enclosed area, at least 0 [unit of y times unit of u]; the difference of both senses if it has several `lobes`.
-    stroke : float
-        Largest minus smallest output of the cycle [unit of y].
-    relative_width : float
-        `max_width` over `stroke`; nan for a constant output.
+    stroke, relative_width : float
+        Largest minus smallest output of the cycle [unit of y], and `max_width` over it; nan for a constant output.
     orientation : {"counterclockwise", "clockwise", "none"}
         Sense of the path in the plane of u (to the right) and y (up); "none" if the area is zero to rounding.
     closure_gap : float
@@ -380,10 +378,8 @@ class MagneticMetrics:
     ----------
     energy : float
         Integral of H dB around the cycle [J/m^3]; negative for a loop that runs clockwise.
-    coercivity : float
-        Half the distance of the two fields at B = 0 [A/m]; nan if a branch does not cross it.
-    remanence : float
-        Half the distance of the two flux densities at H = 0 [T]; nan if the loop does not cross it.
+    coercivity, remanence : float
+        Half the distances of the fields at B = 0 [A/m], and of the flux densities at H = 0 [T]; nan without both zeros.
     peak_field, peak_induction : float
         Half the spans between the loop's ends [A/m], [T].
     amplitude_permeability, largest_permeability : float

@@ -172,9 +172,9 @@ class Actuator:
         """An actuator for `hysim.identify`, on one or several records with time: law, creep, modes and delay at once.
 
         Records of different rates tell the parts apart: a slow one shows law and creep, a fast one with corners or
-        steps the modes and the delay. What they do not determine is held, says the result's message. A record begins at
-        rest, creep included, with its input held between samples. A law with a single memory has its own at the first
-        sample of each record (``hysteresis.z0``); plays begin at rest at zero unless ``initial=`` says otherwise.
+        steps the modes and the delay. What they do not determine is held, and the result's message says so. A record
+        begins at rest, creep included; its input is held between samples. A law with a single memory has its own at the
+        first sample of each record (``hysteresis.z0``); plays begin at rest at zero unless ``initial=`` says otherwise.
 
         Parameters
         ----------

@@ -73,7 +73,7 @@ class Creep:
         Parameters
         ----------
         percent, band : float, and (float, float)
-            Growth in a decade, of the value at the reference time [%], and shortest and longest time of it [s].
+            Growth in a decade of the value at the reference time [%], and shortest and longest time of validity [s].
         per_decade_elements : int
             Number of log-spaced elements in a decade.
         reference_time : float

@@ -24,10 +24,8 @@ class StateSpace:
         [1/s]
     B, C : array, shape (n,)
         Input and output.
-    D : float
-        What passes through [unit of y / unit of u].
-    delay : float
-        Dead time [s], not negative.
+    D, delay : float
+        What passes through [unit of y / unit of u], and dead time [s], not negative.
 
     Raises
     ------

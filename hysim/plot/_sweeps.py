@@ -219,9 +219,9 @@ def residual_map(
     and a change from bottom to top is drift. A cell is the mean over the samples of one branch in one interval of the
     input; grey is zero, lighter is more, darker is less, and white has no samples.
 
-    `model` is a model, a result of a fit, or a Simulation of the record's input. `bins` is the number of intervals, by
-    default half as many as a branch has samples, at most 40. Reversals up to the fraction `tolerance` of the input's
-    span do not end a branch. `quanta` names the sensor's quanta, the unit if the record has a resolution. Shape (2,).
+    `model` is a model, a fit, or a Simulation of the record's input. `bins` is the number of intervals, by default half
+    as many as a branch has samples, at most 40. Reversals up to the fraction `tolerance` of the input's span end no
+    branch. `quanta` names the sensor's quanta, the unit if the record has a resolution. The result has shape (2,).
 
     Raises
     ------

@@ -1,7 +1,7 @@
 """The result of `sweep`, a table with one row for each task, and its Sobol indices.
 
-**Sobol indices** are the shares of the variance of an output that are due to each parameter. Two samples A and B of n
-sets, and for each parameter i AB_i, which is A with the column of parameter i from B, give from n (d + 2) tasks
+**Sobol indices** are the shares of the variance of an output that are due to each parameter. Independent samples A and
+B of n sets, and for each parameter i AB_i, which is A with column i from B, give from n (d + 2) tasks
 
     first order   S_i = Var(E(f | x_i)) / Var(f)              share of parameter i alone
     total         T_i = 1 - Var(E(f | all but x_i)) / Var(f)  share of parameter i and its interactions
@@ -240,10 +240,8 @@ def sobol_indices(result: Sweep, *, seed: int = 0) -> SobolIndices:
 
     Parameters
     ----------
-    result : Sweep
-        Result with every task of the sample.
-    seed : int
-        Seed of the bootstrap.
+    result, seed : Sweep, and int
+        Result with every task of the sample, and seed of the bootstrap.
 
     Returns
     -------

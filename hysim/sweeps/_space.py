@@ -50,8 +50,8 @@ class Sample:
     Raises
     ------
     TypeError, ValueError
-        If a distribution is neither a pair of numbers in order nor one of `scipy.stats`, there is none, or `n` does not
-        suit.
+        If a distribution is neither a pair in order nor one of `scipy.stats`, there is none, or `n` does not suit the
+        method.
 
     Examples
     --------

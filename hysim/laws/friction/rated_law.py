@@ -99,10 +99,8 @@ class TimedLaw(Subject, Placed, ABC):
 
         Raises
         ------
-        SimulationError
-            If the output diverges; the message names the sample.
-        ValueError
-            If u is not finite or has not one axis, or the sample time is not positive.
+        SimulationError, ValueError
+            If the output diverges, with the sample; if u is not finite or has not one axis, or sample_time <= 0.
         """
         return self.at_sample_time(sample_time).response(u)
 

@@ -31,10 +31,9 @@ class MaxwellSlip(Bank, Clamps):
         k_i, of any sign [unit of y / unit of u].
     slips : sequence of float, length n_elements
         Elongation d_i at which each element slips, not negative [unit of u].
-    feedthrough : float
-        Stiffness of a spring beside them that does not slip [unit of y / unit of u].
-    offset : float
-        Output at rest at u = 0 [unit of y].
+    feedthrough, offset : float
+        Stiffness of a spring beside them that does not slip [unit of y / unit of u], and output at rest at u = 0 [unit
+        of y].
     z0 : float or sequence of float, length n_elements
         Positions of the blocks before the first sample, which may pull them along [unit of u].
 

@@ -39,14 +39,10 @@ class ModifiedPrandtlIshlinskii(Bank, PlaySum):
 
     Parameters
     ----------
-    thresholds : sequence of float, length n_plays
-        r_i, not negative and increasing [unit of u]. The play of threshold zero is the input itself.
-    weights : sequence of float, length n_plays
-        w_i, of any sign [unit of x / unit of u].
-    dead_zones : sequence of float, length n_zones
-        Thresholds d_j, increasing [unit of x]. That of threshold zero is x itself.
-    dead_zone_weights : sequence of float, length n_zones
-        c_j, of any sign [unit of y / unit of x].
+    thresholds, weights
+        As in `PrandtlIshlinskii` [unit of u, unit of x / unit of u].
+    dead_zones, dead_zone_weights : sequence of float, length n_zones
+        Thresholds d_j, increasing [unit of x], and c_j, of any sign [unit of y / unit of x]. S of threshold zero is x.
     offset, z0
         As in `PrandtlIshlinskii` [unit of y, unit of u].
 

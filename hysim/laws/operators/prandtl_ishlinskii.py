@@ -38,10 +38,9 @@ class PrandtlIshlinskii(Bank, Clamps):
 
     Parameters
     ----------
-    thresholds : sequence of float, length n_plays
-        r_i, not negative and increasing [unit of u]. The play of threshold zero is the input itself.
-    weights : sequence of float, length n_plays
-        w_i, of any sign [unit of y / unit of u].
+    thresholds, weights : sequence of float, length n_plays
+        r_i, not negative and increasing [unit of u], and w_i, of any sign [unit of y / unit of u]. The play of
+        threshold zero is the input itself.
     offset : float
         Output at rest at u = 0 [unit of y].
     z0 : float or sequence of float, length n_plays

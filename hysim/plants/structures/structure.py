@@ -62,7 +62,7 @@ class StaticResponse:
     drift, force : array, shape (n, n_elements)
         Of the elements [m], [N]; dashpots have none.
     residual : array, shape (n,)
-        Largest force out of balance over the largest force so far: at most 1e-10, or rounding of displacements.
+        Largest force out of balance over the largest force so far: at most 1e-10, or the rounding of displacements.
     """
 
     control: FloatArray
@@ -457,10 +457,8 @@ class Structure(SearchedStructure):
         pattern : array, shape (n_nodes,), optional
             Loads at the masses for a factor of one; by default a jack at what is controlled: one newton at the mass,
             or at both ends of the element.
-        at : str
-            As of `pushover`.
-        steps : int
-            Equal steps of each stroke.
+        at, steps : str, and int
+            As of `pushover`, and equal steps of each stroke.
 
         Returns
         -------
@@ -535,10 +533,8 @@ def shear_frame(
 
     Parameters
     ----------
-    masses : array, shape (n,)
-        Of the floors, the lowest first [kg].
-    stiffnesses : array, shape (n,), optional
-        Of linear columns of each storey [N/m].
+    masses, stiffnesses : array, shape (n,)
+        Of the floors, the lowest first [kg], and, optional, of linear columns of each storey [N/m].
     laws : law, or sequence of n laws or None, optional
         Force of each storey's columns for its drift, beside the linear ones; one law for all storeys alike.
     **options
