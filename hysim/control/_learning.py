@@ -358,6 +358,7 @@ class LearnedTrials:
     corrections, measurements, commands : array, shape (n_trials, n_samples)
         Corrections of the reference, what the sensor read [unit of y], and commands within the limits [unit of u], or
         references where a controller with feedback runs on a stage of your own.
+    rms : array, shape (n_trials,)
         Rms of the error of each trial, without the rest but with the sensor's noise in it [unit of y].
     condition : LearningCondition
         Part of the error that remains after a trial at worst.

@@ -292,9 +292,9 @@ def tune(
     Raises
     ------
     TypeError, ValueError
-        As `hysim.close_loop`, or if a plant has no gain, the reference is constant at the resting displacement, an
-        option is unknown, no controller of the linear rule is stable, or every loop that was simulated is in a limit
-        cycle.
+        As `hysim.close_loop`, or if a plant has no gain, the reference rests at the resting displacement, an option is
+        unknown, no controller of the linear rule is stable, or every loop that was simulated is in a limit cycle.
+
     Examples
     --------
     >>> import numpy as np, hysim as hs

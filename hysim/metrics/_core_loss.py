@@ -93,20 +93,10 @@ class Steinmetz:
     def loss_of(self, B: npt.ArrayLike, sample_time: float) -> float:
         """Loss density under a period of any waveform, by the iGSE with minor loops [W/m^3].
 
-        Noise in B is a multitude of steep minor loops: smooth a measured waveform before.
-
-        Parameters
-        ----------
-        B : array, shape (n,)
-            Flux density in one period, whose last sample is the first one again, as in `hysim.signals` [T].
-        sample_time : float
-            Time between two samples [s].
-
-        Raises
-        ------
-        ValueError
-            If B is not finite, its first and last sample differ by more than 1 % of its span, it has fewer than 3
-            samples, or the sample time is not positive.
+        `B` (n,) is the flux density [T] in one period whose last sample is the first one again, as in `hysim.signals`,
+        every `sample_time` [s]. Noise in it is a multitude of steep minor loops: smooth a measured waveform before.
+        Raises ValueError if B is not finite, its first and last sample differ by more than 1 % of its span, it has
+        fewer than 3 samples, or the sample time is not positive.
         """
         samples = read_only(B, "B", ndim=1)
         check_positive(sample_time=sample_time)

@@ -226,7 +226,7 @@ def loop_metrics(u: npt.ArrayLike, y: npt.ArrayLike, *, cycles: int = 1, toleran
     Raises
     ------
     ValueError
-        If lengths differ, a value is not finite, the input is constant, or samples or cycles are too few.
+        If lengths differ, a value is not finite, the input is constant, or there are below 3 samples or too few cycles.
 
     Examples
     --------
