@@ -39,10 +39,8 @@ class Record:
 
     Parameters
     ----------
-    u : array, shape (n,)
-        Input, for instance a voltage [``units["u"]``].
-    y : array, shape (n,)
-        Output, for instance a displacement [``units["y"]``].
+    u, y : array, shape (n,)
+        Input and output, for instance a voltage and a displacement [``units["u"]``, ``units["y"]``].
     t : array, shape (n,), optional
         Strictly increasing times of the samples [``units["t"]``]; rate-independent laws need none. By default those in
         the index of `u` and `y`, where these are a Series of pandas or a DataArray of xarray: dates, time spans, an
@@ -60,11 +58,9 @@ class Record:
 
     Raises
     ------
-    ValueError
-        If lengths differ, a value is not finite or the time does not increase; the message names the sample. If the
-        times in the indexes of `u` and `y` differ.
-    TypeError
-        If the values are not numbers.
+    ValueError, TypeError
+        If lengths differ, a value is not finite or no number, the time does not increase, or the times in the indexes
+        of `u` and `y` differ; the message names the sample.
 
     Examples
     --------
@@ -191,11 +187,10 @@ class Record:
     def cycles(self, tolerance: float = TOLERANCE) -> tuple[Self, ...]:
         """Complete cycles of the input, in the order of time; empty without a complete cycle.
 
-        A cycle goes from one extreme of the record to the other and back, each within 5 % of the input's span;
-        `hysim.loop_metrics` measures the last one. Cycles are counted from the end and share no branch, so that the
-        initial rise of a record is left out. If there are none, as in 0 -> max -> min -> 0 and in growing protocols,
-        they are the cycles of full amplitude about a level; `hysim.cycle_metrics` has the smaller ones too: cycle k of
-        its table is ``rec[table.start[k]:table.stop[k]]``.
+        A cycle goes from one extreme of the record to the other and back, each within 5 % of the input's span. Cycles
+        are counted from the end and share no branch: the initial rise of a record is left out. If there are none, as in
+        0 -> max -> min -> 0 and in growing protocols, they are the cycles of full amplitude about a level;
+        `hysim.cycle_metrics` has the smaller ones too: cycle k of its table is ``rec[table.start[k]:table.stop[k]]``.
 
         Parameters
         ----------
@@ -222,8 +217,7 @@ class Record:
         """Interpolate the record and its channels linearly at even times, from the first time on.
 
         An extreme of the input between two new samples is lost: choose a `sample_time` [``units["t"]``] well below the
-        time between reversals. A ValueError is raised if the record has no time, or the step is not positive, longer
-        than the record, or gives more than 1e8 samples.
+        time between reversals. ValueError without a time, or for a step that gives no or more than 1e8 samples.
 
         Examples
         --------
@@ -252,10 +246,8 @@ class Record:
 
         Parameters
         ----------
-        order : int
-            Degree of the polynomial.
-        tolerance : float
-            As in `reversals`.
+        order, tolerance : int, and float
+            Degree of the polynomial, and what is ignored as in `reversals`.
 
         Returns
         -------

@@ -189,12 +189,9 @@ def simulate(
 
     Raises
     ------
-    TypeError
-        If the plant has no ``response``.
-    ValueError
-        If lengths differ, a value is not finite, or a plant with dynamics has no even time.
-    SimulationError
-        If the output diverges; the message names the sample.
+    TypeError, ValueError, SimulationError
+        If the plant has no ``response``; if lengths differ, a value is not finite, or a plant with dynamics has no even
+        time; if the output diverges, with the sample.
 
     Examples
     --------

@@ -46,24 +46,21 @@ class AdaptiveInverse(WithoutFeedback):
 
     Raises
     ------
-    TypeError
-        If the law is none that a step describes.
-    ValueError
-        If a name is unknown, the lengths differ, a drift or the noise is not positive, or the law has no inverse.
+    TypeError, ValueError
+        If the law is none that a step describes; if a name is unknown, lengths differ, a drift or the noise is not
+        positive, or the law has no inverse.
 
     Examples
     --------
     The gain of the plant is 20 % lower than that of the law; the fixed inverse does not see it.
 
     >>> import numpy as np, hysim as hs
-    >>> law = hs.BoucWen(feedthrough=1.0, gain=-0.5)
-    >>> plant = hs.BoucWen(feedthrough=1.0, gain=-0.4)
+    >>> law, plant = (hs.BoucWen(feedthrough=1.0, gain=gain) for gain in (-0.5, -0.4))
     >>> t = 0.01 * np.arange(2000)
     >>> r = 0.5 * np.sin(2.0 * t)
     >>> adaptive = hs.AdaptiveInverse(law=law, free=("gain",), drift=(0.1,), noise=1e-3)
     >>> run, fixed = (hs.close_loop(plant, each, t, r) for each in (adaptive, hs.InverseFeedforward(law=law)))
-    >>> late, later = slice(1000, -1), slice(1001, None)
-    >>> errors = [np.abs(each.y[later] - r[late]).max() for each in (run, fixed)]
+    >>> errors = [np.abs(each.y[1001:] - r[1000:-1]).max() for each in (run, fixed)]
     >>> bool(errors[0] < 0.02 * errors[1])
     True
     """

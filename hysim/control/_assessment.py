@@ -30,8 +30,7 @@ class LoopAssessment:
     Parameters
     ----------
     stable : bool
-        Whether the linear loop is stable at the law's least and largest slope, and the loop rests once the reference
-        does.
+        Whether the linear loop is stable at the law's extreme slopes, and the loop rests once the reference does.
     message : str
         Why it is not stable; empty if it is.
     period : float
@@ -41,8 +40,7 @@ class LoopAssessment:
     limited_percent : float
         Share of the samples at a limit of controller or amplifier [%].
     max_sensitivity, max_sensitivity_with_delay : float
-        Largest ``|1 / (1 + L)|`` of the linear loop at either slope, and that with one sample more of delay; infinite
-        if it is unstable, nan for a controller whose linear part is unknown.
+        Largest ``|1 / (1 + L)|`` at either slope, and with one more sample of delay; inf if unstable, nan if unknown.
     command_jump : float
         Jump of the command when the measurement moves by one; nan if unknown [unit of u / unit of y].
     closed
@@ -93,9 +91,8 @@ def assess_loop(
 ) -> LoopAssessment:
     """Close a loop, and judge its stability, robustness and error.
 
-    A loop whose linear poles lie outside the unit circle may still run along between the limits of its voltage, and a
-    loop that is stable in linear theory may swing there, or on the steps of its sensor. Both are not stable: the
-    figures of such a run say nothing of the controller.
+    A loop that is unstable in linear theory may still run along between the limits of its voltage, and a stable one may
+    swing there, or on the steps of its sensor. Both count as not stable: their errors say nothing of the controller.
 
     Parameters
     ----------
@@ -215,10 +212,8 @@ class HysteresisAssessment:
     hysteresis_reduction_percent, lag_reduction_percent : float
         100 (1 - W closed / W open) [%], W the largest width over the stroke of the true displacement against the
         reference. The first is nan without a law (the loop is lag), the second with one, both if it is not stable.
-    open_width, closed_width : float
-        Largest widths [unit of y].
-    open_lag_width, lag_width : float
-        The same with the law replaced by a line of its secant gain [unit of y].
+    open_width, closed_width, open_lag_width, lag_width : float
+        Largest widths, and the same with the law replaced by a line of its secant gain [unit of y].
     open_tracking_rms, tracking_rms, closure_gap : float
         Rms errors, and displacement at the end minus at the start [unit of y].
     secant_gain : float
@@ -357,10 +352,8 @@ def assess_hysteresis(
 
     Parameters
     ----------
-    plant : Actuator, law or linear plant
-        At rest at no voltage before the first sample.
-    controller : PID, or anything with its ``compiled``
-        Closes the loop.
+    plant, controller
+        As in `hysim.close_loop`; the plant is at rest at no voltage before the first sample.
     low, high : float
         Extremes of the triangle, which the plant must be able to reach [unit of y].
     period, sample_time : float
@@ -462,7 +455,7 @@ def assess_step(
     Parameters
     ----------
     plant, controller
-        As in `assess_hysteresis`; the plant rests at `u0`.
+        As in `hysim.close_loop`.
     step : float
         Height from the resting displacement [unit of y].
     duration, sample_time : float
@@ -472,8 +465,7 @@ def assess_step(
     hold : float
         Time before the step, for a controller with a wrong model to come to rest [s].
     known_ahead : bool
-        Whether the reference is known ahead, so that a controller with preview moves before the step. By default the
-        controller learns of the step when the open loop steps.
+        Whether a controller with preview moves before the step; by default it learns of it when the open loop steps.
 
     Returns
     -------

@@ -188,10 +188,9 @@ class PID(SampledController):
     tracking_time : float, optional
         Time constant with which the integral unwinds while the voltage is limited [s], at least a sample time; by
         default sqrt(Ti Td), and Ti without a derivative.
-    setpoint_weight : float
-        b, the weight of the reference in the proportional action.
-    derivative_weight : float
-        c, the weight of the reference in the derivative: 0 avoids a kick at a step of the reference, 1 takes the error.
+    setpoint_weight, derivative_weight : float
+        b and c, the weights of the reference in the proportional action and in the derivative; c = 0 avoids a kick at a
+        step of the reference, 1 takes the error.
 
     Raises
     ------
@@ -278,7 +277,6 @@ class PID(SampledController):
         return u, (last, integral, derivative, weighted)
 
     def frequency_response(self, frequency: npt.ArrayLike, sample_time: float) -> npt.NDArray[np.complex128]:
-        """Response from the negative measurement to the command at frequencies [rad/s], not zero with an integral."""
         z = np.exp(1j * np.asarray(frequency, dtype=float) * sample_time)
         lag = self.derivative_filter + sample_time
         derivative = self.kd / lag * (z - 1.0) / (z - self.derivative_filter / lag)

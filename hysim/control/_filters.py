@@ -24,9 +24,8 @@ without phase and vibration: y is the reference through the weights b_1 b_2, b_1
 
 Each is discretised by s = w / tan(w h / 2) (z - 1) / (z + 1), which keeps its response at the frequency w. Sources: N.
 C. Singer and W. P. Seering, J. Dyn. Sys. Meas. Control 112 (1990); W. E. Singhose, W. P. Seering and N. C. Singer, J.
-Mech. Design 116 (1994), EI; M. Tomizuka, J. Dyn. Sys. Meas. Control 109 (1987), the inverse; A. J. Fleming, S. S.
-Aphale and S. O. R. Moheimani, IEEE Trans. Nanotechnology 9 (2010); J. L. Fanson and T. K. Caughey, AIAA Journal 28
-(1990), the damping.
+Mech. Design 116 (1994), EI; M. Tomizuka, J. Dyn. Sys. Meas. Control 109 (1987), inverse; A. J. Fleming, S. S. Aphale,
+S. O. R. Moheimani, IEEE Trans. Nanotechnology 9 (2010); J. L. Fanson, T. K. Caughey, AIAA Journal 28 (1990).
 """
 
 import math

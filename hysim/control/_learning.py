@@ -129,7 +129,6 @@ class _Learning(SteppedController):
         return limits_of(self.controller)
 
     def ahead(self, sample_time: float) -> int:
-        """Samples by which the reference must be known ahead, as of the controller."""
         return preview(self.controller, sample_time)
 
     def condition(self, sample_time: float) -> LearningCondition:
@@ -174,10 +173,9 @@ class RepetitiveControl(_Learning):
         Lowest and highest reference, along which slopes are taken [unit of y].
     cutoff : float, optional
         Corner of the low pass [rad/s]; by default the highest at which the errors shrink.
-    gain : float
-        Part of the error that is corrected at once.
-    uncertainty : float
-        Relative error of natural frequencies and slopes for which errors must shrink.
+    gain, uncertainty : float
+        Part of the error that is corrected at once, and relative error of natural frequencies and slopes for which
+        errors must shrink.
     period : float
         Of the reference [s], whole samples. Where the low pass is longer than a period, it learns from several periods.
 
@@ -358,7 +356,7 @@ class LearnedTrials:
     t, reference : array, shape (n_samples,)
         Times [s] and reference, with the rest before and after it [unit of y].
     corrections, measurements, commands : array, shape (n_trials, n_samples)
-        Corrections of the reference, what the sensor read [unit of y], and commands within the limits [unit of u]; the
+        Corrections of the reference, what the sensor read [unit of y], and commands within the limits [unit of u], or
         references where a controller with feedback runs on a stage of your own.
     rms : array, shape (n_trials,)
         Rms of the error of each trial, without the rest but with the sensor's noise in it [unit of y].

@@ -150,10 +150,8 @@ def close_loop(
         ``excitation="force"`` begins at its initial state; the controller acts by `influence` and reads `output`.
     controller : PID, TrackingController, InverseFeedforward, or anything with their ``compiled``
         At rest too. With a method ``ahead`` it gets the reference so many samples ahead, and at the end its last value.
-    t : array, shape (n,)
-        Evenly spaced times [s]; their spacing is the controller's sample time.
-    reference : array, shape (n,)
-        [unit of y]
+    t, reference : array, shape (n,)
+        Evenly spaced times, whose spacing is the controller's sample time [s], and the reference [unit of y].
     u0 : float, optional
         Command before the first sample [unit of u]. By default the one at which the memory of the plant's law holds,
         which of an identified law is the first input of its record; 0 for a plant without one.
@@ -172,11 +170,9 @@ def close_loop(
 
     Raises
     ------
-    SimulationError
-        If the loop diverges, or passes 1e100; it names the time.
-    TypeError, ValueError
-        If the plant is not one, times are uneven, lengths differ, the plant cannot rest at `u0`, or options of an
-        actuator are given for a structure, or the other way round.
+    SimulationError, TypeError, ValueError
+        If the loop diverges, or passes 1e100, with the time; if the plant is not one, times are uneven, lengths differ,
+        the plant cannot rest at `u0`, or options of an actuator are given for a structure or the other way round.
 
     Examples
     --------

@@ -104,20 +104,15 @@ def loop_shaping(
 
     Parameters
     ----------
-    plant : Actuator, law, linear plant or fit
-        What it controls.
-    sample_time : float
-        Of the controller [s].
+    plant, sample_time : Actuator, law, linear plant or fit, and float
+        What it controls, and its sample time [s].
     stroke : (float, float)
         Lowest and highest reference, along which slopes are taken [unit of y].
-    bandwidth : float
-        Up to which errors are to be small [rad/s].
-    max_sensitivity : float
-        M, the sensitivity that is accepted beyond.
-    effort : float
-        Weight of the command, times the plant's gain, against that of errors.
-    disturbance : float
-        Part of the plant's output range that a disturbance of the command causes.
+    bandwidth, max_sensitivity : float
+        Up to which errors are to be small [rad/s], and M, the sensitivity that is accepted beyond.
+    effort, disturbance : float
+        Weight of the command, times the plant's gain, against that of errors, and part of the plant's output range that
+        a disturbance of the command causes.
     variations : sequence of plants
         On which the controller is checked too.
     limits : (float, float), optional

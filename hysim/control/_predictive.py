@@ -45,18 +45,15 @@ class PredictiveControl(SteppedController):
     ----------
     model : Actuator, law or fit
         What it drives; an amplifier must act at once.
-    horizon : float
-        Time over which it predicts [s], at most 200 samples.
-    effort : float
-        Weight of changes of the law's output beside errors of the displacement.
+    horizon, effort : float
+        Time over which it predicts [s], at most 200 samples, and weight of the law output's changes against errors.
     limits : (float, float), optional
         Lowest and highest command [unit of u].
     rate : float, optional
         Largest rate of the command [unit of u / s].
-    output_limits : (float, float), optional
-        Lowest and highest displacement, which are exceeded where nothing else is possible [unit of y].
-    softness : float
-        Weight of a displacement beyond these limits beside errors.
+    output_limits, softness : (float, float), optional, and float
+        Lowest and highest displacement, which are exceeded where nothing else is possible [unit of y], and weight of
+        what is beyond them against errors.
     model_error, drift : float
         What is expected of the law's output and of the disturbance: error, and change, in a sample, in units of the
         sensor's noise. Small numbers trust the model, and damp less of what it does not know.
@@ -104,7 +101,6 @@ class PredictiveControl(SteppedController):
         return as_actuator(self.model).u0
 
     def ahead(self, sample_time: float) -> int:
-        """Samples by which the reference must be known ahead."""
         return self._samples(sample_time) if self.preview else 0
 
     def _samples(self, sample_time: float) -> int:

@@ -226,9 +226,8 @@ _CLOSES = 1e-6  # least slope of a law that closes a loop, in units of the cycle
 class LinearFigures(NamedTuple):
     """Figures of the linear loop, the worst over both slopes of the law; nan for a controller without a linear part.
 
-    The sensitivities are the largest ``|1 / (1 + L)|``, also with one sample more of delay, and infinite if the loop is
-    unstable; `decay` is that of the slowest oscillation per sample, and `command_jump` the jump of the command when the
-    measurement moves by one.
+    The sensitivities are the largest ``|1 / (1 + L)|``, also with one sample more of delay, infinite if the loop is
+    unstable; `decay` is that of the slowest oscillation per sample; for `command_jump` see `LoopAssessment`.
     """
 
     max_sensitivity: float
@@ -356,18 +355,11 @@ def bandwidth(
 
     Parameters
     ----------
-    plant : Actuator, law or linear plant
-        At rest at `u0` before the first sample; the noise of its sensor is left out.
-    controller : PID, TrackingController, or anything with their ``compiled``
-        Closes the loop.
-    sample_time : float
-        Sample time of the controller [s].
-    amplitude : float
-        Amplitude of the sine about the resting displacement [unit of y].
-    lowest : float
-        First frequency tried [rad/s].
-    transient : float
-        Time after which the response is periodic [s].
+    plant, controller
+        As in `hysim.close_loop`; the noise of the sensor is left out.
+    sample_time, amplitude, lowest, transient : float
+        Sample time of the controller [s], amplitude of the sine about the resting displacement [unit of y], first
+        frequency that is tried [rad/s], and time after which the response is periodic [s].
     u0 : float, optional
         Voltage before the first sample.
 

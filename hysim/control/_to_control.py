@@ -183,10 +183,9 @@ def to_control(plant: Any, sample_time: float | None = None) -> Any:
 
     Raises
     ------
-    TypeError
-        If the plant is none of these.
-    ValueError
-        If a dead time, law, pure derivative or `TrackingController` is to stay continuous, or ``sample_time <= 0``.
+    TypeError, ValueError
+        If the plant is none of these; if ``sample_time <= 0``, or a dead time, a law, a pure derivative or a
+        `TrackingController` is to stay continuous.
 
     Examples
     --------

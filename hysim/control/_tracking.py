@@ -50,10 +50,8 @@ class InverseFeedforward(WithoutFeedback):
 
     Raises
     ------
-    TypeError
-        If the law cannot be stepped.
-    ValueError
-        If the amplifier takes time or has no gain, or the law has no inverse at u = 0.
+    TypeError, ValueError
+        If the law cannot be stepped, the amplifier takes time or has no gain, or the law has no inverse at u = 0.
 
     Examples
     --------
@@ -154,11 +152,9 @@ class TrackingController(SampledController):
 
     Raises
     ------
-    TypeError
-        If a part is not of its kind.
-    ValueError
-        If the limits are no interval or the feedback has its own, a mode's inverse or a model comes without a
-        feed-forward, or the model is another plant than the feed-forward's.
+    TypeError, ValueError
+        If a part is not of its kind, the limits are no interval or the feedback has its own, a mode's inverse or a
+        model comes without a feed-forward, or the model is another plant.
 
     Examples
     --------
@@ -194,7 +190,6 @@ class TrackingController(SampledController):
                 raise ValueError("the model's law and amplifier must be those of the feedforward")
 
     def ahead(self, sample_time: float) -> int:
-        """Samples by which the reference must be known ahead, for the filters and the hold."""
         if not self.preview:
             return 0
         shaped = self._shaped(sample_time)

@@ -176,10 +176,8 @@ class Tuning:
         Trials within the bound on the noise that no other beats in both objective and sensitivity, most robust first.
     trials : tuple of Trial
         Every controller that was simulated.
-    success : bool
-        Whether a controller within the bounds was found.
-    message : str
-        Extent of the search, distance to the bounds, and number of samples with limited voltage.
+    success, message : bool, and str
+        Whether a controller within the bounds was found; extent of the search, distance to the bounds, limited samples.
     """
 
     controller: Any
@@ -266,12 +264,8 @@ def tune(
 
     Parameters
     ----------
-    plant : Actuator, law or linear plant
-        At rest at `u0` before the first sample.
-    t : array, shape (n,)
-        Evenly spaced times [s]; their spacing is the controller's sample time.
-    reference : array, shape (n,)
-        [unit of y]
+    plant, t, reference
+        As in `hysim.close_loop`.
     controller : PID or TrackingController, optional
         A template: nonzero gains of its PID and damping loop are tuned, the rest stays; ``hs.PID(ki=1.0)`` asks for an
         integral alone. By default a standard-form PID with its setpoint weight and a derivative filter of Td / 10.
@@ -298,9 +292,8 @@ def tune(
     Raises
     ------
     TypeError, ValueError
-        If a plant is not one, has no gain or cannot rest at `u0`, the reference is constant at the resting
-        displacement, times are uneven, an option is unknown, no controller of the linear rule is stable, or every
-        loop that was simulated is in a limit cycle.
+        As `hysim.close_loop`, or if a plant has no gain, the reference rests at the resting displacement, an option is
+        unknown, no controller of the linear rule is stable, or every loop that was simulated is in a limit cycle.
 
     Examples
     --------

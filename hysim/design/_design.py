@@ -34,16 +34,12 @@ class InputDesign:
     covariance : array, shape (n_names, n_names)
         Their covariance, in the same order.
     efficiency : mapping
-        Names of the usual inputs to what they tell, in parts of what this one does: the ratio of the criterion, which
-        is proportional to the number of samples.
-    beside : mapping
-        Names of usual inputs, for an actuator the best of a few speeds, and of your own to inputs, shape (n_samples,).
-    beside_stderr : mapping
-        Their names to the standard errors that are expected of them, by name.
-    criterion : str
-        ``"D"``, ``"A"`` or ``"E"``.
-    noise : float
-        Standard deviation of the output for which all this holds [unit of y].
+        Names of the usual inputs to their criterion over this one's, which is proportional to the number of samples.
+    beside, beside_stderr : mapping
+        Names of usual inputs, for an actuator the best of a few speeds, and of your own to inputs, shape (n_samples,),
+        and to the standard errors that are expected of them, by name.
+    criterion, noise : str, and float
+        ``"D"``, ``"A"`` or ``"E"``, and standard deviation of the output for which all this holds [unit of y].
     limits : InputLimits
         The limits that it keeps.
     remarks : tuple of str
@@ -208,11 +204,9 @@ def design_input(
 
     Raises
     ------
-    TypeError
-        If the plant is none of these, or `free` is a single string.
-    ValueError
-        If a name, a limit or the criterion is unknown, a value is missing, or no input within the limits tells all
-        numbers apart.
+    TypeError, ValueError
+        If the plant is none of these or `free` a single string; if a name, a limit or the criterion is unknown, a value
+        is missing, or no input within the limits tells all numbers apart.
 
     Examples
     --------

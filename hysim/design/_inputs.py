@@ -16,14 +16,10 @@ class InputLimits:
 
     Parameters
     ----------
-    amplitude : float
-        Largest distance of the input from the centre [unit of u].
-    slew : float
-        Largest size of its rate [unit of u / s].
-    duration : float
-        Length of the record [s].
-    sample_time : float
-        Time between two samples [s].
+    amplitude, slew : float
+        Largest distance of the input from the centre [unit of u], and largest size of its rate [unit of u / s].
+    duration, sample_time : float
+        Length of the record, and time between two samples [s].
     centre : float
         Where the input begins [unit of u].
 

@@ -101,11 +101,9 @@ def to_c(
 
     Raises
     ------
-    TypeError
-        If the thing cannot be stepped.
-    ValueError
-        If the name is no name in C, the sample time is not positive and finite, or missing where one is needed, or a
-        step uses Python outside the subset that is translated; the message then names file and line.
+    TypeError, ValueError
+        If the thing cannot be stepped; if the name is no name in C, the sample time is not positive and finite, or
+        missing where one is needed, or a step uses Python that is not translated, with its file and line.
 
     Examples
     --------

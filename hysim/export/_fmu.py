@@ -103,14 +103,10 @@ def to_fmu(
 
     Raises
     ------
-    TypeError
-        If the thing is no model that can be exported.
-    ValueError
-        If the version, the name, a platform or the ending of the file is unknown, or the sample time is missing.
-    ImportError
-        If a shared library is asked for and no compiler can make it.
-    OSError
-        If the file cannot be written, or the compiler fails.
+    TypeError, ValueError, ImportError, OSError
+        If the thing is no model that can be exported; if the version, the name, a platform or the ending of the file is
+        unknown, or the sample time is missing; if a shared library is asked for and no compiler can make it; if the
+        file cannot be written, or the compiler fails.
 
     Examples
     --------

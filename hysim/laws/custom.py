@@ -44,10 +44,9 @@ class CustomLaw(Law):
 
     Raises
     ------
-    TypeError
-        If `step` takes other arguments, or does not compile to one number.
-    ValueError
-        If a name is given twice or is unknown, or a number is not finite.
+    TypeError, ValueError
+        If `step` takes other arguments or does not compile to one number; if a name is given twice or is unknown, or a
+        number is not finite.
 
     Examples
     --------
@@ -100,7 +99,6 @@ class CustomLaw(Law):
 
     @property
     def columns(self) -> tuple[str, ...]:
-        """Names in which the output is affine."""
         return self.linear
 
     @property
@@ -131,7 +129,6 @@ class CustomLaw(Law):
         return self.outputs_of(parameters, u).result(reduce, target, workers)
 
     def search_space(self, record: Record, freedom: Freedom = ALL_FREE) -> SearchSpace:
-        """The box of the bounded parameters."""
         boxes = {**self.bounds, **freedom.bounds}
         searched = [
             Parameter(name, *boxes[name], log=boxes[name][0] > 0.0, physical=(True, True))
@@ -142,7 +139,6 @@ class CustomLaw(Law):
         return declared_space(searched, (), self.scalars, self.initial, record, freedom)
 
     def with_scalars(self, scalars: Mapping[str, float]) -> "CustomLaw":
-        """The law with other parameters and initial values."""
         return replace(
             self,
             parameters={name: scalars.get(name, value) for name, value in self.parameters.items()},

@@ -238,7 +238,6 @@ class Line(Law):
 
     @property
     def known_slopes(self) -> tuple[float, float]:
-        """The slope."""
         return self.slope, self.slope
 
     def compiled_inverse(self, u0: float, limits: Limits = UNLIMITED, sample_time: float = math.inf) -> CompiledLaw:

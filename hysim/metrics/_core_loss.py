@@ -6,11 +6,10 @@
 
 The second is the improved generalised Steinmetz equation (iGSE); for a sine it is the first. A cycle is split into
 loops j of span D_j: one between its extremes, and a minor loop for each reversal between them, which begins where B
-turns and ends where B returns to this level. Minor loops in a minor loop are split off in the same manner, and each
-moment belongs to one loop. B is linear between its samples, so that the integrals and the ends of loops are exact.
-Sources: C. P. Steinmetz, Trans. AIEE 9 (1892) 1; K. Venkatachalam, C. R. Sullivan, T. Abdallah, H. Tacca, Accurate
-prediction of ferrite core loss with nonsinusoidal waveforms using only Steinmetz parameters, IEEE Workshop on Computers
-in Power Electronics (2002) 36.
+turns and ends where B returns to this level. Minor loops inside it are split off likewise. B is linear between its
+samples, so that the integrals and the ends of loops are exact. Sources: C. P. Steinmetz, Trans. AIEE 9 (1892) 1; K.
+Venkatachalam, C. R. Sullivan, T. Abdallah, H. Tacca, Accurate prediction of ferrite core loss with nonsinusoidal
+waveforms using only Steinmetz parameters, IEEE Workshop on Computers in Power Electronics (2002) 36.
 
 Errors of the field y over the flux density u, of a sequence or of each row of several, by the MagNet Challenge 2:
 
@@ -62,10 +61,8 @@ class Steinmetz:
 
         Parameters
         ----------
-        frequency, amplitude : array
-            Frequency [Hz] and amplitude of the flux density [T] of each loss, of shapes that broadcast.
-        loss : array
-            Loss density [W/m^3].
+        frequency, amplitude, loss : array
+            Frequency [Hz], amplitude of the flux density [T] and loss density [W/m^3], of shapes that broadcast.
 
         Raises
         ------
@@ -96,20 +93,10 @@ class Steinmetz:
     def loss_of(self, B: npt.ArrayLike, sample_time: float) -> float:
         """Loss density under a period of any waveform, by the iGSE with minor loops [W/m^3].
 
-        Noise in B is a multitude of steep minor loops: smooth a measured waveform before.
-
-        Parameters
-        ----------
-        B : array, shape (n,)
-            Flux density in one period, whose last sample is the first one again, as in `hysim.signals` [T].
-        sample_time : float
-            Time between two samples [s].
-
-        Raises
-        ------
-        ValueError
-            If B is not finite, its first and last sample differ by more than 1 % of its span, it has fewer than 3
-            samples, or the sample time is not positive.
+        `B` (n,) is the flux density [T] in one period whose last sample is the first one again, as in `hysim.signals`,
+        every `sample_time` [s]. Noise in it is a multitude of steep minor loops: smooth a measured waveform before.
+        Raises ValueError if B is not finite, its first and last sample differ by more than 1 % of its span, it has
+        fewer than 3 samples, or the sample time is not positive.
         """
         samples = read_only(B, "B", ndim=1)
         check_positive(sample_time=sample_time)
@@ -151,8 +138,7 @@ def sequence_relative_error(y: npt.ArrayLike, y_model: npt.ArrayLike) -> float |
     Parameters
     ----------
     y, y_model : array, shape (n,) or (n_sequences, n)
-        Measured and modelled output in the predicted part of the sequences, without samples that the model was told
-        [unit of y].
+        Outputs in the predicted part of the sequences, without samples that the model was told [unit of y].
 
     Returns
     -------
@@ -177,20 +163,16 @@ def normalised_energy_error(
 ) -> float | FloatArray:
     """Error of the integral of y du over its measured size, for one sequence or each row; nan where that is zero.
 
-    It is the normalised energy error of the MagNet Challenge 2, as a fraction and with its sign: positive where the
-    energy of the model is larger. The challenge prints it in percent, and the mean, 95th percentile and maximum of its
-    magnitude. There the scale is the loss that comes with the data, which belongs to the whole sequence: pass it as
-    `loss`. The default scale is that of the predicted part, in which short parts have larger errors.
+    It is the normalised energy error of the MagNet Challenge 2, as a fraction and with its sign, positive where the
+    model's energy is larger; the challenge prints percents of its magnitude, over the loss of the whole sequence that
+    comes with the data: pass that as `loss`. Without it short parts have larger errors.
 
     Parameters
     ----------
-    u : array, shape (n,) or (n_sequences, n)
-        Input, the flux density [unit of u].
-    y, y_model : array of the same shape
-        Measured and modelled output, the field, in the predicted part of the sequences [unit of y].
+    u, y, y_model : array, shape (n,) or (n_sequences, n)
+        Flux density [unit of u], and measured and modelled field [unit of y], in the predicted part of the sequences.
     loss : float or array, shape (n_sequences,), optional
-        Measured energy that the error is divided by, of any sign; by default the integral of y du over these samples
-        [unit of y times unit of u].
+        Measured energy, of any sign; by default the integral of y du over these samples [unit of y times unit of u].
 
     Returns
     -------

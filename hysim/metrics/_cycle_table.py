@@ -96,8 +96,7 @@ class CycleMetrics:
     secant_stiffness : array
         Slope of the line through the loop's ends [unit of y / unit of u].
     equivalent_damping : array
-        Damping ratio of the viscous oscillator of that stiffness that dissipates the magnitude of the energy at its
-        resonance, at least 0 [1]; nan if the stiffness is not positive.
+        Damping ratio of the viscous oscillator that dissipates as much, at least 0 [1]; nan for a stiffness <= 0.
     closure_gap : array
         Output at the cycle's end minus output at its start [unit of y].
     orientation : tuple of {"counterclockwise", "clockwise", "none"}
@@ -219,10 +218,8 @@ def cycle_metrics(
 
     Parameters
     ----------
-    u : array, shape (n,)
-        Input.
-    y : array, shape (n,)
-        Output.
+    u, y : array, shape (n,)
+        Input and output.
     level : float, optional
         Input at which cycles begin and end [unit of u]; by default the first input, or the middle of the levels that
         most of the branches' length reaches: whichever gives cycles of the larger total span.
@@ -238,8 +235,7 @@ def cycle_metrics(
     Raises
     ------
     ValueError
-        If lengths differ, a value is not finite, there are fewer than 3 samples, the input is constant, the level is
-        not finite, or there is no cycle about it.
+        As `hysim.loop_metrics`, or if the level is not finite, or there is no cycle about it.
 
     Examples
     --------

@@ -21,22 +21,8 @@ y+ and y- the forces at the largest and smallest displacement (mean of both bran
 The last is the damping ratio of the viscous oscillator that dissipates as much at its resonance. Energy and ratio are
 negative for a counterclockwise loop, where y lags u. The magnitude of the ratio is the same whichever of u and y is the
 force, if both have their extremes together. Sources: L. S. Jacobsen, Trans. ASME 52 (1930) 169, for the equivalence;
-FEMA 356 (2000), section 2.8.4, and ASCE 41 for the secant stiffness between the extremes of displacement, not of force.
-
-Those of a magnetic loop, B over H:
-
-    energy                  integral of H dB around the cycle, positive for a core that dissipates
-    coercivity              half the distance of the two fields at B = 0
-    remanence               half the distance of the two flux densities at H = 0
-    amplitude_permeability  peak_induction / (mu_0 peak_field), half the spans between the loop's ends
-    largest_permeability    largest slope dB/dH of either branch / mu_0, between neighbouring samples
-
-and of the initial curve, where the record begins demagnetised at H = B = 0:
-
-    initial_permeability    B / (mu_0 H) at its first sample with a field
-    maximum_permeability    largest B / (mu_0 H) of its samples
-
-The branches are those of `hysim.loop_metrics`. Source of the terms: IEC 60050-121 and 60404-4.
+FEMA 356 (2000), section 2.8.4, and ASCE 41 for the secant stiffness between the extremes of displacement, not of force;
+IEC 60050-121 and 60404-4 for the terms of a magnetic loop.
 """
 
 import math
@@ -93,12 +79,9 @@ class LoopMetrics:
     mean_width, mid_width : float
         Area over input span, and the width's magnitude at mid span [unit of y].
     area : float
-        Enclosed area, at least 0 [unit of y times unit of u]; of a loop that crosses itself the difference of the areas
-        that it encloses in either sense: see `lobes`.
-    stroke : float
-        Largest minus smallest output of the cycle [unit of y].
-    relative_width : float
-        `max_width` over `stroke`; nan for a constant output.
+        Enclosed area, at least 0 [unit of y times unit of u]; the difference of both senses if it has several `lobes`.
+    stroke, relative_width : float
+        Largest minus smallest output of the cycle [unit of y], and `max_width` over it; nan for a constant output.
     orientation : {"counterclockwise", "clockwise", "none"}
         Sense of the path in the plane of u (to the right) and y (up); "none" if the area is zero to rounding.
     closure_gap : float
@@ -106,13 +89,11 @@ class LoopMetrics:
     n_cycles : int
         Number of averaged cycles.
     energy : float
-        Integral of y du around the cycle [unit of y times unit of u], which a force y on a displacement u dissipates;
-        minus the area for a counterclockwise loop.
+        Integral of y du, dissipated by a force y over u; negative if counterclockwise [unit of y times unit of u].
     secant_stiffness : float
         Slope of the line through the loop's ends [unit of y / unit of u].
     equivalent_damping : float
-        Damping ratio of the viscous oscillator of that stiffness that dissipates as much at its resonance, with the
-        sign of the energy; texts show its magnitude. nan if the stiffness is not positive.
+        Damping ratio of the viscous oscillator that dissipates as much, of the energy's sign; nan for a stiffness <= 0.
     u : array, shape (m,)
         Increasing inputs: every input of either branch, over their common range [unit of u].
     loading, unloading, width : array, shape (m,)
@@ -231,10 +212,8 @@ def loop_metrics(u: npt.ArrayLike, y: npt.ArrayLike, *, cycles: int = 1, toleran
 
     Parameters
     ----------
-    u : array, shape (n,)
-        Input.
-    y : array, shape (n,)
-        Output.
+    u, y : array, shape (n,)
+        Input and output.
     cycles : int
         Number of last complete cycles whose branches are averaged at common inputs; all measures are of this loop.
     tolerance : float
@@ -247,8 +226,7 @@ def loop_metrics(u: npt.ArrayLike, y: npt.ArrayLike, *, cycles: int = 1, toleran
     Raises
     ------
     ValueError
-        If lengths differ, a value is not finite, the input is constant, or there are fewer than 3 samples or cycles
-        than asked.
+        If lengths differ, a value is not finite, the input is constant, or there are below 3 samples or too few cycles.
 
     Examples
     --------
@@ -394,22 +372,21 @@ _DEMAGNETISED = 1e-3  # of the spans of H and B
 @printed
 @frozen
 class MagneticMetrics:
-    """The measures of one magnetic loop; the equations stand at the head of `hysim.metrics._loop`.
+    """The measures of one magnetic loop, B over H.
 
     Parameters
     ----------
     energy : float
-        Energy per cycle and volume [J/m^3]; negative for a loop that runs clockwise.
-    coercivity : float
-        [A/m]; nan if a branch does not cross B = 0.
-    remanence : float
-        [T]; nan if the loop does not cross H = 0.
+        Integral of H dB around the cycle [J/m^3]; negative for a loop that runs clockwise.
+    coercivity, remanence : float
+        Half the distances of the fields at B = 0 [A/m], and of the flux densities at H = 0 [T]; nan without both zeros.
     peak_field, peak_induction : float
-        Half the distance of the loop's ends [A/m], [T].
+        Half the spans between the loop's ends [A/m], [T].
     amplitude_permeability, largest_permeability : float
-        Relative permeability from end to end, and where a branch is steepest [1]. The latter takes all noise of B.
+        ``peak_induction / (mu_0 peak_field)``, and the largest slope dB/dH between neighbouring samples / mu_0, which
+        takes all noise of B [1].
     initial_permeability, maximum_permeability : float
-        Relative permeabilities of the initial curve [1]; nan if the record does not begin demagnetised.
+        First and largest ``B / (mu_0 H)`` of the initial curve [1]; nan if the record does not begin at H = B = 0.
     saturated_slope : float
         Mean slope of the branches in the outer tenths of the span of the field [T m / A]. Where the loop is saturated,
         ``B - saturated_slope * H`` is without what the sample's holder, or a para- or diamagnetic part, adds.
@@ -503,8 +480,7 @@ def magnetic_metrics(
     Raises
     ------
     ValueError
-        If lengths differ, a value is not finite, there are fewer than 3 samples, H is constant or has fewer cycles
-        than asked for, or mu0 is not positive.
+        As `hysim.loop_metrics`, or if mu0 is not positive.
 
     Examples
     --------

@@ -60,9 +60,8 @@ def describing_function(
 ) -> npt.NDArray[np.complex128]:
     """First harmonic of a law's steady cycle under ``u = mean + a sin(phi)``, over the sine.
 
-    It is N(a), 1 / (pi a) times the integral of y (sin(phi) + i cos(phi)) d phi: the gain is ``abs(N)``, the phase
-    ``np.angle(N)`` [rad], negative where the output lags. The law begins with its own memory at the input `mean`, and
-    cycles until its output repeats, to 1e-12 of its span or, after 262 128 cycles, to 1e-6.
+    The gain is ``abs(N)``, the phase ``np.angle(N)`` [rad], negative where the output lags. The law begins with its
+    memory at `mean`, and cycles until its output repeats, to 1e-12 of its span or, after 262 128 cycles, 1e-6.
 
     Parameters
     ----------
@@ -81,12 +80,9 @@ def describing_function(
 
     Raises
     ------
-    TypeError
-        If the law has no `advance`, or depends on time.
-    ValueError
-        If an amplitude is not positive, a number is not finite, or `samples_per_cycle` is odd or below 4.
-    SimulationError
-        If the output does not repeat, or diverges.
+    TypeError, ValueError, SimulationError
+        If the law has no `advance` or depends on time; if an amplitude is not positive, a number is not finite, or
+        `samples_per_cycle` is odd or below 4; if the output does not repeat, or diverges.
 
     Examples
     --------

@@ -75,9 +75,8 @@ def fit_percent(y: npt.ArrayLike, y_model: npt.ArrayLike) -> float:
 def fpe(residual: npt.ArrayLike, n_parameters: int) -> float:
     """Final prediction error V (1 + d/N) / (1 - d/N) [unit of y, squared]; nan where d >= N.
 
-    `residual` is measured minus model, shape (N,) [unit of y], `n_parameters` the number d of fitted ones. ValueError
-    without samples, or if a value is not finite or the number negative. Source: H. Akaike, Ann. Inst. Statist. Math. 21
-    (1969) 243.
+    `residual` is measured minus model, shape (N,) [unit of y], `n_parameters` the number d. ValueError without samples,
+    or if a value is not finite or d is negative. Source: H. Akaike, Ann. Inst. Statist. Math. 21 (1969) 243.
 
     Examples
     --------

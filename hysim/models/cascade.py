@@ -202,10 +202,8 @@ class Cascade(Composite):
 
     Raises
     ------
-    TypeError
-        If a stage is not a model with a response.
-    ValueError
-        If the cascade is empty.
+    TypeError, ValueError
+        If a stage is not a model with a response, or the cascade is empty.
 
     Examples
     --------

@@ -33,10 +33,9 @@ class Dependent:
 
     Raises
     ------
-    TypeError
-        If the law has no named numbers and response.
-    ValueError
-        If a parameter is unknown or has two polynomials, or a value at a place makes no law.
+    TypeError, ValueError
+        If the law has no named numbers and response; if a parameter is unknown or has two polynomials, or a value at a
+        place makes no law.
 
     Examples
     --------

@@ -282,10 +282,8 @@ class Law(Placed, Searched, ABC):
 
         Raises
         ------
-        SimulationError
-            If the output diverges; the message names the sample.
-        ValueError
-            If u is not finite or has not one axis.
+        SimulationError, ValueError
+            If the output diverges, with the sample; if u is not finite or has not one axis.
         """
         return self.advance(u)[0]
 
@@ -346,10 +344,9 @@ class Law(Placed, Searched, ABC):
 
         Raises
         ------
-        SimulationError
-            If the output diverges.
-        ValueError
-            If a name is unknown or the response has no derivative by it, or u is not finite or has not one axis.
+        SimulationError, ValueError
+            If the output diverges; if a name is unknown, the response has no derivative by it, or u is not finite or
+            has not one axis.
 
         Examples
         --------
@@ -486,11 +483,9 @@ class Law(Placed, Searched, ABC):
 
         Raises
         ------
-        TypeError
-            If a name is not one of the constructor's.
-        ValueError
-            If lengths do not fit, the constructor would refuse a value, or the input has no complete cycle to
-            measure.
+        TypeError, ValueError
+            If a name is not one of the constructor's; if lengths do not fit, the constructor would refuse a value, or
+            the input has no complete cycle to measure.
 
         Examples
         --------
@@ -521,11 +516,9 @@ class Law(Placed, Searched, ABC):
 
         Raises
         ------
-        SimulationError
-            If the output does not reach a sample, or does not rise (or fall) all the way there; it names the sample.
-        ValueError
-            If y is not finite or has not one axis, both u0 and state are given, or the output does not determine where
-            the input begins.
+        SimulationError, ValueError
+            If the output does not reach a sample, which is named, or does not rise (or fall) all the way there; if y is
+            not finite or has not one axis, u0 and state are given, or y does not determine where the input begins.
         """
         outputs = read_only(y, "y", ndim=1)
         if state is not None and u0 is not None:

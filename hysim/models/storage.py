@@ -37,10 +37,8 @@ def save(model: Any, path: str | Path, *, units: Mapping[str, str] | None = None
 
     Raises
     ------
-    TypeError, ValueError
-        If `model` is not a model, or holds models in models, more than `load_model` takes.
-    OSError
-        If the file cannot be written.
+    TypeError, ValueError, OSError
+        If `model` is not a model or holds more models in models than `load_model` takes; if the file cannot be written.
 
     Examples
     --------

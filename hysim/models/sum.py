@@ -303,10 +303,8 @@ class Sum(Composite):
 
     Raises
     ------
-    TypeError
-        If a part is not a model with a response.
-    ValueError
-        If the sum is empty.
+    TypeError, ValueError
+        If a part is not a model with a response, or the sum is empty.
 
     Examples
     --------

@@ -74,10 +74,9 @@ class Actuator:
 
     Raises
     ------
-    TypeError
-        If a stage is not of its kind.
-    ValueError
-        If the vibration holds an initial state or is not held, has several inputs or outputs, or is discrete.
+    TypeError, ValueError
+        If a stage is not of its kind, or the vibration holds an initial state, is not held, has several inputs or
+        outputs, or is discrete.
 
     Examples
     --------
@@ -173,10 +172,9 @@ class Actuator:
         """An actuator for `hysim.identify`, on one or several records with time: law, creep, modes and delay at once.
 
         Records of different rates tell the parts apart: a slow one shows law and creep, a fast one with corners or
-        steps the modes and the delay. What the records do not determine is held, and the result's message says so. A
-        record begins at rest, creep included, as every response does, and its input is held between the samples. A law
-        with a single memory has its own at the first sample of each record (``hysteresis.z0``); plays begin at rest at
-        zero unless ``initial=`` says otherwise.
+        steps the modes and the delay. What they do not determine is held, and the result's message says so. A record
+        begins at rest, creep included; its input is held between samples. A law with a single memory has its own at the
+        first sample of each record (``hysteresis.z0``); plays begin at rest at zero unless ``initial=`` says otherwise.
 
         Parameters
         ----------
@@ -223,9 +221,8 @@ class Actuator:
         >>> import numpy as np, hysim as hs
         >>> stage = hs.Actuator(hysteresis=hs.Play(threshold=0.2), vibration=hs.mode(300.0, 0.05, delay=0.4e-3))
         >>> slow, fast = np.sin(np.linspace(0.0, 9.0, 90)), np.repeat([0.0, 1.0, -0.5, 0.5], 20)
-        >>> recs = [
-        ...     hs.Record(u=u, y=stage.response(u, h), t=h * np.arange(u.size)) for u, h in ((slow, 0.1), (fast, 1e-3))
-        ... ]
+        >>> runs = ((slow, 0.1), (fast, 1e-3))
+        >>> recs = [hs.Record(u=u, y=stage.response(u, h), t=h * np.arange(u.size)) for u, h in runs]
         >>> fit = hs.identify(hs.Actuator.structure(hs.Play, creep=False), recs)
         >>> round(fit.estimates["vibration.natural_frequencies[0]"], 3), round(fit.estimates["vibration.delay"], 6)
         (300.0, 0.0004)
@@ -393,8 +390,7 @@ def as_actuator(plant: Any) -> Actuator:
     """Any plant as an actuator: a law becomes its hysteresis, a linear plant its vibration; others are a TypeError.
 
     Of a cascade of laws that ends with a transfer function the laws become the hysteresis, and the transfer function
-    the vibration, which begins at rest as every actuator does. A creep, an amplifier and the
-    result of a fit are taken, too.
+    the vibration, which begins at rest. A creep, an amplifier and the result of a fit are taken, too.
 
     Examples
     --------

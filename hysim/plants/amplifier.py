@@ -37,10 +37,8 @@ class Amplifier:
 
     Parameters
     ----------
-    gain : float
-        Voltage gain.
-    offset : float
-        Output at a command of zero [V].
+    gain, offset : float
+        Voltage gain, and output at a command of zero [V].
     limits : (float, float), optional
         Lowest and highest output; None for none [V].
     slew_rate : float, optional

@@ -29,10 +29,8 @@ class Creep:
 
     Parameters
     ----------
-    time_constants : sequence of float
-        Of the elements, positive [s].
-    weights : sequence of float
-        Their gains [unit of the output / unit of the input].
+    time_constants, weights : sequence of float
+        Of the elements, positive [s], and their gains [unit of the output / unit of the input].
     instant_gain : float
         g_0, of what follows at once.
 
@@ -74,10 +72,8 @@ class Creep:
 
         Parameters
         ----------
-        percent : float
-            Growth in a decade, of the value at the reference time [%].
-        band : (float, float)
-            Shortest and longest time at which it shall hold [s].
+        percent, band : float, and (float, float)
+            Growth in a decade of the value at the reference time [%], and shortest and longest time of validity [s].
         per_decade_elements : int
             Number of log-spaced elements in a decade.
         reference_time : float

@@ -46,10 +46,8 @@ class MultiInputActuator:
 
     Raises
     ------
-    ValueError
-        If lengths differ, a name occurs twice, or ``"u"`` is not among them.
-    TypeError
-        If a name is no text, or an actuator is not a model with a response.
+    ValueError, TypeError
+        If lengths differ, a name is no text or occurs twice, ``"u"`` is not among them, or an actuator is no model.
 
     See Also
     --------

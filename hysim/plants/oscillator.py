@@ -144,12 +144,8 @@ class BoucWenOscillator:
 
     Parameters
     ----------
-    mass : float
-        Positive [kg].
-    damping : float
-        Viscous, c [N s/m].
-    stiffness : float
-        Of the linear spring, k [N/m].
+    mass, damping, stiffness : float
+        Positive m [kg], viscous c [N s/m], and k of the linear spring [N/m].
     law : BoucWen or PolynomialBoucWen
         Force of the hysteretic spring [N] for the displacement y [m]; its z0 is the memory at the start.
     excitation : {"force", "base"}
@@ -167,10 +163,9 @@ class BoucWenOscillator:
 
     Raises
     ------
-    ValueError
-        If a number is not finite, the mass is not positive, an option is unknown, or substeps is below 1.
-    TypeError
-        If the law is not one of the two, or substeps is not a whole number.
+    ValueError, TypeError
+        If a number is not finite, the mass is not positive, an option is unknown, `substeps` is not whole and positive,
+        or the law is not one of the two.
 
     Examples
     --------

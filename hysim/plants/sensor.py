@@ -16,10 +16,9 @@ class Sensor:
 
     Parameters
     ----------
-    quantum : float
-        Step of the readings, of a converter or a camera's pixel; 0 for none [unit of y].
-    noise : float
-        Its rms value, before the quantum [unit of y].
+    quantum, noise : float
+        Step of the readings, of a converter or a camera's pixel, and rms of the noise before it; 0 for none [unit of
+        y].
     delay : float
         Age of what is read [s]; it need not be a whole number of samples.
     seed : int

@@ -24,10 +24,8 @@ class StateSpace:
         [1/s]
     B, C : array, shape (n,)
         Input and output.
-    D : float
-        What passes through [unit of y / unit of u].
-    delay : float
-        Dead time [s], not negative.
+    D, delay : float
+        What passes through [unit of y / unit of u], and dead time [s], not negative.
 
     Raises
     ------
@@ -132,10 +130,8 @@ class Modes:
 
     Parameters
     ----------
-    natural_frequencies : sequence of float
-        Positive [rad/s].
-    damping_ratios : sequence of float
-        Not negative.
+    natural_frequencies, damping_ratios : sequence of float
+        Positive [rad/s], and not negative.
     gains : sequence of float
         Static gains; their sum is the gain at rest [unit of y / unit of the input].
     delay : float

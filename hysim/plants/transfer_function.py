@@ -277,11 +277,10 @@ class TransferFunction(Composable):
 class TransferFunctionStructure(Subject, Composable):
     """The shape of a transfer function, to be identified; see `TransferFunction.structure`.
 
-    The search runs over second-order sections s^2 + 2 zeta omega s + omega^2 (and one of first order for an
-    odd number of poles) on log scales, which are stable by construction: omega from 0.1 rad over the whole
-    record to the Nyquist rate, zeta from 0.001 to 30, so that real poles may lie at both ends. Resonances
-    above the Nyquist rate are left out: samples look the same as for those below, and they fit noise.
-    A free delay, which is None here, is searched in samples from 0 to a quarter of the record.
+    The search runs over second-order sections s^2 + 2 zeta omega s + omega^2 (and one of first order for an odd number
+    of poles) on log scales, stable by construction: omega from 0.1 rad over the whole record to the Nyquist rate, zeta
+    from 0.001 to 30, so that real poles may lie at both ends. Resonances above the Nyquist rate fit noise: samples look
+    the same as for those below. A free delay, here None, is searched up to a quarter of the record.
     """
 
     poles: int

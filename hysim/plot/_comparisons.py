@@ -85,10 +85,9 @@ def comparison(
 ) -> AxesArray:
     """Draw the best models side by side: one row per model, with its loop, its residuals and its loop width.
 
-    `names` are those of the models, in this order; by default the four with the smallest cross-validated rmse, or the
-    first four. `axes` are three for each model, row by row, and `quanta` is the name of the sensor's quanta, as in
-    `residuals`. The result has shape (n_models, 3). A ValueError is raised if there is nothing to draw, a KeyError if
-    there is no model of a name.
+    `names` are those of the models, in this order (KeyError); by default the four with the smallest cross-validated
+    rmse, or the first four. `axes` are three for each model, row by row, and `quanta` is the name of the sensor's
+    quanta, as in `residuals`. The result has shape (n_models, 3). A ValueError is raised if there is nothing to draw.
 
     Examples
     --------
@@ -179,19 +178,17 @@ def identification(
 ) -> AxesArray:
     """Draw the model over the measured loop, the residuals, and the profiles of the likelihood if there are any.
 
-    `record` is the Record, or the sequence of them, from which `fit` was identified; another one is a ValueError. The
-    band is two standard errors of the model's output to each side, and the model's line its free run on the measured
-    input. Residuals are counted in quanta of the sensor if its resolution is known, with lines at one quantum. A
-    profile is the signed root of the deviance over the distance from the estimate in standard errors, on the diagonal
-    for a normal distribution; the interval at 95 % lies between the horizontal lines. The result has shape (2,), or
-    (3,) with profiles.
+    `record` is the Record, or the sequence of them, from which `fit` was identified, else a ValueError. The band is two
+    standard errors of the model's output to each side, the model's line its free run on the measured input. Residuals
+    are in quanta of the sensor if its resolution is known, with lines at one. A profile is the signed root of the
+    deviance over the distance from the estimate in standard errors, on the diagonal for a normal distribution; the
+    interval at 95 % lies between the horizontal lines. The result has shape (2,), or (3,) with profiles.
 
     Examples
     --------
     >>> import hysim as hs
     >>> rec = hs.datasets.table1()
-    >>> fit = hs.identify(hs.Line, rec)
-    >>> len(hs.plot.identification(fit, rec, hs.plot.figure().subplots(1, 2)))
+    >>> len(hs.plot.identification(hs.identify(hs.Line, rec), rec, hs.plot.figure().subplots(1, 2)))
     2
     """
     records = (record,) if isinstance(record, Record) else tuple(record)

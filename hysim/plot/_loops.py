@@ -86,10 +86,9 @@ def _coloured(
 def width(*results: Any, ax: Axes | None = None) -> Axes:
     """Draw signed loop widths, unloading minus loading, against the input.
 
-    Each of `results` is a Record, a Simulation, a LoopMetrics or anything with arrays `u` and `y`; or a model or the
-    result of a fit, which is simulated on the input of the record before it. `hysim.loop_metrics` measures the last
-    complete cycle. A record is drawn as points, anything else as a line. A ValueError is raised if there is no result,
-    or one has no complete cycle.
+    Each of `results` is a Record, drawn as points, a Simulation, a LoopMetrics or anything with arrays `u` and `y`; or
+    a model or the result of a fit, which is simulated on the input of the record before it. `hysim.loop_metrics`
+    measures the last complete cycle. A ValueError is raised if there is no result, or one has no complete cycle.
 
     Examples
     --------

@@ -28,10 +28,9 @@ _BAND = 2.0  # standard errors
 def selection(discovery: Discovery | OscillatorDiscovery, axes: Sequence[Axes] | AxesArray | None = None) -> AxesArray:
     """Draw the fit and the BIC of the free run of a discovery against the number of terms, on two Axes.
 
-    `discovery` is a result of `hysim.discover` or `hysim.discover_oscillator`. The structures on the path of thresholds
-    are circles, and the chosen law is a diamond, which need not be on the path: the search removes further terms from
-    it. A structure that fits 5 % worse than the best, or whose free run diverges, is a cross on the edge. The result
-    has shape (2,).
+    `discovery` is a result of `hysim.discover` or `hysim.discover_oscillator`. Circles are the structures on the path
+    of thresholds. The chosen law is a diamond; it may be off the path, as the search removes further terms. A cross on
+    the edge fits 5 % worse than the best, or its free run diverges. The result has shape (2,).
     """
     n_terms, fits, scores = discovery.path_n_terms, discovery.path_fit_percent, discovery.scores
     shown = fits >= fits.max(initial=scores["fit_percent"]) - _WORST_FIT
@@ -76,8 +75,7 @@ def fragility(curve: Fragility, ax: Axes | None = None) -> Axes:
 def trade_off(tuning: Tuning, ax: Axes | None = None) -> Axes:
     """Draw the objective of a tuning against the maximum sensitivity: all trials, the best of them, and the chosen one.
 
-    `tuning` is a result of `hysim.tune`. Trials 30 times worse than the chosen one, or twice as sensitive, are left
-    out.
+    `tuning` is a result of `hysim.tune`. Trials 30 times worse than the chosen one, or twice as sensitive, are omitted.
 
     Examples
     --------

@@ -133,8 +133,7 @@ def history(result: InputOutput, axes: Sequence[Axes] | AxesArray | None = None,
 
     `result` is a Record, a Simulation or anything with arrays `u` and `y`; without times they are drawn against the
     sample's number. With two `axes` the memory z is left out. Models on the same `axes` differ by their lines. `hold`
-    is ``"zoh"``, which draws the input as steps, or ``"foh"``, straight lines; another word is a ValueError. The result
-    has shape (2,) or (3,).
+    is ``"zoh"``, which draws the input as steps, or ``"foh"``, straight lines. The result has shape (2,) or (3,).
 
     Examples
     --------
@@ -168,9 +167,8 @@ def history(result: InputOutput, axes: Sequence[Axes] | AxesArray | None = None,
 def signals(result: Simulation, *names: str, axes: Sequence[Axes] | AxesArray | None = None) -> AxesArray:
     """Draw signals of a simulation against time, one panel for each, with a line for each of its columns.
 
-    `result` is a result of `hysim.simulate`, and `names` are names of its signals, such as ``"drift"``; without times
-    they are drawn against the sample's number. A name that is no signal, or no name at all, is a ValueError. The result
-    has shape (n_names,).
+    `result` is a result of `hysim.simulate`, and `names` are names of its signals, such as ``"drift"``, else a
+    ValueError; without times they are drawn against the sample's number. The result has shape (n_names,).
 
     Examples
     --------
@@ -239,8 +237,7 @@ def traces(
 ) -> Axes:
     """Draw outputs against time, over each other.
 
-    `series` maps names to pairs of times and outputs, arrays of the same shape (n,); `units` are labels of the units of
-    ``"t"`` and ``"y"``.
+    `series` maps names to pairs of times and outputs (n,); `units` are labels of the units of ``"t"`` and ``"y"``.
 
     Examples
     --------

@@ -2,8 +2,7 @@
 
 Files of figures have the same bytes each time. Matplotlib numbers the groups of an SVG, so that two pictures have the
 same ids, and gives shared shapes random ids unless they are salted. Here the salt and a prefix of every id come from
-the picture's name, so that pictures can stand beside each other in one HTML page. Text stays text: it can be searched
-and read aloud.
+the picture's name, so that pictures can stand beside each other in one HTML page. Text stays text: it can be searched.
 """
 
 import io

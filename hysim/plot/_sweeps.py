@@ -219,10 +219,9 @@ def residual_map(
     and a change from bottom to top is drift. A cell is the mean over the samples of one branch in one interval of the
     input; grey is zero, lighter is more, darker is less, and white has no samples.
 
-    `model` is a model, a result of a fit, or a Simulation of the record's input. `bins` is the number of intervals, by
-    default half as many as a branch has samples, at most 40. Reversals up to the fraction `tolerance` of the input's
-    span do not end a branch. `quanta` is the name of the sensor's quanta, in which residuals are counted if the record
-    has a resolution. The result has shape (2,).
+    `model` is a model, a fit, or a Simulation of the record's input. `bins` is the number of intervals, by default half
+    as many as a branch has samples, at most 40. Reversals up to the fraction `tolerance` of the input's span end no
+    branch. `quanta` names the sensor's quanta, the unit if the record has a resolution. The result has shape (2,).
 
     Raises
     ------
@@ -282,9 +281,8 @@ def forc(
 
     Grey is zero, lighter is more, darker is less. Of a law the density is the weight of the relays in a cell over its
     area; the cells along the diagonal, whose relays switch at one input, are triangles. Of a record of curves it is
-    that of `hysim.forc`: lines are the ridge, where at each half distance the density is largest, and the
-    central line, middle 0. Without smoothing, and of fewer than ten curves, it is the law of
-    `hysim.Preisach.from_reversal_curves` on the turning points.
+    that of `hysim.forc`, with its ridge, the largest density at each half distance, and the central line, middle 0.
+    Without smoothing, or of fewer than ten curves, it is `hysim.Preisach.from_reversal_curves` on the turning points.
 
     `source` is a Preisach, a PreisachRelays, the result of `hysim.forc`, or a Record of curves such as
     `hysim.signals.reversal_curves`, whose reversals up to the fraction `tolerance` of its span are ignored; `smoothing`

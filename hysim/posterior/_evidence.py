@@ -225,10 +225,9 @@ def compare_evidence(
 
     Raises
     ------
-    ValueError
-        If there is no model, an option is unknown, or a prior does not fit; see `hysim.sample_posterior`.
-    ImportError
-        If dynesty or emcee is not installed: ``pip install 'hysim[bayes]'``.
+    ValueError, ImportError
+        If there is no model, an option is unknown, or a prior does not fit (see `hysim.sample_posterior`); if dynesty
+        or emcee is not installed: ``pip install 'hysim[bayes]'``.
 
     Examples
     --------

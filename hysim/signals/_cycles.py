@@ -13,10 +13,9 @@ from hysim._basics.frozen import FloatArray, read_only
 def staircase(low: float, high: float, step: float, *, cycles: int = 1, samples_per_step: int = 1) -> FloatArray:
     """Steps from low to high and back.
 
-    Every level of the rise occurs again on the fall, so that both extremes occur twice in a row: 0, 5, ..., 125, 125,
-    ..., 5, 0. `step` is the height of a step [unit of u], which divides the span. The result has shape (2 * cycles *
-    levels * samples_per_step,) [unit of u]. A ValueError is raised if high is not above low, the step does not divide
-    the span, or a count is below 1.
+    Every level of the rise occurs again on the fall, so that both extremes occur twice in a row. `step` is the height
+    of a step [unit of u], which divides the span. The result has shape (2 * cycles * levels * samples_per_step,) [unit
+    of u]. ValueError if high is not above low, the step does not divide the span, or a count is below 1.
 
     Examples
     --------
@@ -77,9 +76,8 @@ def sawtooth(low: float, high: float, *, cycles: int, samples_per_cycle: int) ->
     """Straight lines from low to high, and back in one step, sampled evenly.
 
     The step back takes as long as any other step. Reversed, ``[::-1]``, the signal falls along the lines and rises in
-    one step. `low` and `high` are both hit exactly [unit of u]; a line has `samples_per_cycle` samples, at least 2,
-    with both ends among them. The result has shape (cycles * samples_per_cycle,), starts at low and ends at high [unit
-    of u]. A ValueError is raised if high is not above low, or a count is too small.
+    one step. Both extremes are hit exactly [unit of u]; a line has `samples_per_cycle` samples with both ends. The
+    result (cycles * samples_per_cycle,) starts at low. ValueError if high is not above low, or a count is too small.
 
     Examples
     --------
@@ -118,10 +116,9 @@ _ROUNDING = 1e-12  # of a number of steps
 def reversal_curves(low: float, high: float, *, curves: int, samples_per_step: int = 1) -> FloatArray:
     """First-order reversal curves: from low up to one level after the other, and back each time.
 
-    `low` and `high` are both hit exactly [unit of u]. The levels above low divide the span evenly into N = `curves`
-    parts, and the highest one is last. With m = `samples_per_step` from one level to the next, curve k = 1 ... N takes
-    2 k m samples. The result has shape (N (N + 1) m + 1,), starts and ends at low [unit of u]. A ValueError is raised
-    if high is not above low, or a count is below 1.
+    Both extremes are hit exactly [unit of u]. The levels above low divide the span evenly into N = `curves` parts. With
+    m = `samples_per_step` from one level to the next, curve k = 1 ... N takes 2 k m samples. The result (N (N + 1) m +
+    1,) starts and ends at low [unit of u]. A ValueError is raised if high is not above low, or a count is below 1.
 
     Examples
     --------
@@ -146,14 +143,10 @@ def decaying_sine(
 
     Parameters
     ----------
-    amplitude : float
-        Amplitude a_0 of the first cycle [unit of u].
-    mean : float
-        Value in the middle of the cycles [unit of u].
-    cycles : int
-        Number N of cycles.
-    samples_per_cycle : int
-        Samples of a cycle; with a multiple of 4 both extremes of every cycle are hit exactly.
+    amplitude, mean : float
+        Amplitude a_0 of the first cycle, and value in the middle of the cycles [unit of u].
+    cycles, samples_per_cycle : int
+        Number N of cycles, and of their samples; a multiple of 4 hits both extremes of every cycle exactly.
     ratio : float, optional
         a_k / a_(k-1), above 0 and at most 1. By default the amplitudes fall evenly, a_k = a_0 (N - k) / N.
 
@@ -181,8 +174,7 @@ def growing_sine(
 ) -> FloatArray:
     """Cycles of a sine, each larger than the one before: the amplitudes of `decaying_sine` in reverse order.
 
-    The arguments and errors are those of `decaying_sine`, with the `amplitude` of the last cycle; `ratio` is the
-    amplitude of a cycle over that of the next one. The result has the same shape.
+    Arguments, shape and errors are those of `decaying_sine`; `amplitude` is the last one, `ratio` a_k / a_(k+1).
 
     Examples
     --------

@@ -56,10 +56,8 @@ def ground_motion(
     ----------
     peak : float
         Largest size of the acceleration, hit exactly [unit of u, m/s^2 for a structure].
-    duration : float
-        D [s].
-    sample_time : float
-        Time between two samples [s].
+    duration, sample_time : float
+        D, and time between two samples [s].
     seed : int or numpy.random.Generator
         Seed of the noise. The same arguments and seed give the same bits.
     ground_frequency, ground_damping : float
@@ -69,12 +67,8 @@ def ground_motion(
         Circular frequency of the high pass [rad/s], 1.5, 1 and 0.5 for these soils, and its damping ratio.
     envelope : {"saragoni-hart", "jennings", "none"}
         Shape of the motion in time; ``"none"`` cuts a piece out of a stationary motion.
-    rise : float
-        Where the envelope reaches 1, as a share of the duration.
-    plateau : float
-        How long it stays there in ``"jennings"``, as a share of the duration.
-    end : float
-        Its value at the end.
+    rise, plateau, end : float
+        Where the envelope reaches 1, and how long ``"jennings"`` stays there, in parts of the duration; its last value.
 
     Returns
     -------
@@ -84,9 +78,8 @@ def ground_motion(
     Raises
     ------
     ValueError
-        If a number is not positive and finite, a frequency is not below half the sampling rate, `rise` or `end` is not
-        between 0 and 1, rise and plateau leave no time for the end, `envelope` is another word, or there are fewer than
-        16 or more than 1e7 samples.
+        If a number is outside its range, a frequency is not below half the sampling rate, rise and plateau leave no
+        time for the end, `envelope` is another word, or there are fewer than 16 or more than 1e7 samples.
 
     References
     ----------

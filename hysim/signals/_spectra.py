@@ -34,10 +34,8 @@ def multisine(
         Increasing multiples, from 1 to below n / 2.
     rms : float
         Root mean square about the mean, which determines c [unit of u].
-    periods : int
-        Number of periods.
-    samples_per_period : int
-        n.
+    periods, samples_per_period : int
+        Number of periods, and n.
     mean : float
         [unit of u]
     phases : {"random", "schroeder"}
@@ -52,11 +50,9 @@ def multisine(
 
     Raises
     ------
-    ValueError
-        If the lines do not increase or lie outside their range, the rms is not positive, the mean is not finite, a
-        count is below 1, or `phases` is another word.
-    TypeError
-        If the lines are not whole numbers.
+    ValueError, TypeError
+        If the lines do not increase, lie outside their range or are not whole, the rms is not positive, the mean is not
+        finite, a count is below 1, or `phases` is another word.
 
     References
     ----------
@@ -113,10 +109,8 @@ def sweep(
         Frequencies from 0 to below 1 / (2 T) [1 / unit of t]; positive and different for ``"logarithmic"``.
     amplitude, mean : float
         Half the span, and the value in its middle [unit of u].
-    n_samples : int
-        Number of samples.
-    sample_time : float
-        T [unit of t].
+    n_samples, sample_time : int, and float
+        Number of samples, and T [unit of t].
     spacing : {"linear", "logarithmic"}
         Whether the frequency grows by equal steps or by equal factors in equal times.
 

@@ -105,7 +105,6 @@ def _together(batch: Task, chunk: Chunk) -> list[Rows]:
 
 
 def _outputs(returned: Any) -> dict[str, Any]:
-    """The outputs by name, floats and arrays."""
     named = returned if isinstance(returned, Mapping) else {"value": returned}
     if not named or not all(isinstance(name, str) for name in named):
         raise TypeError(f"a task returns a number, an array, or a mapping of names to these, got {returned!r}")

@@ -82,10 +82,8 @@ def fragility(
     ----------
     intensities : array, shape (n,)
         Intensities of the ground motion, positive.
-    n_exceeding : array, shape (n,)
-        Number of records whose response exceeds the limit, or that collapse.
-    n_records : int or array, shape (n,)
-        Number of all records at each intensity.
+    n_exceeding, n_records : array, shape (n,), and int or array, shape (n,)
+        Number of records whose response exceeds the limit, or that collapse, and of all records, at each intensity.
     same_records : bool
         Whether the same records are scaled to each intensity: then the counts are correlated, and the intervals wider.
     level : float

@@ -89,17 +89,13 @@ def loss_map(
     model : model or result of a fit
         From B [T] to H [A/m]: a law, a `hysim.Sum` with `hysim.Dashpot` and `hysim.ExcessLoss`, or a `hysim.Dependent`
         of such a model.
-    amplitudes : array, shape (n_amplitudes,)
-        Positive amplitudes of B, by which the waveform is multiplied [T].
-    frequencies : array, shape (n_frequencies,)
-        Positive frequencies of the cycle [Hz].
-    bias : array, shape (n_bias,)
-        Values that are added to the waveform [T].
+    amplitudes, frequencies, bias : array, shape (n_amplitudes,), (n_frequencies,), (n_bias,)
+        Positive amplitudes of B, by which the waveform is multiplied [T]; positive frequencies of the cycle [Hz]; and
+        values that are added to the waveform [T].
     channels : mapping, optional
         Each channel of a `hysim.Dependent` model to values (n,).
     waveform : array, shape (n,), optional
-        One cycle for amplitude 1 and bias 0, whose last sample is the first one again, as in `hysim.signals`; by
-        default a sine of 1000 samples.
+        One cycle of amplitude 1 and bias 0, both ends included; by default a sine of 1000 samples.
 
     Returns
     -------
@@ -107,13 +103,11 @@ def loss_map(
 
     Raises
     ------
-    TypeError
-        If the model has no response, or channels are given to one that is not a `hysim.Dependent`.
-    ValueError
-        If an amplitude or a frequency is not positive, a number is not finite, the waveform does not end where it
-        begins, a channel is missing or unknown, or every loss is negative, as of a model from H to B.
-    SimulationError
-        If the field does not come to repeat, or diverges.
+    TypeError, ValueError, SimulationError
+        If the model has no response, or channels are given to one that is not a `hysim.Dependent`; if an amplitude or a
+        frequency is not positive, a number is not finite, the waveform does not end where it begins, a channel is
+        missing or unknown, or every loss is negative, as of a model from H to B; if the field does not repeat, or
+        diverges.
 
     Examples
     --------
@@ -148,7 +142,6 @@ def loss_map(
 
 
 def _energy(model: Any, cycle: FloatArray, sample_time: float) -> float:
-    """Integral of H dB over the steady cycle."""
     if isinstance(model, Sum):
         return sum(_energy(part, cycle, sample_time) for part in model.parts)
     period = cycle[:-1] if needs_time(model) else cycle[[first for first, _ in turns(cycle, 0.0).plateaus[:-1]]]

@@ -1,8 +1,7 @@
 """The result of `sweep`, a table with one row for each task, and its Sobol indices.
 
-**Sobol indices** are the shares of the variance of an output that are due to each parameter. Two independent samples A
-and B of n sets, and for each parameter i the sample AB_i, which is A with the column of parameter i from B, give from n
-(d + 2) tasks
+**Sobol indices** are the shares of the variance of an output that are due to each parameter. Independent samples A and
+B of n sets, and for each parameter i AB_i, which is A with column i from B, give from n (d + 2) tasks
 
     first order   S_i = Var(E(f | x_i)) / Var(f)              share of parameter i alone
     total         T_i = 1 - Var(E(f | all but x_i)) / Var(f)  share of parameter i and its interactions
@@ -36,16 +35,10 @@ class Sweep:
     ----------
     parameters : mapping
         Name to values, shape (n,).
-    outputs : mapping
-        Name to the numbers that the tasks returned, shape (n,); nan where a task failed.
-    arrays : mapping
-        Name to the arrays that the tasks returned, shape (n, ...); nan where a task failed.
-    task : array, shape (n,)
-        Places of the tasks in the study, increasing.
-    seed : array, shape (n,)
-        Seeds of the tasks.
-    seconds : array, shape (n,)
-        Computing time of each task [s]; the mean for tasks in a batch.
+    outputs, arrays : mapping
+        Name to the numbers that the tasks returned, shape (n,), and to arrays, shape (n, ...); nan where a task failed.
+    task, seed, seconds : array, shape (n,)
+        Places of the tasks in the study, increasing; their seeds; and their computing times [s], in a batch the mean.
     errors : mapping
         Place of a failed task to its message.
     n_tasks : int
@@ -247,10 +240,8 @@ def sobol_indices(result: Sweep, *, seed: int = 0) -> SobolIndices:
 
     Parameters
     ----------
-    result : Sweep
-        Result with every task of the sample.
-    seed : int
-        Seed of the bootstrap.
+    result, seed : Sweep, and int
+        Result with every task of the sample, and seed of the bootstrap.
 
     Returns
     -------

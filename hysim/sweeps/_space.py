@@ -49,18 +49,16 @@ class Sample:
 
     Raises
     ------
-    TypeError
-        If a distribution is neither a pair of numbers nor one of `scipy.stats`.
-    ValueError
-        If there is no distribution, a pair is not in order, or `n` does not suit the method.
+    TypeError, ValueError
+        If a distribution is neither a pair in order nor one of `scipy.stats`, there is none, or `n` does not suit the
+        method.
 
     Examples
     --------
     >>> import hysim as hs
     >>> from scipy import stats
     >>> sample = hs.Sample(distributions={"beta": (0.2, 2.0), "n": stats.uniform(1.0, 1.0)}, n=64)
-    >>> drawn = sample.draw()
-    >>> {name: values.shape for name, values in drawn.items()}
+    >>> {name: values.shape for name, values in sample.draw().items()}
     {'beta': (64,), 'n': (64,)}
     """
 

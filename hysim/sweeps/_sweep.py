@@ -248,7 +248,6 @@ def sweep(
 
 
 def _share(shard: tuple[int, int] | None, n_tasks: int) -> npt.NDArray[np.int64]:
-    """The tasks of a shard."""
     if shard is not None and not (isinstance(shard, Sequence) and len(shard) == 2):
         raise TypeError(f"shard must be a pair (k, n), such as (3, 100), got {shard!r}")
     k, n = shard or (0, 1)

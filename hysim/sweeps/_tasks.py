@@ -71,10 +71,8 @@ def response_task(
 
     Raises
     ------
-    TypeError
-        If the family has no ``responses``, or none with this measure.
-    ValueError
-        If the measure is unknown, `y` is missing or not needed, or the lengths differ.
+    TypeError, ValueError
+        If the family has no ``responses`` with this measure, `y` is missing or not needed, or the lengths differ.
 
     Examples
     --------
@@ -159,10 +157,8 @@ def structure_task(
 
     Raises
     ------
-    TypeError
-        If the structure is none.
-    ValueError
-        If a measure is unknown, or the records are not finite.
+    TypeError, ValueError
+        If the structure is none, a measure is unknown, or the records are not finite.
 
     Examples
     --------

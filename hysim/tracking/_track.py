@@ -183,10 +183,9 @@ def track_parameters(
 
     Raises
     ------
-    TypeError
-        If the law is none, or depends on the rate of its input.
-    ValueError
-        If a name is unknown, the noise is not positive, the method is unknown, or every copy of the law diverges.
+    TypeError, ValueError
+        If the law is none, or depends on the rate of its input; if a name or the method is unknown, the noise is not
+        positive, or every copy of the law diverges.
 
     Examples
     --------

@@ -94,7 +94,6 @@ class Bilinear(Law):
 
     @property
     def known_slopes(self) -> tuple[float, float]:
-        """Those of the hardening and of the elastic line."""
         return min(self.hardening, self.stiffness), max(self.hardening, self.stiffness)
 
     @classmethod

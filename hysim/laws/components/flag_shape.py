@@ -84,7 +84,6 @@ class FlagShape(Law):
 
     @property
     def known_slopes(self) -> tuple[float, float]:
-        """Those after and before the activation."""
         return min(self.hardening, self.stiffness), max(self.hardening, self.stiffness)
 
     @classmethod

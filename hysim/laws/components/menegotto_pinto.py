@@ -166,7 +166,6 @@ class MenegottoPinto(Law):
 
     @property
     def known_slopes(self) -> tuple[float, float]:
-        """Those of the asymptotes and of the elastic line."""
         return min(self.hardening, self.stiffness), max(self.hardening, self.stiffness)
 
     @classmethod

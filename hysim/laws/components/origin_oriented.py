@@ -73,7 +73,6 @@ class OriginOriented(Law):
 
     @property
     def known_slopes(self) -> tuple[float, float]:
-        """Those of both lines."""
         return min(self.hardening, self.stiffness), max(self.hardening, self.stiffness)
 
     @classmethod

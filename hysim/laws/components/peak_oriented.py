@@ -116,7 +116,6 @@ class PeakOriented(Law):
 
     @property
     def known_slopes(self) -> tuple[float, float]:
-        """Zero and the elastic slope."""
         return min(0.0, self.stiffness), max(0.0, self.stiffness)
 
     @classmethod

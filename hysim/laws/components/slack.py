@@ -91,7 +91,6 @@ class Slack(Law):
 
     @property
     def known_slopes(self) -> tuple[float, float]:
-        """Zero where both rods are loose, and the sum of both where neither is."""
         slopes = 0.0, self.stiffness, self.opposite_stiffness, self.stiffness + self.opposite_stiffness
         return min(slopes), max(slopes)
 

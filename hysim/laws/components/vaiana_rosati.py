@@ -155,7 +155,6 @@ class VaianaRosati(Law):
 
     @classmethod
     def check(cls, tables: Tables) -> None:
-        """Refuse a parameter that does not hold one number or two, and an alpha that is not positive."""
         for name in _MIRRORED:
             if tables[name].shape[1] not in (1, 2):
                 raise ValueError(f"{name} must hold one number or two, got {tables[name].shape[1]}")
@@ -174,7 +173,6 @@ class VaianaRosati(Law):
         return Packed(np.concatenate(columns, axis=1), cls.initial_memory(tables))
 
     def freed_in_turn(self) -> tuple[Stage, ...]:
-        """The exponential, and then the tanh."""
         stages = []
         for word, letter in (("exponential", "beta"), ("tanh", "gamma")):
             names = tuple(name for name in self.scalars if name.startswith(letter))

@@ -187,7 +187,6 @@ class BoucWenLaw(BoucWenStep, MemoryLaw):
 
     @property
     def known_slopes(self) -> tuple[float, float]:
-        """Those of `slope_bounds`."""
         return self.slope_bounds()
 
     def slope_bounds(self, low: float = -np.inf, high: float = np.inf) -> tuple[float, float]:
@@ -228,13 +227,11 @@ class BoucWenLaw(BoucWenStep, MemoryLaw):
         return boucwen_inverse.inverse(self)
 
     def inverse_begun(self, y: FloatArray, u0: float | None, state: State | InverseState | None) -> CompiledLaw:
-        """In closed form, from the input that gives the first output with the memory at z0."""
         rest = boucwen_inverse.at_rest(self, float(y[0])) if u0 is None and state is None else (u0, self.z0)
         begin: Any = rest if state is None else state
         return boucwen_inverse.inverse(self, float(begin[0])).begun(begin)
 
     def unreached(self, sample: int, y: float, inverse: CompiledLaw) -> str:
-        """Message with the input and the slope there."""
         return boucwen_inverse.unreached(sample, y, inverse)
 
     def compiled_inverse(self, u0: float, limits: Limits = UNLIMITED, sample_time: float = math.inf) -> CompiledLaw:
@@ -254,7 +251,6 @@ class BoucWenLaw(BoucWenStep, MemoryLaw):
         return Packed(cls.joined(tables, "A", "beta", "gamma", "n"), cls.initial_memory(tables))
 
     def divergence(self, sample: int, u: float, y: float) -> str:
-        """Message with the sums of parameters that let the memory diverge."""
         loading, unloading = self.beta + self.gamma, self.beta - self.gamma
         return (
             f"the memory diverges at sample {sample} (u = {u:g}): with beta + gamma = {loading:g} and beta - gamma = "

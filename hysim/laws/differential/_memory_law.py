@@ -52,7 +52,6 @@ class MemoryLaw(Law):
 
     @classmethod
     def check(cls, tables: Tables) -> None:
-        """Refuse an exponent that is not positive, and a polynomial without coefficients."""
         super().check(tables)
         if not tables[cls.polynomial].size:
             raise ValueError(f"{cls.polynomial} must hold at least one coefficient")
@@ -86,7 +85,6 @@ class MemoryLaw(Law):
 
     @property
     def columns(self) -> tuple[str, ...]:
-        """Names in which the output is affine."""
         return (*self.coefficient_names, "gain", "offset")
 
     @property

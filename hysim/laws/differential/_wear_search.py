@@ -131,7 +131,6 @@ class _Chart:
         return replace(self, span=1.0, path=self.path / self.span, slope=1.0)
 
     def decode(self, x: FloatArray) -> dict[str, FloatArray]:
-        """Parameters of the memory, each (n_sets,), from coordinates (n_sets, n_x)."""
         sets = np.atleast_2d(x)
         raw = dict(zip(self.coordinates, sets.T, strict=True))
         known = {name: np.full(len(sets), self.values[name]) for name in _MEMORY}
@@ -155,7 +154,6 @@ class _Chart:
         return known
 
     def encode(self, parameters: Mapping[str, float]) -> FloatArray:
-        """Coordinates (n_x,) of one set of parameters."""
         known = {name: np.array(parameters[name]) for name in _MEMORY}
         unit = plain.shape_unit(known["A"], known["n"], self.span)
         loading, unloading = known["beta"] + known["gamma"], known["beta"] - known["gamma"]

@@ -183,7 +183,6 @@ class BoucWenBaberNoori(MemoryLaw):
 
     @classmethod
     def check(cls, tables: Tables) -> None:
-        """Refuse also a law that pinches in which a width or the yield memory is not positive."""
         super().check(tables)
         pinches = tables["zeta_s"] != 0.0
         sums = {"beta + gamma": tables["beta"] + tables["gamma"], "psi": tables["psi"], "lambda_": tables["lambda_"]}
@@ -295,7 +294,6 @@ class BoucWenBaberNoori(MemoryLaw):
 
     @property
     def known_slopes(self) -> tuple[float, float]:
-        """Those of the Bouc-Wen law, where it neither degrades nor pinches."""
         if any(self.scalars[name] for name in _WEARING):
             return super().known_slopes
         return PolynomialBoucWen(**{name: self.arguments[name] for name in PolynomialBoucWen.defaults()}).known_slopes

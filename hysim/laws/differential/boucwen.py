@@ -378,7 +378,6 @@ class EquivalentBoucWen(BoucWenStep):
 
     @classmethod
     def pack(cls, tables: Tables) -> Packed:
-        """The constants and the memory of the Bouc-Wen law."""
         parameters = cls.equivalent(tables)
         plain = {name: np.full_like(parameters["A"], value) for name, value in BoucWen.defaults().items()}
         return BoucWen.pack({**plain, **parameters})
@@ -391,7 +390,6 @@ class EquivalentBoucWen(BoucWenStep):
 
     @property
     def known_slopes(self) -> tuple[float, float]:
-        """Those of the Bouc-Wen law."""
         return self.bouc_wen.known_slopes
 
     def tangent(self, direction: npt.ArrayLike, z: npt.ArrayLike) -> FloatArray:
@@ -407,13 +405,10 @@ class EquivalentBoucWen(BoucWenStep):
         return self.bouc_wen.inverse()
 
     def inverse_begun(self, y: FloatArray, u0: float | None, state: State | InverseState | None) -> CompiledLaw:
-        """The inverse of the Bouc-Wen law."""
         return self.bouc_wen.inverse_begun(y, u0, state)
 
     def unreached(self, sample: int, y: float, inverse: CompiledLaw) -> str:
-        """Message with the input and the slope there."""
         return self.bouc_wen.unreached(sample, y, inverse)
 
     def compiled_inverse(self, u0: float, limits: Limits = UNLIMITED, sample_time: float = math.inf) -> CompiledLaw:
-        """The closed form of the inverse, stepped; see `hysim.models.inverse_steps`."""
         return self.bouc_wen.compiled_inverse(u0, limits)

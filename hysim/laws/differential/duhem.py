@@ -121,7 +121,6 @@ class DuhemStructure(Subject, Composable):
             raise ValueError(f"{barred[0]!r} needs a memory of its own: begin the search from a law, Duhem.from_terms")
 
     def search_space(self, record: Record, freedom: Freedom = ALL_FREE) -> SearchSpace:
-        """The box of `Duhem.search_space` around the regression on this record."""
         names = [term.name for term in self.terms]
         degrees = sorted({term.degree for term in self.terms}, reverse=True)
         level = {"feedthrough": 0.0, "offset": 0.0, "y0": float(record.y[0]) if len(record) else 0.0}
@@ -133,11 +132,9 @@ class DuhemStructure(Subject, Composable):
         return replace(space, starts=np.clip(starts, space.lower, space.upper), screened=0)
 
     def regressors(self, parameters: Parameters, record: Record) -> FloatArray:
-        """As `Duhem.regressors`."""
         return self.family.regressors(parameters, record)
 
     def assemble(self, parameters: Mapping[str, float]) -> Any:
-        """The law with these parameters, one number for each name."""
         return self.family.assemble(parameters)
 
     def _distance(self, values: Mapping[str, float], record: Record) -> float:
@@ -345,7 +342,6 @@ class Duhem(Law):
 
     @classmethod
     def defaults(cls) -> dict[str, Any]:
-        """Zero polynomials, and the other defaults."""
         return {"p": _none(), "q": _none(), **super().defaults()}
 
     @classmethod
@@ -376,7 +372,6 @@ class Duhem(Law):
         y[:] = outputs(laws, feedthrough, y0 - offset, u, LARGEST, 1)[0] + offset[:, np.newaxis]
 
     def divergence(self, sample: int, u: float, y: float) -> str:
-        """Message with the law's equation."""
         return f"{super().divergence(sample, u, y)}: {self.equation}"
 
     def search_space(self, record: Record, freedom: Freedom = ALL_FREE) -> SearchSpace:
@@ -399,7 +394,6 @@ class Duhem(Law):
         raise ValueError('a Duhem law has no steady cycle that could be computed: use initial="free"')
 
     def assemble(self, parameters: Mapping[str, float]) -> Self:
-        """The law with these parameters, one number for each name."""
         terms = {name: value for name, value in parameters.items() if name not in _OUTPUT}
         others = {name: parameters.get(name, self.scalars[name]) for name in _OUTPUT}
         return self.from_terms(terms, **others)
@@ -417,7 +411,6 @@ class Duhem(Law):
         return "z" if self.feedthrough or self.offset or self.p_abs.any() or self.q_abs.any() else "y"
 
     def with_scalars(self, scalars: Mapping[str, float]) -> Self:
-        """The law with other numbers, by their names in `scalars`."""
         return self.assemble({**self.scalars, **scalars})
 
     @property

@@ -94,7 +94,6 @@ class TabulatedDahl(Law):
 
     @classmethod
     def check(cls, tables: Tables) -> None:
-        """Refuse what is no table, and numbers outside their limits."""
         super().check(tables)
         sizes = [tables[name].shape[1] for name in ("inputs", "centre", "amplitude")]
         if len({*sizes}) > 1 or sizes[0] < 2:

@@ -128,7 +128,6 @@ class GeneralizedMaxwellSlip(RatedLaw):
 
     @property
     def viscosity(self) -> float:
-        """The viscous friction."""
         return self.viscous
 
     def friction(self, velocity: npt.ArrayLike) -> FloatArray:

@@ -99,10 +99,8 @@ class TimedLaw(Subject, Placed, ABC):
 
         Raises
         ------
-        SimulationError
-            If the output diverges; the message names the sample.
-        ValueError
-            If u is not finite or has not one axis, or the sample time is not positive.
+        SimulationError, ValueError
+            If the output diverges, with the sample; if u is not finite or has not one axis, or sample_time <= 0.
         """
         return self.at_sample_time(sample_time).response(u)
 
@@ -169,7 +167,6 @@ class TimedLaw(Subject, Placed, ABC):
         )  # fmt: skip
 
     def regressors(self, parameters: Parameters, record: Record) -> FloatArray:
-        """Columns in which the output is affine, and the rest of it, shape (n_sets, n_samples, n_columns + 1)."""
         return self.at_sample_time(record.sample_time).regressors(parameters, record)
 
     def steady(self, parameters: Parameters, record: Record) -> dict[str, Any]:
@@ -177,7 +174,6 @@ class TimedLaw(Subject, Placed, ABC):
         return dict(self.at_sample_time(record.sample_time).steady(parameters, record))
 
     def assemble(self, parameters: Mapping[str, float]) -> Self:
-        """The law with these parameters, one number for each name; the others are its own."""
         return self.with_scalars(parameters)
 
 

@@ -83,7 +83,6 @@ class StribeckFriction(RatedLaw):
 
     @property
     def viscosity(self) -> float:
-        """The viscous friction."""
         return self.viscous
 
     def steady_force(self, velocity: npt.ArrayLike) -> FloatArray:

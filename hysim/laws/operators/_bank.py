@@ -194,7 +194,6 @@ class Clamps(Elements, Law):
 
     @property
     def known_slopes(self) -> tuple[float, float]:
-        """Those of `slope_bounds`."""
         return self.slope_bounds()
 
     def slope_bounds(self) -> tuple[float, float]:

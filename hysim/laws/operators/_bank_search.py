@@ -98,7 +98,6 @@ class SignedStructure(Subject, Composable):
         """The initial memory of the laws, (n_sets, n_memory)."""
 
     def assemble(self, parameters: Mapping[str, float]) -> Any:
-        """The law with these parameters, one number for each name."""
         tuples = {name.partition("[")[0] for name in parameters if "[" in name}
         values = {**parameters, **{name: table_of(name, parameters)[0] for name in tuples}}
         values["z0"] = self.initial(parameters)[0]
@@ -230,7 +229,6 @@ class BankStructure(SignedStructure):
         return "rest", "still", "periodic", *(("free",) if self.zones is None else ())
 
     def longer_past(self) -> "BankStructure | None":
-        """With one former turning point more."""
         may_be_longer = self.turns < _MOST_TURNS and self.law.by_input
         return replace(self, turns=self.turns + 1) if may_be_longer else None
 

@@ -70,7 +70,6 @@ class PlaySum(Law):
         return self.inverse_from(self.advance([u0])[1], limits)
 
     def unreached(self, sample: int, y: float, inverse: CompiledLaw) -> str:
-        """Message for an output that no input gives."""
         return f"no input gives the output at sample {sample} (y = {y:g})"
 
     def inverse_from(self, state: State, limits: Limits = UNLIMITED) -> CompiledLaw:
@@ -92,7 +91,6 @@ class PlaysAtSampleTime(Bank, PlaySum):
     z0: tuple[float, ...] = (0.0,)
 
     def refusal(self) -> str | None:
-        """Why the law has no inverse at its sample time; None where it has one."""
         if (refusal := self.plays.refusal()) is not None:
             return refusal
         sums = np.cumsum(self.weights)

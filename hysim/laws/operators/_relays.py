@@ -229,7 +229,6 @@ class RelayLaw(ByStructure, Law):
 
     @classmethod
     def check(cls, tables: Tables) -> None:
-        """Refuse levels and weights that are no relays."""
         check_relays(tables["levels"], tables["weights"])
 
     @classmethod
@@ -279,7 +278,6 @@ class RelayLaw(ByStructure, Law):
         return y, (float(inputs[-1]) if y.size else before, *x[1 : d + 1].tolist())
 
     def remembering(self, u0: float, memory: State) -> Any:
-        """The law after these extremes."""
         return type(self)(**{**self.arguments, "z0": memory}, u0=u0)
 
     @property
@@ -332,8 +330,7 @@ class RelayLaw(ByStructure, Law):
         N intervals have N (N + 1) / 2 weights; one loop between two inputs determines 2 N - 1 combinations of them.
         With `one_signed` all weights off the diagonal have the sign of the record's loop, positive for a
         counterclockwise one; else they are free, and may be of alternating signs on noisy records. By default the BIC
-        decides. Raises ValueError or TypeError if the number is not a positive int, or the levels are not finite or do
-        not increase.
+        decides. Raises ValueError or TypeError for a number that is not a positive int, or levels that do not increase.
 
         Examples
         --------

@@ -60,10 +60,9 @@ class GeneralizedPrandtlIshlinskii(Bank, PlaySum):
     >>> import hysim as hs
     >>> envelope = (1.0, 2.0, 0.0, 0.0, 0.0)
     >>> law = hs.GeneralizedPrandtlIshlinskii(thresholds=(0.0, 0.5), weights=(1.0, 1.0), left=envelope)
-    >>> law.response([0.0, 1.0, 0.5, -1.0]).round(6).tolist()
-    [0.0, 1.428055, 1.225622, -1.428055]
-    >>> law.inverse_response(law.response([0.0, 1.0, 0.5, -1.0])).round(6).tolist()
-    [0.0, 1.0, 0.5, -1.0]
+    >>> y = law.response([0.0, 1.0, 0.5, -1.0])
+    >>> y.round(6).tolist(), law.inverse_response(y).round(6).tolist()
+    ([0.0, 1.428055, 1.225622, -1.428055], [0.0, 1.0, 0.5, -1.0])
     """
 
     thresholds: tuple[float, ...] = ()
@@ -83,7 +82,6 @@ class GeneralizedPrandtlIshlinskii(Bank, PlaySum):
 
     @classmethod
     def check(cls, tables: Tables) -> None:
-        """Refuse elements that are no plays, and envelopes that do not increase."""
         super().check(tables)
         _check_envelopes(tables["left"], tables["right"])
 
@@ -125,7 +123,6 @@ class GeneralizedPrandtlIshlinskii(Bank, PlaySum):
 
     @classmethod
     def pushing(cls, parameters: Parameters, record: Record) -> Tables:
-        """The envelopes."""
         return {side: table_of(side, parameters) for side in ("left", "right")}
 
     @classmethod
@@ -139,7 +136,6 @@ class GeneralizedPrandtlIshlinskii(Bank, PlaySum):
         return left | named("right", right)
 
     def as_structure(self) -> BankStructure:
-        """The structure with the thresholds and envelopes of this law, or with free ones by default."""
         left, right = (self.left, self.right) if self.thresholds else ((), ())
         one_signed = None if self.is_one_signed() else False
         return self.structure(thresholds=self.thresholds, one_signed=one_signed, left=left, right=right)

@@ -22,9 +22,8 @@ class MaxwellSlip(Bank, Clamps):
 
     u is the displacement, z_i the block to which spring i is fixed, F the force. An element holds at most the force k_i
     d_i. The law is a sum of stops; the loop of a positive stiffness runs clockwise. A law without elements, the
-    default, is a line; as a start of `hysim.identify` it leaves the elements to the record, as
-    ``MaxwellSlip.structure()`` does. Sources: M. Goldfarb and N. Celanovic, IEEE Control Systems 17 (1997); W. D. Iwan,
-    J. Appl. Mech. 33 (1966).
+    default, is a line; `hysim.identify` takes it as ``MaxwellSlip.structure()``. Sources: M. Goldfarb and N. Celanovic,
+    IEEE Control Systems 17 (1997); W. D. Iwan, J. Appl. Mech. 33 (1966).
 
     Parameters
     ----------
@@ -32,10 +31,9 @@ class MaxwellSlip(Bank, Clamps):
         k_i, of any sign [unit of y / unit of u].
     slips : sequence of float, length n_elements
         Elongation d_i at which each element slips, not negative [unit of u].
-    feedthrough : float
-        Stiffness of a spring beside them that does not slip [unit of y / unit of u].
-    offset : float
-        Output at rest at u = 0 [unit of y].
+    feedthrough, offset : float
+        Stiffness of a spring beside them that does not slip [unit of y / unit of u], and output at rest at u = 0 [unit
+        of y].
     z0 : float or sequence of float, length n_elements
         Positions of the blocks before the first sample, which may pull them along [unit of u].
 
@@ -48,10 +46,8 @@ class MaxwellSlip(Bank, Clamps):
     --------
     >>> import hysim as hs
     >>> law = hs.MaxwellSlip.from_limits(stiffness=(4.0, 2.0), limits=(1.0, 2.0))
-    >>> law.slips
-    (0.25, 1.0)
-    >>> law.response([0.0, 0.25, 2.0, 1.5, -2.0]).tolist()
-    [0.0, 1.5, 3.0, 0.0, -3.0]
+    >>> law.slips, law.response([0.0, 0.25, 2.0, 1.5, -2.0]).tolist()
+    ((0.25, 1.0), [0.0, 1.5, 3.0, 0.0, -3.0])
     """
 
     units: ClassVar = {"stiffness": "y/u", "slips": "u", "feedthrough": "y/u", "offset": "y", "z0": "u"}

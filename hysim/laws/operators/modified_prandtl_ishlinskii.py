@@ -39,18 +39,12 @@ class ModifiedPrandtlIshlinskii(Bank, PlaySum):
 
     Parameters
     ----------
-    thresholds : sequence of float, length n_plays
-        r_i, not negative and increasing [unit of u]. The play of threshold zero is the input itself.
-    weights : sequence of float, length n_plays
-        w_i, of any sign [unit of x / unit of u].
-    dead_zones : sequence of float, length n_zones
-        Thresholds d_j, increasing [unit of x]. That of threshold zero is x itself.
-    dead_zone_weights : sequence of float, length n_zones
-        c_j, of any sign [unit of y / unit of x].
-    offset : float
-        Output at rest at u = 0 [unit of y].
-    z0 : float or sequence of float, length n_plays
-        Positions before the first sample, which pushes them [unit of u].
+    thresholds, weights
+        As in `PrandtlIshlinskii` [unit of u, unit of x / unit of u].
+    dead_zones, dead_zone_weights : sequence of float, length n_zones
+        Thresholds d_j, increasing [unit of x], and c_j, of any sign [unit of y / unit of x]. S of threshold zero is x.
+    offset, z0
+        As in `PrandtlIshlinskii` [unit of y, unit of u].
 
     Raises
     ------
@@ -63,10 +57,8 @@ class ModifiedPrandtlIshlinskii(Bank, PlaySum):
     >>> law = hs.ModifiedPrandtlIshlinskii(
     ...     thresholds=(0.0, 0.5), weights=(1.0, 2.0), dead_zones=(0.0, 1.0), dead_zone_weights=(1.0, 0.5)
     ... )
-    >>> law.response([0.0, 1.0, 0.5, -1.0]).tolist()
-    [0.0, 2.5, 1.75, -2.0]
-    >>> law.inverse_response([0.0, 2.5, 1.75, -2.0]).tolist()
-    [0.0, 1.0, 0.5, -1.0]
+    >>> law.response([0.0, 1.0, 0.5, -1.0]).tolist(), law.inverse_response([0.0, 2.5, 1.75, -2.0]).tolist()
+    ([0.0, 2.5, 1.75, -2.0], [0.0, 1.0, 0.5, -1.0])
     """
 
     thresholds: tuple[float, ...] = ()
@@ -85,7 +77,6 @@ class ModifiedPrandtlIshlinskii(Bank, PlaySum):
 
     @classmethod
     def check(cls, tables: Tables) -> None:
-        """Refuse elements that are no plays or no dead zones."""
         super().check(tables)
         check_dead_zones(tables["dead_zones"], tables["dead_zone_weights"])
 
@@ -133,7 +124,6 @@ class ModifiedPrandtlIshlinskii(Bank, PlaySum):
         return self.plays.inverted(x, u0, state)
 
     def as_structure(self) -> BankStructure:
-        """The structure with the thresholds of this law, or with the default thresholds."""
         own, known = named("weights", self.weights), self.dead_zones if self.thresholds else ()
         return replace(super().as_structure(), own=own, dead_zones=known)
 

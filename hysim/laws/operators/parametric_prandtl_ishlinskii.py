@@ -47,11 +47,10 @@ class ParametricPrandtlIshlinskii(Law):
 
     As a start of `hysim.identify` the class leaves the reach to the record, the span of the input, and what was before
     it: the cycle between the lowest and the highest input, on the branch in whose direction the record moves first, or
-    plays that all stand at zero or at the first input, where that fits clearly better (the BIC of a few densities is
-    lower by 10). With ``initial="rest"`` all plays stand at zero before the first sample, with ``"free"`` they have
-    made one stroke from there, to ``z0[1]``. Sources: M. Al Janaideh, S. Rakheja and C.-Y. Su, IEEE/ASME Trans.
-    Mechatronics 16 (2011), for a parametric density; P. Krejci and K. Kuhnen, IEE Proc. Control Theory Appl. 148
-    (2001), for the law.
+    plays that all stand at zero or at the first input, where that fits clearly better (the BIC is lower by 10). With
+    ``initial="rest"`` all plays stand at zero before the first sample, with ``"free"`` they have made one stroke from
+    there, to ``z0[1]``. Sources: M. Al Janaideh, S. Rakheja and C.-Y. Su, IEEE/ASME Trans. Mechatronics 16 (2011), for
+    a density; P. Krejci and K. Kuhnen, IEE Proc. Control Theory Appl. 148 (2001), for the law.
 
     Parameters
     ----------
@@ -59,10 +58,9 @@ class ParametricPrandtlIshlinskii(Law):
         Exponent of the density at small thresholds, above -1; negative for loops that are sharp at their reversals.
     decay : float
         Threshold over which the density falls by the factor e, positive [unit of u].
-    weight : float
-        Sum of the weights of the plays at u = 0, positive for a counterclockwise loop [unit of y / unit of u].
-    weight_slope : float
-        Change of this sum with the input [unit of y / unit of u^2].
+    weight, weight_slope : float
+        Sum of the weights of the plays at u = 0, positive for a counterclockwise loop [unit of y / unit of u], and its
+        change with the input [unit of y / unit of u^2].
     offset : float
         Output at u = 0 where all plays stand at zero [unit of y].
     input_coefficients : sequence of float
@@ -119,7 +117,6 @@ class ParametricPrandtlIshlinskii(Law):
 
     @classmethod
     def check(cls, tables: Tables) -> None:
-        """Refuse what is no density or no number of plays."""
         super().check(tables)
         exponent, reach, plays = (tables[name] for name in ("exponent", "reach", "plays"))
         idle = (tables["weight"] == 0.0) & (tables["weight_slope"] == 0.0)

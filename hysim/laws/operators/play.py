@@ -25,10 +25,8 @@ class Play(Clamps):
     ----------
     threshold : float
         Half width r, not negative [unit of u].
-    gain : float
-        [unit of y / unit of u].
-    offset : float
-        Output at z = 0 [unit of y].
+    gain, offset : float
+        [unit of y / unit of u], and output at z = 0 [unit of y].
     z0 : float
         Position before the first sample, which pushes it [unit of u].
 
@@ -78,10 +76,8 @@ class Stop(Clamps):
     ----------
     threshold : float
         Elongation r at which it slips, not negative [unit of u].
-    gain : float
-        Stiffness [unit of y / unit of u].
-    offset : float
-        Output of the relaxed element [unit of y].
+    gain, offset : float
+        Stiffness [unit of y / unit of u], and output of the relaxed element [unit of y].
     z0 : float
         Where it is fixed before the first sample, which may pull it along [unit of u].
 

@@ -33,16 +33,14 @@ class PrandtlIshlinskii(Bank, Clamps):
 
     ``z_i(k) = min(max(z_i(k-1), u_k - r_i), u_k + r_i)``. Positive weights give the counterclockwise loops of
     piezoelectric stacks, negative ones beside a large w_0 the clockwise ones of a force. A law without plays, the
-    default, is a constant; as a start of `hysim.identify` it leaves the plays to the record, as
-    ``PrandtlIshlinskii.structure()`` does. Sources: K. Kuhnen, European J. Control 9 (2003), for the inverse; P. Krejci
-    and K. Kuhnen, IEE Proc. Control Theory Appl. 148 (2001).
+    default, is a constant; `hysim.identify` takes it as ``PrandtlIshlinskii.structure()``. Sources: K. Kuhnen, European
+    J. Control 9 (2003), for the inverse; P. Krejci and K. Kuhnen, IEE Proc. Control Theory Appl. 148 (2001).
 
     Parameters
     ----------
-    thresholds : sequence of float, length n_plays
-        r_i, not negative and increasing [unit of u]. The play of threshold zero is the input itself.
-    weights : sequence of float, length n_plays
-        w_i, of any sign [unit of y / unit of u].
+    thresholds, weights : sequence of float, length n_plays
+        r_i, not negative and increasing [unit of u], and w_i, of any sign [unit of y / unit of u]. The play of
+        threshold zero is the input itself.
     offset : float
         Output at rest at u = 0 [unit of y].
     z0 : float or sequence of float, length n_plays
@@ -57,10 +55,8 @@ class PrandtlIshlinskii(Bank, Clamps):
     --------
     >>> import hysim as hs
     >>> law = hs.PrandtlIshlinskii(thresholds=(0.0, 0.5), weights=(1.0, 2.0))
-    >>> law.response([0.0, 1.0, 0.5, -1.0]).tolist()
-    [0.0, 2.0, 1.5, -2.0]
-    >>> law.inverse_response([0.0, 2.0, 1.5, -2.0]).tolist()
-    [0.0, 1.0, 0.5, -1.0]
+    >>> law.response([0.0, 1.0, 0.5, -1.0]).tolist(), law.inverse_response([0.0, 2.0, 1.5, -2.0]).tolist()
+    ([0.0, 2.0, 1.5, -2.0], [0.0, 1.0, 0.5, -1.0])
     """
 
     units: ClassVar = {"thresholds": "u", "weights": "y/u", "offset": "y", "z0": "u"}

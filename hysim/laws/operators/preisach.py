@@ -10,8 +10,7 @@ along the dominant extremes x_k of the input; a larger one wipes out smaller one
 weights over pairs of intervals between levels, and agree where the input stops at levels only. The inverse runs the
 same recursion on the outputs: as E is monotone, the dominant extremes of the output are those of the input. Each stroke
 ends on a piece on which y is linear, so that it is exact. Sources: F. Preisach, Z. Phys. 94 (1935); D. H. Everett,
-Trans. Faraday Soc. 51 (1955); I. D. Mayergoyz, Mathematical Models of Hysteresis, 1991, for first-order reversal curves
-and the interpolation of E.
+Trans. Faraday Soc. 51 (1955); I. D. Mayergoyz, Mathematical Models of Hysteresis, 1991.
 """
 
 import math
@@ -57,10 +56,8 @@ class PreisachRelays(RelayLaw):
         L_0 < L_1 < ... [unit of u].
     weights : sequence of float, length N (N + 1) / 2
         w_ij for j <= i, row by row [unit of y]: of the relay that goes up at L_(i+1) and down at L_j.
-    offset : float
-        Mean of the outputs of all relays up and of all down [unit of y].
-    z0 : sequence of float
-        Inputs before the first sample, the oldest first; before them all relays are down [unit of u].
+    offset, z0
+        As in `Preisach` [unit of y, unit of u].
 
     Raises
     ------
@@ -93,8 +90,7 @@ class Preisach(RelayLaw):
 
     Each weight of `PreisachRelays` is spread evenly over its pair of intervals, along the diagonal over one interval
     with itself. The output is piecewise linear in the input, with the diagonal weight's slope after a reversal. A law
-    without relays, the default, is a constant; as a start of `hysim.identify` it leaves the levels to the record, as
-    ``Preisach.structure()`` does.
+    without relays, the default, is a constant; `hysim.identify` takes it as ``Preisach.structure()``.
 
     Parameters
     ----------
@@ -117,10 +113,8 @@ class Preisach(RelayLaw):
     --------
     >>> import hysim as hs
     >>> law = hs.Preisach(levels=(0.0, 1.0, 2.0), weights=(1.0, 0.5, 1.0))
-    >>> law.response([0.0, 1.5, 2.0, 1.5, 0.5, 0.0]).tolist()
-    [-2.5, 1.0, 2.5, 1.5, -1.0, -2.5]
-    >>> law.inverse_response([-2.5, 1.0, 2.5, 1.5]).tolist()
-    [0.0, 1.5, 2.0, 1.5]
+    >>> law.response([0.0, 1.5, 2.0, 1.5, 0.5]).tolist(), law.inverse_response([-2.5, 1.0, 2.5, 1.5]).tolist()
+    ([-2.5, 1.0, 2.5, 1.5, -1.0], [0.0, 1.5, 2.0, 1.5])
     """
 
     spread: ClassVar[bool] = True
@@ -306,7 +300,6 @@ class Preisach(RelayLaw):
         return low * high > 0.0
 
     def inverse_begun(self, y: FloatArray, u0: float | None, state: State | None) -> CompiledLaw:
-        """In closed form, after the inputs before the first sample."""
         past = state[1:] if state is not None else self.past if u0 is None else (*self.past, u0)
         return self.inverse_from(past, room=y.size)
 

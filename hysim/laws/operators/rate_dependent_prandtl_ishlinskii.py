@@ -57,10 +57,8 @@ class RateDependentPrandtlIshlinskii(Bank, Placed):
         w_i, of any sign [unit of y / unit of u].
     beta : float
         Growth of the thresholds with the speed of the input, not negative [s].
-    offset : float
-        Output at rest at u = 0 [unit of y].
-    z0 : float or sequence of float, length n_plays
-        Positions before the first sample, which pushes them [unit of u].
+    offset, z0
+        As in `PrandtlIshlinskii` [unit of y, unit of u].
 
     Raises
     ------
@@ -71,10 +69,8 @@ class RateDependentPrandtlIshlinskii(Bank, Placed):
     --------
     >>> import hysim as hs
     >>> law = hs.RateDependentPrandtlIshlinskii(thresholds=(0.0, 0.25), weights=(1.0, 1.0), beta=0.25)
-    >>> law.response([0.0, 1.0, 0.0], sample_time=1.0).tolist()
-    [0.0, 1.5, 0.5]
-    >>> law.response([0.0, 1.0, 0.0], sample_time=2.0).tolist()
-    [0.0, 1.625, 0.375]
+    >>> [law.response([0.0, 1.0, 0.0], sample_time=h).tolist() for h in (1.0, 2.0)]
+    [[0.0, 1.5, 0.5], [0.0, 1.625, 0.375]]
     >>> law.inverse_response([0.0, 1.5, 0.5], sample_time=1.0).tolist()
     [0.0, 1.0, 0.0]
     """
@@ -98,7 +94,6 @@ class RateDependentPrandtlIshlinskii(Bank, Placed):
 
     @classmethod
     def pushing(cls, parameters: Parameters, record: Record) -> Tables:
-        """The growth of the thresholds with the step of the input."""
         beta = np.reshape(parameters["beta"], (-1, 1))
         n_sets = len(table_of("thresholds", parameters))
         return {"width": np.broadcast_to(beta / record.sample_time, (n_sets, 1))}

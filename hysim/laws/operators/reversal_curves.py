@@ -75,14 +75,11 @@ class Forc:
         Weight of relays over area, and its standard error, at upper thresholds along axis 0 and lower ones along axis
         1, both at `levels` [unit of y / unit of u^2].
     smoothing, growth : float
-        Reach of the local regression beyond the first curve, and its gain per curve from the diagonal on [curve
-        distances].
+        Reach of the regression beyond the first curve, and its gain per curve from the diagonal [curve distances].
     left_out : float
         Rms error of the outputs at curves left out, every fifth in turn [unit of y]; nan for a given smoothing.
-    stroke : float
-        Largest less smallest output of all curves [unit of y].
-    n_curves : int
-        Number of curves.
+    stroke, n_curves : float, and int
+        Largest less smallest output of all curves [unit of y], and their number.
     drift, noise : float
         Span of the drift of the outputs where the curves begin, and their standard deviation from curve to curve [unit
         of y]; nan where fewer than three curves begin at an extreme of the record.
@@ -249,8 +246,7 @@ def everett_from_curves(
 ) -> tuple[FloatArray, FloatArray, float]:
     """Levels, E at the pairs of them (upper, lower), and the output at the lowest input.
 
-    E is zero above the diagonal, beyond the curves as at their ends; for a record turned by 180 degrees it is E(-b,
-    -a).
+    E is zero above the diagonal, beyond curves as at their ends; for a record turned by 180 degrees it is E(-b, -a).
     """
     if _begins_at_the_top(record, tolerance):
         own = None if levels is None else -read_only(levels, "levels", ndim=1)[::-1]

@@ -42,9 +42,8 @@ class MovingStructure(AssembledStructure):
         """Output (n_samples,) that `output` names, at the samples of an input that is linear between them.
 
         `u` (n_samples,) is the acceleration of the base [m/s^2] or a force [N], whose samples are `sample_time` apart
-        [s]; at the first one the structure has its initial state. Raises SimulationError if the motion diverges or
-        cannot be resolved, with the time; ValueError if `u` is not finite or has not one axis, or the sample time is
-        not positive.
+        [s]; at the first one the structure has its initial state. Raises SimulationError with the time if the motion
+        diverges or cannot be resolved; ValueError if `u` is not finite or has several axes, or sample_time <= 0.
         """
         return self.signals(u, sample_time)["y"]
 

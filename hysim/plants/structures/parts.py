@@ -56,10 +56,9 @@ class Element:
 
     Raises
     ------
-    TypeError
-        If the law cannot be stepped, or a node is not a whole number.
-    ValueError
-        If not exactly one of `between` and `direction` is given, nodes are equal or negative, or it is zero.
+    TypeError, ValueError
+        If the law cannot be stepped, a node is not whole, not exactly one of `between` and `direction` is given, nodes
+        are equal or negative, or the direction is zero.
 
     Examples
     --------
@@ -155,10 +154,8 @@ class Rayleigh:
 
     Parameters
     ----------
-    mass : float
-        Factor of the mass matrix [1/s].
-    stiffness : float
-        Factor of the stiffness matrix [s].
+    mass, stiffness : float
+        Factors of the mass matrix [1/s] and of the stiffness matrix [s].
 
     Examples
     --------

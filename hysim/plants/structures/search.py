@@ -9,9 +9,8 @@ substeps throughout so that the outputs are smooth: as many as turn the phase of
 most 0.8 rad each, whose error is about 1e-5 of the largest acceleration.
 
 The search begins with the first motions of the record with the largest input, which are small and determine the
-stiffness, and goes on to longer parts of it; what a part does not determine is kept near its start. The
-parts are short and cost little: with 14 numbers 50 % off the whole search took half as long with them, and ended in
-the same optimum.
+stiffness, and goes on to longer parts of it; what a part does not determine is kept near its start. The parts cost
+little: with 14 numbers 50 % off the search took half as long with them, and ended in the same optimum.
 
 `hysim.identify` fits one output for each record. The sensors' outputs are laid one behind the other, each in units of
 its noise; the input is repeated for each of them.
@@ -58,10 +57,8 @@ class StructureRecord:
 
     Parameters
     ----------
-    t : array, shape (n,)
-        Times of the samples, evenly spaced [s].
-    u : array, shape (n,)
-        Acceleration of the base [m/s^2], or force [N].
+    t, u : array, shape (n,)
+        Evenly spaced times of the samples [s], and acceleration of the base [m/s^2] or force [N].
     displacement, velocity, acceleration : array, shape (n, n_nodes), optional
         Relative to the ground, the accelerations absolute, as `hysim.simulate` has them [m], [m/s], [m/s^2]. A column
         of nan is a sensor that is not there.

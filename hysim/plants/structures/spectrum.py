@@ -165,7 +165,6 @@ def _records(values: Any, n_zeros: int) -> list[FloatArray]:
 
 
 def _slope(oscillator: Structure, yield_input: float) -> float:
-    """Slope of the law at rest."""
     law, stroke = oscillator.laws.steppers[0], _AT_REST * yield_input
     members = ((law.started(0.0), u) for u in (stroke, -stroke))
     up, down = (each.step(each.parameters, each.state, u) / u for each, u in members)

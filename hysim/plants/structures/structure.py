@@ -53,10 +53,8 @@ class StaticResponse:
 
     Parameters
     ----------
-    control : array, shape (n,)
-        Displacement that was told [m].
-    factor : array, shape (n,)
-        Loads by the pattern: the forces at the masses are `factor` times `pattern`.
+    control, factor : array, shape (n,)
+        Displacement that was told [m], and loads by the pattern: the forces at the masses are `factor` times `pattern`.
     pattern : array, shape (n_nodes,)
         Pattern of the loads [N].
     displacement : array, shape (n, n_nodes)
@@ -64,8 +62,7 @@ class StaticResponse:
     drift, force : array, shape (n, n_elements)
         Of the elements [m], [N]; dashpots have none.
     residual : array, shape (n,)
-        Largest force out of balance, as a share of the largest force so far; at most 1e-10, or what the rounding of
-        displacements comes to with stiff elements.
+        Largest force out of balance over the largest force so far: at most 1e-10, or the rounding of displacements.
     """
 
     control: FloatArray
@@ -245,9 +242,8 @@ class Structure(SearchedStructure):
         Displacement of each mass when the base moves by one, by default 1; or the share of the force at each mass, by
         default all of it at the last one.
     output : str
-        Signal that is the output y: ``"displacement"``, ``"velocity"``, ``"acceleration"``, with the number of the
-        mass, such as ``"acceleration.2"``; ``"drift.0"`` or ``"force.0"`` with the place of the element. Without a
-        number the last one.
+        Output y: ``"displacement"``, ``"velocity"``, ``"acceleration"`` with the number of the mass, such as
+        ``"acceleration.2"``; ``"drift.0"``, ``"force.0"`` with the place of the element; without a number the last.
     substeps : int, optional
         Equal steps between two samples, of order 4. By default steps are divided by `tolerance`.
     tolerance : float
@@ -258,11 +254,9 @@ class Structure(SearchedStructure):
 
     Raises
     ------
-    ValueError
-        If sizes do not fit, a matrix is not symmetric, the mass is not positive definite, a number is not finite, or
-        an option is unknown.
-    TypeError
-        If an element is not an `Element`.
+    ValueError, TypeError
+        If sizes do not fit, a matrix is not symmetric, the mass is not positive definite, a number is not finite, an
+        option is unknown, or an element is not an `Element`.
 
     Examples
     --------
@@ -429,12 +423,10 @@ class Structure(SearchedStructure):
 
         Raises
         ------
-        SimulationError
-            If no equilibrium is found, as where the structure would snap through while the control rests; it names the
-            control value.
-        ValueError
-            If the pattern has not one number for each mass or is zero, a number is not finite, or `at` names neither a
-            displacement nor a drift.
+        SimulationError, ValueError
+            If no equilibrium is found, as where the structure would snap through while the control rests, with the
+            control value; if the pattern has not one number for each mass or is zero, a number is not finite, or `at`
+            is unknown.
 
         Examples
         --------
@@ -465,10 +457,8 @@ class Structure(SearchedStructure):
         pattern : array, shape (n_nodes,), optional
             Loads at the masses for a factor of one; by default a jack at what is controlled: one newton at the mass,
             or at both ends of the element.
-        at : str
-            As of `pushover`.
-        steps : int
-            Equal steps of each stroke.
+        at, steps : str, and int
+            As of `pushover`, and equal steps of each stroke.
 
         Returns
         -------
@@ -543,10 +533,8 @@ def shear_frame(
 
     Parameters
     ----------
-    masses : array, shape (n,)
-        Of the floors, the lowest first [kg].
-    stiffnesses : array, shape (n,), optional
-        Of linear columns of each storey [N/m].
+    masses, stiffnesses : array, shape (n,)
+        Of the floors, the lowest first [kg], and, optional, of linear columns of each storey [N/m].
     laws : law, or sequence of n laws or None, optional
         Force of each storey's columns for its drift, beside the linear ones; one law for all storeys alike.
     **options
