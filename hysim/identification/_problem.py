@@ -322,7 +322,7 @@ class Problem:
         return columns, fixed_part
 
     def _different(self, x: FloatArray, part: Part) -> tuple[Any, Any]:
-        """Sets of which no two are the same for a record, and the place of each set among them."""
+        """Sets that differ for a record, and the place of each set among them."""
         own = part.coordinates[part.coordinates >= 0]
         if own.size == self.n_x:
             return slice(None), slice(None)

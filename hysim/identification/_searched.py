@@ -78,8 +78,8 @@ class Search:
             columns, fixed_part = problem.split(x[np.newaxis])
             works = problem.work(np.column_stack([columns[0], problem.y - fixed_part[0]])) / problem.scale
             size = np.linalg.norm(works[:, -1]) or 1.0
-            found = lsq_linear(works[:, :-1], works[:, -1] / size, bounds=np.array(box) / size)
-            return found.x * size, found.fun * size
+            linear = lsq_linear(works[:, :-1], works[:, -1] / size, bounds=np.array(box) / size)
+            return linear.x * size, linear.fun * size
 
         x = best.theta[:n_x]
         if n_x:

@@ -118,8 +118,8 @@ def by_energy(known: Uncertainty, problem: Problem, theta: FloatArray, sigma: fl
     norms = np.linalg.norm(slopes, axis=0)
     norms[norms == 0.0] = 1.0
     to_work = np.asarray(np.linalg.pinv(problem.work(slopes / norms), rcond=_SINGULAR).T, dtype=np.float64)
-    moved = np.concatenate([_transposed(record.u, to_work[own]) for record, own in problem.pieces])
-    spread = sigma * np.sqrt(n_samples / (n_samples - n_names)) * moved.T / norms[:, np.newaxis]
+    shift = np.concatenate([_transposed(record.u, to_work[own]) for record, own in problem.pieces])
+    spread = sigma * np.sqrt(n_samples / (n_samples - n_names)) * shift.T / norms[:, np.newaxis]
     of_names = named_slopes(problem, theta[np.newaxis])[0] @ spread
     covariance = np.where(np.isnan(known.covariance), np.nan, of_names @ of_names.T)
     output = np.linalg.norm(slopes @ spread, axis=1)

@@ -216,17 +216,15 @@ def _root(values: FloatArray) -> FloatArray:
 def condition(model: Any, known: Record) -> CoreField:
     """A core's law with its weights corrected by a stretch that is known, to predict what follows.
 
-    The weights of the law are taken times a gain, and a constant is added, both free; each weight is then normal with
-    the standard deviation `CoreField.spread` times that of the noise. The most likely ones are those of a Bayesian
-    update.
+    A gain of all weights and a constant are free; each weight is then normal with a standard deviation of
+    `CoreField.spread` times that of the noise, and the most likely ones are those of a Bayesian update.
 
     Parameters
     ----------
     model : CoreField, Dependent of it, or a result with one
         As `hysim.identify` returns it.
     known : Record
-        Flux density and field of the stretch, from the first sample on, with a constant channel where the model has
-        one.
+        Flux density and field of the stretch, from the first sample on; a channel must be constant.
 
     Returns
     -------
