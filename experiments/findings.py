@@ -1331,7 +1331,7 @@ def cores(result: Result) -> list[str]:
             ("worst", "worst_percent", number),
         ),
         f"The third cycle of a cell is predicted to {number(result['median_cell_error_over_noise'], 3)} times the "
-        f"noise in the median and {number(result['worst_cell_error_over_noise'], 3)} at worst; the interval at 95 % "
+        f"noise in the median and {number(result['worst_cell_error_over_noise'], 3)} at worst. The interval at 95 % "
         f"holds the rate of {result['rates_in_interval']} of 100 cells.",
     ]
 

@@ -238,11 +238,10 @@ def condition(model: Any, known: Record) -> CoreField:
 
     Examples
     --------
-    >>> import numpy as np
     >>> import hysim as hs
-    >>> B = hs.signals.triangle(-0.3, 0.3, cycles=3, samples_per_cycle=100)
+    >>> B = hs.signals.triangle(-0.3, 0.3, cycles=1, samples_per_cycle=100)
     >>> core = hs.CoreField(weights=(0.0, 50.0, 0.0, 0.0, 0.0, 0.0), spread=10.0)
-    >>> known = hs.Record(u=B[:60], y=60.0 * B[:60], t=1e-6 * np.arange(60))
+    >>> known = hs.Record(u=B[:60], y=60.0 * B[:60], t=[1e-6 * k for k in range(60)])
     >>> round(float(hs.condition(core, known).response([0.0, 0.1], 1e-6)[1]), 1)
     6.0
     """
