@@ -238,6 +238,7 @@ def test_the_name_of_a_tuple_stands_for_all_its_numbers():
     recs = [record(dataclasses.replace(law, amplitude=(0.1 * T, 0.2 * T)), T) for T in SUPPLIES]
     fit = hs.identify(law, recs, depends={"amplitude": ("T", 1)})
     np.testing.assert_allclose(fit.model.at(T=3.0).amplitude, [0.3, 0.6], rtol=1e-6)
+    assert fit.model.response([], channels={"T": []}).size == 0
 
 
 def test_a_state_that_depends_on_the_parameters_is_refused():

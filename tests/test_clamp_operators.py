@@ -449,6 +449,7 @@ test_wrong_arguments_are_named = refused(
     (lambda: EXAMPLE.limit_cycle(0.0), "amplitude must be positive"),
     (lambda: EXAMPLE.inverse_response([0.0], u0=0.0, state=(0.0,)), "not both"),
     (lambda: hs.Play.responses({"r": 1.0}, [0.0]), TypeError, "unknown parameter 'r'"),
+    (lambda: hs.PrandtlIshlinskii.responses({"weights[9]": 1.0}, [0.0]), r"weights\[9\] is beyond the"),
     (lambda: hs.Play.responses({"threshold": [[1.0]]}, [0.0]), "too many axes"),
     (lambda: hs.Play.responses({"threshold": [1.0, -2.0]}, [0.0]), "negative"),
     (lambda: hs.Play.responses({"gain": [1, 2], "z0": [1, 2, 3]}, [0.0]), "one length or length 1"),

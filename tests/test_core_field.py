@@ -1,6 +1,7 @@
 """The field of a core by its flux density: against parts of other laws, its fit, and the update by a known stretch."""
 
 import importlib
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -110,6 +111,8 @@ def test_without_noise_it_is_found_again():
     fit = hs.identify(structure, record_of(core, u))
     np.testing.assert_allclose(fit.residual[200:], 0.0, atol=1e-4)
     assert fit.loop_width is None or fit.loop_width.value > 0.0
+    assert hs.compare({"core": fit.model}, record_of(core, u))["core"].max_width > 0.0
+    np.testing.assert_array_equal(fit.model.response(u[9:], STEP), replace(fit.model, u0=None).response(u[9:], STEP))
 
 
 def test_sequences_in_the_layout_of_the_magnet_challenge_are_predicted(tmp_path, monkeypatch):
@@ -146,3 +149,7 @@ def test_records_that_tell_nothing_are_refused():
         hs.identify(hs.CoreField.structure(channel="T"), record_of(hs.CoreField(), path(np.random.default_rng(0))))
     with pytest.raises(TypeError, match="condition takes a CoreField at a constant channel"):
         hs.condition(hs.Dahl(), rest)
+    with pytest.raises(TypeError, match="condition takes a Record"):
+        hs.condition(hs.CoreField(), rest.u)
+    with pytest.raises(ValueError, match="has a weight: give longer records"):
+        hs.identify(hs.CoreField, hs.Record(u=rest.t, y=rest.y, t=rest.t), weights=np.eye(50)[0])

@@ -72,6 +72,8 @@ def test_a_loss_map_has_the_closed_forms_of_its_parts_and_gives_steinmetz_back()
 test_what_has_no_loss_is_refused = refused(
     (lambda: hs.loss_map(hs.Play(), [2.0], [1.0]), "every loss is negative"),
     (lambda: hs.loss_map(hs.Stop(), [1.0], [1.0], channels={"T": [1.0]}), TypeError, "depends on no channel"),
+    (lambda: hs.loss_map(hs.Stop(), [], [1.0]), "needs an amplitude"),
+    (lambda: LAW.loss(1.0, -1.0), "amplitude must not be negative"),
     (lambda: hs.Steinmetz.from_losses([1.0, 2.0], [1.0, 2.0], [1.0, 0.0]), "loss must be positive"),
     (lambda: hs.Steinmetz.from_losses([1.0, 1.0], [1.0, 2.0], [1.0, 3.0]), "two frequencies"),
     (lambda: hs.metrics.normalised_energy_error(*np.ones((3, 2, 5)), loss=np.ones((2, 1))), "one for each sequence"),

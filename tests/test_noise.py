@@ -246,6 +246,10 @@ def test_the_energy_decides_and_the_intervals_are_those_for_errors_of_the_output
     record = hs.Record(u=u, y=hs.Dahl(stiffness=3.0, coulomb=0.8).response(u) + 0.1 * rng.standard_normal(u.size))
     by_output, by_energy = (hs.identify(hs.Dahl, record, weights=each).residual for each in (None, "energy"))
     assert np.sum((work @ by_energy) ** 2) < 0.95 * np.sum((work @ by_output) ** 2)
+    small = hs.Record(u=1e-9 * u, y=record.y)
+    np.testing.assert_allclose(hs.identify(hs.Dahl, small, weights="energy").residual, by_energy, atol=1e-3)
+    held = hs.identify(hs.Line, hs.Record(u=u, y=y), weights="energy", bounds={"slope": (0.0, 1.0)})
+    assert "slope is at its given bound 1" in held.message
     assert_refused("no cross_validate", hs.identify, hs.Dahl, record, weights="energy", cross_validate="cycles")
     assert_refused("searched for", hs.identify, hs.SingleValued, record, weights="energy")
 

@@ -333,7 +333,7 @@ def _with_initial_state(record: Record, fitted: Identification, seed: int) -> An
 def _loop(model: Any, record: Record, y: FloatArray) -> LoopMetrics:
     """The model's loop; a curve without memory has width 0, at whatever inputs its branches were sampled."""
     loop = loop_metrics(record.u, y)
-    if not isinstance(model, Direct):
+    if not isinstance(model, Direct) or needs_time(model):
         return loop
     curve, zeros = response_of(model, loop.u, None), np.zeros(loop.u.size)
     names = ("max_width", "mean_width", "mid_width", "area", "relative_width", "energy")

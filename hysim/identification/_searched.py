@@ -73,12 +73,15 @@ class Search:
 
         problem, n_x = self.problem, self.problem.n_x
         box, width = problem.linear_box(), problem.space.upper - problem.space.lower
+        unit = problem.scale * max(float(np.ptp(record.u)) for record, _ in problem.pieces)
 
         def solved(x: FloatArray) -> tuple[FloatArray, FloatArray]:
             columns, fixed_part = problem.split(x[np.newaxis])
-            works = problem.work(np.column_stack([columns[0], problem.y - fixed_part[0]])) / problem.scale
+            works = problem.work(np.column_stack([columns[0], problem.y - fixed_part[0]])) / unit
+            if not np.isfinite(works).all():  # no better than no output
+                return np.zeros(works.shape[1] - 1), problem.work(problem.y[:, np.newaxis])[:, 0] / unit
             size = np.linalg.norm(works[:, -1]) or 1.0
-            linear = lsq_linear(works[:, :-1], works[:, -1] / size, bounds=np.array(box) / size)
+            linear = lsq_linear(works[:, :-1], works[:, -1] / size, bounds=np.array(box) / size, method="bvls")
             return linear.x * size, linear.fun * size
 
         x = best.theta[:n_x]
@@ -130,11 +133,13 @@ class Search:
         residual, sigma = self.residual(best.theta)[np.newaxis], np.full((1, 1), best.sigma)
         curvature = self.noise.terms(residual, sigma).curvature[0]
         known = uncertainty(self.problem, best.theta, curvature)
-        if self.by_energy:
-            return by_energy(known, self.problem, best.theta, best.sigma)
-        if not self.treatment.noises or known.slopes is None:
+        if known.slopes is None or not (self.by_energy or self.treatment.noises):
             return known
-        return known.with_disturbances(self._by_input_noise(best.theta), curvature * self.problem.weights)
+        noises = self.treatment.noises
+        disturbances = self._by_input_noise(best.theta) if noises else np.zeros((1, self.problem.n_samples))
+        if self.by_energy:
+            return by_energy(known, self.problem, best.theta, best.sigma, disturbances)
+        return known.with_disturbances(disturbances, curvature * self.problem.weights)
 
     def _by_input_noise(self, theta: FloatArray) -> FloatArray:
         """Changes of the output (n_draws, n_samples) by noise of the input that is drawn anew."""

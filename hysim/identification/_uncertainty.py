@@ -108,8 +108,13 @@ def uncertainty(problem: Problem, theta: FloatArray, curvature: FloatArray) -> U
     )
 
 
-def by_energy(known: Uncertainty, problem: Problem, theta: FloatArray, sigma: float) -> Uncertainty:
-    """What is `known`, for an optimum of the work T y: errors e of the output move it by ``(T J)^+ T e``."""
+def by_energy(
+    known: Uncertainty, problem: Problem, theta: FloatArray, sigma: float, disturbances: FloatArray
+) -> Uncertainty:
+    """What is `known`, for an optimum of the work T y: errors e of the output move it by ``(T J)^+ T e``.
+
+    The errors are those of `sigma`, and `disturbances` (n_draws, n_samples).
+    """
     if known.slopes is None:
         return known
     x, n_samples, n_names = theta[: problem.n_x], problem.n_samples, len(problem.space.names)
@@ -119,9 +124,11 @@ def by_energy(known: Uncertainty, problem: Problem, theta: FloatArray, sigma: fl
     norms[norms == 0.0] = 1.0
     to_work = np.asarray(np.linalg.pinv(problem.work(slopes / norms), rcond=_SINGULAR).T, dtype=np.float64)
     shift = np.concatenate([_transposed(record.u, to_work[own]) for record, own in problem.pieces])
-    spread = sigma * np.sqrt(n_samples / (n_samples - n_names)) * shift.T / norms[:, np.newaxis]
-    of_names = named_slopes(problem, theta[np.newaxis])[0] @ spread
-    covariance = np.where(np.isnan(known.covariance), np.nan, of_names @ of_names.T)
+    change, size = shift.T / norms[:, np.newaxis], sigma * np.sqrt(n_samples / (n_samples - n_names))
+    change_of_names, spread = named_slopes(problem, theta[np.newaxis])[0] @ change, size * change
+    of_names, by_input = size * change_of_names, change_of_names @ disturbances.T
+    covariance = of_names @ of_names.T + by_input @ by_input.T / len(disturbances)
+    covariance[np.isnan(known.covariance)] = np.nan
     output = np.linalg.norm(slopes @ spread, axis=1)
     return replace(
         known, covariance=covariance, of_theta=spread @ spread.T, with_names=spread @ of_names.T, output=output

@@ -25,7 +25,7 @@ from collections.abc import Iterator
 import numpy as np
 import numpy.typing as npt
 
-from hysim._basics.frozen import FloatArray, Positive, check_positive, checked, read_only
+from hysim._basics.frozen import FloatArray, Positive, check_not_negative, check_positive, checked, read_only
 from hysim._columns.turning import TOLERANCE, turns
 
 
@@ -88,7 +88,9 @@ class Steinmetz:
 
     def loss(self, frequency: npt.ArrayLike, amplitude: npt.ArrayLike) -> FloatArray:
         """Loss density under sines of a frequency [Hz] and an amplitude [T], of shapes that broadcast [W/m^3]."""
-        return self.k * read_only(frequency, "frequency") ** self.alpha * read_only(amplitude, "amplitude") ** self.beta
+        f, B = read_only(frequency, "frequency"), read_only(amplitude, "amplitude")
+        check_not_negative(frequency=f.min(initial=0.0), amplitude=B.min(initial=0.0))
+        return self.k * f**self.alpha * B**self.beta
 
     def loss_of(self, B: npt.ArrayLike, sample_time: float) -> float:
         """Loss density under a period of any waveform, by the iGSE with minor loops [W/m^3].

@@ -170,6 +170,8 @@ class Dependent:
         inputs = read_only(u, "u", ndim=1)
         checked = checked_channels(channels or {}, inputs.size)
         values = self._needed(checked)
+        if not inputs.size:
+            return inputs
         self._warn(values)
         if not any(isinstance(value, np.ndarray) for value in values.values()):
             return response_of(self.constant(values), inputs, sample_time)

@@ -139,7 +139,7 @@ def _column(law: Any, name: str, u: FloatArray, y: FloatArray, step: float, side
     for k in range(_STEPS):
         values = value + np.array((*sides, 0.0)[:2]) * step / _FALL**k
         width = values[0] - values[1]  # as it is between rounded numbers
-        with np.errstate(invalid="ignore", over="ignore"):
+        with np.errstate(invalid="ignore", over="ignore", divide="ignore"):
             row = [np.subtract(*_outputs(law, name, values, u)) / width]
             for order, longer in enumerate(before[:_ORDERS], 1):
                 row.append(row[-1] + (row[-1] - longer) / (_FALL**order - 1.0))

@@ -89,7 +89,10 @@ def tables_of(
     }
     for name, column in columns.items():
         field, _, place = name.partition("[")
-        tables[field] = np.where(np.arange(tables[field].shape[1]) == int(place[:-1]), column, tables[field])
+        places = np.arange(tables[field].shape[1])
+        if int(place[:-1]) not in places:
+            raise ValueError(f"{name} is beyond the {places.size} numbers of {field}: give all of {field}")
+        tables[field] = np.where(places == int(place[:-1]), column, tables[field])
     return tables, inputs
 
 

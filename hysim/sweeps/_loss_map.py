@@ -123,10 +123,14 @@ def loss_map(
     grid = {"amplitudes": amplitudes, "frequencies": frequencies, "bias": bias}
     swings, rates, means = (read_only(np.atleast_1d(values), name, ndim=1) for name, values in grid.items())
     others = {name: read_only(np.atleast_1d(values), name, ndim=1) for name, values in (channels or {}).items()}
+    if not all(each.size for each in (swings, rates, means, *others.values())):
+        raise ValueError("loss_map needs an amplitude, a frequency and a bias, and a value of each channel")
     check_positive(amplitudes=swings.min(initial=math.inf), frequencies=rates.min(initial=math.inf))
     if others and not isinstance(model, Dependent):
         raise TypeError(f"a {type(model).__name__} depends on no channel: give a hysim.Dependent, or no channels")
-    wave = sine(1.0, cycles=1, samples_per_cycle=_SAMPLES) if waveform is None else read_only(waveform, ndim=1)
+    wave = (
+        sine(1.0, cycles=1, samples_per_cycle=_SAMPLES) if waveform is None else read_only(waveform, "waveform", ndim=1)
+    )
     if wave.size < 3 or not abs(wave[-1] - wave[0]) < _STEADY * np.ptp(wave):
         raise ValueError("waveform must be one cycle that ends where it begins: append its first sample to it")
     energies = []

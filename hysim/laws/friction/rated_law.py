@@ -70,6 +70,10 @@ class TimedLaw(Subject, Placed, ABC):
         """None for `hysim.compare` to try by itself, since friction is no model of an actuator."""
         return {}
 
+    def placed(self, u0: float | None, u_range: tuple[float, ...] | None = None) -> Self:
+        """The law with its memory at `u0`; one without an initial memory begins at the first sample of any input."""
+        return super().placed(u0 if self.initial else None, u_range)
+
     # ------------------------------------------------------------------------------ simulation
 
     def __post_init__(self) -> None:

@@ -28,7 +28,7 @@ from hysim.models.protocols import DirectFit
 from hysim.models.tables import Tables
 from hysim.models.varying import ChannelPolynomial, places
 from hysim.models.varying import weights as weights_at
-from hysim.records import Record
+from hysim.records import Record, as_record
 
 _STRENGTHS = np.logspace(-12.0, 0.0, 25)  # of the ridge, in rows: from rounding of the terms to a prior of noise's size
 _SPREADS = np.append(0.0, np.logspace(-3.0, 0.0, 7))  # of the weights, in standard deviations of the noise
@@ -245,10 +245,15 @@ def condition(model: Any, known: Record) -> CoreField:
     >>> round(float(hs.condition(core, known).response([0.0, 0.1], 1e-6)[1]), 1)
     6.0
     """
-    law = on_record(model_of(model), known)
+    record = as_record(known, "condition")
+    if record is None:
+        raise TypeError(f"condition takes a Record of the known stretch, got {type(known).__name__}")
+    law = on_record(model_of(model), record)
     if not isinstance(law, CoreField):
-        raise TypeError(f"condition takes a CoreField at a constant channel, got {law!r}")
-    return law.conditioned(known)
+        raise TypeError(
+            f"condition takes a CoreField at a constant channel, got a {type(model_of(model)).__name__} on this record"
+        )
+    return law.conditioned(record)
 
 
 @checked
@@ -278,6 +283,8 @@ class CoreFieldStructure:
         shares = np.split(np.ones(cuts[-1]) if weights is None else weights, cuts[:-1])
         tells = [self._is_later(record) & settled(record.u, law.thresholds) for record in records]
         shares = [share * own for share, own in zip(shares, tells, strict=True)]
+        if not np.concatenate(shares).any():
+            raise ValueError("no sample past the known begin and the first stroke has a weight: give longer records")
         folds = _folds([len(record) for record in records])
         normal = _Normal.of((self._rows(law, at, record) for record in records), records, shares, folds)
         paths = [normal.solutions(fold)[0] for fold in range(len(normal.squares))]

@@ -533,7 +533,7 @@ class JilesAtherton(Law):
 
         Gain, feedthrough, offset and z0 of the law do not count. ValueError if Hs is not positive and finite.
         """
-        check_positive(Hs=Hs)
+        check_positive(Hs=float(read_only(Hs, "Hs", ndim=0)))
         core = self.placed(None).with_scalars({"gain": MU0, "feedthrough": MU0, "offset": 0.0, "z0": 0.0})
         B, tip = core.advance(Hs * _STROKES)
         chi = self.c * self.Ms / self.a * float(initial_slope(np.array(self.anisotropy)))
