@@ -458,27 +458,7 @@ def test_excess_loss_of_a_sinusoidal_flux_is_bertottis():
     expected = 0.5 * 4.0 * quarter * 1.2**1.5 * np.sqrt(2.0 * np.pi * frequency)
     assert 4.0 * quarter * np.sqrt(2.0 * np.pi) == pytest.approx(8.76, abs=5e-3)
     assert float(H[1:] @ np.diff(B)) == pytest.approx(expected, rel=1e-5)  # velocities by 4 000 chords
-
-
-def test_excess_loss_steps_and_continues_as_it_responds():
-    u, part = np.random.default_rng(1).normal(size=30), hs.ExcessLoss(c=0.7)
-    y = part.response(u, 0.1)
-    step, parameters, state = part.compiled(u[0], sample_time=0.1)
-    assert [step(parameters, state, value) for value in u] == y.tolist()
-    head, state = part.advance(u[:11], sample_time=0.1)
-    assert [*head, *part.advance(u[11:], state, sample_time=0.1)[0]] == y.tolist()
-    assert part.response(-u, 0.1).tolist() == (-y).tolist()
-
-
-@pytest.mark.parametrize("part", [hs.Dashpot, hs.ExcessLoss])
-def test_many_parts_at_once_have_the_bits_of_each(part):
-    u, c = np.random.default_rng(2).normal(size=(3, 20)), [0.5, -2.0, 7.0]
-    rows = part.responses({"c": c}, u, 0.1)
-    assert rows.tolist() == [part(c=each).response(row, 0.1).tolist() for each, row in zip(c, u, strict=True)]
-    assert part.responses({"c": c}, u[0], 0.1, reduce="final")[1] == part(c=-2.0).response(u[0], 0.1)[-1]
-    assert part.responses({}, u[0], 0.1).tolist() == [part().response(u[0], 0.1).tolist()]
-    assert_refused("unknown parameter 'k'", part.responses, {"k": 1.0}, u, 0.1, error=TypeError)
-    assert_refused("sample_time must be positive", part.responses, {"c": c}, u, 0.0)
+    assert hs.ExcessLoss(c=0.5).response(-B, 1.0 / (n * frequency)).tolist() == (-H).tolist()
 
 
 def test_the_parts_beside_a_line_are_identified_together():

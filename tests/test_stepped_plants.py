@@ -121,11 +121,6 @@ def test_a_transfer_function_rests_at_any_input(delay, hold, sample):
         assert y == pytest.approx(expected, abs=1e-12 * np.abs(expected).max())  # it is linear, to rounding
 
 
-def test_a_dashpot_is_its_response_to_the_bit():
-    u = walk(4)
-    assert stepped(hs.Dashpot(c=0.3), u, TIME).tolist() == hs.Dashpot(c=0.3).response(u, TIME).tolist()
-
-
 MODE = hs.TransferFunction(num=(0.3, 30.0), den=(1.0, 0.4, 40.0))
 FAST = hs.Amplifier(gain=2.0, offset=0.1, limits=(-3.0, 3.0))
 SLOW = hs.Amplifier(gain=2.0, offset=0.1, limits=(-3.0, 3.0), slew_rate=60.0, time_constant=0.4 * TIME)

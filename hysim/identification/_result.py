@@ -33,6 +33,10 @@ class Width:
     lower: float
     upper: float
 
+    def bounds(self, words: str) -> str:
+        """The interval in some words; the empty text where it is not known."""
+        return words.format(self.lower, self.upper) if np.isfinite(self.lower) else ""
+
 
 @printed
 @frozen
@@ -264,7 +268,7 @@ class Identification(Stored):
             ],
             {
                 "residual": f"{self._residual_in_words()}, {self.residual.size} samples",
-                "loop width": f"{width.value:.4g}, from {width.lower:.4g} to {width.upper:.4g}" if width else "",
+                "loop width": f"{width.value:.4g}{width.bounds(', from {:.4g} to {:.4g}')}" if width else "",
                 "cross-validated": "" if np.isnan(self.cv_rmse) else f"rmse {self.cv_rmse:.4g}",
                 "search": self.message,
                 "choice": "" if self.choice is None else self.choice.in_words(),
@@ -287,7 +291,7 @@ class Identification(Stored):
         lines += [f"  residual: {self._residual_in_words()}"]
         if self.loop_width is not None:
             width = self.loop_width
-            lines.append(f"  loop width {width.value:.4g}  [{width.lower:.4g}, {width.upper:.4g}]")
+            lines.append(f"  loop width {width.value:.4g}{width.bounds('  [{:.4g}, {:.4g}]')}")
         if not np.isnan(self.cv_rmse):
             lines.append(f"  cross-validated rmse {self.cv_rmse:.4g}")
         lines += [

@@ -4,10 +4,9 @@ It is fitted by ridge regression. With the terms F of all records, of size one, 
 
     w = argmin sum_k p_k (y_k - F_k w)^2 + lambda sum_j w_j^2
 
-over records of which a share at the begin is left out, as that is known in use. lambda is the strength, of a row, that
-predicts best the records that are left out. With it the weights of a left-out record are corrected by its begin as
-`CoreField.conditioned` does, and the spread is what then predicts the rest best. The constants below were chosen by us
-on simulated cores (experiments/59_cores.py).
+where lambda is the one that predicts best the records that are left out. The begin of each of them then corrects its
+weights, see `condition`, by the spread that predicts best its rest. We chose the constants below on simulated cores
+(experiments/59_cores.py).
 """
 
 from collections.abc import Iterable, Sequence
@@ -115,7 +114,6 @@ class CoreField(TimedLaw):
 
     @classmethod
     def check(cls, tables: Tables) -> None:
-        """Refuse numbers outside their limits, and lengths that do not fit."""
         super().check(tables)
         m, n, n_sizes, n_weights = (tables[each].shape[1] for each in ("thresholds", "lags", "lag_sizes", "weights"))
         if n_sizes != n:
@@ -154,9 +152,8 @@ class CoreField(TimedLaw):
         degree : int
             Degree of that polynomial; less where the records have fewer values of the channel.
         known : float
-            Share of each record at its begin that is known when the rest is predicted, from 0 to less than 1. It is not
-            fitted, and tells how much the weights differ from core to core, the `spread`. Neither are samples fitted
-            before stops up to 0.4 of the input's range have forgotten what was before.
+            Share of each record at its begin that is known when the rest is predicted, from 0 to less than 1. It tells
+            how much the weights differ from core to core, the `spread`.
 
         Returns
         -------
@@ -176,18 +173,16 @@ class CoreField(TimedLaw):
         >>> core = hs.CoreField(thresholds=(0.05,), weights=(0.0, 50.0, 0.0, 0.0, 0.0, 0.0, 20.0, 0.0, 0.0))
         >>> record = hs.Record(u=B, y=core.response(B, 1e-6), t=1e-6 * np.arange(B.size))
         >>> fit = hs.identify(hs.CoreField.structure(lags=()), record)
-        >>> round(float(np.abs(fit.residual[60:]).max()), 1)  # of 61 A/m; the memory of the first stroke is not known
-        0.4
+        >>> round(fit.fit_percent)
+        100
         """
         return CoreFieldStructure(law=cls, stops=stops, lags=lags, channel=channel, degree=degree, known=known)
 
     @classmethod
     def fitted(cls, records: Sequence[Record], weights: FloatArray | None = None) -> DirectFit:
-        """The fit of the default structure."""
         return cls.structure().fitted(records, weights)
 
     def memory(self, u: npt.ArrayLike, sample_time: float) -> FloatArray:
-        """Stops and lags s_i, d_j at the samples of `u`, shape (n_samples, m + n); see `response`."""
         return self.at_sample_time(sample_time).remembered(u)
 
     def terms(self, record: Record) -> FloatArray:
@@ -281,10 +276,8 @@ class CoreFieldStructure:
         law, at = self._begun(records), self._places(records)
         cuts = np.cumsum([len(record) for record in records])
         shares = np.split(np.ones(cuts[-1]) if weights is None else weights, cuts[:-1])
-        tells = [self._is_later(record) & settled(record.u, law.thresholds) for record in records]
-        shares = [share * own for share, own in zip(shares, tells, strict=True)]
-        if not np.concatenate(shares).any():
-            raise ValueError("no sample past the known begin and the first stroke has a weight: give longer records")
+        if np.count_nonzero(np.concatenate(shares)) < len(law.weights):
+            raise ValueError(f"{cuts[-1]} samples tell too little of {len(law.weights)} weights: take fewer stops")
         folds = _folds([len(record) for record in records])
         normal = _Normal.of((self._rows(law, at, record) for record in records), records, shares, folds)
         paths = [normal.solutions(fold)[0] for fold in range(len(normal.squares))]
@@ -299,8 +292,7 @@ class CoreFieldStructure:
         model, damped = self._model(law, at, path[best]), values + normal.ridge(_STRENGTHS[best])
         half = vectors * np.sqrt(np.maximum(values, 0.0)) / damped
         spread = [np.linalg.norm(self._rows(law, at, record) @ half, axis=1) for record in records]
-        fitted = f"{sum(map(np.count_nonzero, shares))} of {cuts[-1]} samples"
-        words = f"{fitted}, ridge of {_STRENGTHS[best]:.2g}, spread {law.spread:.2g} of the weights over the noise"
+        words = f"ridge of {_STRENGTHS[best]:.2g}, spread {law.spread:.2g} of the weights over the noise"
         return DirectFit((model,) * len(records), float(np.sum(values / damped)), np.concatenate(spread), words)
 
     def _begun(self, records: Sequence[Record]) -> Any:
