@@ -126,8 +126,8 @@ def measured(folder: Path) -> list[Row]:
     for material in () if rows else AMPLITUDES:
         loops = [(np.tile(each.y, 2), np.tile(each.u, 2)) for each in core_loops(folder, material)]
         records = [hs.Record(u=B, y=H, t=np.arange(float(B.size))) for B, H in loops]
-        shares = [np.full(len(each), 1.0 / np.mean(each.y**2)) for each in records]
-        kind = hs.CoreField.structure(lags=(), known=0.5)  # the first cycle makes the second one steady
+        shares = [np.repeat([0.0, 1.0 / np.mean(H**2)], H.size // 2) for _, H in loops]  # the second cycle is steady
+        kind = hs.CoreField.structure(lags=(), known=0.5)
         fit, seconds = cpu_timed(hs.identify, kind, records, weights=shares)
         pairs = [(each.y, fit.model.response(each.u, 1.0)) for each in records]
         halves = [[values[values.size // 2 :] for values in pair] for pair in pairs]
