@@ -111,7 +111,7 @@ def uncertainty(problem: Problem, theta: FloatArray, curvature: FloatArray) -> U
 def by_energy(
     known: Uncertainty, problem: Problem, theta: FloatArray, sigma: float, disturbances: FloatArray
 ) -> Uncertainty:
-    """What is `known`, for an optimum of the work T y: errors e of the output move it by ``(T J)^+ T e``.
+    """The uncertainty at an optimum for the work T y: errors e of the output move it by ``(T J)^+ T e``.
 
     The errors are those of `sigma`, and `disturbances` (n_draws, n_samples).
     """
@@ -136,7 +136,7 @@ def by_energy(
 
 
 def _transposed(u: FloatArray, values: FloatArray) -> FloatArray:
-    """What the transposed integral by the trapezoidal rule makes of values (n_samples, n)."""
+    """The transpose of the integral by the trapezoidal rule, times values (n_samples, n)."""
     later = np.cumsum(values[::-1], axis=0)[::-1][1:]
     halves = 0.5 * np.diff(u)[:, np.newaxis] * later
     return np.pad(halves, ((0, 1), (0, 0))) + np.pad(halves, ((1, 0), (0, 0)))

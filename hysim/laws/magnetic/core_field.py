@@ -54,8 +54,8 @@ class CoreField(TimedLaw):
     u is the flux density B and y the field H. Stops are the memory, lags the rate (for a slow input d_j is tau_j dB/dt,
     that of eddy currents), and the roots excess losses. Where u is linear between the samples all of them are exact, so
     that more samples on a stroke change nothing. The law is linear in its weights, which `hysim.identify` finds in one
-    step, see `structure`; what depends on the temperature is then a `hysim.Dependent`. `hysim.condition` corrects them
-    by a stretch of a sequence that is known.
+    step, for the stops and lags of a `structure`, not of an instance; with a channel the model is a `hysim.Dependent`.
+    `hysim.condition` corrects the weights by a stretch of a sequence that is known.
 
     Parameters
     ----------
@@ -139,7 +139,7 @@ class CoreField(TimedLaw):
         degree: int = 2,
         known: float = 0.1,
     ) -> "CoreFieldStructure":
-        """What `hysim.identify` fits in one step, by ridge regression.
+        """The stops, lags and channel of a law for `hysim.identify`, which fits it by ridge regression.
 
         Parameters
         ----------
@@ -186,7 +186,7 @@ class CoreField(TimedLaw):
         return self.at_sample_time(sample_time).remembered(u)
 
     def terms(self, record: Record) -> FloatArray:
-        """What the weights multiply at the samples of a record, shape (n_samples, n_weights)."""
+        """The factors of the weights at the samples of a record, shape (n_samples, n_weights)."""
         state = self.memory(record.u, record.sample_time)
         m, x = len(self.thresholds), record.u[:, np.newaxis] / self.size
         ahead = state[:, m:] / self.lag_sizes if self.lags else state[:, m:]
