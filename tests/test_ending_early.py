@@ -411,3 +411,14 @@ def test_what_cannot_end_in_order_is_ended_with_one_line(started, tmp_path, code
         assert seconds > 1.0  # it was given the time to end by itself
     else:
         assert seconds < PROMISED + BUSY
+
+
+def test_a_thread_that_compiles_is_stopped_when_it_has_compiled():
+    """An exception inside the compiler would leave it locked, and the next one to compile would wait for ever."""
+    scope = {"__name__": "numba.some", "sleep": time.sleep, "done": []}
+    exec("def compiling():\n    sleep(0.5)\n    done.append(True)", scope)
+    with threads(1) as pool:
+        pool.submit(scope["compiling"])
+        time.sleep(0.1)
+        pool.stop(1.0)
+    assert scope["done"] == [True]

@@ -18,6 +18,7 @@ import signal
 import sys
 import threading
 import time
+import traceback
 from collections.abc import Callable, Iterator
 from concurrent.futures import Executor, Future, ProcessPoolExecutor
 from contextlib import contextmanager
@@ -35,6 +36,7 @@ _STRETCH = 100_000  # samples of one path: some hundredths of a second
 GLANCE = 0.1  # longest wait without a check for signals [s]
 _SIGNAL_OF_PARENTS_DEATH = 1  # PR_SET_PDEATHSIG of Linux
 _PATIENCE = 0.3  # seconds to wait for threads that are being stopped
+_COMPILING = 60.0  # seconds to wait for one that compiles: an exception there would leave the compiler locked for ever
 
 _most: ContextVar[int | None] = ContextVar("most threads", default=None)
 
@@ -114,6 +116,11 @@ def map_on_threads(
             if progress is not None:
                 progress(len(results), n_items)
     return results
+
+
+def _is_compiling(ident: int) -> bool:
+    stack = traceback.walk_stack(sys._current_frames().get(ident))
+    return any(str(frame.f_globals.get("__name__")).startswith(("numba.", "llvmlite.")) for frame, _ in stack)
 
 
 @contextmanager
@@ -204,6 +211,9 @@ class _Threads(Executor):
         serving, self._serving = self._serving, set()
         with _starting:
             for ident in serving:
+                end = time.monotonic() + _COMPILING
+                while _is_compiling(ident) and time.monotonic() < end:
+                    time.sleep(0.1 * GLANCE)
                 ctypes.pythonapi.PyThreadState_SetAsyncExc(ctypes.c_ulong(ident), ctypes.py_object(_Stopped))
         deadline = time.monotonic() + patience
         for thread in self._threads:

@@ -191,7 +191,7 @@ class CoreField(TimedLaw):
         m, x = len(self.thresholds), record.u[:, np.newaxis] / self.size
         ahead = state[:, m:] / self.lag_sizes if self.lags else state[:, m:]
         stops = state[:, :m] / self.thresholds if m else state[:, :m]
-        parts = np.hstack([stops, ahead, _root(ahead)])
+        parts = np.hstack([stops, ahead, np.copysign(np.sqrt(np.abs(ahead)), ahead)])
         last = np.hstack([stops**2, np.broadcast_to(x**4, (len(x), 2 * len(self.lags)))])
         alone = x ** np.append(0.0, np.arange(1.0, 2.0 * kernels.N_ALONE - 2.0, 2.0))
         memories = np.stack([parts, parts * x**2, parts * last], axis=-1)
@@ -202,10 +202,6 @@ class CoreField(TimedLaw):
         tells = settled(known.u, np.array(self.thresholds))
         weights = corrected(np.array(self.weights), self.terms(known)[tells], known.y[tells], self.spread)
         return replace(self, weights=tuple(weights.tolist()))
-
-
-def _root(values: FloatArray) -> FloatArray:
-    return np.asarray(np.copysign(np.sqrt(np.abs(values)), values))
 
 
 def condition(model: Any, known: Record) -> CoreField:
@@ -342,10 +338,9 @@ class CoreFieldStructure:
         law = replace(law, weights=tuple(values[:, 0].tolist()))
         if self.channel is None:
             return law
-        rows = (tuple(row) for row in values.tolist())
         named = [
             ChannelPolynomial(parameter=f"weights[{j}]", channel=self.channel, at=at, values=row)
-            for j, row in enumerate(rows)
+            for j, row in enumerate(map(tuple, values.tolist()))
         ]
         return Dependent(law=law, polynomials=tuple(named))
 
