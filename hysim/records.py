@@ -461,6 +461,14 @@ def as_record(value: Any, verb: str) -> Record | None:
     )
 
 
+def span_of(*records: Record) -> float:
+    """Widest span of the inputs [unit of u]; ValueError where none moves."""
+    span = max(float(np.ptp(record.u)) for record in records)
+    if span == 0.0:
+        raise ValueError("the input is constant: nothing can be identified from it")
+    return span
+
+
 def check_increasing(t: FloatArray) -> None:
     if not (np.diff(t) > 0).all():
         k = int(np.argmax(np.diff(t) <= 0)) + 1

@@ -182,7 +182,7 @@ def _law(thing: Any, u: FloatArray, parts: Parts) -> tuple[dict[str, Any], list[
     if not isinstance(law, Law):
         raise TypeError(
             f"a page takes a law, or a sum or cascade of laws, got {type(thing).__name__}: plants and controllers "
-            "are exported by hysim.to_c and hysim.to_fmu"
+            "are exported by hysim.to_c and hysim.to_fmu; a law with channels is shown as .at(T=...)"
         )
     node, names = _node(law, type(thing), parts), list(law.scalars)
     free = [names[place] for place in node["free"] if names[place] != _CLOCK]

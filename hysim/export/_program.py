@@ -238,7 +238,8 @@ def program_of(
         if sample_time is None:
             raise ValueError(f"a {type(thing).__name__} is sampled: give sample_time")
         return _of_controller(thing, sample_time, *start_of(thing, sample_time, u0, y0))
-    raise TypeError(f"a law, a plant or a controller that can be stepped is expected, got {type(thing).__name__}")
+    kinds = "a law, a plant or a controller that can be stepped"
+    raise TypeError(f"{kinds} is expected, got {type(thing).__name__}; one with channels is exported as .at(T=...)")
 
 
 def _packing_of(law: Law) -> Packing | None:

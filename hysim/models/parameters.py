@@ -13,7 +13,7 @@ import numpy as np
 from hysim._basics.frozen import FloatArray
 from hysim.models.search_space import Freedom, SearchSpace
 from hysim.models.tables import scalars_of
-from hysim.records import Record
+from hysim.records import Record, span_of
 
 
 @dataclass(frozen=True)
@@ -247,9 +247,7 @@ def space_of_chart(
 
 def spans(record: Record) -> dict[str, float]:
     """Spans of input and output, the latter 1 where it is constant. Raises ValueError if the input is constant."""
-    span = float(np.ptp(record.u))
-    if span == 0.0:
-        raise ValueError("the input is constant: nothing can be identified from it")
+    span = span_of(record)
     return {"u": span, "h": 0.5 * span, "y": float(np.ptp(record.y)) or 1.0, "1": 1.0}
 
 

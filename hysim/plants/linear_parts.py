@@ -35,7 +35,7 @@ from hysim.plants.creep import Creep
 from hysim.plants.multi_input_actuator import MAIN, MultiInputActuator
 from hysim.plants.state_space import Modes
 from hysim.plants.transfer_function import TransferFunction
-from hysim.records import Record
+from hysim.records import Record, span_of
 
 _REFERENCE = 0.1  # [s]
 _BAND = (1e-3, 1e3)  # [s]
@@ -156,10 +156,9 @@ class Survey:
         steps = [_even_step(record, k, len(records)) for k, record in enumerate(records)]
         durations = [step * len(record) for step, record in zip(steps, records, strict=True)]
         spans = [float(np.ptp(record.u)) for record in records]
-        if max(spans) == 0.0:
-            raise ValueError("the input is constant: nothing can be identified from it")
+        widest = span_of(*records)
         speeds = [float(np.abs(np.diff(r.u)).sum()) / d for r, d in zip(records, durations, strict=True)]
-        wide = [k for k, span in enumerate(spans) if span >= _WIDE * max(spans)]
+        wide = [k for k, span in enumerate(spans) if span >= _WIDE * widest]
         fastest = min(range(len(records)), key=lambda k: (steps[k], -speeds[k]))
         return cls(
             law=min(wide, key=lambda k: speeds[k]),

@@ -43,7 +43,7 @@ from hysim.plants.equation_of_motion import (
     linear_plant,
     regression,
 )
-from hysim.records import Record
+from hysim.records import Record, span_of
 
 _FREQUENCIES = 8  # tried where no linear plant is near
 _SCREENED = 256
@@ -264,8 +264,7 @@ class OscillatorStructure(Subject):
     def motion(self, record: Record) -> Motion:
         """Force and displacement from which the start is computed; of a periodic record, the mean period."""
         sample_time = record.sample_time
-        if np.ptp(record.u) == 0.0:
-            raise ValueError("the input is constant: nothing can be identified from it")
+        span_of(record)  # which raises
         if len(record) <= 2 * HALF_FILTER:
             raise ValueError(f"the record must have more than {2 * HALF_FILTER} samples, got {len(record)}")
         u, y = self._mean_period(record.u), self._mean_period(record.y)

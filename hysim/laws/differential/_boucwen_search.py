@@ -26,7 +26,7 @@ import numpy as np
 from hysim._basics.frozen import FloatArray
 from hysim.models.parameters import space_of_chart
 from hysim.models.search_space import Freedom, SearchSpace
-from hysim.records import Record
+from hysim.records import Record, span_of
 
 REDUNDANT = (("A", "gain"),)
 _FURTHER = ("b2", "b3", "b4", "b5", "b6")
@@ -224,14 +224,6 @@ def _chart(
         reach=float(np.abs(record.u).max()),
         slope=slope_of(record, values),
     )
-
-
-def span_of(record: Record) -> float:
-    """Span of the input; ValueError where it is constant."""
-    span = float(np.ptp(record.u))
-    if span == 0.0:
-        raise ValueError("the input is constant: nothing can be identified from it")
-    return span
 
 
 def slope_of(record: Record, values: Mapping[str, float]) -> float:

@@ -25,7 +25,7 @@ import numpy as np
 from hysim._basics.frozen import FloatArray
 from hysim.laws.differential import _boucwen_search as plain
 from hysim.models.search_space import Freedom, SearchSpace
-from hysim.records import Record
+from hysim.records import Record, span_of
 
 _LARGEST = 600.0  # knee of the loading branch; smaller yield memories are below what a record resolves
 _SAME_SIGN = 0.02  # smallest knee of a law that pinches, whose loading coefficient is positive
@@ -92,7 +92,7 @@ def search_space(
         coordinates=tuple(other.get(name, name) for name in free),
         values={**defaults, **held},
         limits=limits,
-        span=plain.span_of(record),
+        span=span_of(record),
         path=float(np.abs(np.diff(record.u)).sum()),
         slope=plain.slope_of(record, {**defaults, **held}),
     )

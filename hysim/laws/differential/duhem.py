@@ -46,7 +46,7 @@ from hysim.models.model import Example, family
 from hysim.models.protocols import CompiledLaw, Identifiable, Subject
 from hysim.models.search_space import ALL_FREE, Freedom, Parameters, SearchSpace
 from hysim.models.tables import Tables
-from hysim.records import Record
+from hysim.records import Record, span_of
 
 _REACH = 10.0
 _REACH_LEVEL = 1.0
@@ -61,8 +61,7 @@ def search_space(
     freedom: Freedom,
 ) -> SearchSpace:
     """Declare the box for the terms, feedthrough, offset and y0 in `defaults`."""
-    if np.ptp(record.u) == 0.0:
-        raise ValueError("the input is constant: nothing can be identified from it")
+    span_of(record)  # which raises
     terms = {name: Term.parse(name) for name in defaults if name not in _OUTPUT}
     has_own_memory = any(defaults[name] for name in _OUTPUT[:2]) or any(term.absolute for term in terms.values())
     held = freedom.held(

@@ -27,7 +27,7 @@ from hysim.models.protocols import DirectFit
 from hysim.models.tables import Tables
 from hysim.models.varying import ChannelPolynomial, places
 from hysim.models.varying import weights as weights_at
-from hysim.records import Record, as_record
+from hysim.records import Record, as_record, span_of
 
 _STRENGTHS = np.logspace(-12.0, 0.0, 25)  # of the ridge, in rows: from rounding of the terms to a prior of noise's size
 _SPREADS = np.append(0.0, np.logspace(-3.0, 0.0, 7))  # of the weights, in standard deviations of the noise
@@ -294,8 +294,7 @@ class CoreFieldStructure:
     def _begun(self, records: Sequence[Record]) -> Any:
         """The law without weights: where its stops and lags stand."""
         size = max(float(np.abs(record.u).max()) for record in records)
-        if max(float(np.ptp(record.u)) for record in records) == 0.0:
-            raise ValueError("the input is constant: nothing can be identified from it")
+        span_of(*records)  # which raises
         thresholds = size * np.geomspace(_SMALLEST, 1.0, self.stops)
         lags = records[0].sample_time * _LAGS if self.lags is None else np.array(self.lags)
         weights = (0.0,) * (kernels.N_POWERS * (self.stops + 2 * lags.size) + kernels.N_ALONE)

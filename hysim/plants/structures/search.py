@@ -32,7 +32,7 @@ from hysim.models.protocols import Subject
 from hysim.models.search_space import ALL_FREE, Freedom, Parameters, SearchSpace
 from hysim.plants.structures.moving import MovingStructure
 from hysim.plants.structures.parts import OF_ELEMENTS, OF_NODES, expanded, is_shared, scalars_of, sharing, unknown
-from hysim.records import Record, check_increasing, even_step
+from hysim.records import Record, check_increasing, even_step, span_of
 
 _LEAST = 1e-6  # of the size of a signal: its residual is not taken for smaller, however exact the fit
 
@@ -208,8 +208,7 @@ class SearchedStructure(MovingStructure, Subject):
         """The box around the free numbers, and starts from parts of the record; ValueError without free numbers."""
         if freedom.initial not in (None, "rest"):
             raise ValueError("a structure begins with its initial_state: leave initial out")
-        if np.ptp(record.u) == 0.0:
-            raise ValueError("the input is constant: nothing can be identified from it")
+        span_of(record)  # which raises
         if not freedom.free:
             raise ValueError(f"say which numbers of the structure are free: {_examples(self.scalars)}")
         record.sample_time  # noqa: B018  # raises ValueError if there is none
