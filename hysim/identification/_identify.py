@@ -28,6 +28,7 @@ from hysim.identification._result import Identification
 from hysim.identification._search import PERFECT, chosen, stages_in_words, widened
 from hysim.identification._searched import Search
 from hysim.identification._starts import begun, begun_by_parts
+from hysim.identification.sharing import sharing
 from hysim.identification.swapped import swapped_columns, swapped_for
 from hysim.models.by_structure import searched
 from hysim.models.dependent import Dependent, on_record
@@ -188,7 +189,7 @@ def identify(
     shares = None if energy else _weights(weights, records)
     if max_evaluations is not None:
         check_count("max_evaluations", max_evaluations)
-    with at_most(workers), one_blas_thread():
+    with at_most(workers), one_blas_thread(), sharing():
         if isinstance(model_or_class, Direct) and depends is None:
             if energy:
                 raise ValueError('weights="energy" is for models that are searched for')

@@ -1,8 +1,8 @@
-"""Searches that several families have in common, done once within one call of `compare` or `select`.
+"""Searches that are asked for several times within one call of `identify`, `compare` or `select`, done once.
 
-A family that contains a simpler one begins its search with the optima of that one (`Problem.simpler`). Several families
-contain the same one, and it is often compared itself. The first that needs a search does it; the others wait, and take
-what it found. The results are those of each alone.
+The best law of the admissible region is compared with the optimum, and often returned in its place. A family that
+contains a simpler one begins its search with the optima of that one (`Problem.simpler`), which several families may
+contain, and which is often compared itself. The first that needs a search does it; the others wait for what it finds.
 """
 
 import hashlib
@@ -29,7 +29,7 @@ _lock = threading.Lock()
 @contextmanager
 def sharing() -> Iterator[None]:
     """Within the block `once` searches a problem once, in threads that `map_on_threads` begins there too."""
-    token = _known.set({})
+    token = _known.set({} if (known := _known.get()) is None else known)
     try:
         yield
     finally:
@@ -48,15 +48,14 @@ def once(problem: Problem, seed: int, search: Callable[[], T]) -> T:
         return search()
     with _lock:
         is_first = key not in known
-        result = known.setdefault(key, Future())
+        result: Future[T] = known.setdefault(key, Future())
     if is_first:
         try:
             result.set_result(search())
         except BaseException as error:
             result.set_exception(error)
             raise
-    shared: T = awaited(result)
-    return shared
+    return awaited(result)
 
 
 def _contents(problem: Problem) -> Hashable:
