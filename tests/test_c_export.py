@@ -3,7 +3,6 @@
 import math
 import re
 import subprocess
-import sys
 
 import numpy as np
 import pytest
@@ -277,20 +276,18 @@ test_a_thing_without_a_program_is_refused = refused(
 
 
 @needs_compiler
-def test_an_inverse_from_a_file_by_the_command_line_alone(tmp_path):
+def test_an_inverse_from_a_file_by_the_command_line_alone(tmp_path, monkeypatch):
     """Identified plays, their inverse in C, and its commands through the identified law."""
     true = hs.PrandtlIshlinskii(thresholds=(0.0, 1.0, 3.0), weights=(0.5, 0.3, 0.2))
     u = np.concatenate([hs.signals.triangle(0.0, high, cycles=1, samples_per_cycle=80) for high in (10.0, 6.0)])
     lines = [f"{v!r},{w!r}" for v, w in zip(u.tolist(), true.response(u).tolist(), strict=True)]
     (tmp_path / "loop.csv").write_text("\n".join(["voltage,displacement", *lines]) + "\n")
-    hysim = [sys.executable, "-m", "hysim"]
+    monkeypatch.chdir(tmp_path)
     columns = ["--u", "voltage", "--y", "displacement", "--model", "prandtl-ishlinskii"]
-    for command in (
-        [*hysim, "identify", "loop.csv", *columns, "--out", "law.json"],
-        [*hysim, "c", "law.json", "--inverse", "--out", "inverse.c"],
-        [COMPILER, *STRICT, "inverse.c", "inverse_main.c", "-o", "inverse", "-lm"],
-    ):
-        subprocess.run(command, cwd=tmp_path, check=True, capture_output=True)
+    assert main(["identify", "loop.csv", *columns, "--out", "law.json"]) == 0
+    assert main(["c", "law.json", "--inverse", "--out", "inverse.c"]) == 0
+    command = [COMPILER, *STRICT, "inverse.c", "inverse_main.c", "-o", "inverse", "-lm"]
+    subprocess.run(command, check=True, capture_output=True)
     law, wanted = hs.load_model(tmp_path / "law.json"), 2.5 + 2.4 * np.sin(0.1 * np.arange(300))
     voltages = printed(tmp_path / "inverse", wanted)
     assert np.abs(law.response(np.append(0.0, voltages))[1:] - wanted).max() < 1e-12 * np.ptp(wanted)
