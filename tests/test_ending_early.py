@@ -82,7 +82,6 @@ def ended(child, number, *, group_too=False):
     ("number", "code", "said"),
     [
         (signal.SIGTERM, 128 + signal.SIGTERM, "hysim: ended by SIGTERM\n"),
-        (signal.SIGKILL, -signal.SIGKILL, ""),
         (signal.SIGINT, 130, "hysim: interrupted\n"),
     ],
 )
@@ -113,7 +112,6 @@ ONE_CALL = "sum(range(10**12))"  # no other thread of its process runs before it
 @pytest.mark.parametrize(
     ("executor", "body", "number"),
     [
-        ("processes", SLEEP, signal.SIGKILL),
         ("processes", ONE_CALL, signal.SIGKILL),
         ("processes", LOOP, signal.SIGTERM),
         ("processes", SLEEP, signal.SIGINT),
