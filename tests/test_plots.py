@@ -513,11 +513,11 @@ def test_a_long_record_alone_has_arrows():
 
 
 def test_a_picture_of_many_samples_is_small_and_keeps_its_texts():
-    record = noisy(100_000)
+    record = noisy(40_000)
     canvas = hs.plot.figure()
     hs.plot.identification(hs.identify(hs.Line, record), record, canvas.subplots(1, 2))
     svg = hs.plot.to_svg(canvas)
-    assert len(svg) < 300_000  # 30 bytes a sample would be 6 MB
+    assert len(svg) < 300_000  # 30 bytes a sample would be 2.4 MB
     assert "Residual" in svg
     assert svg == hs.plot.to_svg(canvas)
 
