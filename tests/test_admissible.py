@@ -40,6 +40,11 @@ def only_unsafe() -> hs.Identification:
     return hs.identify(hs.BoucWen, hs.datasets.table1(), fixed={"n": 1.0})
 
 
+@pytest.fixture(scope="module")
+def only_safe() -> hs.Identification:
+    return hs.identify(hs.BoucWen, hs.datasets.table1(), fixed={"n": 1.0}, admissible=True)
+
+
 def small_cycles(record: hs.Record) -> np.ndarray:
     """Inputs from the end of the record on, within its range: other than those of the trials."""
     rng = np.random.default_rng(7)
@@ -127,9 +132,8 @@ def test_where_only_an_unsafe_law_fits_the_first_line_says_so(only_unsafe):
     assert hs.Identification.from_json(json.dumps(document)).unsafe == ""  # a file of an earlier version
 
 
-def test_the_admissible_law_is_returned_where_it_is_asked_for_whatever_its_fit(only_unsafe):
-    table = hs.datasets.table1()
-    fit = hs.identify(hs.BoucWen, table, fixed={"n": 1.0}, admissible=True)
+def test_the_admissible_law_is_returned_where_it_is_asked_for_whatever_its_fit(only_unsafe, only_safe):
+    table, fit = hs.datasets.table1(), only_safe
     assert fit.success
     assert fit.unsafe == ""
     assert fit.fit_percent == pytest.approx(only_unsafe.regions["admissible"].fit_percent, abs=1e-9)
@@ -140,7 +144,7 @@ def test_the_admissible_law_is_returned_where_it_is_asked_for_whatever_its_fit(o
     assert "at the edge of the admissible ones" in fit.message
 
 
-def test_a_family_without_a_region_has_an_admissible_law_too():
+def test_a_family_without_a_region_has_an_admissible_law_too(only_safe):
     """The generalised law's optimum on one thin loop diverges on others."""
     table = hs.datasets.table1()
     best = hs.identify(hs.GeneralizedBoucWen, table, fixed={"n": 1.0}, admissible=False)
@@ -148,9 +152,8 @@ def test_a_family_without_a_region_has_an_admissible_law_too():
     assert best.unsafe != ""
     assert safe.unsafe == ""
     assert safe.success
-    plain = hs.identify(hs.BoucWen, table, fixed={"n": 1.0}, admissible=True)
-    assert plain.rmse < np.inf
-    assert safe.rmse < plain.rmse  # it contains that law, and begins there
+    assert only_safe.rmse < np.inf
+    assert safe.rmse < only_safe.rmse  # it contains that law, and begins there
     assert safe.residual == pytest.approx(table.y - safe.model.response(table.u), abs=1e-12)
 
 
@@ -162,12 +165,11 @@ def test_several_records_have_one_admissible_law(record):
     assert fit.residual == pytest.approx(np.concatenate([each.y for each in both]) - np.concatenate(outputs), abs=1e-12)
 
 
-def test_tables_of_several_laws_mark_the_unsafe_ones():
+def test_tables_of_several_laws_mark_the_unsafe_ones(only_unsafe):
     table = hs.datasets.table1()
-    names = {"bouc-wen": hs.BoucWen(n=1.0), "line": hs.Line}
     selection = hs.select({"unsafe": hs.BoucWen, "line": hs.Line}, table).to_text()
     assert "unsafe (UNSAFE)" in selection
-    fits = {"bouc-wen": hs.identify(names["bouc-wen"], table, fixed={"n": 1.0}), "line": hs.identify(hs.Line, table)}
+    fits = {"bouc-wen": only_unsafe, "line": hs.identify(hs.Line, table)}
     comparison = hs.compare(fits, table)
     assert "bouc-wen (UNSAFE)" in comparison.to_text()
     assert comparison["bouc-wen"].unsafe == fits["bouc-wen"].unsafe

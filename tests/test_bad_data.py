@@ -65,6 +65,7 @@ def test_loading_alone_tells_nothing_of_unloading(family):
 
 
 @functools.cache
+@functools.cache
 def fitted_in_units(of_u, of_y):
     table1 = hs.datasets.table1()
     return hs.identify(hs.BoucWen, hs.Record(u=of_u * table1.u, y=of_y * table1.y), fixed={"n": 1.0})
@@ -86,9 +87,8 @@ def test_values_beyond_all_units_are_refused(table1):
 
 
 def test_a_large_offset_of_the_input_is_borne_by_the_output_offset(table1):
-    plain, moved = (
-        hs.identify(hs.BoucWen, hs.Record(u=table1.u + by, y=table1.y), fixed={"n": 1.0}) for by in (0.0, 1e5)
-    )
+    plain = fitted_in_units(1.0, 1.0)
+    moved = hs.identify(hs.BoucWen, hs.Record(u=table1.u + 1e5, y=table1.y), fixed={"n": 1.0})
     assert moved.fit_percent == pytest.approx(plain.fit_percent, abs=1e-6)
     for name in ("beta", "gamma", "gain", "z0"):
         # the slope's column differs from the offset's by 1e-3: the standard errors lose these digits
@@ -98,10 +98,8 @@ def test_a_large_offset_of_the_input_is_borne_by_the_output_offset(table1):
 
 def test_samples_that_are_there_twice_change_no_estimate(table1):
     twice = np.repeat(np.arange(len(table1)), 2)
-    fit, plain = (
-        hs.identify(hs.BoucWen, rec, fixed={"n": 1.0})
-        for rec in (hs.Record(u=table1.u[twice], y=table1.y[twice]), table1)
-    )
+    plain = fitted_in_units(1.0, 1.0)
+    fit = hs.identify(hs.BoucWen, hs.Record(u=table1.u[twice], y=table1.y[twice]), fixed={"n": 1.0})
     assert fit.fit_percent == pytest.approx(plain.fit_percent, abs=1e-6)
     assert fit.estimates["beta"] == pytest.approx(plain.estimates["beta"], rel=1e-3)
     assert fit.whiteness < 1e-3  # which says that these are not independent
