@@ -99,7 +99,7 @@ def _distinct(parameters: Parameters, n_sets: int) -> tuple[list[dict[str, float
     return [dict(zip(names, row, strict=True)) for row in rows.tolist()], np.ravel(which)
 
 
-@functools.lru_cache(maxsize=64)
+@functools.lru_cache(maxsize=1024)  # a search comes back to the best of some hundred points
 def _chain(stages: Stages, step: float) -> Chain:
     """The stages at a sample time; where inputs are compared, they are the same for all of them."""
     return Chain(stages, step)
