@@ -213,3 +213,7 @@ def test_what_candidates_have_in_common_is_searched_once_and_is_what_each_finds_
     tables = [hs.compare(families, record, workers=workers, cross_validate=None) for workers in (1, 2)]
     assert searched.count((hs.BoucWen, u.size)) == 6
     assert tables[0].rows == tables[1].rows
+    searched.clear()
+    fit = hs.identify(hs.BoucWen, hs.datasets.table1(), fixed={"n": 1.0}, admissible=True)
+    assert "unrestricted" in fit.regions
+    assert len(searched) == 2  # among all laws, and among the admissible ones
