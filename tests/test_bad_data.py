@@ -65,7 +65,6 @@ def test_loading_alone_tells_nothing_of_unloading(family):
 
 
 @functools.cache
-@functools.cache
 def fitted_in_units(of_u, of_y):
     table1 = hs.datasets.table1()
     return hs.identify(hs.BoucWen, hs.Record(u=of_u * table1.u, y=of_y * table1.y), fixed={"n": 1.0})

@@ -82,6 +82,7 @@ def ended(child, number, *, group_too=False):
     ("number", "code", "said"),
     [
         (signal.SIGTERM, 128 + signal.SIGTERM, "hysim: ended by SIGTERM\n"),
+        (signal.SIGKILL, -signal.SIGKILL, ""),
         (signal.SIGINT, 130, "hysim: interrupted\n"),
     ],
 )
