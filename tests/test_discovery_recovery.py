@@ -237,7 +237,7 @@ def test_a_likelier_law_that_comes_to_no_steady_loop_is_not_taken(table1, found)
     residual = table1.y - model.response(table1.u)
     assert hs.metrics.bic(residual, 6) == pytest.approx(-347.23, abs=0.01)
     assert hs.metrics.bic(residual, 6) < found.scores["bic"]
-    assert not drifting.settles
+    assert not drifting.settles()
     lows = model.response(np.concatenate([table1.u, np.tile([125.0, 0.0], 20)]))[-39::2]
     assert lows[-1] < lows[0] - 0.5 * np.ptp(table1.y)  # and each cycle by more than the last
     lows = found.model.response(np.concatenate([table1.u, np.tile([125.0, 0.0], 20)]))[-39::2]

@@ -19,7 +19,7 @@ y0 = offset + feedthrough u0 is no free number.
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-from functools import cached_property
+from functools import cache, cached_property
 from typing import Generic, NamedTuple, Self, TypeVar
 
 import numpy as np
@@ -153,14 +153,14 @@ class Candidate(Generic[S]):
     """A refined structure.
 
     `unknowns` (size + n_records,) are its numbers and each record's y0, `residual` (n_samples,) is in strokes,
-    `jacobian` (n_samples, size + n_records) is its derivative. `settles`: whether cyclic inputs end in a steady loop.
+    `jacobian()` (n_samples, size + n_records) is its derivative. `settles()`: whether cycles end in a steady loop.
     """
 
     structure: S
     unknowns: FloatArray
-    jacobian: FloatArray
+    jacobian: Callable[[], FloatArray]  # it and the next are computed where they are asked for
     residual: FloatArray
-    settles: bool
+    settles: Callable[[], bool]
 
     @cached_property
     def cost(self) -> float:
@@ -179,7 +179,7 @@ class Candidate(Generic[S]):
     def covariance(self) -> FloatArray:
         """Covariance of the unknowns, zero for y0 at rest; nan where the records do not determine all of them."""
         n, d, covariance = self.residual.size, self.n_parameters, np.zeros((self.unknowns.size,) * 2)
-        jacobian, covariance[:d, :d] = self.jacobian[:, :d], np.nan
+        jacobian, covariance[:d, :d] = self.jacobian()[:, :d], np.nan
         sizes = np.linalg.norm(jacobian, axis=0)
         if n > d and (sizes > 0.0).all():
             singular, right = np.linalg.svd(jacobian / sizes, full_matrices=False)[1:]
@@ -297,10 +297,9 @@ class FreeRun:
         )
         x, residual = reached.x[0], reached.evaluated[0][0]
         unknowns = x * units
-        unknowns[structure.size :] = [
-            self._first(structure, unknowns[np.newaxis], k)[0] for k in range(len(self.records))
-        ]
-        return Candidate(structure, unknowns, slopes(x, residual) / units, residual, self._settles(structure, unknowns))
+        first = [self._first(structure, unknowns[np.newaxis], k)[0] for k in range(len(self.records))]
+        unknowns[structure.size :], jacobian = first, cache(lambda: slopes(x, residual) / units)
+        return Candidate(structure, unknowns, jacobian, residual, cache(lambda: self._settles(structure, unknowns)))
 
     def _scaled(self, structure: Structure) -> Callable[[FloatArray], FloatArray]:
         units = self.units(structure)

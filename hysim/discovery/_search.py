@@ -147,8 +147,7 @@ def searched(
     free_run = FreeRun(tuple(records), None if masks is None else tuple(masks), options.signs, Work(MOST_WORK))
     thin = thinned(free_run)
     optimizer, form = options.optimizer, options.derivative
-    if form == "auto":
-        form = _better_form(thin.visible, library, optimizer)
+    form = _better_form(thin.visible, library, optimizer) if form == "auto" else form
     rows = slopes(free_run.visible, form)
     starts = shifted(rows, library.terms, feedthrough=library.feedthrough != "no", offset=library.offset)
     required = frozenset({"feedthrough"} if library.feedthrough == "must" else ())
@@ -212,7 +211,7 @@ def _better_form(records: Sequence[Record], library: Library, optimizer: str) ->
 
 def _on_all_samples(free_run: FreeRun, search: Search, library: Library, seed: int, restarts: int) -> Candidate[Terms]:
     """Steps 4 and 5 of the selection on all samples, and the best of descending again from random starts."""
-    finalists = search.followed(search.sound)
+    finalists = search.followed
     if free_run.n_samples > search.free_run.n_samples:
         shortest = preferred(finalists, library.letter)
         few = {c.structure: c.unknowns for c in (shortest, *finalists[:_FINALISTS])}
@@ -269,7 +268,7 @@ def or_any_exponent(
     if not bic_of(least, thin.n_samples, fewest) < best.bic - INDISTINCT:
         return chosen.candidate
     candidates += [_refined(thin, of_memory, structure) for structure in others]
-    sound = [candidate for candidate in candidates if candidate is not None and candidate.settles]
+    sound = [candidate for candidate in candidates if candidate is not None and candidate.settles()]
     lowest = min(sound, key=lambda candidate: candidate.bic, default=None)
     if lowest is None or lowest.bic >= best.bic - INDISTINCT or gap(best, lowest) < ALIKE:
         return chosen.candidate

@@ -217,18 +217,19 @@ class Search:
     def candidates(self) -> list[Candidate[Terms]]:
         return sorted((c for c in self.tried.values() if c is not None), key=lambda c: (c.bic, c.structure))
 
-    @property
-    def sound(self) -> list[Candidate[Terms]]:
-        """Candidates that come to a steady loop; all candidates if no candidate does."""
+    def sound(self, most: int = 1) -> list[Candidate[Terms]]:
+        """The best candidates that come to a steady loop; the best of all if no candidate does."""
         refined = self.candidates
-        return [candidate for candidate in refined if candidate.settles] or refined
+        return list(itertools.islice((each for each in refined if each.settles()), most)) or refined[:most]
 
-    def followed(self, candidates: Sequence[Candidate[Terms]]) -> list[Candidate[Terms]]:
-        best = self.sound[0]
-        return [c for c in candidates if c.bic < best.bic + HOPELESS or gap(c, best) < ALIKE]
+    @property
+    def followed(self) -> list[Candidate[Terms]]:
+        best = self.sound()[0]
+        near = [c for c in self.candidates if c.bic < best.bic + HOPELESS or gap(c, best) < ALIKE]
+        return [candidate for candidate in near if candidate.settles()] or near
 
     def _hopeless(self, structure: Terms) -> float:
-        sound, n = self.sound, self.free_run.n_samples
+        sound, n = self.sound(), self.free_run.n_samples
         if not sound:
             return math.inf
         best, d = sound[0], structure.size + (0 if structure.rest else len(self.free_run.records))
@@ -238,7 +239,7 @@ class Search:
         """Steps 2 and 3 about structures inside `largest`; whether all of them were tried before the work was done."""
         done: set[Terms] = set()
         for _ in range(ROUNDS):
-            points = [c for c in self.sound[:_POINTS] if c.structure not in done]
+            points = [c for c in self.sound(_POINTS) if c.structure not in done]
             points += [c for c in [self.tried.get(largest)] if c is not None and not done]
             if not points:
                 break
@@ -247,7 +248,7 @@ class Search:
                 if self.free_run.work.share >= SEARCH_SHARE:
                     return False
                 self.refine(each.structure, each.unknowns, race=True)
-        for candidate in self.sound[:_TWINS]:
+        for candidate in self.sound(_TWINS):
             for rest in self.rests:
                 self.refine(candidate.structure._replace(rest=rest), candidate.unknowns)
         return True
@@ -260,7 +261,7 @@ class Search:
 
     def could_win(self, size: int, best: float = math.inf) -> bool:
         """Whether a structure of `size` numbers would be preferred if it ran as well as the best of any size."""
-        sound = self.sound
+        sound = self.sound()
         least = min((candidate.cost for candidate in self.candidates), default=0.0)
         starts = 0 if True in self.rests else len(self.free_run.records)
         bound = bic_of(least, self.free_run.n_samples, size + starts)
@@ -322,7 +323,7 @@ def pruned(
         start = np.delete(candidate.unknowns, k)
         worst = cost_of(candidate.bic + INDISTINCT, free_run.n_samples, candidate.n_parameters - 1)
         refined = free_run.refine(smaller, start[np.newaxis], tolerance=tolerance, hopeless=worst)
-        if refined is not None and refined.bic <= candidate.bic + INDISTINCT and refined.settles >= candidate.settles:
+        if refined and refined.bic <= candidate.bic + INDISTINCT and refined.settles() >= candidate.settles():
             return pruned(free_run, refined, required, tolerance)
     return candidate
 
