@@ -23,8 +23,12 @@ from hysim._basics.frozen import FloatArray, read_only
 from hysim.kernels._compile import inlined, uncounted, unstored
 
 F = TypeVar("F", bound=Callable[..., Any])
-Rates = Callable[[FloatArray, FloatArray, float, float, FloatArray], None]
-"""``rates(parameters, x, u, s, out)``: the slopes of the states `x` into `out`."""
+Rates = Callable[[FloatArray, FloatArray, float, float, float, FloatArray], None]
+"""``rates(parameters, x, u, s, side, out)``: the slopes of the states `x` into `out`.
+
+A law with a corner at x[0] = 0 may give those of the `side` from which a step crosses it, where this side's formula goes
+on: such a step is then as long as any other, and the zero in it is found by Newton's rule.
+"""
 
 Longest = Callable[[FloatArray, FloatArray, float, float], float]
 """``longest(parameters, x, slope, s)``: the longest step from `x`, for what is narrow and could be missed."""
@@ -124,13 +128,13 @@ def follower(
                     total += a[j * stages + m] * k[m * n + i]
                 y[i] = x[i] + h * total
             crosses = crosses or y[0] * side < 0.0
-            rates(parameters, y, u + c[j] * h, s, k[j * n : (j + 1) * n])
+            rates(parameters, y, u + c[j] * h, s, side, k[j * n : (j + 1) * n])
         for i in range(n):
             total = 0.0
             for m in range(stages):
                 total += b[m] * k[m * n + i]
             after[i] = x[i] + h * total
-        rates(parameters, after, end, s, k[stages * n : (stages + 1) * n])
+        rates(parameters, after, end, s, side, k[stages * n : (stages + 1) * n])
         return crosses
 
     @own
@@ -161,7 +165,7 @@ def follower(
         for i in range(n):
             is_known = is_known and x[i] == after[i]
         if not is_known:
-            rates(parameters, x, last, s, k[:n])
+            rates(parameters, x, last, s, x[0], k[:n])
         ended[0], ended[1] = u, s
         if tolerance > _COARSE:
             ended[2] -= _EACH
@@ -173,7 +177,7 @@ def follower(
             for i in range(n):
                 y[i] = x[i]
             y[0] = 0.0
-            rates(parameters, y, last if steepest > 0.0 else u, s, after)
+            rates(parameters, y, last if steepest > 0.0 else u, s, 0.0, after)
             steepest = min(steepest, abs(after[0])) if steepest > 0.0 else abs(after[0])
         for i in range(n):
             largest[i] = abs(x[i])
@@ -225,9 +229,9 @@ def follower(
                 taken = after[0] = 0.0
                 for i in range(1, n):
                     after[i] = x[i]
-            if corner and x[0] != 0.0 and abs(after[0]) <= rounding:
-                after[0] = 0.0
-                rates(parameters, after, at + taken, s, k[end : end + n])
+            if corner and ((x[0] != 0.0 and abs(after[0]) <= rounding) or side * after[0] < 0.0):
+                after[0] = 0.0 if abs(after[0]) <= rounding else after[0]
+                rates(parameters, after, at + taken, s, after[0], k[end : end + n])
             aims = 0
             for i in range(n):
                 x[i], k[i] = after[i], k[end + i]

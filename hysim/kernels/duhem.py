@@ -24,10 +24,10 @@ N_STATE = 2 + workspace(1)
 
 
 @uncounted
-def rates(parameters: FloatArray, x: FloatArray, u: float, s: float, out: FloatArray) -> None:
-    """f(u, z)."""
+def rates(parameters: FloatArray, x: FloatArray, u: float, s: float, side: float, out: FloatArray) -> None:
+    """f(u, z), on this side of z = 0."""
     laws, rows, columns, z = int(parameters[2]), int(parameters[3]), int(parameters[4]), x[0]
-    part = (0 if s > 0.0 else laws // 2) + (1 if laws == 4 and z < 0.0 else 0)
+    part = (0 if s > 0.0 else laws // 2) + (1 if laws == 4 and (side < 0.0 or (side == 0.0 and z < 0.0)) else 0)
     first = N_HEAD + part * rows * columns
     total = 0.0
     for i in range(rows - 1, -1, -1):

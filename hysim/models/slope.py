@@ -18,7 +18,7 @@ from hysim._names import meant
 from hysim.kernels.stepping import sources, unstored
 
 _TEXT = """\
-def rates(p: FloatArray, x: FloatArray, u: float, s: float, out: FloatArray) -> None:
+def rates(p: FloatArray, x: FloatArray, u: float, s: float, side: float, out: FloatArray) -> None:
     {slopes} = slope(p, {states}, u, s)
 
 def room(p: FloatArray, x: FloatArray, slope: float, s: float) -> float:
