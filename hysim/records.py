@@ -462,7 +462,7 @@ def as_record(value: Any, verb: str) -> Record | None:
 
 
 def span_of(*records: Record) -> float:
-    """Widest span of the inputs [unit of u]; ValueError where none moves."""
+    """Widest span of the inputs [unit of u]; ValueError where no input moves."""
     span = max(float(np.ptp(record.u)) for record in records)
     if span == 0.0:
         raise ValueError("the input is constant: nothing can be identified from it")

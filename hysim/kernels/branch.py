@@ -26,8 +26,8 @@ F = TypeVar("F", bound=Callable[..., Any])
 Rates = Callable[[FloatArray, FloatArray, float, float, float, FloatArray], None]
 """``rates(parameters, x, u, s, side, out)``: the slopes of the states `x` into `out`.
 
-A law with a corner at x[0] = 0 may give those of the `side` from which a step crosses it, where this side's formula goes
-on: such a step is then as long as any other, and the zero in it is found by Newton's rule.
+A law with a corner at x[0] = 0 may give those of the `side` from which a step crosses it, if their formula goes on
+beyond: such a step is then as long as any other, and the zero in it is found by Newton's rule.
 """
 
 Longest = Callable[[FloatArray, FloatArray, float, float], float]
