@@ -182,7 +182,7 @@ def follower(
         for i in range(n):
             largest[i] = abs(x[i])
         left = h = u - last
-        aims, is_high, evaluated, done, before = 0, False, 1, 0.0, 0.0
+        aims, is_high, evaluated, done, before, across = 0, False, 1, 0.0, 0.0, 0.0
         for step in range(most):
             h = math.copysign(min(abs(h), longest(parameters, x, k[0], s)), s)
             if abs(h) >= abs(left):
@@ -219,6 +219,7 @@ def follower(
                 h *= 0.5
                 continue
             if corner and x[0] * after[0] < 0.0 and abs(after[0]) > rounding:
+                across = h if abs(h) > abs(across) else across
                 aims += 1
                 aimed, secant = h - after[0] / k[end], h * (abs(x[0]) / (abs(x[0]) + abs(after[0])))
                 if aims > _NEWTON or not 0.1 * abs(secant) < s * aimed < abs(h):
@@ -245,6 +246,7 @@ def follower(
             left -= taken
             done += abs(taken)
             h *= min(_MOST, _SAFETY * max(error, _OF_LAST * before, 1e-10) ** (-0.125 if is_high else -0.2))
+            h = across if x[0] == 0.0 and across != 0.0 else h  # steps to a zero are short because of it alone
             before = error
         x[0] = math.nan
         return evaluated
