@@ -280,12 +280,9 @@ def frame(
     rows = None if index is None else pandas.Index(index[1], name=index[0])
     made = pandas.DataFrame(dict(columns), index=rows)
     told = {"units": dict(units or {})} | dict(notes or {})
-    made.attrs = {name: value for name, value in told.items() if not _is_empty(value)}
+    known = {name: value for name, value in told.items() if value is not None and value not in ("", {})}
+    made.attrs = {name: value for name, value in known.items() if not isinstance(value, float) or math.isfinite(value)}
     return made
-
-
-def _is_empty(value: Any) -> bool:
-    return value is None or value in ("", {}) or (isinstance(value, float) and not math.isfinite(value))
 
 
 def dataset(

@@ -399,8 +399,8 @@ def signed_charge(capacity: npt.ArrayLike, current: npt.ArrayLike) -> FloatArray
     steps = np.diff(q)
     again = steps < 0.0
     steps[again] = q[1:][again]
-    usual = float(np.abs(steps[~again]).max(initial=0.0))
-    if (q < 0.0).any() or (steps[again] > usual).any():
+    usual = float(np.abs(steps[~again]).max(initial=0.0))  # by hand: a half cycle begins below half of the last value
+    if (q < 0.0).any() or (steps[again] > np.minimum(usual, 0.5 * q[:-1][again])).any():
         raise ValueError("capacity must count up from zero in each half cycle; a charge with a sign needs no more")
     return np.append(0.0, np.cumsum(np.sign(i[1:]) * steps))
 
@@ -423,6 +423,10 @@ def several(records: Any, verb: str) -> tuple[Record, ...]:
         raise TypeError(f"{verb} takes a Record or several of them, got {type(records).__name__}: hs.Record(u=u, y=y)")
     if not members:
         raise ValueError(f"{verb} takes a Record or several of them: no record was given")
+    for name in "uy":
+        units = dict.fromkeys(each.units[name] for each in members if each is not None and name in each.units)
+        if len(units) > 1:
+            raise ValueError(f"{verb} takes records in the same units, got {name} in {' and '.join(units)}")
     return tuple(_of_ordinary_size(each, verb) for each in members if each is not None)
 
 

@@ -348,15 +348,19 @@ def test_control_names_the_quantities_that_drive_and_takes_them_in_the_units_of_
     (tmp_path / "way.csv").write_text("t [s],r [mm]\n0,0.0005\n0.1,0.001\n0.2,0.0005\n")
     design = ("control", tmp_path / "stack.json", "--record", tmp_path / "cycle.csv", "--sample-time", "1e-3")
     code, out, _ = run(*design, "--controller", "inverse", "--reference", tmp_path / "way.csv")
-    assert code == 0
-    assert "record     the model fits the displacement [µm] by 100.00 %\n" in out
+    assert (code, "record     the model fits the displacement [µm] by 100.00 %\n" in out) == (0, True)
     assert "reference  displacement [µm]: way.csv, second column, tracking rms 0." in out
     assert "command    voltage [V]: 0 to 100 V, the extremes of cycle.csv\n" in out
+    assert "  100.00  " in run("compare", tmp_path / "cycle.csv", "--model", tmp_path / "stack.json")[1]
+    names, *lines = run("simulate", tmp_path / "stack.json", tmp_path / "cycle.csv")[1].splitlines()
+    assert names == "u [V],y [um],z"
+    assert np.loadtxt(lines, delimiter=",")[:, 1] == pytest.approx(law.response(u), abs=1e-12)
     for name, unit in (("way.csv", "V"), ("cycle.csv", "N")):
         path = tmp_path / name
         path.write_text(path.read_text().replace("[mm]", f"[{unit}]").replace("[kV]", f"[{unit}]"))
         code, _, err = run(*design, "--controller", "inverse", "--reference", tmp_path / "way.csv")
         assert (code, f"{name} is not in the units of the model: '{unit}' cannot become" in err) == (2, True)
+    assert run("plot", path, "--model", tmp_path / "stack.json", "--out", tmp_path / "loop.svg")[0] == 2
 
 
 def test_a_reference_is_a_step_or_a_file_and_the_loop_of_a_linear_plant_is_lag(run, tmp_path):

@@ -14,7 +14,6 @@ import hysim as hs
 U = np.array([0.0, 0.4, -0.3, 0.7, 0.7, -0.6, 0.1, 0.0])
 _MATERIALS = ("opensees", "opensees_original", "suanpan")
 POSITIVE = st.floats(0.1, 3.0)
-SIGNED = st.floats(-2.0, 2.0)
 
 THEIRS = {
     "low_guo": {"alpha": 0.35, "beta": 0.6, "gamma": 0.2, "d": 1.3, "h0": 0.1},

@@ -1,5 +1,7 @@
 """Several records share their parameters and not their states; a record that repeats itself needs no state at all."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from strategies import assert_refused, refused
@@ -73,6 +75,7 @@ test_initial_must_fit_the_records = refused(
     (record(), {"initial": 3}, "got 3"),
     ([], {}, "no record"),
     ([record(), None], {}, TypeError, "takes a Record or several"),
+    ([replace(record(), units={"y": unit}) for unit in ("um", "mm")], {}, "got y in um and mm"),
     call=lambda records, options: hs.identify(LAW, records, **options),
 )
 

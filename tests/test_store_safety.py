@@ -23,10 +23,6 @@ def squares(a):
     return {"square": a * a, "both": [a, a * a]}
 
 
-def cubes(a):
-    return {"cube": a**3, "both": [a, a**3]}
-
-
 @pytest.fixture
 def path(tmp_path):
     hs.sweep(squares, SPACE, store=tmp_path / "study.sqlite", workers=1)

@@ -60,6 +60,7 @@ test_wrong_arguments_are_named = refused(
     (lambda: hs.TabulatedDahl(inputs=(0.0, 0.0)), "inputs must increase"),
     (lambda: hs.TabulatedDahl(inputs=(0.0, 1.0, 2.0)), "equally long"),
     (lambda: hs.signed_charge([0.0, 1.0, -1.0], [1.0, 1.0, 1.0]), "count up from zero"),
-    (lambda: hs.signed_charge([0.0, 1.0, 2.0, 1.9], [1.0, 1.0, 1.0, 1.0]), "count up from zero"),
+    (lambda: hs.signed_charge([0.0, 0.5, 0.49, 1.0], [1.0, 1.0, 1.0, 1.0]), "count up from zero"),
+    (lambda: hs.TabulatedDahl.over(hs.Record(u=np.ones(3), y=np.arange(3.0))), "the input is constant"),
     (lambda: hs.TabulatedDahl(z0=2.0), "z0 must be of a size of at most 1"),
 )

@@ -20,7 +20,6 @@ of_another = "no function"
 STRICT = ["-std=c99", "-ffp-contract=off", "-Wall", "-Wextra", "-Wpedantic", "-Werror"]
 TABLE = np.array([1.0, -2.5, 1e-300, 0.1])
 FEW = (0.5, 2.0)
-NONE = None
 COUNT = 3
 
 

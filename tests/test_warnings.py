@@ -57,6 +57,12 @@ def test_a_regular_output_of_a_step_or_of_a_line_is_not_suspected():
         assert not any(each.startswith(SWAPPED) for each in hs.identify(hs.Line, hs.Record(u=u, y=y)).warnings)
 
 
+def test_a_fit_that_is_worse_than_a_constant_says_so():
+    for slope, fit in ((3.0, True), (-5.0, False)):
+        record = hs.Record(u=LOOP, y=3.0 * LOOP + 0.1 * np.cos(LOOP))
+        assert any("mean of y" in each for each in hs.identify(hs.Line, record, fixed={"slope": slope}).warnings) != fit
+
+
 def test_columns_that_one_family_fits_better_in_reverse_are_suspected(table1):
     """Noise on the voltage hides the generator; a play cannot make the voltage from the displacement."""
     shaken = table1.u + 0.05 * np.random.default_rng(0).standard_normal(len(table1))

@@ -5,7 +5,7 @@ the middle 80 % of the displacements that the plant reaches within the limits.
 """
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import asdict, dataclass, is_dataclass, replace
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -75,7 +75,7 @@ def designed(path: str, options: DesignOptions, exported: Callable[[Any], object
     model, units = models.read(path)
     record, within = None, options.limits
     if options.record is not None:
-        record = in_units(hs.load(options.record, u=options.u, y=options.y), units, options.record)
+        record = models.in_units(hs.load(options.record, u=options.u, y=options.y), units, options.record)
         units = {**units, **record.units}
         within = within or (float(record.u.min()), float(record.u.max()))
     actuator, kind = plant(model, options), options.controller
@@ -156,16 +156,6 @@ def fit_percent(model: Any, record: hs.Record | None) -> float:
     return hs.metrics.fit_percent(record.y, free_run(model, record).y)
 
 
-def in_units(record: hs.Record, units: Mapping[str, str], source: str) -> hs.Record:
-    """The record in these units, where it has others; ValueError if they differ by more than a prefix."""
-    labels = {name: unit for name, unit in units.items() if name in ("u", "y")}
-    other = {name: unit for name, unit in labels.items() if record.units.get(name, unit) != unit}
-    try:
-        return record.convert(other) if other else record
-    except ValueError as error:
-        raise ValueError(f"{source} is not in the units of the model: {error}") from None
-
-
 def reference(task: Task, rest: float, kind: str, unit: str | None) -> tuple[FloatArray, float, str]:
     """Triangle, step from rest or reference in a file [unit of y]; seconds that do not count; and the objective."""
     h = task.sample_time
@@ -175,7 +165,7 @@ def reference(task: Task, rest: float, kind: str, unit: str | None) -> tuple[Flo
         values = hs.signals.triangle(task.low, task.high, cycles=2, samples_per_cycle=task.samples_per_cycle)
         return values, task.period, "rms"
     units = {} if unit is None else {"u": unit}
-    return in_units(hs.load(kind, t=0, u=1, y=1), units, kind).resample(h).u, 0.0, "rms"
+    return models.in_units(hs.load(kind, t=0, u=1, y=1), units, kind).resample(h).u, 0.0, "rms"
 
 
 def feedback(actuator: hs.Actuator, kind: str, within: Pair | None) -> hs.PID | hs.TrackingController | None:

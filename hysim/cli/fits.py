@@ -207,6 +207,7 @@ def compare(
     subjects: dict[str, Any] = {}
     for name in model:
         subjects |= _subjects(name)
+        record = models.in_units(record, models.read(name)[1] if name.endswith(".json") else {}, file)
     try:
         table = hs.compare(
             subjects or None, record, cross_validate=cross_validate or "auto", test=kept, seed=seed,

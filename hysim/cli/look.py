@@ -211,6 +211,7 @@ def plot(
     laws, runs = {}, []
     for path in model:
         law, units = models.read(path)
+        measured = [models.in_units(record, units, file) for record in measured]
         name = models.name_of(path) if len(model) > 1 else type(law).__name__
         laws[name] = law
         runs.append(replace(models.simulated(law, measured[0], {**measured[0].units, **units}), name=name))

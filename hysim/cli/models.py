@@ -5,7 +5,7 @@ import os
 import pkgutil
 import re
 import sys
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Annotated, Any, Literal, Protocol, runtime_checkable
@@ -328,6 +328,16 @@ def read(path: str) -> tuple[Any, dict[str, str]]:
     if not Path(path).exists() and path in names_to_identify():
         raise ValueError(f"{path} is a family without numbers: write a model of it by hysim identify --out {path}.json")
     return from_json(Path(path).read_bytes(), path)
+
+
+def in_units(record: "hs.Record", units: Mapping[str, str], source: str, signals: str = "uy") -> "hs.Record":
+    """The record in these units, where it has others; ValueError if they differ by more than a prefix."""
+    known = {name: units[name] for name in signals if name in units}
+    other = {name: unit for name, unit in known.items() if record.units.get(name, unit) != unit}
+    try:
+        return record.convert(other) if other else record
+    except ValueError as error:
+        raise ValueError(f"{source} is not in the units of the model: {error}") from None
 
 
 def name_of(path: str) -> str:

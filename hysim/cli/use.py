@@ -49,7 +49,7 @@ def simulate(
         raise ValueError(f"the model stands before the record: hysim simulate {file} {model}")
     law, units = models.read(model)
     of_the_ground = isinstance(law, _Shaken) and law.excitation == "base"
-    record = records.read_input(settings, file, of_the_ground=of_the_ground)
+    record = models.in_units(records.read_input(settings, file, of_the_ground=of_the_ground), units, file, "u")
     units |= (settings.units or {}) | {signal: unit for signal, unit in record.units.items() if signal != "y"}
     simulation = models.simulated(law, record, units)
     columns = simulation.columns

@@ -35,7 +35,7 @@ from hysim.records import Record
 
 Bounds = tuple[FloatArray, FloatArray]
 
-_MOST_STEPS = 150  # between two samples: to end at zero of the memory can take 110, more are steps of the law
+_MOST_STEPS = 150  # by hand: between two samples; a law that needs more is stiff
 
 
 Name = Term | str

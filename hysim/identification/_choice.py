@@ -278,7 +278,8 @@ class _Trials:
         kept = [few_places(record, _SAMPLES // len(records)) for record in records]
         self.whole = _Sampled(records, every)
         self.short = _Sampled([_at(*each) for each in zip(records, kept, strict=True)], kept)
-        self.cuts = [] if others else [cut for cut in (round(x * len(first)) for x in _CUTS) if _is_cycle(first[:cut])]
+        cuts = [] if others else [round(share * len(first)) for share in _CUTS]
+        self.cuts = [cut for cut in cuts if first[:cut].reversals(TOLERANCE).size >= _CYCLE]
         self.amplitude = max((float(np.ptp(first.u) / np.ptp(first.u[:cut])) for cut in self.cuts), default=math.nan)
 
     def unknowns(self, subject: Any) -> int:
@@ -343,10 +344,6 @@ def _at(record: Record, kept: Samples) -> Record:
     return (
         record if kept.size == len(record) else Record(u=record.u[kept], y=record.y[kept], resolution=record.resolution)
     )
-
-
-def _is_cycle(record: Record) -> bool:
-    return record.reversals(TOLERANCE).size >= _CYCLE
 
 
 def _folds(records: Sequence[Record]) -> list[Samples]:

@@ -232,7 +232,8 @@ def identify(
                 doubts = [swapped_for(first.family, setting, 1.0 - fit.fit_percent / 100.0)]
             on_their_records = [on_record(each, record) for each, record in zip(fit.models, records, strict=True)]
             off = excursion(on_their_records, records)
-            doubts += [implausible(off), rate_noise_warning(on_their_records, records)]
+            worse = "the fit is negative: the mean of y predicts it better" if fit.fit_percent < 0.0 else ""
+            doubts += [implausible(off), rate_noise_warning(on_their_records, records), worse]
             fit = _marked(fit, danger(off, records, fit.regions.get("admissible")), admissible)
         return replace(fit, warnings=(*fit.warnings, *filter(None, doubts))) if any(doubts) else fit
 

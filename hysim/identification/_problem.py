@@ -24,7 +24,7 @@ from hysim._names import meant
 from hysim.identification.marquardt import Settled, least_squares, triangle
 from hysim.models.by_structure import searched
 from hysim.models.protocols import Identifiable, placed
-from hysim.models.search_space import STATES, STATES_IN_WORDS, Freedom, Parameters, SearchSpace
+from hysim.models.search_space import STATES, STATES_IN_WORDS, Freedom, SearchSpace
 from hysim.models.stages import BASE, Stage
 from hysim.records import Record, few_places
 
@@ -333,7 +333,8 @@ class Problem:
         """The family's parameters, (n_sets,) each, for the record `k`; those that are linear are left out."""
         part = self.parts[k]
         parameters = self._decoded(x, part)
-        return _steady(self.family, parameters, part.before) if part.before and self.own.state else parameters
+        steady = self.family.steady(parameters, part.before) if part.before and self.own.state else {}
+        return {**parameters, **steady}
 
     def _decoded(self, x: FloatArray, part: Part) -> dict[str, FloatArray]:
         present = part.coordinates >= 0
@@ -598,7 +599,3 @@ def _called(name: str, k: int | None) -> str:
 
 def _place(order: Sequence[tuple[Any, int | None]], k: int, key: Any) -> int:
     return next((place for place, (other, owner) in enumerate(order) if other == key and owner in (None, k)), -1)
-
-
-def _steady(family: Any, parameters: Parameters, record: Record) -> dict[str, FloatArray]:
-    return {**parameters, **family.steady(parameters, record)}

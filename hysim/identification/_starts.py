@@ -246,7 +246,7 @@ def _told_apart(plant: Any, setting: Setting, problem: Problem, ends: FloatArray
         theta = problem.completed(ends[:1])[0]
         spread = _stderr(problem, theta)
         doubts = plant.doubts(problem.estimates(theta), setting.freedom)
-        sizes = [_excess(spread[doubt.name], doubt.largest) for doubt in doubts if doubt.name in spread]
+        sizes = [np.nan_to_num(spread[each.name] / each.largest, nan=np.inf) for each in doubts if each.name in spread]
         if not sizes or max(sizes) <= 1.0:
             break
         known = _parts_only(problem, ends[:1])
@@ -256,10 +256,6 @@ def _told_apart(plant: Any, setting: Setting, problem: Problem, ends: FloatArray
             return plant, np.empty((1, 0))
         ends = _descended(problem, _best_starts(problem)[:1], exact=True)
     return plant, ends
-
-
-def _excess(stderr: float, largest: float) -> float:
-    return math.inf if math.isnan(stderr) else stderr / largest
 
 
 def _stderr(problem: Problem, theta: FloatArray) -> dict[str, float]:

@@ -160,7 +160,8 @@ class DependentStructure(Subject):
         """The structure with places for the channels of these records; ValueError for unknown names or few values."""
         space = self.law.search_space(max(records, key=lambda record: float(np.ptp(record.u))))
         known, spans = (*space.names, *space.held), {}
-        depends = {each: pair for name, pair in self.depends.items() for each in _numbers_of(name, known)}
+        numbers = {name: [each for each in known if each.startswith(f"{name}[")] or [name] for name in self.depends}
+        depends = {each: pair for name, pair in self.depends.items() for each in numbers[name]}
         for name, (channel, degree) in depends.items():
             if name not in known:
                 raise ValueError(f"depends names {name!r}; the parameters are {among(name, known)}")
@@ -305,11 +306,6 @@ class DependentStructure(Subject):
 
     def _with(self, law: Any) -> "DependentStructure":
         return self if law is self.law else replace(self, law=law)
-
-
-def _numbers_of(name: str, known: Sequence[str]) -> list[str]:
-    """The name; of a field that is a tuple the names of its numbers."""
-    return [each for each in known if each.startswith(f"{name}[")] or [name]
 
 
 def _comes_near_zero(at: tuple[float, ...], values: FloatArray) -> npt.NDArray[np.bool_]:

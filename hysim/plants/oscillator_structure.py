@@ -101,11 +101,7 @@ def _starts(motion: Motion, plant: Linear, laws: SearchSpace, wanted: int) -> li
     ends = np.clip([each.x for each in reached], laws.lower, laws.upper).reshape(-1, laws.lower.size)
     errors = np.array([each.fun for each in reached])
     sets = [(float(errors[k]), equation.parameters(ends[k])) for k in _apart(laws, ends, errors, _SAME)]
-    return [each for each in sets if _is_a_plant(each[1])][:wanted]
-
-
-def _is_a_plant(values: Mapping[str, float]) -> bool:
-    return values["mass"] > 0.0 and values["A"] > 0.0 and values["stiffness"] + values["A"] > 0.0
+    return [(e, p) for e, p in sets if min(p["mass"], p["A"], p["stiffness"] + p["A"]) > 0.0][:wanted]
 
 
 class _Equation:

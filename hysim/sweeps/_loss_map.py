@@ -133,6 +133,8 @@ def loss_map(
     )
     if wave.size < 3 or not abs(wave[-1] - wave[0]) < _STEADY * np.ptp(wave):
         raise ValueError("waveform must be one cycle that ends where it begins: append its first sample to it")
+    if abs(np.abs(wave).max() - 1.0) > 0.01:  # by hand: samples may miss the extrema
+        raise ValueError("waveform must have the amplitude 1: take its mean off, which is the bias, and divide it")
     energies = []
     for point in itertools.product(*(each.tolist() for each in others.values())):
         law = model.at(**dict(zip(others, point, strict=True))) if isinstance(model, Dependent) else model

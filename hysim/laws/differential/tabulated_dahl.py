@@ -13,7 +13,7 @@ from hysim.models.model import Example, family
 from hysim.models.parameters import Parameter
 from hysim.models.search_space import Parameters
 from hysim.models.tables import Tables
-from hysim.records import Record
+from hysim.records import Record, span_of
 
 
 @family
@@ -131,7 +131,7 @@ class TabulatedDahl(Law):
         check_whole(nodes, "nodes", least=2)
         u, y = np.concatenate([each.u for each in records]), np.concatenate([each.y for each in records])
         inputs, level = np.linspace(u.min(), u.max(), nodes), (float(y.mean()),) * nodes
-        return cls(inputs=tuple(inputs.tolist()), centre=level, amplitude=(0.0,) * nodes, rate=10.0 / np.ptp(u))
+        return cls(inputs=tuple(inputs.tolist()), centre=level, amplitude=(0.0,) * nodes, rate=10.0 / span_of(*records))
 
     @classmethod
     def from_branches(
