@@ -424,9 +424,8 @@ def several(records: Any, verb: str) -> tuple[Record, ...]:
     if not members:
         raise ValueError(f"{verb} takes a Record or several of them: no record was given")
     for name in "uy":
-        units = dict.fromkeys(each.units[name] for each in members if each is not None and name in each.units)
-        if len(units) > 1:
-            raise ValueError(f"{verb} takes records in the same units, got {name} in {' and '.join(units)}")
+        if len(units := {each.units.get(name, "") for each in members if each is not None} - {""}) > 1:
+            raise ValueError(f"{verb} takes records in the same units, got {name} in {' and '.join(sorted(units))}")
     return tuple(_of_ordinary_size(each, verb) for each in members if each is not None)
 
 

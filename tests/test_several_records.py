@@ -75,7 +75,7 @@ test_initial_must_fit_the_records = refused(
     (record(), {"initial": 3}, "got 3"),
     ([], {}, "no record"),
     ([record(), None], {}, TypeError, "takes a Record or several"),
-    ([replace(record(), units={"y": unit}) for unit in ("um", "mm")], {}, "got y in um and mm"),
+    ([replace(record(), units={"y": unit}) for unit in ("um", "mm")], {}, "got y in mm and um"),
     call=lambda records, options: hs.identify(LAW, records, **options),
 )
 

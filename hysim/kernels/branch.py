@@ -246,7 +246,8 @@ def follower(
             left -= taken
             done += abs(taken)
             h *= min(_MOST, _SAFETY * max(error, _OF_LAST * before, 1e-10) ** (-0.125 if is_high else -0.2))
-            h = across if x[0] == 0.0 and across != 0.0 else h  # steps to a zero are short because of it alone
+            if x[0] == 0.0 and 0.0 < abs(across) < math.inf:  # once: the steps to a zero are short because of it alone
+                h, across = across, math.inf
             before = error
         x[0] = math.nan
         return evaluated
