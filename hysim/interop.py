@@ -279,8 +279,8 @@ def frame(
     pandas = optional("pandas", "to_frame", "tables")
     rows = None if index is None else pandas.Index(index[1], name=index[0])
     made = pandas.DataFrame(dict(columns), index=rows)
-    told = {"units": dict(units or {})} | dict(notes or {})
-    known = {name: value for name, value in told.items() if value is not None and value not in ("", {})}
+    told = {"units": dict(units or {}), **(notes or {})}.items()
+    known = {name: value for name, value in told if value not in (None, "", {})}
     made.attrs = {name: value for name, value in known.items() if not isinstance(value, float) or math.isfinite(value)}
     return made
 

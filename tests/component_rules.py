@@ -173,7 +173,8 @@ PATHS = dict(zip(NAMES, (bilinear, flag, rod, origin, excursion, excursion, nail
 
 def walked(law, u):
     """Output of a law by its rule, and the walks of which it is the sum."""
-    n, path, walks = law.scalars, PATHS[type(law).__name__], []
+    n, path, walks = dict(law.scalars), PATHS[type(law).__name__], []
+    n |= {"yield_input": min(n["yield_input"], n["cap_input"])} if n.get("capping_ratio", 0.0) > 0.0 else {}
     unit, k, slack = n.get("yield_input", n.get("activation", 1.0)), n.get("hardening", 0.0), n.get("slack", 0.0)
     y = n.get("offset", 0.0) + k * u
     for sign, stiffness in [(1.0, n["stiffness"]), (-1.0, n.get("opposite_stiffness"))][: 1 + (path is rod)]:

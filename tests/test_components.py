@@ -81,6 +81,7 @@ def test_without_pinching_the_law_of_ibarra_is_the_peak_oriented_one_and_elastic
     assert plain == pytest.approx(hs.PeakOriented(hardening_ratio=0.03, unloading=0.0).response(u), abs=1e-12)
     law, u = hs.IbarraMedinaKrawinkler(Lambda_s=20.0, Lambda_k=20.0, c=0.5), u / np.abs(u).max()
     assert law.response(u) == pytest.approx(u, abs=1e-15)
+    assert hs.IbarraMedinaKrawinkler(yield_input=20.0).response([1.0, 5.0, -5.0]) == pytest.approx([1.0, 5.0, -5.0])
 
 
 LIMITS = """Bilinear isotropic 1 below 1, Bilinear z0 -1.1 of a size of at most 1, FlagShape loss 2.1 at most 2,

@@ -65,7 +65,7 @@ class IbarraMedinaKrawinkler(Law):
     hardening_ratio : float
         Slope beyond the yield point over the stiffness, from 0 to 1.
     cap_input : float
-        Input of the cap, at least yield_input where there is one [unit of u].
+        Input of the cap; if it is below yield_input, and the capping_ratio positive, the law yields there [unit of u].
     capping_ratio : float
         Slope beyond the cap, downwards, over the stiffness, not negative; 0 if there is no cap.
     residual : float
@@ -212,11 +212,11 @@ class IbarraMedinaKrawinkler(Law):
     @classmethod
     def pack(cls, tables: Tables) -> Packed:
         """The fields, with R of the virgin backbone for cap_input, and capacities over yield_input."""
-        unit, a, falling = tables["yield_input"], tables["hardening_ratio"], tables["capping_ratio"]
-        at = tables["cap_input"] / unit
-        cap = np.where(falling > 0.0, 1.0 + a * (at - 1.0) + falling * at, np.inf)
+        a, falling, cap = tables["hardening_ratio"], tables["capping_ratio"], tables["cap_input"]
+        unit = np.minimum(tables["yield_input"], np.where(falling > 0.0, cap, np.inf))
+        cap = np.where(falling > 0.0, 1.0 + a * (cap / unit - 1.0) + falling * (cap / unit), np.inf)
         scaled = {name: tables[name] / unit for name in _CAPACITIES}
-        return super().pack({**tables, "cap_input": cap, **scaled})
+        return super().pack({**tables, "yield_input": unit, "cap_input": cap, **scaled})
 
     @classmethod
     def from_opensees(
