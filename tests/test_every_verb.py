@@ -76,7 +76,9 @@ def test_each_of_several_records_is_run_from_its_own_state():
     fit = hs.identify(hs.BoucWen, halves, fixed={"n": 1.0})
     y, model = REC.y, np.concatenate([m.response(each.u) for m, each in zip(fit.models, halves, strict=True)])
     assert fit.fit_percent == pytest.approx(hs.metrics.fit_percent(y, model), abs=ROUNDING)
-    assert hs.compare({"fit": fit}, halves)["fit"].fit_percent == pytest.approx(fit.fit_percent, abs=ROUNDING)
+    table = hs.compare({"fit": fit}, halves)
+    assert table["fit"].fit_percent == pytest.approx(fit.fit_percent, abs=ROUNDING)
+    assert f"on 2 records, {len(REC)} samples" in str(table)
     loops = hs.plot.identification(fit, halves, hs.plot.figure().subplots(1, 2))[0]
     drawn = [line.get_ydata() for line in loops.lines if len(line.get_ydata()) in (121, 120)]
     assert np.allclose(np.concatenate(drawn[-2:]), model, rtol=0.0, atol=1e-12)

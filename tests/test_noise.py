@@ -244,7 +244,10 @@ def test_the_energy_decides_and_the_intervals_are_those_for_errors_of_the_output
     stderr = np.sqrt(np.sum(fit.residual**2) / (u.size - 2) * np.sum(back**2, axis=1))
     np.testing.assert_allclose([fit.stderr[name] for name in ("offset", "slope")], stderr, rtol=1e-6)
     record = hs.Record(u=u, y=hs.Dahl(stiffness=3.0, coulomb=0.8).response(u) + 0.1 * rng.standard_normal(u.size))
-    by_output, by_energy = (hs.identify(hs.Dahl, record, weights=each).residual for each in (None, "energy"))
+    of_output, of_energy = (hs.identify(hs.Dahl, record, weights=each) for each in (None, "energy"))
+    assert of_energy.least_squares.estimates == pytest.approx(of_output.estimates)
+    assert f"where {of_output.fit_percent:.4g} % is possible" in of_energy.message
+    by_output, by_energy = of_output.residual, of_energy.residual
     assert np.sum((work @ by_energy) ** 2) < 0.95 * np.sum((work @ by_output) ** 2)
     small = hs.Record(u=1e-9 * u, y=record.y)
     np.testing.assert_allclose(hs.identify(hs.Dahl, small, weights="energy").residual, by_energy, atol=1e-3)
@@ -252,6 +255,8 @@ def test_the_energy_decides_and_the_intervals_are_those_for_errors_of_the_output
     assert "slope is at its given bound 1" in held.message
     assert_refused("no cross_validate", hs.identify, hs.Dahl, record, weights="energy", cross_validate="cycles")
     assert_refused("searched for", hs.identify, hs.SingleValued, record, weights="energy")
+    frame = hs.shear_frame([1.0], laws=hs.Bilinear())
+    assert_refused("not for a structure", hs.identify, frame, record, weights="energy")
 
 
 @pytest.mark.parametrize("source", ["spoilt.csv", "-"])

@@ -127,6 +127,7 @@ def compare(
             rows=tuple(row for row in by_name.values() if isinstance(row, ComparisonRow)),
             failed={name: reason for name, reason in by_name.items() if isinstance(reason, str)},
             test=trial.record if trial else None,
+            earlier=records[:-1],
         )
 
     try:

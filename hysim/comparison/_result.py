@@ -125,6 +125,8 @@ class Comparison:
         Name to the reason, for models that could not be identified or simulated on the record.
     test : Record or None
         The samples of the test.
+    earlier : tuple of Record
+        The records before it, where there are several.
     """
 
     record: Record
@@ -132,6 +134,7 @@ class Comparison:
     rows: tuple[ComparisonRow, ...]
     failed: Mapping[str, str] = field(default_factory=dict)
     test: Record | None = None
+    earlier: tuple[Record, ...] = ()
 
     def __getitem__(self, name: str) -> ComparisonRow:
         for row in self.rows:
@@ -159,6 +162,10 @@ class Comparison:
         return tuple(row for score, row in sorted(scores, key=lambda pair: pair[0]) if score == score)
 
     @property
+    def _y(self) -> FloatArray:
+        return np.concatenate([record.y for record in (*self.earlier, self.record)])
+
+    @property
     def winner(self) -> str | None:
         """The model with the smallest cross-validated rmse; None unless at least two models have one."""
         best = self.ranked()
@@ -175,7 +182,7 @@ class Comparison:
             best.cv_residual,
             {row.name: row.cv_rmse for row in others},
             best.cv_rmse,
-            span=float(np.ptp(self.record.y)),
+            span=float(np.ptp(self._y)),
             fitted=[row.name for row in others if row.n_parameters],
         )
 
@@ -204,7 +211,7 @@ class Comparison:
     @property
     def warnings(self) -> tuple[str, ...]:
         """Warnings, one sentence each: a constant output, unsafe laws, those of the best model, and swapped columns."""
-        constant = [CONSTANT] if np.ptp(self.record.y) == 0.0 else []
+        constant = [CONSTANT] if np.ptp(self._y) == 0.0 else []
         ranked = self.ranked() or self.ranked("rmse")
         every = [(row.name, each) for row in ranked for each in row.warnings]
         of_best = [f"{name}: {each}" for name, each in every if name == ranked[0].name and each != CONSTANT]
@@ -232,7 +239,8 @@ class Comparison:
         table = [["", *(column.heading for column in selected[1:])]]
         table += [[_printed(row[column.name], column.digits) for column in selected] for row in ordered[:_PRINTED]]
         more, many = len(ordered) - _PRINTED, len(ordered)
-        head = f"Comparison of {many} model{'' if many == 1 else 's'} on {self.record.name or 'a record'}, "
+        on = f"{len(self.earlier) + 1} records" if self.earlier else self.record.name or "a record"
+        head = f"Comparison of {many} model{'' if many == 1 else 's'} on {on}, "
         notes = [f"  ... and {more} more"] if more > 0 else []
         sentences = [
             f"Not compared: {', '.join(self.failed)}." if self.failed else "",
@@ -240,7 +248,7 @@ class Comparison:
             f"Warnings: {'; '.join(self.warnings)}" if self.warnings else "",
         ]
         notes += folded(" ".join(filter(None, sentences)), first="  ", indent="  ")
-        return summary_text([f"{head}{len(self.record)} samples", *(f"  {line}" for line in aligned(table)), *notes])
+        return summary_text([f"{head}{self._y.size} samples", *(f"  {line}" for line in aligned(table)), *notes])
 
     def to_html(self) -> str:
         """The short table for a notebook, and the verdict."""
@@ -295,7 +303,7 @@ class Comparison:
         method = "(signed ranks of left-out errors, 5 % after Holm's correction)"
         smaller = tuple(each.name for each in self.contrasts if each.contradicts)
         if similar := tuple(name for name in self.undecided if name not in smaller):
-            return f"{len(self.record)} samples show no significant difference to {_first(similar)} {method}"
+            return f"{self._y.size} samples show no significant difference to {_first(similar)} {method}"
         if any(math.isnan(each.probability) and not each.diverged for each in self.contrasts):
             return "the errors that would show a difference to the others are not all known"
         if smaller:

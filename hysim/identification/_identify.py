@@ -186,6 +186,8 @@ def identify(
         check_choice("weights", weights, ("energy",))
         if noise not in (None, "gaussian") or intervals != "linear" or cross_validate is not None:
             raise ValueError('weights="energy" goes with normal noise, linear intervals and no cross_validate')
+        if isinstance(model_or_class, Recorded):
+            raise ValueError('weights="energy" is for models whose output times input is a work, not for a structure')
     shares = None if energy else _weights(weights, records)
     if max_evaluations is not None:
         check_count("max_evaluations", max_evaluations)
@@ -280,11 +282,14 @@ def _searched(
         noise_model = noise_model.at_least(squares[0].cost, n_samples - len(problem.space.names))
     best = Search(problem, noise_model, seed, treatment)
     search, likely, named, remark = choose(best, best.likely(squares), admissible)
+    plain = squares[0].x if search is best else likely[0].theta[: problem.n_x]
     if energy:
         search, likely = search.on_energy(likely[0])
-        remark = "; ".join(filter(None, (remark, "the work along the records fits best")))
-    plain = squares[0].x if search is best else likely[0].theta[: problem.n_x]
     result, likely = search.described(likely, intervals, plain)
+    if energy and result.least_squares is not None:
+        possible = result.least_squares.fit_percent
+        said = f"the work fits best: the fit of y is {result.fit_percent:.4g} % where {possible:.4g} % is possible"
+        remark = "; ".join(filter(None, (remark, said)))
     message = "; ".join(filter(None, (result.message, remark, stages_in_words(problems, problem.stage))))
     optima = np.array([optimum.theta for optimum in likely])
     errors = left_out_errors(search.problem, noise_model, optima, folds)

@@ -160,7 +160,7 @@ class Identification(Stored):
     sigma, log_likelihood : float
         Most likely scale of the noise [unit of y], and the largest likelihood without constants.
     least_squares : Candidate or None
-        Optimum of the sum of squares, where the noise is not Gaussian.
+        Optimum of the sum of squares of y, where the noise is not Gaussian or the work is fitted.
     residual : array, shape (n,)
         Measured minus model, ``record.y - model.response(record.u)``, one record after the other [unit of y]. Of a
         `hysim.StructureRecord` its sensors one behind the other, each in units of its noise.

@@ -124,7 +124,7 @@ class Search:
                 known = self._uncertainty(likely[0])
                 curves, _ = self._profiles(likely, known)
         result = self._described(likely, known, intervals, curves)
-        if isinstance(self.noise, Gaussian):
+        if isinstance(self.noise, Gaussian) and not self.by_energy:
             return result, likely
         plain = self.candidate(self.problem.completed(least_squares[np.newaxis])[0])
         return replace(result, least_squares=plain), likely
