@@ -208,7 +208,8 @@ def condition(model: Any, known: Record) -> CoreField:
     """A core's law with its weights corrected by a stretch that is known, to predict what follows.
 
     A gain of all weights and a constant are free; each weight is then normal with a standard deviation of
-    `CoreField.spread` times that of the noise, and the most likely ones are those of a Bayesian update.
+    `CoreField.spread` times that of the noise, and the most likely ones are those of a Bayesian update. A stretch of
+    less than a cycle hardly tells a gain from a constant: the prediction may then be several times worse than without.
 
     Parameters
     ----------
