@@ -14,7 +14,7 @@ from hysim.models.dependent_structure import DependentStructure
 from hysim.models.model import family
 from hysim.models.parts import response_of
 from hysim.models.protocols import Numbered, Placeable, Responding, needs_time, placed
-from hysim.models.varying import ChannelPolynomial, response_along
+from hysim.models.varying import ChannelPolynomial, response_along, weights
 from hysim.records import Record
 
 _ROUNDING = 1e-9  # of a sample's number
@@ -217,7 +217,9 @@ class Dependent:
             warnings.warn(doubt, stacklevel=3)
 
     def _along(self, u: FloatArray, sample_time: float | None, values: Mapping[str, Any]) -> FloatArray:
-        series = {each.parameter: each.value(values[each.channel]) for each in self.polynomials}
+        kinds = {(each.at, each.channel) for each in self.polynomials}  # parameters have most of them in common
+        shares = {(at, channel): weights(at, values[channel]) for at, channel in kinds}
+        series = {each.parameter: shares[each.at, each.channel] @ np.array(each.values) for each in self.polynomials}
         for name, each in series.items():
             for value in (float(each.min()), float(each.max())):
                 self.law.with_scalars({name: value})  # which refuses what makes no law

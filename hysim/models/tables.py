@@ -89,10 +89,12 @@ def tables_of(
     }
     for name, column in columns.items():
         field, _, place = name.partition("[")
-        places = np.arange(tables[field].shape[1])
-        if int(place[:-1]) not in places:
-            raise ValueError(f"{name} is beyond the {places.size} numbers of {field}: give all of {field}")
-        tables[field] = np.where(places == int(place[:-1]), column, tables[field])
+        table, k = tables[field], int(place[:-1])
+        if not 0 <= k < table.shape[1]:
+            raise ValueError(f"{name} is beyond the {table.shape[1]} numbers of {field}: give all of {field}")
+        if not table.flags.writeable:  # the first of its numbers
+            tables[field] = table = np.array(table)
+        table[:, k] = column[:, 0]
     return tables, inputs
 
 

@@ -9,7 +9,7 @@ weights, see `condition`, by the spread that predicts best its rest. We chose th
 (experiments/59_cores.py).
 """
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
 from typing import Any, ClassVar, NamedTuple, Self
 
@@ -35,6 +35,7 @@ _LAGS = np.array([0.5, 4.0, 32.0])  # sample times: the first one is nearly the 
 _SMALLEST = 0.005  # threshold, of the largest flux density
 _MOST_OF_RANGE = 0.8  # so that samples remain, whose stops near the range itself differ little
 _MOST_FOLDS = 5
+_AT_ONCE = 50_000  # samples, to bound the memory
 Fold = npt.NDArray[np.intp]
 
 
@@ -187,8 +188,10 @@ class CoreField(TimedLaw):
 
     def terms(self, record: Record) -> FloatArray:
         """The factors of the weights at the samples of a record, shape (n_samples, n_weights)."""
-        state = self.memory(record.u, record.sample_time)
-        m, x = len(self.thresholds), record.u[:, np.newaxis] / self.size
+        return self._terms(record.u, self.memory(record.u, record.sample_time))
+
+    def _terms(self, u: FloatArray, state: FloatArray) -> FloatArray:
+        m, x = len(self.thresholds), u[:, np.newaxis] / self.size
         ahead = state[:, m:] / self.lag_sizes if self.lags else state[:, m:]
         stops = state[:, :m] / self.thresholds if m else state[:, :m]
         parts = np.hstack([stops, ahead, np.copysign(np.sqrt(np.abs(ahead)), ahead)])
@@ -276,7 +279,12 @@ class CoreFieldStructure:
         if np.count_nonzero(np.concatenate(shares)) < len(law.weights):
             raise ValueError(f"{cuts[-1]} samples tell too little of {len(law.weights)} weights: take fewer stops")
         folds = _folds([len(record) for record in records])
-        normal = _Normal.of((self._rows(law, at, record) for record in records), records, shares, folds)
+        of_records = zip(records, shares, folds, strict=True)
+        normal = _Normal.of(
+            (rows, record.y[k], share[k], own[k])
+            for record, share, own in of_records
+            for k, rows in self._rows(law, at, record)
+        )
         paths = [normal.solutions(fold)[0] for fold in range(len(normal.squares))]
         errors = [normal.errors(path, fold) for fold, path in enumerate(paths)]
         best = int(np.argmin(np.sum(errors, axis=0)))
@@ -288,7 +296,8 @@ class CoreFieldStructure:
         path, values, vectors = normal.solutions(None)
         model, damped = self._model(law, at, path[best]), values + normal.ridge(_STRENGTHS[best])
         half = vectors * np.sqrt(np.maximum(values, 0.0)) / damped
-        spread = [np.linalg.norm(self._rows(law, at, record) @ half, axis=1) for record in records]
+        pieces = (rows for record in records for _, rows in self._rows(law, at, record))
+        spread = [np.linalg.norm(rows @ half, axis=1) for rows in pieces]
         words = f"ridge of {_STRENGTHS[best]:.2g}, spread {law.spread:.2g} of the weights over the noise"
         return DirectFit((model,) * len(records), float(np.sum(values / damped)), np.concatenate(spread), words)
 
@@ -317,10 +326,14 @@ class CoreFieldStructure:
         """Whether a sample is past the share that is known."""
         return np.arange(len(record)) >= self.known * len(record)
 
-    def _rows(self, law: Any, at: tuple[float, ...], record: Record) -> FloatArray:
-        """The terms times the polynomials of the channel, (n, n_weights * n_places)."""
+    def _rows(self, law: Any, at: tuple[float, ...], record: Record) -> Iterator[tuple[slice, FloatArray]]:
+        """Some samples at a time, and their terms times the polynomials of the channel, (n, n_weights * n_places)."""
         along = np.broadcast_to(weights_at(at, self._channel(record)), (len(record), len(at)))
-        return np.asarray((law.terms(record)[..., np.newaxis] * along[:, np.newaxis]).reshape(len(record), -1))
+        state = law.memory(record.u, record.sample_time)
+        for first in range(0, len(record), _AT_ONCE):
+            k = slice(first, first + _AT_ONCE)
+            rows = law._terms(record.u[k], state[k])[..., np.newaxis] * along[k, np.newaxis]
+            yield k, rows.reshape(len(rows), -1)
 
     def _conditioned(
         self, law: Any, at: tuple[float, ...], record: Record, share: FloatArray, solution: FloatArray
@@ -373,18 +386,17 @@ class _Normal(NamedTuple):
     total: float
 
     @classmethod
-    def of(
-        cls, every: Iterable[FloatArray], records: Sequence[Record], shares: Sequence[FloatArray], folds: list[Fold]
-    ) -> "_Normal":
+    def of(cls, pieces: Iterable[tuple[FloatArray, FloatArray, FloatArray, Fold]]) -> "_Normal":
+        """Of rows (n, n_weights), outputs, shares and folds (n,), some samples at a time."""
         sums: dict[int, Any] = {}
-        for rows, record, share, own in zip(every, records, shares, folds, strict=True):
+        for rows, y, share, own in pieces:
             for fold in np.unique(own).tolist():
                 k = own == fold
-                some, y, weighted = rows[k], record.y[k], rows[k] * share[k, np.newaxis]
-                added = weighted.T @ some, weighted.T @ y, share[k] @ y**2
-                sums[fold] = [old + new for old, new in zip(sums.get(fold, (0.0,) * 3), added, strict=True)]
-        gram, right, squares = (np.array([sums[fold][k] for fold in sorted(sums)]) for k in range(3))
-        return cls(gram, right, squares, float(np.concatenate(shares).sum()))
+                some, weighted = rows[k], rows[k] * share[k, np.newaxis]
+                added = weighted.T @ some, weighted.T @ y[k], share[k] @ y[k] ** 2, share[k].sum()
+                sums[fold] = [old + new for old, new in zip(sums.get(fold, (0.0,) * 4), added, strict=True)]
+        gram, right, squares, total = (np.array([sums[fold][k] for fold in sorted(sums)]) for k in range(4))
+        return cls(gram, right, squares, float(total.sum()))
 
     def ridge(self, strength: npt.ArrayLike) -> FloatArray:
         return np.asarray(np.asarray(strength) * self.total)
