@@ -219,7 +219,8 @@ class Linear:
 
     def units(self, columns: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Unit of each parameter, and centre and standard deviation of its prior in units, (n_sets, n_linear)."""
-        low, high = columns.min(axis=1), columns.max(axis=1)
+        along = np.ascontiguousarray(np.swapaxes(columns, 1, 2))  # in which extremes take a fifth of the time
+        low, high = along.min(axis=2), along.max(axis=2)
         size = np.maximum(np.abs(low), np.abs(high))
         is_level = high - low <= _LEVEL * size
         scale = np.where(is_level, size, high - low)

@@ -71,7 +71,7 @@ _LARGEST = 1e100  # beyond it squares of squares overflow: such a set has diverg
 
 
 class Columns(NamedTuple):
-    """Regression: columns in the units of the prior, the target without them, these units, and which diverged."""
+    """Regression: columns, the target without them, the units of the prior, and which diverged."""
 
     columns: FloatArray  # (n_sets, n_samples, n_linear)
     target: FloatArray  # (n_sets, n_samples)
@@ -214,7 +214,7 @@ class Target:
         return self._log_likelihood(parts, w, sigma) + self.b_prior.log_density(w, parts.units) + log_volume
 
     def _log_likelihood(self, parts: Columns, w: FloatArray, sigma: FloatArray) -> FloatArray:
-        residual = parts.target - (parts.columns @ w[..., np.newaxis])[..., 0]
+        residual = parts.target - (parts.columns @ (w * parts.units[0])[..., np.newaxis])[..., 0]
         return np.where(parts.is_lost, -np.inf, self.noise.log_likelihood(residual, sigma))
 
     def _columns(self, x: FloatArray) -> Columns:
@@ -224,8 +224,7 @@ class Target:
         with np.errstate(invalid="ignore"):
             is_lost = ~((np.abs(columns) < _LARGEST).all(axis=(1, 2)) & (np.abs(target) < _LARGEST).all(axis=1))
         columns[is_lost], target[is_lost] = 0.0, 0.0
-        units = self.b_prior.units(columns)
-        return Columns(columns * units[0][:, np.newaxis], target, units, np.asarray(is_lost))
+        return Columns(columns, target, self.b_prior.units(columns), np.asarray(is_lost))
 
     def _split(self, x: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Columns and fixed part; sets that the family refuses are not finite."""
@@ -241,14 +240,14 @@ class Target:
 
     def _regression(self, parts: Columns, sigma: FloatArray) -> tuple[FloatArray, FloatArray]:
         """The triangle R (n_sets, n_linear, n_linear) and Q^T times the right side (n_sets, n_linear)."""
-        _, centre, spread = parts.units
-        weight = 1.0 / self.noise.spread(sigma)
-        n_sets, n_samples, n = parts.columns.shape
-        both = np.zeros((n_sets, n_samples + n, n + 1))
-        both[:, :n_samples, :n] = parts.columns * weight[:, np.newaxis, np.newaxis]
-        both[:, :n_samples, n] = parts.target * weight[:, np.newaxis]
-        both[:, n_samples + np.arange(n), np.arange(n)] = 1.0 / spread
-        both[:, n_samples:, n] = centre / spread
+        unit, centre, spread = parts.units
+        n_sets, n = unit.shape
+        scale = np.column_stack([unit, np.ones(n_sets)]) / self.noise.spread(sigma)[:, np.newaxis]
+        likely = np.linalg.qr(np.concatenate([parts.columns, parts.target[..., np.newaxis]], axis=2), mode="r")
+        both = np.zeros((n_sets, likely.shape[1] + n, n + 1))
+        both[:, :-n] = likely * scale[:, np.newaxis]
+        both[:, -n + np.arange(n), np.arange(n)] = 1.0 / spread
+        both[:, -n:, n] = centre / spread
         rows = np.asarray(np.linalg.qr(both, mode="r"))
         return rows[:, :n, :n], rows[:, :n, n]
 
