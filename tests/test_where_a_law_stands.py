@@ -80,8 +80,10 @@ def test_an_inverse_begins_where_the_law_stands(law):
     np.testing.assert_allclose(placed.response(placed.inverse_response(y)), y, rtol=0, atol=1e-9)
     inverse = hs.InverseFeedforward(law=placed)
     assert inverse.u0 == 0.7
-    step, parameters, state = inverse.compiled(1.0, 0.7)
-    commands = [step(parameters, state, wanted, 0.0) for wanted in y.tolist()]
+    state, commands = inverse.initial(1.0), []
+    for wanted in y.tolist():
+        command, state = inverse.step(state, wanted, 0.0)
+        commands.append(command)
     np.testing.assert_allclose(placed.response(commands), y, rtol=0, atol=1e-9)
 
 
@@ -122,12 +124,17 @@ def test_parts_stand_where_their_inputs_are():
 
 @needs_compiler
 @pytest.mark.parametrize("name", ["BoucWen", "BoucWen, any exponent", "PrandtlIshlinskii", "Preisach"])
-def test_c_and_python_begin_alike(name, tmp_path):
+def test_c_and_python_begin_alike(name, tmp_path, shell):
     law = LAWS[name].placed(0.7)
     y = law.response(U)
+    hs.save(law, tmp_path / "law.json")
     for thing, inputs, expected in ((law, U, y), (hs.InverseFeedforward(law=law), y, law.inverse_response(y))):
-        in_c = printed_by_main(hs.to_c(thing, name="stack"), tmp_path, inputs)
+        code = hs.to_c(thing, name="stack")
+        in_c = printed_by_main(code, tmp_path, inputs)
         np.testing.assert_allclose(in_c, expected, rtol=0, atol=1e-9)
+        inverse = ["--inverse"] if thing is not law else []
+        assert shell("c", tmp_path / "law.json", *inverse, "--out", tmp_path / "stack.c")[0] == 0
+        assert (tmp_path / "stack.c").read_text() == code.source
 
 
 def test_a_loop_begins_where_the_law_stands():
@@ -137,6 +144,7 @@ def test_a_loop_begins_where_the_law_stands():
     assert run.conditions["u0"] == 0.7
     np.testing.assert_allclose(run.command, 0.7, atol=1e-12)  # it stands still where it began
     assert hs.close_loop(law, hs.PID(ki=5.0), t, np.zeros(50), u0=0.0).conditions["u0"] == 0.0
+    assert hs.control.RestingPlant(law, 0.01).u0 == 0.7
 
 
 def test_an_input_beyond_the_identified_range_is_warned_of():

@@ -147,7 +147,7 @@ def c(
     out: options.Source,
     inverse: bool = False,
     sample_time: options.Positive | None = None,
-    u0: float = 0.0,
+    u0: float | None = None,
 ) -> None:
     """Write a model, or its inverse, as C99 for the device that it runs on.
 
@@ -161,7 +161,7 @@ def c(
     out : the source; the other files stand beside it
     inverse : the inverse of the law: the input that gives a wanted output
     sample_time : time between two samples of a plant, or of a law that depends on time [s]
-    u0 : input at rest, at which an inverse starts [unit of u]
+    u0 : input at which it starts (default: where the law in the file stands) [unit of u]
 
     Examples
     --------
@@ -192,8 +192,8 @@ def fmu(
     sample_time: options.Positive | None = None,
     name: str | None = None,
     units: options.Units | None = None,
-    u0: float = 0.0,
-    y0: float = 0.0,
+    u0: float | None = None,
+    y0: float | None = None,
     platforms: Annotated[tuple[Platform, ...], options.Value("PLATFORMS", _platforms)] | None = None,
 ) -> None:
     """Write a model as a functional mock-up unit for Simulink, Modelica and other tools.
@@ -209,8 +209,9 @@ def fmu(
     sample_time : time between two samples of a plant or a controller [s]
     name : name of the model, a name in C (default: that of its class)
     units : unit of u or y, such as u=V (default: those in the model's file)
-    u0 : input at which a law rests before the simulation, command at which a controller starts [unit of u]
-    y0 : displacement at which a controller starts [unit of y]
+    u0 : input of a law, or command of a controller, before the simulation (default: where the law in the file stands)
+        [unit of u]
+    y0 : displacement at which a controller starts (default: at rest) [unit of y]
     platforms : linux, windows, mac, with commas between them, for which it holds a shared library, or none (default:
         this machine, if it has a C compiler)
 

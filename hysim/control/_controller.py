@@ -19,7 +19,7 @@ from scipy.linalg import block_diag
 from hysim._basics.frozen import FloatArray, Interval, NotNegative, read_only, vectors
 from hysim.kernels import controllers as kernels
 from hysim.models.model import family
-from hysim.models.protocols import CompiledController, positive_time
+from hysim.models.protocols import CompiledController, positive_time, standing
 
 
 @runtime_checkable
@@ -120,9 +120,12 @@ class SteppedController(ABC):
         """Samples by which the reference must be known ahead of its time."""
         return 0
 
-    def initial(self, sample_time: float, u: float = 0.0, y: float = 0.0) -> CompiledController:
-        """State to `step` from, at rest at a command and a displacement; ValueError for a bad sample time [s]."""
-        return begun(self, sample_time, u, y)
+    def initial(self, sample_time: float, u: float | None = None, y: float = 0.0) -> CompiledController:
+        """State to `step` from, at rest at a command and a displacement; ValueError for a bad sample time [s].
+
+        By default the command is that at which the law of the controller stands, or zero.
+        """
+        return begun(self, sample_time, standing(self, u), y)
 
     def step(self, state: CompiledController, reference: float, measurement: float) -> tuple[float, CompiledController]:
         """Command for one sample, the same bits as in a loop, and the state after it; `state` does not change.

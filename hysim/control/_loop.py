@@ -255,13 +255,14 @@ def around(
 
 
 class RestingPlant:
-    """A sampled actuator, or a structure in its place, at rest at the command `u0`, from which every loop starts."""
+    """A sampled actuator, law or structure, at rest at the command `u0`, from which every loop starts."""
 
     def __init__(
         self, plant: Any, sample_time: float, u0: float | None = None, substeps: int | None = None, chain: Any = None
     ) -> None:
-        self.plant, self.sample_time, self.u0 = plant, sample_time, standing(plant, u0)
-        self.chain = plant.chain(sample_time, substeps) if chain is None else chain
+        self.plant = plant if isinstance(plant, Structure) else as_actuator(plant)
+        self.sample_time, self.u0 = sample_time, standing(self.plant, u0)
+        self.chain = self.plant.chain(sample_time, substeps) if chain is None else chain
         self.state = self.chain.rest(self.u0)
         self.y0 = self.chain.displacement(self.state)
 
