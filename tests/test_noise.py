@@ -87,6 +87,14 @@ def test_quanta_far_below_the_noise_change_nothing():
         np.testing.assert_allclose(mine, other, rtol=1e-6)
 
 
+def test_robust_standard_errors_are_those_of_the_information():
+    """That of Student's t on the location is (nu + 1) / (nu + 3) / sigma^2; the descent's weights sum up to more."""
+    rng, u = np.random.default_rng(4), np.linspace(-1.0, 1.0, 200)
+    fit = hs.identify(hs.Line, hs.Record(u=u, y=0.3 + 2.0 * u + 0.1 * rng.standard_t(4, u.size)), noise="robust")
+    expected = fit.sigma * np.sqrt(7.0 / 5.0 * u.size / (u.size - 2)) / np.linalg.norm(u - u.mean())
+    assert fit.stderr["slope"] == pytest.approx(expected, rel=1e-6)
+
+
 def test_one_outlier_does_not_move_the_robust_optimum():
     u = np.concatenate([hs.signals.triangle(-1.0, 1.0, cycles=2, samples_per_cycle=40), [-0.4, 0.3, -0.2, 0.9]])
     law = hs.BoucWen(beta=1.4, gamma=-0.6, feedthrough=0.7, gain=-0.5, z0=0.1)

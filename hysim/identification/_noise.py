@@ -33,7 +33,10 @@ Scale = float | FloatArray
 
 
 class Terms(NamedTuple):
-    """-ln p of each sample, its slope and its curvature in the model's output, (n_sets, n_samples)."""
+    """-ln p of each sample, its slope and its curvature in the model's output, (n_sets, n_samples).
+
+    For outliers the curvature is that of a parabola above the loss, which a descent may trust.
+    """
 
     loss: FloatArray
     slope: FloatArray

@@ -11,7 +11,7 @@ from hysim._basics.frozen import FloatArray
 from hysim.identification._assumptions import Treated
 from hysim.identification._descent import Descent
 from hysim.identification._diagnostics import bootstrap, fit_measures, loop_widths, width_stderr
-from hysim.identification._noise import Gaussian, Noise, Quantised
+from hysim.identification._noise import Gaussian, Noise, Quantised, Robust
 from hysim.identification._problem import Problem
 from hysim.identification._profile import Profile, profiles, threshold
 from hysim.identification._result import Candidate, Identification, Width
@@ -132,6 +132,8 @@ class Search:
     def _uncertainty(self, best: LocalOptimum) -> Uncertainty:
         residual, sigma = self.residual(best.theta)[np.newaxis], np.full((1, 1), best.sigma)
         curvature = self.noise.terms(residual, sigma).curvature[0]
+        if isinstance(self.noise, Robust):  # the information of each sample, which is less
+            curvature = np.broadcast_to(self.noise.spread(sigma)[0] ** -2.0, curvature.shape)
         known = uncertainty(self.problem, best.theta, curvature)
         if known.slopes is None or not (self.by_energy or self.treatment.noises):
             return known
