@@ -87,6 +87,20 @@ def test_quanta_far_below_the_noise_change_nothing():
         np.testing.assert_allclose(mine, other, rtol=1e-6)
 
 
+@pytest.mark.parametrize("family", [hs.PrandtlIshlinskii, hs.Duhem])
+def test_an_output_without_weight_changes_nothing(family):
+    """Neither the box of a search nor a measure of the fit."""
+    rng, u = np.random.default_rng(3), hs.signals.decaying_sine(3.0, cycles=3, samples_per_cycle=60)
+    y = hs.BoucWen(beta=0.5, gamma=0.2, feedthrough=0.6, gain=1.5).response(u) + 0.02 * rng.standard_normal(u.size)
+    weights, wrong = np.ones(u.size), y.copy()
+    weights[33], wrong[33] = 0.0, 1e9
+    fits = [hs.identify(family, hs.Record(u=u, y=each), weights=weights, cross_validate=5) for each in (y, wrong)]
+    assert fits[0].estimates == fits[1].estimates
+    assert fits[0].cv_rmse == fits[1].cv_rmse
+    assert str(fits[0]) == str(fits[1])
+    assert fits[1].residual[33] == pytest.approx(1e9)
+
+
 def test_robust_standard_errors_are_those_of_the_information():
     """That of Student's t on the location is (nu + 1) / (nu + 3) / sigma^2; the descent's weights sum up to more."""
     rng, u = np.random.default_rng(4), np.linspace(-1.0, 1.0, 200)

@@ -122,6 +122,22 @@ def test_rounded_values_have_the_probability_of_their_interval(sigma):
             assert value == pytest.approx(direct, rel=1e-6)
 
 
+def test_weights_and_bounds_of_a_fit_are_those_of_its_posterior():
+    """Samples of weight zero have no say, others that of their weight, and a bound is the end of a flat prior."""
+    rng, u = np.random.default_rng(3), hs.signals.triangle(-1.0, 1.0, cycles=4, samples_per_cycle=40)
+    weights = np.where(np.arange(u.size) < 100, 1.0, 0.0)
+    y = 2.0 * u + 0.3 + np.where(weights > 0.0, 0.0, 3.0) + 0.01 * rng.standard_normal(u.size)
+    record, part = hs.Record(u=u, y=y), hs.Record(u=u[:100], y=y[:100])
+    for shares in (weights, np.where(u > 0.0, 4.0, 1.0) * weights):
+        fit = hs.identify(hs.Line, record, weights=shares)
+        post = hs.sample_posterior(fit, record, samples=1000)
+        assert post.mean["offset"] == pytest.approx(fit.estimates["offset"], abs=0.2 * fit.stderr["offset"])
+        assert np.std(post.samples["slope"]) == pytest.approx(fit.stderr["slope"], rel=0.15)
+    assert_refused("are for noise=", hs.sample_posterior, fit, record, noise="robust")
+    bounded = hs.identify(hs.Line, part, bounds={"slope": (2.01, 3.0)})
+    assert hs.sample_posterior(bounded, part, samples=400).samples["slope"].min() >= 2.01
+
+
 @pytest.mark.parametrize(("name", "law"), [("gaussian", stats.norm), ("robust", stats.t(4.0))])
 def test_densities_are_those_of_scipy(name, law):
     rng = np.random.default_rng(0)

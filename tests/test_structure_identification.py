@@ -110,6 +110,8 @@ def test_sensors_weigh_by_their_noise_and_standard_errors_are_honest():
         assert np.sqrt(np.mean(residual**2)) == pytest.approx(1.0, rel=0.05)  # the second weighing changes little
     for name in free:
         assert abs(fit.estimates[name] - structure.scalars[name]) < 4.0 * fit.stderr[name]
+    parted = hs.identify(structure, rec, free=["damping"], weights=np.where(rec.t < rec.t[80], 1.0, 0.0))
+    assert [np.count_nonzero(each) for each in np.split(parted.weights, 2)] == [80, 80]  # for both sensors
     alone = hs.identify(begun(structure, free, 0.2), replace(rec, drift=None), free=free)
     assert fit.stderr["elements.0.gain"] < alone.stderr["elements.0.gain"]
 

@@ -151,7 +151,10 @@ def _cycles(records: Sequence[Record], cuts: Sequence[int]) -> list[npt.NDArray[
 def left_out_errors(
     problem: Problem, noise: Noise, optima: FloatArray, every_fold: Sequence[npt.NDArray[np.intp]]
 ) -> FloatArray:
-    """Error of each sample, shape (n,), in the fit that leaves it out; nan without such a fit, inf if it diverged."""
+    """Error of each sample, shape (n,), in the fit that leaves it out; inf if it diverged.
+
+    It is nan without such a fit, and of samples that have no weight in any.
+    """
     errors_of_all = np.full(problem.y.size, np.nan)
     if not every_fold:
         return errors_of_all
@@ -160,6 +163,7 @@ def left_out_errors(
     groups = [every_fold[k : k + at_once] for k in range(0, len(every_fold), at_once)]
     errors = [_left_out_errors(problem, noise, starts, group) for group in groups]
     errors_of_all[np.concatenate(every_fold)] = np.concatenate(errors)
+    errors_of_all[problem.weights == 0.0] = np.nan
     return errors_of_all
 
 

@@ -34,7 +34,17 @@ from hysim.models.by_structure import searched
 from hysim.models.dependent import Dependent, on_record
 from hysim.models.dependent_structure import DependentStructure
 from hysim.models.model import family_named, is_identifiable
-from hysim.models.protocols import Direct, Identifiable, Offering, PartByPart, Placeable, Recorded, needs_time, placed
+from hysim.models.protocols import (
+    Direct,
+    Identifiable,
+    Offering,
+    PartByPart,
+    Placeable,
+    Recorded,
+    Rescalable,
+    needs_time,
+    placed,
+)
 from hysim.models.search_space import Freedom
 from hysim.records import Record, several
 
@@ -116,6 +126,7 @@ def identify(
         returned: ``"unrestricted"``, or ``"admissible"``.
     weights : array, shape (n,), or one for each record, or "energy", optional
         Weight of each sample in the sum of squares, not negative; 0 leaves it out. Only ratios count; inputs are kept.
+        Those of a `hysim.StructureRecord` are for each time, and count for all its sensors.
         ``"energy"`` takes the squared error of the work from the first sample, the integral of y du, in place of that
         of y. It is searched for from the optimum for y; the intervals are those for independent errors of y.
     max_evaluations : int, optional
@@ -205,9 +216,10 @@ def identify(
                 fit = _marked(fit, danger(off, records, None), admissible)
         else:
             family, ends, is_cut = placed(_family(model_or_class, depends), None), None, False
-            setting = Setting(records, options, initial, shares, max_evaluations, seed)
+            searched_on = _without_left_out(records, shares)
+            setting = Setting(searched_on, options, initial, shares, max_evaluations, seed)
             if isinstance(family, DependentStructure):
-                family = begun(family.over(records), setting)
+                family = begun(family.over(searched_on), setting)
             treatment = treated(family, setting, input)
             along = replace(setting, records=treatment.records)
             if isinstance(family, PartByPart):
@@ -233,11 +245,12 @@ def identify(
             if not any(doubts) and not is_partial and not needs_time(fit.model):
                 doubts = [swapped_for(first.family, setting, 1.0 - fit.fit_percent / 100.0)]
             on_their_records = [on_record(each, record) for each, record in zip(fit.models, records, strict=True)]
-            off = excursion(on_their_records, records)
+            off = excursion(on_their_records, searched_on)
             worse = "the fit is negative: the mean of y predicts it better" if fit.fit_percent < 0.0 else ""
             doubts += [implausible(off), rate_noise_warning(on_their_records, records), worse]
-            fit = _marked(fit, danger(off, records, fit.regions.get("admissible")), admissible)
-        return replace(fit, warnings=(*fit.warnings, *filter(None, doubts))) if any(doubts) else fit
+            fit = _marked(fit, danger(off, searched_on, fit.regions.get("admissible")), admissible)
+        given = {} if shares is None else {"weights": np.concatenate(shares)}
+        return replace(fit, warnings=(*fit.warnings, *filter(None, doubts)), bounds=options.bounds, **given)
 
 
 def _refuse_for_any(subject: Any, options: Mapping[str, Any]) -> None:
@@ -302,15 +315,29 @@ def _weights(weights: Any, records: Sequence[Record]) -> list[FloatArray] | None
         return None
     single = len(records) == 1 and np.ndim(weights[0]) == 0
     shares = [read_only(each, "weights", ndim=1) for each in ([weights] if single else weights)]
-    if [each.size for each in shares] != [len(record) for record in records]:
+    sizes = [each.input.size if isinstance(each, Rescalable) else len(each) for each in records]
+    if [each.size for each in shares] != sizes:
         raise ValueError(
-            f"weights must hold one number for each sample, {', '.join(str(len(record)) for record in records)}; "
+            f"weights must hold one number for each sample, {', '.join(map(str, sizes))}; "
             f"got {', '.join(str(each.size) for each in shares)}"
         )
+    shares = [np.tile(each, len(record) // each.size) for each, record in zip(shares, records, strict=True)]
     every = np.concatenate(shares)
     if (every < 0.0).any() or not every.any():
         raise ValueError(f"weights must not be negative, and not all zero, got {every.min():g}")
     return shares
+
+
+def _without_left_out(records: Sequence[Record], shares: Sequence[FloatArray] | None) -> Sequence[Record]:
+    """Records whose outputs of weight zero are on a line between their neighbours, so that they scale no search."""
+    if shares is None or not all(type(record) is Record for record in records):
+        return records
+    filled = []
+    for record, share in zip(records, shares, strict=True):
+        kept = np.flatnonzero(share)
+        y = record.y if kept.size in (0, share.size) else np.interp(np.arange(share.size), kept, record.y[kept])
+        filled.append(replace(record, y=y))
+    return filled
 
 
 def _freedom(fixed: Mapping[str, float], free: Sequence[str], bounds: Mapping[str, tuple[float, float]]) -> Freedom:

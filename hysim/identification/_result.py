@@ -194,6 +194,10 @@ class Identification(Stored):
         First line of the summary where the law is not safe on smaller cycles within its record's range; else empty.
     choice : Choice, optional
         The families that were tried, where none was given.
+    weights : array, shape (n,)
+        Weights of the samples as they were given; empty without.
+    bounds : mapping
+        Bounds of parameters as they were given.
     """
 
     json_name = "identification"
@@ -235,6 +239,8 @@ class Identification(Stored):
     warnings: tuple[str, ...] = ()
     unsafe: str = ""
     choice: Choice | None = None
+    weights: FloatArray = field(default_factory=lambda: np.empty(0))
+    bounds: Mapping[str, tuple[float, float]] = field(default_factory=dict)
 
     @property
     def family(self) -> str:
@@ -335,7 +341,8 @@ class Identification(Stored):
         return "" if self.success or self.unsafe else f", NOT converged: {self.message.partition('; ')[0]}"
 
     def _residual_in_words(self) -> str:
-        largest = float(np.abs(self.residual).max())
+        counted = self.residual[self.weights > 0.0] if self.weights.size else self.residual
+        largest = float(np.abs(counted).max())
         words = [f"largest {largest:.4g}"]
         if self.resolution is not None:
             words = [f"largest {largest / self.resolution:.2f} quanta, rms {self.rmse / self.resolution:.2f}"]

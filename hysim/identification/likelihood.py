@@ -40,7 +40,8 @@ def again(fit: Identification, records: Sequence[Record], bounds: Bounds, initia
     models = [without_filter(each, [])[0] for each in fit.models] if len(fit.models) == len(records) else [model]
     _check_same(fit, plain, [problem(each, paths, freedom, initial).own.starts[0] for each in models])
     inner = _inner(bounds, plain)
-    return problem(model, paths, replace(freedom, bounds=inner), initial) if inner else plain
+    within = problem(model, paths, replace(freedom, bounds=inner), initial) if inner else plain
+    return within.weighted(np.split(fit.weights, plain.cuts[1:-1])) if fit.weights.size else within
 
 
 def optima(fit: Identification, known: Problem, bounds: Bounds, initial: Initial) -> FloatArray:

@@ -354,7 +354,11 @@ class Recorded(Protocol):
 
 @runtime_checkable
 class Rescalable(Protocol):
-    """A record whose outputs are of several sensors, in units of their noise."""
+    """A record whose outputs are of several sensors, one after the other, in units of their noise."""
+
+    @property
+    def input(self) -> FloatArray:
+        """The input once, which all of them share."""
 
     def noise(self, residual: FloatArray) -> FloatArray:
         """Size of this residual (n,) at each sensor, shape (n_sensors,)."""

@@ -23,9 +23,11 @@ normal. All is computed by logarithms, so that ends may lie far out on one side.
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
+import numpy.typing as npt
 from scipy.special import log_ndtr, ndtr, ndtri, ndtri_exp
 
 from hysim._basics.frozen import FloatArray
@@ -91,6 +93,14 @@ class Target:
     sigma_given: Given | None
     evaluations: int = field(default=0)
     optima: FloatArray = field(default_factory=lambda: np.empty((0, 0)))
+
+    @cached_property
+    def _counted(self) -> tuple[npt.NDArray[np.intp], FloatArray] | None:
+        """Samples that have a weight, and its root relative to their mean; None if all have the same."""
+        weights = self.problem.weights
+        kept = np.flatnonzero(weights)
+        root = np.sqrt(weights[kept] / weights[kept].mean())
+        return None if kept.size == weights.size and np.ptp(root) == 0.0 else (kept, root)
 
     @property
     def n_x(self) -> int:
@@ -221,6 +231,9 @@ class Target:
         self.evaluations += len(x)
         columns, fixed = self._split(x)
         target = self.problem.y - fixed
+        if self._counted is not None:
+            kept, root = self._counted
+            columns, target = columns[:, kept] * root[:, np.newaxis], target[:, kept] * root
         with np.errstate(invalid="ignore"):
             is_lost = ~((np.abs(columns) < _LARGEST).all(axis=(1, 2)) & (np.abs(target) < _LARGEST).all(axis=1))
         columns[is_lost], target[is_lost] = 0.0, 0.0
