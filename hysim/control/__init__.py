@@ -1,44 +1,36 @@
 """Controllers, the loops they close, and measures of these loops."""
 
-from hysim.control._adaptive import AdaptiveInverse as AdaptiveInverse
-from hysim.control._assessment import HysteresisAssessment as HysteresisAssessment
-from hysim.control._assessment import LoopAssessment as LoopAssessment
-from hysim.control._assessment import OpenLoop as OpenLoop
-from hysim.control._assessment import SquareWaveAssessment as SquareWaveAssessment
-from hysim.control._assessment import StepAssessment as StepAssessment
-from hysim.control._assessment import assess_hysteresis as assess_hysteresis
-from hysim.control._assessment import assess_loop as assess_loop
-from hysim.control._assessment import assess_square_wave as assess_square_wave
-from hysim.control._assessment import assess_step as assess_step
-from hysim.control._assessment import driven_by as driven_by
-from hysim.control._assessment import open_loop as open_loop
-from hysim.control._controller import PID as PID
-from hysim.control._controller import Controller as Controller
-from hysim.control._controller import begun as begun
-from hysim.control._controller import held_samples as held_samples
-from hysim.control._controller import preview as preview
-from hysim.control._filters import DampingLoop as DampingLoop
-from hysim.control._filters import ModeInverse as ModeInverse
-from hysim.control._filters import Notch as Notch
-from hysim.control._filters import Shaper as Shaper
-from hysim.control._learning import IterativeLearning as IterativeLearning
-from hysim.control._learning import LearnedTrials as LearnedTrials
-from hysim.control._learning import RepetitiveControl as RepetitiveControl
-from hysim.control._loop import ClosedLoop as ClosedLoop
-from hysim.control._loop import RestingPlant as RestingPlant
-from hysim.control._loop import as_actuator as as_actuator
-from hysim.control._loop import close_loop as close_loop
-from hysim.control._loop import secant_gain as secant_gain
-from hysim.control._loop import slopes as slopes
-from hysim.control._loop_shaping import LinearController as LinearController
-from hysim.control._loop_shaping import loop_shaping as loop_shaping
-from hysim.control._predictive import PredictiveControl as PredictiveControl
-from hysim.control._stability import LinearLoop as LinearLoop
-from hysim.control._stability import bandwidth as bandwidth
-from hysim.control._stability import later as later
-from hysim.control._to_control import to_control as to_control
-from hysim.control._tracking import InverseFeedforward as InverseFeedforward
-from hysim.control._tracking import TrackingController as TrackingController
-from hysim.control._tune import Trial as Trial
-from hysim.control._tune import Tuning as Tuning
-from hysim.control._tune import tune as tune
+from hysim.control._adaptive import AdaptiveInverse
+from hysim.control._assessment import (
+    HysteresisAssessment,
+    LoopAssessment,
+    OpenLoop,
+    SquareWaveAssessment,
+    StepAssessment,
+    assess_hysteresis,
+    assess_loop,
+    assess_square_wave,
+    assess_step,
+    driven_by,
+    open_loop,
+)
+from hysim.control._controller import PID, Controller, begun, held_samples, preview
+from hysim.control._filters import DampingLoop, ModeInverse, Notch, Shaper
+from hysim.control._learning import IterativeLearning, LearnedTrials, RepetitiveControl
+from hysim.control._loop import ClosedLoop, RestingPlant, as_actuator, close_loop, secant_gain, slopes
+from hysim.control._loop_shaping import LinearController, loop_shaping
+from hysim.control._predictive import PredictiveControl
+from hysim.control._stability import LinearLoop, bandwidth, later
+from hysim.control._to_control import to_control
+from hysim.control._tracking import InverseFeedforward, TrackingController
+from hysim.control._tune import Trial, Tuning, tune
+
+__all__ = [
+    "PID", "AdaptiveInverse", "ClosedLoop", "Controller", "DampingLoop", "HysteresisAssessment",
+    "InverseFeedforward", "IterativeLearning", "LearnedTrials", "LinearController", "LinearLoop", "LoopAssessment",
+    "ModeInverse", "Notch", "OpenLoop", "PredictiveControl", "RepetitiveControl", "RestingPlant", "Shaper",
+    "SquareWaveAssessment", "StepAssessment", "TrackingController", "Trial", "Tuning", "as_actuator",
+    "assess_hysteresis", "assess_loop", "assess_square_wave", "assess_step", "bandwidth", "begun", "close_loop",
+    "driven_by", "held_samples", "later", "loop_shaping", "open_loop", "preview", "secant_gain", "slopes",
+    "to_control", "tune",
+]  # fmt: skip

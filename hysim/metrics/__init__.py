@@ -14,26 +14,8 @@ from hysim.metrics._responses import (
 from hysim.metrics.criteria import aic, bic, fit_percent, fpe, nrmse, rmse
 
 __all__ = [
-    "CycleMetrics",
-    "LoopMetrics",
-    "MagneticMetrics",
-    "Steinmetz",
-    "StepMetrics",
-    "VibrationReduction",
-    "aic",
-    "bic",
-    "cycle_metrics",
-    "describing_function",
-    "fit_percent",
-    "fpe",
-    "loop_metrics",
-    "magnetic_metrics",
-    "normalised_energy_error",
-    "nrmse",
-    "reduction_percent",
-    "rmse",
-    "sequence_relative_error",
-    "step_metrics",
-    "vibration_reduction",
-    "width_rmse",
-]
+    "CycleMetrics", "LoopMetrics", "MagneticMetrics", "Steinmetz", "StepMetrics", "VibrationReduction", "aic",
+    "bic", "cycle_metrics", "describing_function", "fit_percent", "fpe", "loop_metrics", "magnetic_metrics",
+    "normalised_energy_error", "nrmse", "reduction_percent", "rmse", "sequence_relative_error", "step_metrics",
+    "vibration_reduction", "width_rmse",
+]  # fmt: skip
