@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy.linalg import eigh
 
-from hysim._basics.frozen import FloatArray, read_only, whole_substeps
+from hysim._basics.frozen import Count, FloatArray, checked, read_only, whole_substeps
 from hysim.kernels.stepping import START
 from hysim.kernels.structure_ensembles import fill_slopes, fill_structure, start_motion
 from hysim.kernels.structure_flows import N_POWERS
@@ -216,19 +216,20 @@ def uncertainty(errors: FloatArray, peaks: FloatArray) -> FloatArray:
     return np.asarray(shares.max(axis=1, initial=0.0))
 
 
+@checked
 class AssembledStructure:
     """Masses on elements: their matrices, their small motions at the start, and the places of their outputs."""
 
     mass: FloatArray
-    damping: Any
-    stiffness: FloatArray
-    elements: Any
-    excitation: Literal["base", "force"]
-    influence: tuple[float, ...]
-    output: str
-    substeps: int | None
-    tolerance: float
-    initial_state: tuple[float, ...]
+    damping: Any = 0.0
+    stiffness: FloatArray = 0.0  # type: ignore[assignment]
+    elements: Any = ()
+    excitation: Literal["base", "force"] = "base"
+    influence: tuple[float, ...] = ()
+    output: str = "displacement"
+    substeps: Count | None = None
+    tolerance: float = 1e-8
+    initial_state: tuple[float, ...] = ()
 
     @cached_property
     def n_nodes(self) -> int:

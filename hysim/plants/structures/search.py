@@ -240,8 +240,7 @@ class SearchedStructure(MovingStructure, Subject):
     def _strokes(self, record: Record) -> FloatArray | None:
         """Largest drift of each element at the start, (n_elements,); None if the motion diverges."""
         try:
-            structure: Any = self
-            coarse = replace(structure, substeps=self.search_substeps(record.sample_time))
+            coarse = replace(self, substeps=self.search_substeps(record.sample_time))
             return np.asarray(np.abs(coarse.signals(_input(record), record.sample_time)["drift"]).max(axis=0))
         except SimulationError:
             return None

@@ -18,13 +18,13 @@ the forces out of balance fall, and a stroke on which that does not help is halv
 
 import itertools
 from collections.abc import Callable, Mapping, Sequence
-from typing import Any, ClassVar, Literal, NamedTuple
+from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 from scipy.linalg import LinAlgError, cholesky
 
-from hysim._basics.frozen import Count, FloatArray, check_choice, check_whole, frozen, read_only
+from hysim._basics.frozen import FloatArray, check_choice, check_whole, frozen, read_only
 from hysim._basics.parallel import in_chunks
 from hysim._basics.printing import extent, printed, summary_text
 from hysim.errors import SimulationError
@@ -273,17 +273,6 @@ class Structure(SearchedStructure):
     >>> sim.peaks["drift"].shape, bool(abs(sim.signals["imbalance"]).max() < 1e-8 * sim.signals["input_work"].max())
     ((2,), True)
     """
-
-    mass: FloatArray
-    damping: Any = 0.0
-    stiffness: FloatArray = 0.0  # type: ignore[assignment]
-    elements: Any = ()
-    excitation: Literal["base", "force"] = "base"
-    influence: tuple[float, ...] = ()
-    output: str = "displacement"
-    substeps: Count | None = None
-    tolerance: float = 1e-8
-    initial_state: tuple[float, ...] = ()
 
     dynamic: ClassVar[bool] = True
 
