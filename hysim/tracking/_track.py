@@ -222,19 +222,6 @@ def track_parameters(
     by = "particle" if copies.memory.size > _MOST_MEMORIES else "sigma-point"
     drifts = most_likely(lambda sizes: filtered(sizes, by).log_likelihood, drifts, searched)
     estimates = filtered(drifts, method)
-    return _result(law, coordinates, estimates, record, method, spread, drifts, searched)
-
-
-def _result(
-    law: Law,
-    coordinates: Coordinates,
-    estimates: Filtered,
-    record: Record,
-    method: str,
-    noise: float,
-    drifts: FloatArray,
-    searched: npt.NDArray[np.bool_],
-) -> ParameterTrack:
     values = coordinates.decode(estimates.mean)
     last: dict[str, float] = dict(zip(coordinates.names, values[-1].tolist(), strict=True))
     return ParameterTrack(
@@ -247,7 +234,7 @@ def _result(
         expected_error=estimates.expected_error,
         jumps=estimates.jumps,
         method=method,
-        noise=noise,
+        noise=spread,
         drift=dict(zip(coordinates.names, drifts.tolist(), strict=True)),
         searched=tuple(np.array(coordinates.names)[searched].tolist()),
         log_likelihood=estimates.log_likelihood,
