@@ -7,10 +7,12 @@ import math
 import re
 import textwrap
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from typing import Any, NoReturn, TypeVar
+from typing import Any, NoReturn, TypeVar, dataclass_transform
 
 import numpy as np
 import numpy.typing as npt
+
+from hysim._basics.frozen import frozen
 
 LINES, LETTERS = 10, 100
 _FORMULA = re.compile(r"'*[=+@\t\r-]")
@@ -42,6 +44,12 @@ def printed(cls: type[T]) -> type[T]:
     cls.__repr__ = _first_line  # type: ignore[method-assign]
     cls.__getattr__ = _no_attribute  # type: ignore[attr-defined]
     return shown(cls)
+
+
+@dataclass_transform(kw_only_default=True, frozen_default=True)
+def frozen_result(cls: type[T]) -> type[T]:
+    """Make `cls`, which has a ``__str__``, the result of a verb: frozen, as by `frozen`, and `printed`."""
+    return printed(frozen(cls))
 
 
 def shown(cls: type[T]) -> type[T]:

@@ -12,8 +12,8 @@ import numpy as np
 import numpy.typing as npt
 
 from hysim import signals
-from hysim._basics.frozen import FloatArray, frozen, read_only
-from hysim._basics.printing import extent, printed, quantity, summary_text
+from hysim._basics.frozen import FloatArray, read_only
+from hysim._basics.printing import extent, frozen_result, quantity, summary_text
 from hysim.control._controller import Controller, preview
 from hysim.control._loop import ClosedLoop, RestingPlant, around, as_actuator, sampled, secant_gain, without_memory
 from hysim.control._stability import judge
@@ -22,8 +22,7 @@ from hysim.metrics import LoopMetrics, VibrationReduction, loop_metrics, reducti
 from hysim.plants.actuator import Actuator
 
 
-@printed
-@frozen
+@frozen_result
 class LoopAssessment:
     """Stability, robustness and error of a closed loop.
 
@@ -157,8 +156,7 @@ def _judged(
     )
 
 
-@printed
-@frozen
+@frozen_result
 class OpenLoop:
     """Response to a periodic reference without a controller; every signal has shape (n,).
 
@@ -202,8 +200,7 @@ class OpenLoop:
         return reduction_percent(self.loop.relative_width, self.loop_of(y).relative_width)
 
 
-@printed
-@frozen
+@frozen_result
 class HysteresisAssessment:
     """Figures of a triangle in open and in closed loop, over the last cycle.
 
@@ -262,8 +259,7 @@ class HysteresisAssessment:
         )
 
 
-@printed
-@frozen
+@frozen_result
 class StepAssessment:
     """Figures of a step in open and in closed loop.
 
@@ -289,8 +285,7 @@ class StepAssessment:
         )
 
 
-@printed
-@frozen
+@frozen_result
 class SquareWaveAssessment:
     """Figures of a square wave in its periodic steady state, in open and in closed loop.
 

@@ -27,11 +27,10 @@ from hysim._basics.frozen import (
     Positive,
     check_whole,
     checked,
-    frozen,
     read_only,
     vectors,
 )
-from hysim._basics.printing import printed, quantity, summary_text
+from hysim._basics.printing import frozen_result, quantity, summary_text
 from hysim._basics.results import model_of
 from hysim.control._controller import SteppedController, begun, limits_of, preview
 from hysim.control._loop import RestingPlant, close_loop, known_ahead, sampled
@@ -346,8 +345,7 @@ class IterativeLearning(_Learning):
         return run.measurement, run.command, run.drive
 
 
-@printed
-@frozen
+@frozen_result
 class LearnedTrials:
     """Trials of `IterativeLearning.learn`.
 

@@ -13,8 +13,8 @@ from typing import Any, TypeGuard
 import numpy as np
 import numpy.typing as npt
 
-from hysim._basics.frozen import FloatArray, frozen, read_only, vectors
-from hysim._basics.printing import extent, printed, quantity, summary_text
+from hysim._basics.frozen import FloatArray, read_only, vectors
+from hysim._basics.printing import extent, frozen_result, quantity, summary_text
 from hysim._basics.progress import Reports, along, reports
 from hysim._basics.results import model_of
 from hysim.control._controller import Controller, begun, held_samples, limits_of, preview
@@ -35,8 +35,7 @@ _OF_COMMAND = ("command", "drive", "u")
 _SHOWN = ("sample_time", "delay", "preview", "noise", "sensor_quantum", "voltage_noise_rms", "held_samples")
 
 
-@printed
-@frozen
+@frozen_result
 class ClosedLoop:
     """Signals of a closed loop, each of shape (n,), and its conditions.
 

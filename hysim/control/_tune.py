@@ -27,7 +27,7 @@ import numpy.typing as npt
 from scipy.optimize import minimize
 
 from hysim._basics.frozen import FloatArray, check_choice, check_positive, frozen
-from hysim._basics.printing import printed, summary_text
+from hysim._basics.printing import frozen_result, summary_text
 from hysim.control._controller import PID, SampledController, limits_of
 from hysim.control._loop import RestingPlant, as_actuator, sampled, secant_gain, slopes
 from hysim.control._stability import LinearLoop, limit_cycle, slowest_decay
@@ -159,8 +159,7 @@ class Trial:
     objective: float
 
 
-@printed
-@frozen
+@frozen_result
 class Tuning:
     """Result of `tune`.
 

@@ -7,8 +7,8 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from hysim._basics.frozen import FloatArray, check_positive, frozen, read_only
-from hysim._basics.printing import printed, summary_text
+from hysim._basics.frozen import FloatArray, check_positive, read_only
+from hysim._basics.printing import frozen_result, summary_text
 from hysim._basics.results import model_of
 from hysim.design import _inputs as shapes
 from hysim.design._inputs import InputLimits
@@ -18,8 +18,7 @@ from hysim.plants.actuator_structure import ActuatorStructure
 from hysim.plants.linear_parts import FREQUENCY
 
 
-@printed
-@frozen
+@frozen_result
 class InputDesign:
     """An input, and what it is expected to tell of a law.
 

@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 
 from hysim._basics.atomic import write_text
-from hysim._basics.frozen import FloatArray, frozen
-from hysim._basics.printing import printed, summary_text
+from hysim._basics.frozen import FloatArray
+from hysim._basics.printing import frozen_result, summary_text
 from hysim._basics.results import model_of
 from hysim._release import __version__
 from hysim.errors import warn_unsafe
@@ -22,8 +22,7 @@ _FOLDER = Path(__file__).with_name("c")  # templates
 _FEW = 16  # places of a state that are set one by one
 
 
-@printed
-@frozen
+@frozen_result
 class CSource:
     """A law, a plant or a controller in C99.
 

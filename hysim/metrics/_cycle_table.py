@@ -24,9 +24,9 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from hysim._basics.frozen import FloatArray, frozen
+from hysim._basics.frozen import FloatArray
 from hysim._basics.prefixes import in_brackets
-from hysim._basics.printing import aligned, csv_text, extent, folded, printed, quantity, summary_text
+from hysim._basics.printing import aligned, csv_text, extent, folded, frozen_result, quantity, summary_text
 from hysim._columns.excursions import Loops, protocol
 from hysim._columns.turning import ROUNDING, TOLERANCE, too_few
 from hysim.metrics._loop import COUNTERCLOCKWISE, FORCE, LoopMetrics, measure, samples_of_a_loop
@@ -76,8 +76,7 @@ _COLUMNS = (
 )
 
 
-@printed
-@frozen
+@frozen_result
 class CycleMetrics:
     """The measures of every cycle of a record; arrays have shape (n_cycles,), in the order of time.
 

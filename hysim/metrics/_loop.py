@@ -33,8 +33,8 @@ from typing import Literal, NamedTuple, overload
 import numpy as np
 import numpy.typing as npt
 
-from hysim._basics.frozen import FloatArray, check_positive, frozen, items, vectors
-from hysim._basics.printing import extent, printed, quantity, summary_text
+from hysim._basics.frozen import FloatArray, check_positive, items, vectors
+from hysim._basics.printing import extent, frozen_result, quantity, summary_text
 from hysim._columns.excursions import measured_cycles
 from hysim._columns.turning import ROUNDING, TOLERANCE, Cycle, settled, turns
 
@@ -67,8 +67,7 @@ class Lobe(NamedTuple):
     orientation: Orientation
 
 
-@printed
-@frozen
+@frozen_result
 class LoopMetrics:
     """The measures of one loop; the equations stand at the head of `hysim.metrics._loop`.
 
@@ -369,8 +368,7 @@ _VACUUM = 1.25663706212e-6
 _DEMAGNETISED = 1e-3  # of the spans of H and B
 
 
-@printed
-@frozen
+@frozen_result
 class MagneticMetrics:
     """The measures of one magnetic loop, B over H.
 

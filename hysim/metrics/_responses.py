@@ -34,7 +34,7 @@ import numpy as np
 import numpy.typing as npt
 
 from hysim._basics.frozen import FloatArray, frozen, read_only, vectors
-from hysim._basics.printing import printed, summary_text
+from hysim._basics.printing import frozen_result, summary_text
 from hysim._basics.results import model_of
 from hysim._columns.turning import ROUNDING
 from hysim.errors import SimulationError
@@ -155,8 +155,7 @@ class StepMetrics:
     t98: float
 
 
-@printed
-@frozen
+@frozen_result
 class VibrationReduction:
     """The reduction of the vibration after a step by a loop, always three figures together.
 

@@ -14,12 +14,11 @@ import numpy as np
 import numpy.typing as npt
 from scipy import optimize, special
 
-from hysim._basics.frozen import FloatArray, frozen, vectors
-from hysim._basics.printing import printed, summary_text
+from hysim._basics.frozen import FloatArray, vectors
+from hysim._basics.printing import frozen_result, summary_text
 
 
-@printed
-@frozen
+@frozen_result
 class Fragility:
     """Result of `hysim.fragility`: a lognormal fragility curve, and the counts that it is fitted to.
 

@@ -17,8 +17,8 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from hysim._basics.frozen import FloatArray, check_positive, frozen, read_only
-from hysim._basics.printing import aligned, extent, printed, summary_text
+from hysim._basics.frozen import FloatArray, check_positive, read_only
+from hysim._basics.printing import aligned, extent, frozen_result, summary_text
 from hysim._basics.results import model_of
 from hysim._columns.turning import turns
 from hysim.errors import SimulationError
@@ -34,8 +34,7 @@ _CYCLES, _LONGEST = [4**k for k in range(2, 11)], 2**21  # cycles before the mea
 _STEADY = 1e-8  # of the span: largest change of H during half of these cycles, and of B in one
 
 
-@printed
-@frozen
+@frozen_result
 class LossMap:
     """Result of `hysim.loss_map`: core loss over amplitude, frequency, bias and channels.
 

@@ -17,17 +17,16 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from hysim._basics.frozen import FloatArray, frozen
+from hysim._basics.frozen import FloatArray
 from hysim._basics.libraries import optional
-from hysim._basics.printing import csv_text, printed, summary_text
+from hysim._basics.printing import csv_text, frozen_result, summary_text
 from hysim._names import among
 from hysim.sweeps._chunks import Table, seeds
 from hysim.sweeps._space import Column, Space, saltelli
 from hysim.sweeps._store import opened
 
 
-@printed
-@frozen
+@frozen_result
 class Sweep:
     """A study as a table; ``result["name"]`` is a column of it.
 
@@ -199,8 +198,7 @@ def result_of(table: Table, space: Space, task_seeds: Column, asked: npt.NDArray
 _RESAMPLES = 200
 
 
-@printed
-@frozen
+@frozen_result
 class SobolIndices:
     """Sobol indices of the outputs of a study.
 

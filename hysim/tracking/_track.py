@@ -12,8 +12,8 @@ from typing import Any, Literal
 import numpy as np
 import numpy.typing as npt
 
-from hysim._basics.frozen import FloatArray, check_choice, frozen
-from hysim._basics.printing import printed, summary_text
+from hysim._basics.frozen import FloatArray, check_choice
+from hysim._basics.printing import frozen_result, summary_text
 from hysim._basics.results import model_of
 from hysim.models.law import Law
 from hysim.records import Record
@@ -22,8 +22,7 @@ from hysim.tracking._filters import Coordinates, Copies, Filtered, Walk, coordin
 _BAND = 1.959963984540054  # standard deviations of a band at 95 %
 
 
-@printed
-@frozen
+@frozen_result
 class ParameterTrack:
     """Numbers of a law along a record, as far as the samples up to each one tell them.
 

@@ -23,9 +23,9 @@ from typing import Any
 
 import numpy as np
 
-from hysim._basics.frozen import FloatArray, checked, frozen, read_only
+from hysim._basics.frozen import FloatArray, checked, read_only
 from hysim._basics.parallel import in_chunks
-from hysim._basics.printing import printed, summary_text
+from hysim._basics.printing import frozen_result, summary_text
 from hysim.errors import SimulationError
 from hysim.models.parameters import Coordinate, free_coordinate, space_of
 from hysim.models.protocols import Subject
@@ -50,8 +50,7 @@ _DIFFERENCE = 1e-5  # of a coordinate
 _INSIDE = 1e-9  # coordinates: a descent begins inside the box
 
 
-@printed
-@frozen
+@frozen_result
 class StructureRecord:
     """Input of a structure, and what several sensors measured.
 

@@ -14,9 +14,9 @@ import numpy as np
 import numpy.typing as npt
 from scipy.optimize import elementwise
 
-from hysim._basics.frozen import FloatArray, check_positive, frozen, read_only
+from hysim._basics.frozen import FloatArray, check_positive, read_only
 from hysim._basics.parallel import map_on_threads
-from hysim._basics.printing import aligned, printed, summary_text
+from hysim._basics.printing import aligned, frozen_result, summary_text
 from hysim._basics.results import model_of
 from hysim.laws.static import Line
 from hysim.models.protocols import positive_time
@@ -30,8 +30,7 @@ _CLOSE, _NARROW = 1e-6, 1e-10  # in ln(ductility); in ln(scale) where the ductil
 _DIVERGED = 1e6  # times the elastic displacement; down to periods of 1 ms the weakest oscillators follow the ground
 
 
-@printed
-@frozen
+@frozen_result
 class ResponseSpectrum:
     """Result of `hysim.response_spectrum`; tables have the shape (n_records, n_periods).
 

@@ -24,9 +24,9 @@ import numpy as np
 import numpy.typing as npt
 from scipy.linalg import LinAlgError, cholesky
 
-from hysim._basics.frozen import FloatArray, check_choice, check_whole, frozen, read_only
+from hysim._basics.frozen import FloatArray, check_choice, check_whole, read_only
 from hysim._basics.parallel import in_chunks
-from hysim._basics.printing import extent, printed, summary_text
+from hysim._basics.printing import extent, frozen_result, summary_text
 from hysim.errors import SimulationError
 from hysim.models.model import family
 from hysim.models.protocols import positive_time
@@ -46,8 +46,7 @@ _DIFFERENCE = 1e-5  # share of a stroke: central differences then err at about 1
 _LOOSEST = 1e-3  # tolerance
 
 
-@printed
-@frozen
+@frozen_result
 class StaticResponse:
     """Equilibria of a structure that is pushed slowly.
 
