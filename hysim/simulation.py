@@ -7,8 +7,8 @@ from typing import Any, Protocol, runtime_checkable
 import numpy as np
 import numpy.typing as npt
 
-from hysim._basics.frozen import FloatArray, frozen, vectors
-from hysim._basics.printing import extent, printed, summary_text
+from hysim._basics.frozen import FloatArray, vectors
+from hysim._basics.printing import extent, frozen_result, summary_text
 from hysim._basics.progress import Reports, along, reports
 from hysim._basics.results import Result, model_of
 from hysim.interop import dataset, frame
@@ -24,8 +24,7 @@ _BY_ELEMENT = frozenset({"drift", "force"})
 _PEAK = "peak_"
 
 
-@printed
-@frozen
+@frozen_result
 class Simulation:
     """Result of `simulate`.
 

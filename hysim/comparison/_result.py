@@ -9,8 +9,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from hysim._basics.frozen import FloatArray, check_choice, frozen, items
-from hysim._basics.printing import aligned, bic_in_words, csv_text, folded, listed, printed, summary_text
+from hysim._basics.frozen import FloatArray, check_choice, items
+from hysim._basics.printing import aligned, bic_in_words, csv_text, folded, frozen_result, listed, summary_text
 from hysim._names import among
 from hysim.comparison._verdict import Contrast, contrasts
 from hysim.identification.forms import CONSTANT, SWAPPED
@@ -26,8 +26,7 @@ _NAMED = 6  # models that a sentence names
 Value = str | int | float | bool
 
 
-@printed
-@frozen
+@frozen_result
 class ComparisonRow:
     """One model on the record.
 
@@ -108,8 +107,7 @@ class ComparisonRow:
         )
 
 
-@printed
-@frozen
+@frozen_result
 class Comparison:
     """Models side by side.
 

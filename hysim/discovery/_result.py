@@ -15,7 +15,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from hysim._basics.frozen import FloatArray, frozen
-from hysim._basics.printing import printed, summary_text, wrapped
+from hysim._basics.printing import frozen_result, summary_text, wrapped
 from hysim.discovery._judgement import Judgement
 from hysim.discovery._refinement import AnyExponent, Candidate, Structure, Terms
 from hysim.identification.forms import Stored
@@ -224,8 +224,7 @@ class _Discovered(Stored, ABC):
         return "" if math.isnan(value) else f" +- {value:.2g}"
 
 
-@printed
-@frozen
+@frozen_result
 class Discovery(_Discovered):
     """A law that was discovered in records.
 
@@ -298,8 +297,7 @@ class Discovery(_Discovered):
         return rows
 
 
-@printed
-@frozen
+@frozen_result
 class OscillatorDiscovery(_Discovered):
     """A plant and the law of its memory, discovered from the oscillator's input and output.
 

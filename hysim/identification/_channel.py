@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from hysim._basics.frozen import FloatArray, frozen
-from hysim._basics.printing import printed, quantity, summary_text
+from hysim._basics.frozen import FloatArray
+from hysim._basics.printing import frozen_result, quantity, summary_text
 from hysim._basics.results import model_of
 from hysim._columns.channels import value_in
 from hysim.identification._identify import identify
@@ -27,8 +27,7 @@ from hysim.records import Record
 _LEVEL = 0.95
 
 
-@printed
-@frozen
+@frozen_result
 class ParameterCurve(Stored):
     """An identified parameter as a polynomial of its channel.
 

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from hysim._basics.frozen import FloatArray, frozen
-from hysim._basics.printing import aligned, bic_in_words, folded, printed, summary_text, wrapped
+from hysim._basics.printing import aligned, bic_in_words, folded, frozen_result, summary_text, wrapped
 from hysim.identification._profile import Profile
 from hysim.identification.forms import Stored
 from hysim.interop import frame
@@ -38,8 +38,7 @@ class Width:
         return words.format(self.lower, self.upper) if np.isfinite(self.lower) else ""
 
 
-@printed
-@frozen
+@frozen_result
 class Choice:
     """Families that were tried on records.
 
@@ -123,8 +122,7 @@ class Choice:
         )
 
 
-@printed
-@frozen
+@frozen_result
 class Identification(Stored):
     """Parameters of a model, identified on one or several records.
 

@@ -4,8 +4,8 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
-from hysim._basics.frozen import check_choice, frozen
-from hysim._basics.printing import aligned, printed, summary_text
+from hysim._basics.frozen import check_choice
+from hysim._basics.printing import aligned, frozen_result, summary_text
 from hysim._basics.progress import Reports, announced_by, reports
 from hysim.identification._identify import identify
 from hysim.identification._result import Identification
@@ -16,8 +16,7 @@ from hysim.records import Record
 CRITERIA = ("bic", "aic", "fpe", "cv_rmse")
 
 
-@printed
-@frozen
+@frozen_result
 class Selection:
     """Candidates identified on the same records, ranked by a criterion.
 

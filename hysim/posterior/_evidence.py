@@ -9,7 +9,7 @@ import numpy as np
 
 from hysim._basics.blas import one_blas_thread
 from hysim._basics.frozen import check_choice, check_count, frozen
-from hysim._basics.printing import aligned, listed, printed, summary_text
+from hysim._basics.printing import aligned, frozen_result, listed, summary_text
 from hysim._basics.progress import Reports, reports
 from hysim.identification import Identification, identify
 from hysim.posterior._log_evidence import LogEvidence, bridge_evidence, nested_evidence
@@ -56,8 +56,7 @@ class EvidenceRow:
     n_evaluations: int
 
 
-@printed
-@frozen
+@frozen_result
 class Evidence:
     """Evidences of models on the same records, and which model the data prefer.
 

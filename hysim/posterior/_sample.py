@@ -9,9 +9,9 @@ import numpy as np
 import numpy.typing as npt
 
 from hysim._basics.blas import one_blas_thread
-from hysim._basics.frozen import FloatArray, check_count, frozen, read_only
+from hysim._basics.frozen import FloatArray, check_count, read_only
 from hysim._basics.libraries import optional
-from hysim._basics.printing import aligned, csv_text, printed, quantity, summary_text, wrapped
+from hysim._basics.printing import aligned, csv_text, frozen_result, quantity, summary_text, wrapped
 from hysim._basics.progress import Reports, reports
 from hysim.errors import SimulationError
 from hysim.identification import Identification, Width
@@ -31,8 +31,7 @@ _SAMPLES_PER_WALKER = 25  # effective ones: of shorter paths R-hat is large by c
 _MOST_STEPS = 100_000
 
 
-@printed
-@frozen
+@frozen_result
 class Prediction:
     """Outputs of draws of the parameters for one input.
 
@@ -86,8 +85,7 @@ class Prediction:
         )
 
 
-@printed
-@frozen
+@frozen_result
 class Posterior:
     """Draws of all free parameters of a model from their distribution given the records.
 

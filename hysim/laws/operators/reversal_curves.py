@@ -38,8 +38,8 @@ from typing import Any, Literal, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from hysim._basics.frozen import FloatArray, check_positive, frozen, read_only
-from hysim._basics.printing import extent, printed, quantity, summary_text
+from hysim._basics.frozen import FloatArray, check_positive, read_only
+from hysim._basics.printing import extent, frozen_result, quantity, summary_text
 from hysim._columns.turning import TOLERANCE
 from hysim.records import Record
 
@@ -62,8 +62,7 @@ _OF_PEAK = 0.1  # least density of the ridge
 _CLEAR = 3.0  # standard errors, above which a density is not noise
 
 
-@printed
-@frozen
+@frozen_result
 class Forc:
     """The density of relays that first-order reversal curves measure; nan where they do not reach.
 
