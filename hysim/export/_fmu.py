@@ -235,13 +235,6 @@ def _commands(platforms: Sequence[str] | None, version: str) -> dict[Target, Seq
 # ---------------------------------------------------------------------------------- variables and their units
 
 
-class BaseUnit(NamedTuple):
-    """Exponents of `BASE_UNITS`, and the power of ten with which a value becomes one in them."""
-
-    exponents: tuple[int, ...]
-    power: int
-
-
 def label(unit: str, units: Mapping[str, str]) -> str:
     """The label of a unit such as ``"y/u"`` for the labels of u, y and t; empty where one of them is unknown.
 
@@ -257,15 +250,15 @@ def label(unit: str, units: Mapping[str, str]) -> str:
     return "/".join([names[0], *(f"({name})" if "/" in name else name for name in names[1:])])
 
 
-def base_unit(unit: str) -> BaseUnit | None:
-    """A label such as ``um/V`` in base units, None where it is not understood.
+def base_unit(unit: str) -> dict[str, str] | None:
+    """Exponents of base units, and the factor to them, of a label such as ``um/V``; None where it is not understood.
 
     >>> base_unit("um/V")
-    BaseUnit(exponents=(-1, -1, 3, 1, 0, 0), power=-6)
+    {'kg': '-1', 'm': '-1', 's': '3', 'A': '1', 'factor': '1e-06'}
     >>> base_unit("px") is None
     True
     """
-    exponents, power = [0] * len(BASE_UNITS), 0
+    exponents, power = dict.fromkeys(BASE_UNITS, 0), 0
     for k, part in enumerate(unit.split("/")):
         if part == "1":
             continue
@@ -275,9 +268,10 @@ def base_unit(unit: str) -> BaseUnit | None:
             return None
         sign = -1 if k else 1
         power += sign * (prefix + _POWERS.get(base, 0))
-        for place, exponent in enumerate(_EXPONENTS[base]):
-            exponents[place] += sign * exponent
-    return BaseUnit(tuple(exponents), power)
+        for name, exponent in zip(BASE_UNITS, _EXPONENTS[base], strict=False):
+            exponents[name] += sign * exponent
+    factor = {"factor": repr(10.0**power)} if power else {}
+    return {name: str(exponent) for name, exponent in exponents.items() if exponent} | factor
 
 
 class Variable(NamedTuple):
@@ -372,9 +366,7 @@ def _units(variables: Iterable[Variable]) -> str:
         if (base := base_unit(each)) is None:
             text += f"    <Unit name={quoteattr(each)} />\n"
             continue
-        exponents = {name: str(n) for name, n in zip(BASE_UNITS, base.exponents, strict=True) if n}
-        factor = {"factor": repr(10.0**base.power)} if base.power else {}
-        text += f"    <Unit name={quoteattr(each)}>\n      <BaseUnit{_written(exponents | factor)} />\n    </Unit>\n"
+        text += f"    <Unit name={quoteattr(each)}>\n      <BaseUnit{_written(base)} />\n    </Unit>\n"
     return f"  <UnitDefinitions>\n{text}  </UnitDefinitions>\n" if text else ""
 
 

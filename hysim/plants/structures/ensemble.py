@@ -1,7 +1,7 @@
 """Many structures that differ in numbers, or in their inputs: one number or a few of each."""
 
 from collections.abc import Mapping
-from typing import Any, Literal, NamedTuple, get_args
+from typing import Any, Literal, get_args
 
 import numpy as np
 import numpy.typing as npt
@@ -23,15 +23,8 @@ Reduction = Literal[
 REDUCTIONS = get_args(Reduction)
 AT_ONCE = 2_000_000  # samples that a call of the kernel computes, or one structure
 
-
-class _Stack(NamedTuple):
-    """Structures one a row: their laws' kernels, parameters, states and elastic slopes, and their linear parts."""
-
-    laws: assembly.Laws
-    parameters: FloatArray
-    states: FloatArray
-    slopes: FloatArray
-    matrices: assembly.Matrices
+_Stack = tuple[assembly.Laws, FloatArray, FloatArray, FloatArray, assembly.Matrices]
+"""Structures one a row: their laws' kernels, parameters, states and elastic slopes, and their linear parts."""
 
 
 def values_by_name(structure: Any, values: Mapping[str, npt.ArrayLike] | npt.ArrayLike) -> dict[str, FloatArray]:
@@ -102,7 +95,7 @@ def _by_tables(structure: Any, numbers: Mapping[str, FloatArray], n_sets: int) -
     constants = read_only(np.concatenate([none, *parameters], axis=1), finite=False)
     memories = read_only(np.concatenate([none, *states], axis=1), finite=False)
     slopes = read_only(laws.slopes(constants, memories))
-    return _Stack(laws, constants, memories, slopes, _matrices(structure, numbers, slopes, n_sets))
+    return laws, constants, memories, slopes, _matrices(structure, numbers, slopes, n_sets)
 
 
 def _tabled(law: Law, varied: Mapping[str, FloatArray]) -> tuple[Startable, FloatArray, FloatArray]:
@@ -164,7 +157,7 @@ def _one_by_one(structure: Any, numbers: Mapping[str, FloatArray], n_sets: int) 
         raise ValueError("all sets begin with the same initial_state")
     mass, damping, stiffness = (np.concatenate([each.matrices[k] for each in made]) for k in (0, 1, 2))
     directions = np.concatenate([each.matrices.directions for each in made])
-    return _Stack(
+    return (
         first.laws,
         read_only(np.stack([each.laws.parameters for each in made]), finite=False),
         read_only(np.stack([each.laws.states for each in made]), finite=False),
