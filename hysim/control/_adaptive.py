@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from hysim._basics.frozen import FloatArray, Interval, read_only
-from hysim.control._controller import WithoutFeedback
+from hysim.control._controller import WithoutFeedback, compiled_of
 from hysim.kernels import stepping
 from hysim.kernels.adaptive_inverse import adaptive
 from hysim.models.compiled_step import compiled_step
@@ -112,7 +112,7 @@ class AdaptiveInverse(WithoutFeedback):
             *(each for _, each in copies), search, inverse.state, np.zeros(2 * count),
         ]  # fmt: skip
         step = _bound(compiled_step(law.step), stepping.unchanged if law.resume is None else law.resume)
-        return CompiledController(step, read_only(np.concatenate(constants), finite=False), np.concatenate(state))
+        return compiled_of(step, constants, state)
 
     def _sizes(self) -> FloatArray:
         """Differences of the numbers by which the derivatives of the output are computed."""

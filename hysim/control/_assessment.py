@@ -334,14 +334,7 @@ _UNKNOWN: dict[str, Any] = dict.fromkeys(
 
 
 def assess_hysteresis(
-    plant: Any,
-    controller: Controller,
-    *,
-    low: float,
-    high: float,
-    period: float,
-    sample_time: float,
-    cycles: int = 10,
+    plant: Any, controller: Controller, *, low: float, high: float, period: float, sample_time: float, cycles: int = 10
 ) -> HysteresisAssessment:
     """Let a loop follow a triangle, and measure the hysteresis that remains.
 

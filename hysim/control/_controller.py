@@ -10,7 +10,8 @@ kd = Kp Td, with b = c = 1 and T_f = 0. `hysim.kernels.controllers` has the samp
 
 import math
 from abc import ABC, abstractmethod
-from typing import NamedTuple, Protocol, Self, runtime_checkable
+from collections.abc import Sequence
+from typing import Any, NamedTuple, Protocol, Self, runtime_checkable
 
 import numpy as np
 import numpy.typing as npt
@@ -60,6 +61,11 @@ def begun(controller: Controller, sample_time: float, u0: float = 0.0, y0: float
 def with_room(state: FloatArray, u: float, reference: float, measurement: float) -> FloatArray:
     """State of a controller, and what is held before the first valid sample."""
     return np.concatenate([state, [reference, measurement, u, 0.0]])
+
+
+def compiled_of(step: Any, parameters: Sequence[Any], state: Sequence[Any]) -> CompiledController:
+    """A compiled controller whose parameters and state are these parts, one behind the other."""
+    return CompiledController(step, read_only(np.concatenate(parameters), finite=False), np.concatenate(state))
 
 
 def held_samples(state: CompiledController) -> int:

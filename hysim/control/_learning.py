@@ -27,12 +27,11 @@ from hysim._basics.frozen import (
     Positive,
     check_whole,
     checked,
-    read_only,
     vectors,
 )
 from hysim._basics.printing import frozen_result, quantity, summary_text
 from hysim._basics.results import model_of
-from hysim.control._controller import SteppedController, begun, limits_of, preview
+from hysim.control._controller import SteppedController, begun, compiled_of, limits_of, preview
 from hysim.control._loop import RestingPlant, close_loop, known_ahead, sampled
 from hysim.control._to_control import to_control
 from hysim.control._tracking import InverseFeedforward, TrackingController, is_fed_back
@@ -154,8 +153,7 @@ class _Learning(SteppedController):
         head = [samples, reach, full, max(late - full, 0.0), float(is_trial), inner.state.size]
         parameters = [np.array(head), low_pass, inverse, inner.state, inner.parameters]
         state = [np.array([u0, 0.0, 0.0]), np.full(full + 2, y0), np.zeros(room), inner.state]
-        step = _bound(inner.step)
-        return CompiledController(step, read_only(np.concatenate(parameters), finite=False), np.concatenate(state))
+        return compiled_of(_bound(inner.step), parameters, state)
 
 
 @family

@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 from scipy.linalg import block_diag, solve_discrete_are, toeplitz
 
-from hysim._basics.frozen import Count, FloatArray, Interval, NotNegative, Positive, read_only
-from hysim.control._controller import SteppedController
+from hysim._basics.frozen import Count, FloatArray, Interval, NotNegative, Positive
+from hysim.control._controller import SteppedController, compiled_of
 from hysim.control._to_control import to_control
 from hysim.kernels import predictive as kernels
 from hysim.kernels.tracking import bound
@@ -142,11 +142,7 @@ class PredictiveControl(SteppedController):
             np.full(p, level), np.zeros(p), np.full(p, level), level * np.eye(1, p)[0], level * np.cumsum(pulse),
             np.zeros(4 * p), inverse.parameters, inverse.state,
         ]  # fmt: skip
-        return CompiledController(
-            _with_inverse(kernels.predict, inverse.step),
-            read_only(np.concatenate(parameters), finite=False),
-            np.concatenate(state),
-        )
+        return compiled_of(_with_inverse(kernels.predict, inverse.step), parameters, state)
 
     def _problem(self, pulse: FloatArray) -> tuple[FloatArray, float, float]:
         """K^-1, rho and sigma, for a linear stage with this response."""

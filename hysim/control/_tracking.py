@@ -18,7 +18,7 @@ import numpy as np
 import numpy.typing as npt
 
 from hysim._basics.frozen import FloatArray, Interval, read_only
-from hysim.control._controller import PID, Feedback, SampledController, WithoutFeedback
+from hysim.control._controller import PID, Feedback, SampledController, WithoutFeedback, compiled_of
 from hysim.control._filters import DampingLoop, ModeInverse, Notch, Shaper
 from hysim.kernels import tracking as kernels
 from hysim.kernels.inverses import line
@@ -235,11 +235,7 @@ class TrackingController(SampledController):
         ]
         parameters = [np.array(head), taps.ravel(), plant, feedback.parameters, *filters, forward.parameters]
         state = [np.array([u0]), np.full(taps.shape[1], y0), plant_state, feedback.state, np.zeros(4), forward.state]
-        return CompiledController(
-            _with_inverse(kernels.track, forward.step),
-            read_only(np.concatenate(parameters), finite=False),
-            np.concatenate(state),
-        )
+        return compiled_of(_with_inverse(kernels.track, forward.step), parameters, state)
 
     @property
     def _hold(self) -> int:

@@ -62,10 +62,7 @@ TARGETS = MappingProxyType(
             Target("aarch64-linux", "aarch64-linux-gnu.2.17", ".so"),
         ),
         "windows": (Target("x86_64-windows", "x86_64-windows-gnu", ".dll"),),
-        "mac": (
-            Target("x86_64-darwin", "x86_64-macos", ".dylib"),
-            Target("aarch64-darwin", "aarch64-macos", ".dylib"),
-        ),
+        "mac": (Target("x86_64-darwin", "x86_64-macos", ".dylib"), Target("aarch64-darwin", "aarch64-macos", ".dylib")),
     }
 )
 """Targets of each platform."""

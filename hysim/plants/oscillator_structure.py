@@ -125,9 +125,7 @@ class _Equation:
         output = read_only(np.tile([1.0, 0.0, 0.0], (len(x), 1)))
         w = np.empty((len(x), self.along.size))
         in_chunks(
-            lambda begin, end: kernels.batch(memory, output, self.along[np.newaxis], w, begin, end),
-            len(x),
-            minimum=8,
+            lambda begin, end: kernels.batch(memory, output, self.along[np.newaxis], w, begin, end), len(x), minimum=8
         )
         if self.periodic:
             w = w[:, self.along.size // 2 :]

@@ -512,10 +512,7 @@ def _elements(values: Any) -> tuple[Element, ...]:
 
 
 def shear_frame(
-    masses: npt.ArrayLike,
-    stiffnesses: npt.ArrayLike | None = None,
-    laws: Any = None,
-    **options: Any,
+    masses: npt.ArrayLike, stiffnesses: npt.ArrayLike | None = None, laws: Any = None, **options: Any
 ) -> Structure:
     """A frame whose rigid floors move sideways, one storey on the other.
 
