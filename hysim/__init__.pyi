@@ -155,9 +155,9 @@ from hysim.plants.transfer_function import TransferFunction as TransferFunction
 from hysim.plants.state_space import StateSpace as StateSpace
 from hysim.plants.state_space import Modes as Modes
 from hysim.plants.state_space import mode as mode
-from hysim.plants.creep import Creep as Creep
-from hysim.plants.amplifier import Amplifier as Amplifier
-from hysim.plants.sensor import Sensor as Sensor
+from hysim.plants.stages import Creep as Creep
+from hysim.plants.stages import Amplifier as Amplifier
+from hysim.plants.stages import Sensor as Sensor
 from hysim.plants.actuator import Actuator as Actuator
 from hysim.plants.multi_input_actuator import MultiInputActuator as MultiInputActuator
 from hysim.laws.static import Line as Line

@@ -41,8 +41,7 @@ from hysim.laws.static import Line
 from hysim.models.model import family
 from hysim.models.protocols import CompiledController, law_at, positive_time
 from hysim.plants.actuator import Actuator, as_actuator
-from hysim.plants.amplifier import Amplifier
-from hysim.plants.sensor import Sensor
+from hysim.plants.stages import Amplifier, Sensor
 from hysim.plants.state_space import StateSpace
 from hysim.plants.structures.structure import Structure
 from hysim.signals import triangle

@@ -19,8 +19,7 @@ from hysim.models.inverse_search import inverse_step
 from hysim.models.model import family
 from hysim.models.protocols import CompiledController, law_at, positive_time
 from hysim.plants.actuator import Actuator, as_actuator
-from hysim.plants.amplifier import Amplifier
-from hysim.plants.sensor import Sensor
+from hysim.plants.stages import Amplifier, Sensor
 from hysim.signals import triangle
 
 _with_inverse = functools.lru_cache(maxsize=64)(bound)

@@ -50,7 +50,7 @@ from hysim.control._loop import RestingPlant, as_actuator, secant_gain, slopes
 from hysim.control._to_control import to_control
 from hysim.errors import SimulationError
 from hysim.plants.actuator import Actuator
-from hysim.plants.sensor import Sensor
+from hysim.plants.stages import Sensor
 
 _FREQUENCIES = 300
 _SLOWEST = 1e-4

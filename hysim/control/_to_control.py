@@ -29,7 +29,7 @@ from hysim.plants.actuator import Actuator
 from hysim.plants.chain import Chain, ChainState
 from hysim.plants.oscillator import BoucWenOscillator, OscillatorState
 from hysim.plants.sampled import sampled
-from hysim.plants.sensor import Sensor
+from hysim.plants.stages import Sensor
 from hysim.plants.transfer_function import TransferFunction
 
 Rule = Callable[[float, FloatArray, FloatArray, Any], FloatArray]

@@ -27,8 +27,7 @@ from hysim.models.inverse_search import inverse_step
 from hysim.models.model import family
 from hysim.models.protocols import CompiledController, CompiledLaw, needs_time, positive_time
 from hysim.plants.actuator import Actuator, as_actuator, is_law
-from hysim.plants.amplifier import Amplifier
-from hysim.plants.creep import Creep
+from hysim.plants.stages import Amplifier, Creep
 
 _with_inverse = functools.lru_cache(maxsize=256)(kernels.bound)
 

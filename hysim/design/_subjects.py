@@ -16,7 +16,7 @@ from hysim.models.parts import own
 from hysim.models.search_space import Freedom
 from hysim.plants.actuator_structure import ActuatorStructure
 from hysim.plants.linear_parts import BELOW_NYQUIST, DAMPING, FREQUENCY, GAIN
-from hysim.plants.sensor import Sensor
+from hysim.plants.stages import Sensor
 from hysim.records import Record
 
 Criterion = Literal["D", "A", "E"]

@@ -28,9 +28,8 @@ from hysim.kernels.stepping import Start, Step, complete
 from hysim.models.law import Law
 from hysim.models.protocols import Startable, Stepwise, needs_time, standing
 from hysim.plants.actuator import as_stepwise
-from hysim.plants.amplifier import Amplifier
-from hysim.plants.creep import Creep
 from hysim.plants.sampled import Vibration
+from hysim.plants.stages import Amplifier, Creep
 
 _ANNOTATED = MappingProxyType({"float": Scalar.DOUBLE, "int": Scalar.INT, "bool": Scalar.BOOL})
 _VECTORS = Vector(), Vector()

@@ -48,7 +48,7 @@ from hysim.paper.loops import ABOUT_34_V, HIGH, PERIOD, REDUCTIONS, SAMPLE_TIME,
 from hysim.paper.reidentification import SAMPLE_SECONDS
 from hysim.paper.search import Effort, Found, Starts, Task, confirmed, search, step_task, triangle_task
 from hysim.plants.actuator import Actuator
-from hysim.plants.sensor import Sensor
+from hysim.plants.stages import Sensor
 
 FRAME_RATES = (10.0, 30.0, 100.0, 1000.0)
 SENSORS = ((0.0, 0.0), (0.1, 0.0), (0.1, 0.03), (0.1, 0.1), (1.0, 0.0), (1.0, 0.31))

@@ -38,7 +38,7 @@ from hysim.metrics import fit_percent
 from hysim.paper import printed
 from hysim.paper.printed import Matrix, floats
 from hysim.paper.step_reading import step_reading
-from hysim.plants.amplifier import Amplifier
+from hysim.plants.stages import Amplifier
 from hysim.plants.transfer_function import TransferFunction
 
 EQUATION_1 = TransferFunction(num=floats(printed.NUM_1), den=floats(printed.DEN_1))

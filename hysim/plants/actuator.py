@@ -26,11 +26,9 @@ from hysim.models.protocols import (
     placed,
 )
 from hysim.plants.actuator_structure import ActuatorStructure
-from hysim.plants.amplifier import Amplifier
 from hysim.plants.chain import Chain, ChainState, Stages, linear_chain
-from hysim.plants.creep import Creep
 from hysim.plants.sampled import Stage, Vibration
-from hysim.plants.sensor import Sensor
+from hysim.plants.stages import Amplifier, Creep, Sensor
 from hysim.plants.state_space import linear_plant
 from hysim.plants.transfer_function import TransferFunction
 from hysim.records import Record

@@ -22,9 +22,9 @@ from hysim._basics.frozen import FloatArray
 from hysim._basics.parallel import in_chunks
 from hysim.kernels import actuator_columns as kernels
 from hysim.models.search_space import Parameters, SearchSpace
-from hysim.plants.amplifier import Amplifier
 from hysim.plants.chain import Chain, Stages
 from hysim.plants.linear_parts import DAMPING, FREQUENCY, GAIN
+from hysim.plants.stages import Amplifier
 from hysim.records import Record
 
 Rows = npt.NDArray[np.intp]

@@ -27,9 +27,7 @@ from hysim.models.parts import own
 from hysim.models.protocols import Doubt, Identifiable, Subject
 from hysim.models.search_space import ALL_FREE, Freedom, Parameters, SearchSpace
 from hysim.plants.actuator_search import MOST_LATE, as_points, between_samples, columns_through, finer, points
-from hysim.plants.amplifier import Amplifier
 from hysim.plants.chain import Stages
-from hysim.plants.creep import Creep
 from hysim.plants.linear_parts import (
     DAMPING,
     FREQUENCY,
@@ -50,7 +48,7 @@ from hysim.plants.multi_input_actuator import (
     checked_laws,
     seen_by,
 )
-from hysim.plants.sensor import Sensor
+from hysim.plants.stages import Amplifier, Creep, Sensor
 from hysim.records import Record
 
 MOST_MODES = 3

@@ -16,8 +16,6 @@ from hysim.kernels import loop as kernels
 from hysim.laws.static import Line
 from hysim.models.compiled_step import startable
 from hysim.models.protocols import CompiledController, CompiledLaw, Startable, law_at, positive_time
-from hysim.plants.amplifier import Amplifier
-from hysim.plants.creep import Creep
 from hysim.plants.sampled import (
     Stage,
     Vibration,
@@ -29,7 +27,7 @@ from hysim.plants.sampled import (
     vibration_stage,
     whole_and_part,
 )
-from hysim.plants.sensor import Sensor
+from hysim.plants.stages import Amplifier, Creep, Sensor
 
 _chain_step = functools.lru_cache(maxsize=256)(kernels.chain_step)
 _chain_start = functools.lru_cache(maxsize=256)(kernels.chain_start)

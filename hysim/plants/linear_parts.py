@@ -29,10 +29,9 @@ import numpy as np
 from hysim._basics.frozen import FloatArray, read_only
 from hysim.models.parameters import Coordinate, space_of
 from hysim.models.search_space import Freedom, Parameters, SearchSpace
-from hysim.plants.amplifier import Amplifier
 from hysim.plants.chain import Stages
-from hysim.plants.creep import Creep
 from hysim.plants.multi_input_actuator import MAIN, MultiInputActuator
+from hysim.plants.stages import Amplifier, Creep
 from hysim.plants.state_space import Modes
 from hysim.plants.transfer_function import TransferFunction
 from hysim.records import Record, span_of

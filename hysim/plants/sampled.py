@@ -18,7 +18,7 @@ from scipy.linalg import matrix_balance
 
 from hysim._basics.frozen import FloatArray, read_only
 from hysim.plants._linear_response import scaled_companion, transitions
-from hysim.plants.creep import Creep
+from hysim.plants.stages import Creep
 from hysim.plants.state_space import Modes, StateSpace, resting_states
 from hysim.plants.transfer_function import TransferFunction
 

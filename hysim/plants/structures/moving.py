@@ -17,9 +17,8 @@ from hysim.kernels.structure_loop import close
 from hysim.kernels.structure_path import follow
 from hysim.kernels.structure_pointers import addresses
 from hysim.models.protocols import CompiledController, needed_time, positive_time
-from hysim.plants.amplifier import Amplifier
 from hysim.plants.chain import Signals
-from hysim.plants.sensor import Sensor
+from hysim.plants.stages import Amplifier, Sensor
 from hysim.plants.structures import assembly
 from hysim.plants.structures.assembly import AssembledStructure
 from hysim.plants.structures.parts import parted
