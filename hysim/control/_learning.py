@@ -20,15 +20,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy.signal import firwin, kaiser_beta, kaiserord
 
-from hysim._basics.frozen import (
-    FloatArray,
-    Interval,
-    NotNegative,
-    Positive,
-    check_whole,
-    checked,
-    vectors,
-)
+from hysim._basics.frozen import FloatArray, Interval, NotNegative, Positive, check_whole, checked, vectors
 from hysim._basics.printing import frozen_result, quantity, summary_text
 from hysim._basics.results import model_of
 from hysim.control._controller import SteppedController, begun, compiled_of, limits_of, preview

@@ -10,21 +10,10 @@ import numpy.typing as npt
 from hysim._basics.frozen import FloatArray, items, read_only
 from hysim._basics.results import model_of
 from hysim.errors import SimulationError, warn_unsafe
+from hysim.models import protocols as roles
 from hysim.models.cascade import Cascade
 from hysim.models.model import family
-from hysim.models.protocols import (
-    CompiledLaw,
-    Placeable,
-    Remembering,
-    Responding,
-    Sampled,
-    Startable,
-    Steppable,
-    Stepwise,
-    law_at,
-    needs_time,
-    placed,
-)
+from hysim.models.protocols import CompiledLaw, Startable, law_at, needs_time, placed
 from hysim.plants.actuator_structure import ActuatorStructure
 from hysim.plants.chain import Chain, ChainState, Stages, linear_chain
 from hysim.plants.sampled import Stage, Vibration
@@ -36,8 +25,8 @@ from hysim.records import Record
 
 def is_law(value: Any) -> bool:
     """Whether a value has a response and can be stepped in a loop, at a sample time if it needs one."""
-    steps = isinstance(value, Responding) and isinstance(value, Steppable)
-    return steps and (not needs_time(value) or isinstance(value, Sampled))
+    steps = isinstance(value, roles.Responding) and isinstance(value, roles.Steppable)
+    return steps and (not needs_time(value) or isinstance(value, roles.Sampled))
 
 
 @runtime_checkable
@@ -107,14 +96,14 @@ class Actuator:
     @property
     def u0(self) -> float | None:
         """Command at which the memory of the law holds; None for the first one."""
-        if not isinstance(self.hysteresis, Placeable) or self.hysteresis.u0 is None:
+        if not isinstance(self.hysteresis, roles.Placeable) or self.hysteresis.u0 is None:
             return None
         return self.hysteresis.u0 if self.amplifier is None else self.amplifier.command(self.hysteresis.u0)
 
     @property
     def u_range(self) -> tuple[float, ...] | None:
         """Lowest and highest voltage of the record that the law was identified on; None if unknown."""
-        return self.hysteresis.u_range if isinstance(self.hysteresis, Placeable) else None
+        return self.hysteresis.u_range if isinstance(self.hysteresis, roles.Placeable) else None
 
     def placed(self, u0: float | None, u_range: tuple[float, ...] | None = None) -> "Actuator":
         """The actuator with the memory of its law at the command `u0`, and its range from one of commands."""
@@ -346,7 +335,7 @@ class Actuator:
     def memory(
         self, u: npt.ArrayLike, sample_time: float | None = None, *, substeps: int | None = None
     ) -> FloatArray | None:
-        if not isinstance(self.hysteresis, Remembering):
+        if not isinstance(self.hysteresis, roles.Remembering):
             return None
         inputs = read_only(u, "u", ndim=1)
         if not self._drive_takes_time and not needs_time(self.hysteresis):
@@ -416,6 +405,6 @@ def as_actuator(plant: Any) -> Actuator:
     raise TypeError(f"plant must be an Actuator, a law or a linear plant, got {type(plant).__name__}")
 
 
-def as_stepwise(plant: Any) -> Stepwise:
+def as_stepwise(plant: Any) -> roles.Stepwise:
     """A model as one that runs sample by sample: itself where it does, else as an actuator; TypeError if neither."""
-    return plant if isinstance(plant, Stepwise) else as_actuator(plant)
+    return plant if isinstance(plant, roles.Stepwise) else as_actuator(plant)

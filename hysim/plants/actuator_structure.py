@@ -26,28 +26,12 @@ from hysim.models.joint_space import columns_beside, declared, together
 from hysim.models.parts import own
 from hysim.models.protocols import Doubt, Identifiable, Subject
 from hysim.models.search_space import ALL_FREE, Freedom, Parameters, SearchSpace
+from hysim.plants import linear_parts
+from hysim.plants import multi_input_actuator as several
 from hysim.plants.actuator_search import MOST_LATE, as_points, between_samples, columns_through, finer, points
 from hysim.plants.chain import Stages
-from hysim.plants.linear_parts import (
-    DAMPING,
-    FREQUENCY,
-    GAIN,
-    CreepBank,
-    LinearParts,
-    Survey,
-    checked_creep,
-    creep_bank,
-    vibrations_of,
-)
-from hysim.plants.multi_input_actuator import (
-    MAIN,
-    InputSum,
-    ModalGains,
-    MultiInputActuator,
-    Scaled,
-    checked_laws,
-    seen_by,
-)
+from hysim.plants.linear_parts import DAMPING, FREQUENCY, GAIN, CreepBank, LinearParts, Survey
+from hysim.plants.multi_input_actuator import MAIN, InputSum, ModalGains, MultiInputActuator
 from hysim.plants.stages import Amplifier, Creep, Sensor
 from hysim.records import Record
 
@@ -87,12 +71,12 @@ class ActuatorStructure(Subject):
             raise ValueError("hysteresis is needed: a law, its class or structure, such as hs.BoucWen or hs.Line")
         law = self.law() if isinstance(self.law, type) else self.law
         if isinstance(law, Mapping):
-            law = checked_laws(law)
+            law = several.checked_laws(law)
             object.__setattr__(self, "inputs", tuple(law.laws))
         if not isinstance(law, Identifiable):
             raise TypeError(f"hysteresis must be a law that can be identified, got {type(law).__name__}")
         object.__setattr__(self, "law", law)
-        object.__setattr__(self, "creep", checked_creep(self.creep))
+        object.__setattr__(self, "creep", linear_parts.checked_creep(self.creep))
         most = MOST_MODES if len(self.inputs) == 1 else MOST_MODES_OF_SEVERAL
         if isinstance(self.modes, bool) or self.modes not in range(most + 1):
             raise ValueError(f"modes must be a number from 0 to {most}, got {self.modes!r}")
@@ -184,7 +168,7 @@ class ActuatorStructure(Subject):
             records = [
                 replace(record, resolution=quantum) if record.resolution is None else record for record in records
             ]
-        bank = creep_bank(self.creep, survey.shortest, survey.longest)
+        bank = linear_parts.creep_bank(self.creep, survey.shortest, survey.longest)
         idle = {f"creep.weights[{k}]": 0.0 for k in bank.idle} if isinstance(bank, CreepBank) else {}
         idle = {name: value for name, value in idle.items() if name not in {*freedom.free, *freedom.bounds}}
         remarks = (bank.remark,) if isinstance(bank, CreepBank) and idle else ()
@@ -210,7 +194,7 @@ class ActuatorStructure(Subject):
         """The record with the voltages that a known amplifier makes of its commands."""
         if not isinstance(self.amplifier, Amplifier):
             return record
-        others = {name: self.amplifier.voltage(seen_by(record, name).u) for name in self.inputs if name != MAIN}
+        others = {name: self.amplifier.voltage(several.seen_by(record, name).u) for name in self.inputs if name != MAIN}
         return replace(record, u=self.amplifier.voltage(record.u), channels={**record.channels, **others})
 
     def with_law(self, law: Any) -> "ActuatorStructure":
@@ -218,7 +202,7 @@ class ActuatorStructure(Subject):
 
     def behind(self, law: Any) -> "ActuatorStructure":
         """The structure after a law that is known except for its gain, or directly after several inputs."""
-        return replace(self, law=Scaled(law) if len(self.inputs) == 1 else ModalGains(self.inputs, self.modes))
+        return replace(self, law=several.Scaled(law) if len(self.inputs) == 1 else ModalGains(self.inputs, self.modes))
 
     def solved(self, estimates: Mapping[str, float]) -> dict[str, float]:
         """Coordinates by name that are solved for after a known law, and are searched with another law."""
@@ -230,7 +214,7 @@ class ActuatorStructure(Subject):
         """Coordinates of the vibration at which the user lets the search begin."""
         if self.start is None:
             return None
-        return self.parts([]).coordinates_of(vibrations_of(self.start, self.inputs, self.modes))
+        return self.parts([]).coordinates_of(linear_parts.vibrations_of(self.start, self.inputs, self.modes))
 
     @property
     def names(self) -> frozenset[str]:
@@ -325,18 +309,20 @@ class ActuatorStructure(Subject):
         survey = self.survey if self.survey is not None or not records else Survey.of(records)
         bank: Any = self.creep
         if survey is not None:
-            bank = creep_bank(bank, survey.shortest, survey.longest)
+            bank = linear_parts.creep_bank(bank, survey.shortest, survey.longest)
         gains = not isinstance(self.law, ModalGains)
         return LinearParts(self.amplifier, bank, self.modes, self.delay, survey, self.inputs, gains)
 
     def _laws(self, parameters: Parameters, record: Record) -> list[tuple[str, Any, Parameters, Record]]:
         if not isinstance(self.law, InputSum):
             return [(MAIN, self.law, parameters, record)]
-        return [(name, law, own(parameters, name), seen_by(record, name)) for name, law in self.law.laws.items()]
+        return [
+            (name, law, own(parameters, name), several.seen_by(record, name)) for name, law in self.law.laws.items()
+        ]
 
     def _by_mode(self, law: ModalGains, parts: LinearParts, others: Parameters, record: Record) -> FloatArray:
         """Columns (n_sets, n_samples, n_columns + 1) of the inputs through each mode, one, and zero."""
-        law_records = [seen_by(record, name) for name in self.inputs]
+        law_records = [several.seen_by(record, name) for name in self.inputs]
         behind: list[tuple[Parameters, partial[Stages]]] = [(others, partial(parts.stages))]
         if self.modes:
             behind = [(parts.of_mode(others, k), partial(parts.one_mode, k=k)) for k in range(self.modes)]

@@ -16,17 +16,8 @@ from hysim.kernels import loop as kernels
 from hysim.laws.static import Line
 from hysim.models.compiled_step import startable
 from hysim.models.protocols import CompiledController, CompiledLaw, Startable, law_at, positive_time
-from hysim.plants.sampled import (
-    Stage,
-    Vibration,
-    creep_stage,
-    gain,
-    low_pass,
-    sampled,
-    seen_within,
-    vibration_stage,
-    whole_and_part,
-)
+from hysim.plants import sampled as linear
+from hysim.plants.sampled import Stage, Vibration
 from hysim.plants.stages import Amplifier, Creep, Sensor
 
 _chain_step = functools.lru_cache(maxsize=256)(kernels.chain_step)
@@ -91,12 +82,12 @@ class Chain:
         self.linear = linear_stage(creep, vibration, self.step)
         between = {"linear": self.amplifier.dynamic}
         creeping = 0 if creep is None else len(creep.weights)
-        self.stage = sampled(self.linear, self.step, self.delay, creeping=creeping, **between)
-        self.samples_late, part = whole_and_part(self.sensor.delay / sample_time)
+        self.stage = linear.sampled(self.linear, self.step, self.delay, creeping=creeping, **between)
+        self.samples_late, part = linear.whole_and_part(self.sensor.delay / sample_time)
         self.seen_in, reading = -1, self.stage.output
         if part:
-            self.seen_in, at = whole_and_part((1.0 - part) * self.substeps)
-            reading = seen_within(self.linear, self.step, self.delay, at, **between)
+            self.seen_in, at = linear.whole_and_part((1.0 - part) * self.substeps)
+            reading = linear.seen_within(self.linear, self.step, self.delay, at, **between)
         self.outputs = read_only([self.stage.output, reading])
 
     @property
@@ -211,7 +202,7 @@ class Chain:
 
     @property
     def _jumps(self) -> bool:
-        takes_time = self.amplifier.dynamic or whole_and_part(self.delay / self.step)[1]
+        takes_time = self.amplifier.dynamic or linear.whole_and_part(self.delay / self.step)[1]
         return bool(not takes_time and self.linear.D)
 
     @functools.cached_property
@@ -227,15 +218,15 @@ class Chain:
 
 
 def linear_stage(creep: Creep | None, vibration: Vibration | None, step: float) -> Stage:
-    first = gain(1.0) if creep is None else creep_stage(creep)
-    return first if vibration is None else first.then(vibration_stage(vibration, step))
+    first = linear.gain(1.0) if creep is None else linear.creep_stage(creep)
+    return first if vibration is None else first.then(linear.vibration_stage(vibration, step))
 
 
 def linear_chain(amplifier: Amplifier | None, creep: Creep | None, vibration: Vibration | None, step: float) -> Stage:
     """The whole chain with a law of the slope one, without limits and slewing."""
-    driver = gain(1.0 if amplifier is None else amplifier.gain)
+    driver = linear.gain(1.0 if amplifier is None else amplifier.gain)
     if amplifier is not None and amplifier.time_constant:
-        driver = driver.then(low_pass(amplifier.time_constant))
+        driver = driver.then(linear.low_pass(amplifier.time_constant))
     return driver.then(linear_stage(creep, vibration, step))
 
 

@@ -29,20 +29,8 @@ from hysim.laws.differential import _boucwen_search
 from hysim.laws.differential.boucwen import BoucWen
 from hysim.models.protocols import Subject
 from hysim.models.search_space import ALL_FREE, Freedom, Parameters, SearchSpace
-from hysim.plants.equation_of_motion import (
-    HALF_FILTER,
-    Excitation,
-    Linear,
-    Method,
-    Motion,
-    checked_plant,
-    decimated,
-    filtering,
-    interpolated,
-    interpolated_record,
-    linear_plant,
-    regression,
-)
+from hysim.plants import equation_of_motion as equations
+from hysim.plants.equation_of_motion import Excitation, Linear, Method, Motion
 from hysim.records import Record, span_of
 
 _FREQUENCIES = 8  # tried where no linear plant is near
@@ -60,7 +48,7 @@ _REPEATS = 0.1  # share of the input's rms by which a period may differ from the
 
 def start(motion: Motion, laws: SearchSpace, wanted: int) -> tuple[Linear, list[dict[str, float]]]:
     """The plant of small motions, and the best sets of mass, damping, stiffness, A, beta, gamma, n."""
-    nearest = linear_plant(motion)
+    nearest = equations.linear_plant(motion)
     starts = _starts(motion, nearest, laws, wanted) if nearest else _starts_from_afar(motion, laws, wanted)
     sets = [each for _, each in starts]
     if sets:
@@ -82,7 +70,7 @@ def _starts_from_afar(motion: Motion, laws: SearchSpace, wanted: int) -> list[tu
 
 
 def _small_motions(values: Mapping[str, float]) -> Linear:
-    return checked_plant(values["mass"], values["damping"], values["stiffness"] + values["A"])
+    return equations.checked_plant(values["mass"], values["damping"], values["stiffness"] + values["A"])
 
 
 def _starts(motion: Motion, plant: Linear, laws: SearchSpace, wanted: int) -> list[tuple[float, dict[str, float]]]:
@@ -108,7 +96,7 @@ class _Equation:
     """The equation of motion along a measured displacement, for many laws at once."""
 
     def __init__(self, motion: Motion, plant: Linear, laws: SearchSpace) -> None:
-        self.laws, self.filtered, self.periodic = laws, filtering(motion, plant), motion.periodic
+        self.laws, self.filtered, self.periodic = laws, equations.filtering(motion, plant), motion.periodic
         self.along = read_only(np.tile(motion.y, 2) if motion.periodic else motion.y)
         self.known = np.stack([self.filtered(motion.y, power) for power in (2, 1, 0)], axis=1)
         self.basis = np.linalg.qr(self.known)[0]
@@ -142,7 +130,7 @@ class _Equation:
 
     def parameters(self, x: FloatArray) -> dict[str, float]:
         columns = np.column_stack([self.known, self.memories(x[np.newaxis])[0]])
-        mass, damping, stiffness, A = regression(columns, self.target)
+        mass, damping, stiffness, A = equations.regression(columns, self.target)
         law = {name: float(value[0]) for name, value in self.laws.parameters(x[np.newaxis]).items()}
         unit = abs(A) ** (1.0 - law["n"]) if A else 1.0  # z = A w
         shape = {"beta": law["beta"] * unit, "gamma": law["gamma"] * unit, "n": law["n"]}
@@ -259,8 +247,8 @@ class OscillatorStructure(Subject):
         """Force and displacement from which the start is computed; of a periodic record, the mean period."""
         sample_time = record.sample_time
         span_of(record)  # which raises
-        if len(record) <= 2 * HALF_FILTER:
-            raise ValueError(f"the record must have more than {2 * HALF_FILTER} samples, got {len(record)}")
+        if len(record) <= 2 * equations.HALF_FILTER:
+            raise ValueError(f"the record must have more than {2 * equations.HALF_FILTER} samples, got {len(record)}")
         u, y = self._mean_period(record.u), self._mean_period(record.y)
         if np.ptp(y) == 0.0:
             raise ValueError("the output is constant: nothing can be identified from it")
@@ -283,7 +271,7 @@ class OscillatorStructure(Subject):
     def fine_input(self, u: FloatArray) -> FloatArray:
         u, factor = self._mean_period(u), self.oversampling
         if self.hold == "band-limited":
-            return interpolated(u, factor) if self.period else interpolated_record(u, factor)
+            return equations.interpolated(u, factor) if self.period else equations.interpolated_record(u, factor)
         if self.hold == "zoh":
             return np.repeat(u, factor) if self.period else np.repeat(u, factor)[: 1 - factor or None]
         places = np.arange(u.size * factor if self.period else (u.size - 1) * factor + 1) / factor
@@ -291,7 +279,7 @@ class OscillatorStructure(Subject):
 
     def sampled(self, y: FloatArray) -> FloatArray:
         if self.decimation:
-            return decimated(y, self.decimation, periodic=self.period is not None)
+            return equations.decimated(y, self.decimation, periodic=self.period is not None)
         return y[:: self.oversampling]
 
 

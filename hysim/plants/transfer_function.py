@@ -21,16 +21,8 @@ from hysim.models.composable import Composable
 from hysim.models.model import family
 from hysim.models.protocols import CompiledLaw, Startable, Subject, Variant, needed_time, positive_time
 from hysim.models.search_space import ALL_FREE, Freedom, Parameters, SearchSpace
+from hysim.plants import _transfer_function_search as search
 from hysim.plants._linear_response import LinearPlants, LinearState, affine_columns
-from hysim.plants._transfer_function_search import (
-    Guess,
-    UnitGain,
-    denominators,
-    guesses,
-    likely_delays,
-    notes,
-    sections,
-)
 from hysim.records import Record
 
 Hold = Literal["zoh", "foh"]
@@ -381,9 +373,9 @@ class TransferFunctionStructure(Subject, Composable):
     def variants(self) -> tuple[Variant, ...]:
         return ()
 
-    def with_unit_gain(self) -> UnitGain:
+    def with_unit_gain(self) -> search.UnitGain:
         """The structure with the gain at rest one, for use with a stage that carries the gain."""
-        return UnitGain(self)
+        return search.UnitGain(self)
 
     def assemble(self, parameters: Mapping[str, float]) -> TransferFunction:
         initial_state = tuple(parameters[f"x0[{k}]"] for k in range(self.poles))
@@ -398,7 +390,7 @@ class TransferFunctionStructure(Subject, Composable):
 
     def notes(self, record: Record, model: TransferFunction) -> tuple[str, ...]:
         n_parameters = self.poles + self.zeros + 1 + len(self.free_delay)
-        return notes(record, model.response(record.u, record.sample_time), n_parameters)
+        return search.notes(record, model.response(record.u, record.sample_time), n_parameters)
 
     def _starts(
         self, record: Record, lower: FloatArray, upper: FloatArray, delay: float | None, *, at_rest: bool
@@ -407,9 +399,9 @@ class TransferFunctionStructure(Subject, Composable):
         if len(record) < _LONG:
             return np.empty((0, lower.size)), False
         h = record.sample_time
-        delays = likely_delays(record, lower[-1] * h, upper[-1] * h) if delay is None else [delay]
+        delays = search.likely_delays(record, lower[-1] * h, upper[-1] * h) if delay is None else [delay]
         options = {"hold": self.hold, "sample": self.sample}
-        results = guesses(record, self.poles, self.zeros, delays, at_rest=at_rest, **options)
+        results = search.guesses(record, self.poles, self.zeros, delays, at_rest=at_rest, **options)
         starts = np.array([self._coordinates(each, h)[: lower.size] for each in results]).reshape(-1, lower.size)
         starts = np.clip(starts, lower, upper)
         if delay is None or len(starts) < _MAJORITY:
@@ -417,11 +409,11 @@ class TransferFunctionStructure(Subject, Composable):
         apart = np.abs(starts - np.median(starts, axis=0))
         return starts, bool(np.sum((apart < _AGREED * (upper - lower)).all(axis=1)) >= _MAJORITY)
 
-    def _coordinates(self, guess: Guess, sample_time: float) -> FloatArray:
-        return np.append(sections(guess.poles, sample_time), guess.delay / sample_time)
+    def _coordinates(self, guess: search.Guess, sample_time: float) -> FloatArray:
+        return np.append(search.sections(guess.poles, sample_time), guess.delay / sample_time)
 
     def _searched(self, x: FloatArray, sample_time: float, delay: float | None) -> dict[str, FloatArray]:
-        columns = denominators(x, self.poles).T
+        columns = search.denominators(x, self.poles).T
         results = {name: columns[k] / sample_time**k for k, name in enumerate(self.denominator, 1)}
         late = x[:, -1] * sample_time if delay is None else np.full(len(x), delay)
         return results | dict.fromkeys(self.free_delay, late)
