@@ -15,7 +15,8 @@ from hysim._basics.frozen import FloatArray, read_only
 from hysim._basics.prefixes import in_unit, label, printed
 from hysim.comparison import Comparison, ComparisonRow
 from hysim.identification import Identification
-from hysim.plot._style import GUIDE, MANY, MEASURED, POINTS, AxesArray, grid_of, joined, line, one, scattered, several
+from hysim.plot import _style as house
+from hysim.plot._style import GUIDE, MANY, MEASURED, POINTS, AxesArray, AxesLike, line, one, scattered, several
 from hysim.records import Record
 from hysim.simulation import free_run, models_on
 from hysim.sweeps import LossMap
@@ -29,7 +30,7 @@ _SHOWN = 4  # models in a figure, unless names are chosen
 _BINS, _BARS = 40, 0.68  # of a histogram, and the part of its height below the legend
 
 
-def loops(comparison: Comparison, axes: Sequence[Axes] | AxesArray | None = None) -> AxesArray:
+def loops(comparison: Comparison, axes: AxesLike | None = None) -> AxesArray:
     """Draw each model's loop over the measured points, one panel per model, with its fit and its largest width.
 
     The result has one Axes for each row of `comparison`.
@@ -49,9 +50,7 @@ def loops(comparison: Comparison, axes: Sequence[Axes] | AxesArray | None = None
     return panels
 
 
-def residuals(
-    comparison: Comparison, axes: Sequence[Axes] | AxesArray | None = None, *, quanta: str = "quanta"
-) -> AxesArray:
+def residuals(comparison: Comparison, axes: AxesLike | None = None, *, quanta: str = "quanta") -> AxesArray:
     """Draw measured minus model against the input, one panel per model: loading filled, unloading open.
 
     Residuals are counted in quanta of the sensor, with lines at half a quantum (rounding) and at one; `quanta` is their
@@ -79,7 +78,7 @@ def widths(comparison: Comparison, ax: Axes | None = None) -> Axes:
 def comparison(
     comparison: Comparison,
     names: Sequence[str] | None = None,
-    axes: Sequence[Axes] | AxesArray | None = None,
+    axes: AxesLike | None = None,
     *,
     quanta: str = "quanta",
 ) -> AxesArray:
@@ -139,9 +138,7 @@ def loss_map(result: LossMap, ax: Axes | None = None, *, plane: int = 0) -> Axes
     return axes
 
 
-def core_error(
-    errors: Mapping[str, ArrayLike] | ArrayLike, axes: Sequence[Axes] | AxesArray | None = None
-) -> AxesArray:
+def core_error(errors: Mapping[str, ArrayLike] | ArrayLike, axes: AxesLike | None = None) -> AxesArray:
     """Draw the distribution of relative errors over sequences, with its mean, 95th percentile and maximum.
 
     `errors`, shape (n_sequences,), are fractions, such as those of `hysim.metrics.sequence_relative_error`, or a
@@ -173,9 +170,7 @@ def core_error(
     return drawn
 
 
-def identification(
-    fit: Identification, record: Record | Sequence[Record], axes: Sequence[Axes] | AxesArray | None = None
-) -> AxesArray:
+def identification(fit: Identification, record: Record | Sequence[Record], axes: AxesLike | None = None) -> AxesArray:
     """Draw the model over the measured loop, the residuals, and the profiles of the likelihood if there are any.
 
     `record` is the Record, or the sequence of them, from which `fit` was identified, else a ValueError. The band is two
@@ -228,7 +223,7 @@ def _draw_fit(
         if np.isfinite(stderr[part]).all():
             reach = 2.0 * stderr[part]
             corners = np.concatenate([model[part] + reach, (model[part] - reach)[::-1]])
-            style = {"color": line(0)["color"], "alpha": 0.25, "linewidth": 0, **grid_of(part.size)}
+            style = {"color": line(0)["color"], "alpha": 0.25, "linewidth": 0, **house.grid_of(part.size)}
             band = Polygon(np.column_stack([np.concatenate([u[part], u[part][::-1]]), corners]), **style)
             ax.add_artist(band)  # a patch would be searched for extremes side by side, which takes seconds
             ax.update_datalim(band.get_xy())
@@ -240,7 +235,7 @@ def _draw_measured(ax: Axes, u: FloatArray, y: FloatArray, parts: list[NDArray[n
         ax.plot(u, y, label="measured", color=POINTS, **scattered(u.size, **_FILLED))
         return
     for k, part in enumerate(parts):
-        ax.plot(u[part], y[part], label=None if k else "measured", **joined(u.size))
+        ax.plot(u[part], y[part], label=None if k else "measured", **house.joined(u.size))
 
 
 def _draw_profiles(ax: Axes, fit: Identification) -> None:
@@ -300,7 +295,7 @@ def _quantum(record: Record, quanta: str) -> tuple[float, str]:
     return (record.resolution, quanta) if record.resolution else (1.0, printed(record.units.get("y", "")))
 
 
-def _panels(axes: Sequence[Axes] | AxesArray | None, comparison: Comparison) -> AbstractContextManager[AxesArray]:
+def _panels(axes: AxesLike | None, comparison: Comparison) -> AbstractContextManager[AxesArray]:
     n = len(comparison.rows)
     return several(axes, n, height=2.15, columns=min(n, 2), sharey=True)
 

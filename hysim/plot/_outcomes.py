@@ -14,7 +14,7 @@ from hysim.control import Tuning
 from hysim.discovery import Discovery, OscillatorDiscovery
 from hysim.identification import Identification, ParameterCurve, parameter_curve
 from hysim.metrics import describing_function as describing_function_of
-from hysim.plot._style import MEASURED, POINTS, AxesArray, line, one, scattered, several
+from hysim.plot._style import MEASURED, POINTS, AxesArray, AxesLike, line, one, scattered, several
 from hysim.records import Record
 from hysim.sweeps import Fragility
 from hysim.tracking import ParameterTrack
@@ -25,7 +25,7 @@ _WORST_OBJECTIVE = 30.0  # over the chosen objective
 _BAND = 2.0  # standard errors
 
 
-def selection(discovery: Discovery | OscillatorDiscovery, axes: Sequence[Axes] | AxesArray | None = None) -> AxesArray:
+def selection(discovery: Discovery | OscillatorDiscovery, axes: AxesLike | None = None) -> AxesArray:
     """Draw the fit and the BIC of the free run of a discovery against the number of terms, on two Axes.
 
     `discovery` is a result of `hysim.discover` or `hysim.discover_oscillator`. Circles are the structures on the path
@@ -134,7 +134,7 @@ def displacement(result: Displacement, ax: Axes | None = None) -> Axes:
 def describing_function(
     law: Any,
     amplitudes: npt.ArrayLike,
-    axes: Sequence[Axes] | AxesArray | None = None,
+    axes: AxesLike | None = None,
     *,
     mean: float = 0.0,
     units: Mapping[str, str] | None = None,

@@ -7,7 +7,7 @@ from matplotlib.axes import Axes
 
 from hysim._basics.frozen import FloatArray
 from hysim._basics.prefixes import label
-from hysim.plot._style import GUIDE, MEASURED, POINTS, AxesArray, line, one, scattered, several
+from hysim.plot._style import GUIDE, MEASURED, POINTS, AxesArray, AxesLike, line, one, scattered, several
 from hysim.posterior import Evidence, Posterior, Prediction
 from hysim.records import Record
 
@@ -19,9 +19,7 @@ _TICKS = (0.0, -1.0, -2.0, -3.0, -10.0, -30.0, -100.0, -300.0, -1e3, -1e4, -1e5)
 _SHADES = ("#cfe2f0", "#6aa5cf")
 
 
-def corner(
-    posterior: Posterior, names: Sequence[str] | None = None, axes: Sequence[Axes] | AxesArray | None = None
-) -> AxesArray:
+def corner(posterior: Posterior, names: Sequence[str] | None = None, axes: AxesLike | None = None) -> AxesArray:
     """Draw the distribution of each parameter, and of each pair: the regions that hold 39 % and 86 % of the draws.
 
     `names` are those of the parameters, in this order; by default all. Dashed lines are the interval at 95 %. `axes`

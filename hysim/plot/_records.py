@@ -12,7 +12,7 @@ from hysim._basics.results import model_of
 from hysim.control import ClosedLoop
 from hysim.models.protocols import Responding
 from hysim.plants.structures.spectrum import ResponseSpectrum
-from hysim.plot._style import MANY, MEASURED, POINTS, AxesArray, joined, line, one, several, upright
+from hysim.plot._style import MANY, MEASURED, POINTS, AxesArray, AxesLike, joined, line, one, several, upright
 from hysim.records import Record, as_record
 from hysim.simulation import Simulation, columns_of, free_run, has_elements
 
@@ -128,7 +128,7 @@ def loop(*results: Any, ax: Axes | None = None) -> Axes:
     return axes
 
 
-def history(result: InputOutput, axes: Sequence[Axes] | AxesArray | None = None, *, hold: str = "zoh") -> AxesArray:
+def history(result: InputOutput, axes: AxesLike | None = None, *, hold: str = "zoh") -> AxesArray:
     """Draw output, input and, if there is one, memory against time, one over the other.
 
     `result` is a Record, a Simulation or anything with arrays `u` and `y`; without times they are drawn against the
@@ -164,7 +164,7 @@ def history(result: InputOutput, axes: Sequence[Axes] | AxesArray | None = None,
     return panels
 
 
-def signals(result: Simulation, *names: str, axes: Sequence[Axes] | AxesArray | None = None) -> AxesArray:
+def signals(result: Simulation, *names: str, axes: AxesLike | None = None) -> AxesArray:
     """Draw signals of a simulation against time, one panel for each, with a line for each of its columns.
 
     `result` is a result of `hysim.simulate`, and `names` are names of its signals, such as ``"drift"``, else a
@@ -199,7 +199,7 @@ def _axis_of(name: str, units: Mapping[str, str]) -> str:
     return label(units, name) if own else in_unit(name.replace("_", " ").capitalize(), units.get(name, ""))
 
 
-def element_loops(result: Simulation, axes: Sequence[Axes] | AxesArray | None = None) -> AxesArray:
+def element_loops(result: Simulation, axes: AxesLike | None = None) -> AxesArray:
     """Draw the force of each element of a structure against its drift, one panel for each.
 
     `result` is a result of `hysim.simulate` with signals ``"drift"`` and ``"force"`` of the same shape

@@ -26,6 +26,7 @@ from hysim._basics.atomic import write_text
 from hysim._basics.frozen import check_choice
 
 AxesArray = npt.NDArray[np.object_]
+AxesLike = Sequence[Axes] | AxesArray
 
 WIDTH = 6.0
 """Width of a figure [in]: narrow enough to be read on a phone, where it shrinks to 360 pixels."""
@@ -122,7 +123,7 @@ def one(ax: Axes | None, height: float = 4.0) -> Iterator[Axes]:
 
 @contextmanager
 def several(
-    axes: Sequence[Axes] | AxesArray | None,
+    axes: AxesLike | None,
     n: int,
     height: float,
     *,

@@ -1,6 +1,6 @@
 """Pictures of studies, and maps of residuals over inputs and cycles and of relays over their thresholds."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from typing import Any, Literal
 
 import numpy as np
@@ -17,7 +17,7 @@ from hysim._columns.turning import TOLERANCE, turns
 from hysim.laws.operators.preisach import Preisach, PreisachRelays
 from hysim.laws.operators.reversal_curves import FEWEST, Forc
 from hysim.laws.operators.reversal_curves import forc as measured_density
-from hysim.plot._style import DIVERGING, GUIDE, MEASURED, POINTS, AxesArray, line, one, several
+from hysim.plot._style import DIVERGING, GUIDE, MEASURED, POINTS, AxesArray, AxesLike, line, one, several
 from hysim.records import Record
 from hysim.simulation import Simulation, free_run
 from hysim.sweeps import SobolIndices, Sweep
@@ -207,7 +207,7 @@ _FEWEST_CURVES = 3  # below it the map has no shape
 def residual_map(
     record: Record,
     model: Any,
-    axes: Sequence[Axes] | AxesArray | None = None,
+    axes: AxesLike | None = None,
     *,
     bins: int | None = None,
     tolerance: float = TOLERANCE,
