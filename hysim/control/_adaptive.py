@@ -95,7 +95,7 @@ class AdaptiveInverse(WithoutFeedback):
         parameters, rates = self._rates()
         sizes = self._sizes()
         law0 = law.compiled(u0)._replace(step=compiled_step(law.step))
-        own = self._own_state(law0, u0)
+        own = self._begun(law0.parameters, u0)[1]
         lowest, highest = self.limits or (-math.inf, math.inf)
         inverse = searched_inverse(law, law0._replace(state=own), limits=(lowest, highest))
         search = inverse.parameters.copy()
@@ -150,6 +150,3 @@ class AdaptiveInverse(WithoutFeedback):
         if self.law.u0 is not None:
             self.law.step(constants, state, self.law.u0)
         return float(self.law.step(constants, state, u0)), state
-
-    def _own_state(self, law: Any, u0: float) -> FloatArray:
-        return self._begun(law.parameters, u0)[1]

@@ -343,7 +343,8 @@ def secant_gain(
     span = float(np.ptp(cycle))
     if actuator.hysteresis is None and sample_time is None:
         return _usable(actuator.dc_gain)
-    gain = _usable(actuator.dc_gain * _first_slope(actuator))
+    low, high = replace(actuator, amplifier=None).level(np.array([0.0, 1.0]))
+    gain = _usable(actuator.dc_gain * float(high - low))
     before: tuple[float, float] | None = None
     for _ in range(_ITERATIONS):
         y = steady_cycle(actuator, cycle / gain, sample_time, periods)
@@ -404,11 +405,6 @@ def _driven(actuator: Actuator, u: FloatArray, sample_time: float | None) -> Flo
 
 def _steady_level(actuator: Actuator, u: FloatArray) -> FloatArray:
     return steady_cycle(Actuator(hysteresis=actuator.hysteresis), actuator.voltage(u), None)
-
-
-def _first_slope(actuator: Actuator) -> float:
-    low, high = replace(actuator, amplifier=None).level(np.array([0.0, 1.0]))
-    return float(high - low)
 
 
 def _secant(before: tuple[float, float], now: tuple[float, float]) -> float:

@@ -178,10 +178,6 @@ class InputSum(Subject):
             states |= {f"{name}.{state}": value for state, value in law.steady(own(parameters, name), still).items()}
         return states
 
-    def notes(self, record: Record, model: Any) -> tuple[str, ...]:
-        """None: the laws are measured only through the parts after them."""
-        return ()
-
 
 @dataclass(frozen=True)
 class ModalGains(Subject):

@@ -19,7 +19,7 @@ from hysim._basics.frozen import FloatArray, NotNegative, checked, read_only
 from hysim.errors import SimulationError
 from hysim.models.composable import Composable
 from hysim.models.model import family
-from hysim.models.protocols import CompiledLaw, Startable, Subject, Variant, needed_time, positive_time
+from hysim.models.protocols import CompiledLaw, Startable, Subject, needed_time, positive_time
 from hysim.models.search_space import ALL_FREE, Freedom, Parameters, SearchSpace
 from hysim.plants import _transfer_function_search as search
 from hysim.plants._linear_response import LinearPlants, LinearState, affine_columns
@@ -369,9 +369,6 @@ class TransferFunctionStructure(Subject, Composable):
         slack = _AT_ZERO * float(np.ptp(record.y))
         begins_at_zero = record.u[0] == 0.0 and abs(record.y[0]) <= slack
         return ("rest",) if begins_at_zero else ("rest", "free")
-
-    def variants(self) -> tuple[Variant, ...]:
-        return ()
 
     def with_unit_gain(self) -> search.UnitGain:
         """The structure with the gain at rest one, for use with a stage that carries the gain."""

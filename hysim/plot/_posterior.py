@@ -1,6 +1,7 @@
 """Pictures of posteriors: corners, bands of what they predict, and evidences of models."""
 
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -113,17 +114,10 @@ def evidence(evidence: Evidence, ax: Axes | None = None) -> Axes:
     errors = np.array([row.error for row in evidence.rows])
     with one(ax, height=1.3 + 0.34 * len(evidence.rows)) as axes:
         for k, factor in enumerate(evidence.factors):
-            axes.errorbar(
-                values[:, k] - values[:, k].max(),
-                places + 0.22 * (k - 1),
-                xerr=2.0 * errors[:, k],
-                color=line(k)["color"],
-                marker="o^s"[k % 3],
-                markersize=4.0,
-                linestyle="none",
-                linewidth=1.0,
-                label=f"boxes x {factor:g}",
-            )
+            behind, reach = values[:, k] - values[:, k].max(), 2.0 * errors[:, k]
+            points: dict[str, Any] = {"marker": "o^s"[k % 3], "markersize": 4.0, "color": line(k)["color"]}
+            bars: dict[str, Any] = {"xerr": reach, "linestyle": "none", "linewidth": 1.0}
+            axes.errorbar(behind, places + 0.22 * (k - 1), label=f"boxes x {factor:g}", **points, **bars)
         axes.axvline(-np.log(3.0), color=GUIDE, linewidth=0.8, linestyle="dotted")
         axes.set_yticks(places, evidence.names)
         axes.invert_yaxis()

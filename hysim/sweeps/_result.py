@@ -18,9 +18,9 @@ import numpy as np
 import numpy.typing as npt
 
 from hysim._basics.frozen import FloatArray
-from hysim._basics.libraries import optional
 from hysim._basics.printing import csv_text, frozen_result, summary_text
 from hysim._names import among
+from hysim.interop import dataset, frame
 from hysim.sweeps._chunks import Table, seeds
 from hysim.sweeps._space import Column, Space, saltelli
 from hysim.sweeps._store import opened
@@ -92,15 +92,13 @@ class Sweep:
 
     def to_frame(self) -> Any:
         """The columns as a `pandas.DataFrame` with the tasks as index, without arrays; ImportError without pandas."""
-        pandas = optional("pandas", "to_frame", "tables")
-        return pandas.DataFrame(self.columns, index=pandas.Index(self.task, name="task"))
+        return frame(self.columns, index=("task", self.task))
 
     def to_xarray(self) -> Any:
         """The result as an `xarray.Dataset` along the axes of a grid or the tasks; ImportError without xarray.
 
         Further axes of an output `name` are called ``name_0``, ``name_1``; values are nan where there is no row.
         """
-        xarray = optional("xarray", "to_xarray", "tables")
         own = {"seed": self.seed, "seconds": self.seconds, "error": self.error}
         if self.axes is None:
             dims: tuple[str, ...] = ("task",)
@@ -111,7 +109,7 @@ class Sweep:
             name: ((*dims, *(f"{name}_{k}" for k in range(values.ndim - 1))), self._along_axes(values))
             for name, values in {**self.outputs, **self.arrays, **own}.items()
         }
-        return xarray.Dataset(variables, coords=coordinates)
+        return dataset(variables, coordinates, units={})
 
     @property
     def ranges(self) -> dict[str, dict[str, float]]:
