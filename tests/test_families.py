@@ -40,7 +40,7 @@ ALLOWED: dict[tuple[str, ...], tuple[str, ...]] = {
     ("export/_page.py",): ("BoucWen", "Dahl", "Dashpot", "ExcessLoss", "JilesAtherton", "Line", "MaxwellSlip"),
     # Messages and examples name a law that a user may take.
     ("cli/",): ("BoucWen", "Preisach", "PrandtlIshlinskii"),
-    ("control/_adaptive.py", "control/_tracking.py", "design/", "plants/actuator.py"): ("BoucWen",),
+    ("control/_tracking.py", "design/", "plants/actuator.py"): ("BoucWen",),
     ("tracking/_track.py",): ("BoucWen",),
     ("plants/actuator_structure.py",): ("BoucWen", "Line"),
     ("identification/_admissible.py", "discovery/_judgement.py"): ("PrandtlIshlinskii", "Preisach"),

@@ -1,6 +1,5 @@
 """Controllers, the loops they close, and measures of these loops."""
 
-from hysim.control._adaptive import AdaptiveInverse
 from hysim.control._assessment import (
     HysteresisAssessment,
     LoopAssessment,
@@ -22,7 +21,7 @@ from hysim.control._loop_shaping import LinearController, loop_shaping
 from hysim.control._predictive import PredictiveControl
 from hysim.control._stability import LinearLoop, bandwidth, later
 from hysim.control._to_control import to_control
-from hysim.control._tracking import InverseFeedforward, TrackingController
+from hysim.control._tracking import AdaptiveInverse, InverseFeedforward, TrackingController
 from hysim.control._tune import Trial, Tuning, tune
 
 __all__ = [

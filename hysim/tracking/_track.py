@@ -4,20 +4,253 @@ A drift's size is the one that makes the errors of one-sample predictions most l
 noise, too small a one comes late: both make these errors larger or smaller than the filter expects. Their
 log-likelihood (the prediction-error decomposition; A. C. Harvey, Forecasting, Structural Time Series Models and the
 Kalman Filter, 1989, section 3.4) is maximised over the logarithms of the sizes, one at a time.
+
+    theta_k = theta_(k-1) + w_k,    (z_k, y_k) = step(theta_k, z_(k-1), u_k),    measured_k = y_k + noise
+
+The numbers theta walk at random; the memory follows from them by the exact step.
+
+Sigma points: mean and covariance of (theta, z) are carried by 2 n points at +- sqrt(n) standard deviations, each moved
+by the step (the cubature rule; I. Arasaratnam and S. Haykin, IEEE Trans. Autom. Control 54 (2009) 1254). Where the
+errors of the last samples are too large for the noise, a number has jumped: the filter goes back to the first of them,
+raises the variances there, and comes again.
+
+Particles: many copies, weighted by how well they predict, and drawn anew by weight; a few of them jump at each sample.
 """
 
+import math
 from collections.abc import Callable, Mapping, Sequence
-from typing import Any, Literal
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
-from hysim._basics.frozen import FloatArray, check_choice
+from hysim._basics.frozen import FloatArray, check_choice, read_only
 from hysim._basics.printing import frozen_result, summary_text
 from hysim._basics.results import model_of
+from hysim.kernels.copies import step_each
+from hysim.kernels.stepping import START, STEP, by_address
+from hysim.models.compiled_step import compiled_start, compiled_step
 from hysim.models.law import Law
+from hysim.models.tables import tables_of
 from hysim.records import Record
-from hysim.tracking._filters import Coordinates, Copies, Filtered, Walk, coordinates_of, particles, sigma_points
+
+
+class Coordinates(NamedTuple):
+    """Free numbers of a law, and which of them are tracked by their logarithms."""
+
+    names: tuple[str, ...]
+    values: FloatArray
+    log: npt.NDArray[np.bool_]
+
+    def encode(self, values: FloatArray) -> FloatArray:
+        """Coordinates (..., n_names) of values."""
+        return np.where(self.log, np.log(np.where(self.log, values, 1.0)), values)
+
+    def decode(self, x: FloatArray) -> FloatArray:
+        """Values (..., n_names) of coordinates."""
+        return np.where(self.log, np.exp(np.where(self.log, x, 0.0)), x)
+
+    def spread(self, changes: FloatArray) -> FloatArray:
+        return np.where(self.log, changes / np.where(self.log, self.values, 1.0), changes)
+
+
+def coordinates_of(law: Law, free: Sequence[str]) -> Coordinates:
+    """The coordinates of some numbers; ValueError if a name is unknown or decides which step the law has."""
+    if isinstance(free, str):
+        raise TypeError(f"free must be a sequence of names, got the string {free!r}")
+    if unknown := [name for name in free if name not in law.scalars]:
+        raise ValueError(f"free has {unknown[0]!r}: a {type(law).__name__} has {', '.join(law.scalars)}")
+    if initial := [name for name in free if name in law.initial_names]:
+        raise ValueError(f"{initial[0]} is the memory at the first sample, which does not drift: leave it out of free")
+    if not free:
+        raise ValueError("free must name at least one number that drifts")
+    values = np.array([law.scalars[name] for name in free])
+    return Coordinates(tuple(free), values, np.array([_must_be_positive(law, name) for name in free]))
+
+
+def _must_be_positive(law: Law, name: str) -> bool:
+    value = law.scalars[name]
+    try:
+        law.with_scalars({name: -abs(value)})
+    except ValueError:
+        return value > 0.0
+    return False
+
+
+def _place(name: str) -> tuple[str, int]:
+    field, _, place = name.partition("[")
+    return field, int(place[:-1]) if place else 0
+
+
+class Copies:
+    """Copies of a law, moved sample by sample, that differ in the numbers of their `coordinates`."""
+
+    def __init__(self, law: Law, coordinates: Coordinates) -> None:
+        self._law, self._coordinates = law, coordinates
+        self._step = by_address(compiled_step(law.step), STEP.signature)
+        self._start = by_address(compiled_start(law.start), START.signature)
+        self.memory = law.packed[1].copy()
+        self._state = np.zeros(self.memory.size + law.workspace)
+        self._one, _ = tables_of(type(law).__name__, law.arguments, {}, np.zeros(1))
+        self._places = [_place(name) for name in coordinates.names]
+
+    def begun(self, u0: float) -> FloatArray:
+        return np.array(self._law.state_at(u0))
+
+    def moved(self, x: FloatArray, memory: FloatArray, before: float, u: float) -> FloatArray:
+        """Outputs (n,) at the input `u` of copies with coordinates `x` (n, n_names); `memory` (n, n_memory) moves."""
+        y = np.empty(len(x))
+        with np.errstate(all="ignore"):
+            step_each(self._step, self._start, self._packed(x), memory, self._state, before, u, y)
+        return y
+
+    def _packed(self, x: FloatArray) -> FloatArray:
+        law = self._law
+        tables = {name: np.repeat(table, len(x), axis=0) for name, table in self._one.items()}
+        for (field, k), column in zip(self._places, self._coordinates.decode(x).T, strict=True):
+            tables[field][:, k] = column
+        with np.errstate(all="ignore"):
+            return read_only(law.pack(law.completed(tables)).parameters, finite=False)
+
+
+_SURPRISE = 3.0  # mean square of the last normalised errors, from which on a number has jumped
+_RECENT = 12  # errors that are looked at; after a jump as many pass before the next look
+_LEAST = 1e-13  # of the variances: keeps a covariance positive
+_JUMPING = 0.01  # share of the particles that jump at a sample
+_LOG_ROOT_2PI = 0.5 * math.log(2.0 * math.pi)
+_FEWEST = 0.5  # share of effective particles below which they are drawn anew
+
+
+class Walk(NamedTuple):
+    """Standard deviations of the coordinates: at the first sample, of the walk in one sample, and of a jump."""
+
+    first: FloatArray
+    step: FloatArray
+    jump: FloatArray
+
+
+class Filtered(NamedTuple):
+    """Means and standard deviations of the coordinates (n_samples, n_names), and predictions with their deviations.
+
+    The logarithm of the likelihood is that of the errors of predictions one sample ahead. After a jump the samples that
+    came again count with their second predictions, and the place of the jump with one over the number of samples.
+    """
+
+    mean: FloatArray
+    deviation: FloatArray
+    predicted: FloatArray
+    expected_error: FloatArray
+    jumps: tuple[int, ...]
+    log_likelihood: float
+
+
+class Belief(NamedTuple):
+    """Mean (n,) and covariance (n, n) of the coordinates and the memory, and the last input."""
+
+    mean: FloatArray
+    covariance: FloatArray
+    before: float
+
+
+def sigma_points(copies: Copies, x: FloatArray, walk: Walk, noise: float, u: FloatArray, y: FloatArray) -> Filtered:
+    """The filter by sigma points from the coordinates `x` (n_names,)."""
+    begun, count = copies.begun(float(u[0])), x.size
+    covariance = np.zeros((x.size + begun.size - 1,) * 2)
+    covariance[range(count), range(count)] = walk.first**2
+    belief = Belief(np.concatenate([x, begun[1:]]), covariance, float(u[0]))
+    means, deviations = np.empty((u.size, count)), np.empty((u.size, count))
+    predicted, expected, log_density = np.empty(u.size), np.empty(u.size), np.empty(u.size)
+    recent: list[tuple[Belief, float]] = []
+    jumps: list[int] = []
+    for k in range(u.size):
+        last = belief
+        belief, predicted[k], expected[k] = _filtered(copies, last, walk.step, noise, float(u[k]), float(y[k]), k)
+        log_density[k] = _log_normal(float(y[k]) - predicted[k], expected[k])
+        recent = [*recent[-_RECENT + 1 :], (last, ((y[k] - predicted[k]) / expected[k]) ** 2)]
+        if len(recent) == _RECENT and np.mean([square for _, square in recent]) > _SURPRISE and walk.jump.any():
+            begin = recent[0][0]
+            begin.covariance[range(count), range(count)] += walk.jump**2
+            belief, jumps, recent = begin, [*jumps, k], []
+            for j in range(k - _RECENT + 1, k + 1):
+                belief, again, spread = _filtered(copies, belief, walk.step, noise, float(u[j]), float(y[j]), j)
+                log_density[j] = _log_normal(float(y[j]) - again, spread)
+        means[k] = belief.mean[:count]
+        deviations[k] = np.sqrt(np.maximum(belief.covariance.diagonal()[:count], 0.0))
+    log_likelihood = float(log_density.sum()) - len(jumps) * math.log(u.size)
+    return Filtered(means, deviations, predicted, expected, tuple(jumps), log_likelihood)
+
+
+def _log_normal(error: float, deviation: float) -> float:
+    return -0.5 * (error / deviation) ** 2 - math.log(deviation) - _LOG_ROOT_2PI
+
+
+def _filtered(
+    copies: Copies, last: Belief, step: FloatArray, noise: float, u: float, y: float, k: int
+) -> tuple[Belief, float, float]:
+    """The belief after the sample `k`, the output that was predicted, and the standard deviation expected of it."""
+    count, covariance = step.size, last.covariance.copy()
+    covariance[range(count), range(count)] += step**2
+    points = last.mean + _sigma_points(covariance)
+    memory = np.column_stack([np.full(len(points), last.before), points[:, count:]])
+    outputs = copies.moved(points[:, :count], memory, last.before, u)
+    points[:, count:] = memory[:, 1:]
+    usable = np.isfinite(outputs) & np.isfinite(points).all(axis=1)
+    points, outputs = points[usable], outputs[usable]
+    if not outputs.size:
+        raise ValueError(f"every copy of the law diverges at sample {k}: give a smaller drift")
+    mean, predicted = points.mean(axis=0), float(outputs.mean())
+    apart, errors = points - mean, outputs - predicted
+    variance = float(errors @ errors) / len(points) + noise**2
+    gain = apart.T @ errors / len(points) / variance
+    after = apart.T @ apart / len(points) - variance * np.outer(gain, gain)
+    return Belief(mean + gain * (y - predicted), after, u), predicted, float(np.sqrt(variance))
+
+
+def _sigma_points(covariance: FloatArray) -> FloatArray:
+    size = covariance.diagonal().copy()
+    scale = np.sqrt(np.where(size > 0.0, size, 1.0))
+    values, vectors = np.linalg.eigh(covariance / np.outer(scale, scale))
+    spread = scale[:, np.newaxis] * vectors * np.sqrt(np.maximum(values, _LEAST) * len(scale))
+    spread[size <= 0.0] = 0.0
+    return np.asarray(np.concatenate([spread.T, -spread.T]))
+
+
+def particles(
+    copies: Copies, x: FloatArray, walk: Walk, noise: float, u: FloatArray, y: FloatArray, count: int, seed: int
+) -> Filtered:
+    """The filter by particles from the coordinates `x` (n_names,)."""
+    rng = np.random.default_rng(seed)
+    points = x + walk.first * rng.standard_normal((count, x.size))
+    memory = np.tile(copies.begun(float(u[0])), (count, 1))
+    weights = np.full(count, 1.0 / count)
+    means, deviations = np.empty((u.size, x.size)), np.empty((u.size, x.size))
+    predicted, expected = np.empty(u.size), np.empty(u.size)
+    log_likelihood = 0.0
+    for k in range(u.size):
+        points = points + walk.step * rng.standard_normal(points.shape)
+        jumping = rng.random(count) < _JUMPING
+        points[jumping] += walk.jump * rng.standard_normal((int(jumping.sum()), x.size))
+        outputs = copies.moved(points, memory, float(u[max(k - 1, 0)]), float(u[k]))
+        usable = np.isfinite(outputs)
+        if not usable.any():
+            raise ValueError(f"every copy of the law diverges at sample {k}: give a smaller drift")
+        known = np.where(usable, outputs, 0.0)
+        weights = np.where(usable, weights, 0.0)
+        weights = weights / weights.sum()
+        predicted[k] = weights @ known
+        expected[k] = np.sqrt(weights @ (known - predicted[k]) ** 2 + noise**2)
+        log = -0.5 * ((float(y[k]) - known) / noise) ** 2
+        most = log[usable].max()
+        weights = weights * np.exp(log - most)
+        log_likelihood += most + math.log(weights.sum()) - math.log(noise) - _LOG_ROOT_2PI
+        weights = weights / weights.sum()
+        means[k] = weights @ points
+        deviations[k] = np.sqrt(weights @ (points - means[k]) ** 2)
+        if 1.0 / float(weights @ weights) < _FEWEST * count:
+            chosen = np.searchsorted(np.cumsum(weights), (np.arange(count) + rng.random()) / count).clip(max=count - 1)
+            points, memory, weights = points[chosen], memory[chosen], np.full(count, 1.0 / count)
+    return Filtered(means, deviations, predicted, expected, (), float(log_likelihood))
+
 
 _BAND = 1.959963984540054  # standard deviations of a band at 95 %
 
