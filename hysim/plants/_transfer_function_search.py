@@ -66,16 +66,11 @@ class Guess(NamedTuple):
     cost: float
 
 
-def guesses(
-    record: Record, poles: int, zeros: int, delays: Iterable[float], *, hold: str, sample: str, at_rest: bool
-) -> list[Guess]:
+def guesses(structure: Any, record: Record, delays: Iterable[float], *, at_rest: bool) -> list[Guess]:
     """The plants from which the regressions stay finite: of one delay all, of several the best of each, best first."""
     results = []
     for delay in delays:
-        refined = (
-            _refined(record, poles, zeros, delay, cutoff, hold=hold, sample=sample, at_rest=at_rest)
-            for cutoff in _CUTOFFS / record.sample_time
-        )
+        refined = [_refined(structure, record, delay, w, at_rest=at_rest) for w in _CUTOFFS / record.sample_time]
         results.append([guess for guess in refined if guess is not None])
     if len(results) == 1:
         return results[0]
@@ -99,16 +94,14 @@ def likely_delays(record: Record, earliest: float, latest: float) -> list[float]
     return [earliest, *(h * (peak - distances[peak - distances > earliest / h])).tolist()]
 
 
-def _refined(
-    record: Record, poles: int, zeros: int, delay: float, cutoff: float, *, hold: str, sample: str, at_rest: bool
-) -> Guess | None:
+def _refined(structure: Any, record: Record, delay: float, cutoff: float, *, at_rest: bool) -> Guess | None:
     """The guess after all rounds from one cutoff [rad/s]; None where they diverge."""
-    h = record.sample_time
+    h, poles, zeros = record.sample_time, structure.poles, structure.zeros
     roots = np.full(poles, -cutoff, dtype=complex)
     numerator, cost = None, np.inf
     for _ in range(_ROUNDS):
         monic = np.real(np.poly(roots))[np.newaxis, 1:]
-        forced = affine_columns(monic, record.u, h, delay, zeros=zeros, hold=hold, sample=sample)[0]
+        forced = affine_columns(monic, record.u, h, delay, zeros=zeros, **structure.sampling)[0]
         measured = affine_columns(monic, record.y, h, hold="foh")[0, :, : poles + 1]
         known = forced[:, : zeros + 1 if at_rest else -1]
         simulated = measured
@@ -220,13 +213,12 @@ class UnitGain:
         delay = parameters["delay"] if self.structure.delay is None else self.structure.delay
         delays = np.broadcast_to(np.asarray(delay, dtype=float), len(monic))
         plants = LinearPlants.of(monic, numerators, delays, sample_time)
-        return plants.filtered(signals, hold=self.structure.hold, sample=self.structure.sample)
+        return plants.filtered(signals, **self.structure.sampling)
 
     def free_responses(self, parameters: Parameters, record: Record) -> FloatArray:
         """Columns of the initial state, (n_sets, n_samples, n)."""
         monic = self.structure.monic(parameters)
-        hold, sample = self.structure.hold, self.structure.sample
-        return affine_columns(monic, record.u, record.sample_time, zeros=0, hold=hold, sample=sample)[..., 1:-1]
+        return affine_columns(monic, record.u, record.sample_time, zeros=0, **self.structure.sampling)[..., 1:-1]
 
     def assemble(self, parameters: Mapping[str, float]) -> Any:
         return self.structure.assemble(parameters)

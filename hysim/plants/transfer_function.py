@@ -306,6 +306,11 @@ class TransferFunctionStructure(Subject, Composable):
         return tuple(f"den[{k}]" for k in range(1, self.poles + 1))
 
     @property
+    def sampling(self) -> dict[str, str]:
+        """How the record was sampled, by the names of `affine_columns`."""
+        return {"hold": self.hold, "sample": self.sample}
+
+    @property
     def free_delay(self) -> tuple[str, ...]:
         return ("delay",) if self.delay is None else ()
 
@@ -355,8 +360,8 @@ class TransferFunctionStructure(Subject, Composable):
 
     def regressors(self, parameters: Parameters, record: Record) -> FloatArray:
         delay = parameters["delay"] if self.delay is None else self.delay
-        options = {"hold": self.hold, "sample": self.sample}
-        return affine_columns(self.monic(parameters), record.u, record.sample_time, delay, zeros=self.zeros, **options)
+        monic, step = self.monic(parameters), record.sample_time
+        return affine_columns(monic, record.u, step, delay, zeros=self.zeros, **self.sampling)
 
     def monic(self, parameters: Parameters) -> FloatArray:
         """Denominators without their leading one, (n_sets, n)."""
@@ -397,8 +402,7 @@ class TransferFunctionStructure(Subject, Composable):
             return np.empty((0, lower.size)), False
         h = record.sample_time
         delays = search.likely_delays(record, lower[-1] * h, upper[-1] * h) if delay is None else [delay]
-        options = {"hold": self.hold, "sample": self.sample}
-        results = search.guesses(record, self.poles, self.zeros, delays, at_rest=at_rest, **options)
+        results = search.guesses(self, record, delays, at_rest=at_rest)
         starts = np.array([self._coordinates(each, h)[: lower.size] for each in results]).reshape(-1, lower.size)
         starts = np.clip(starts, lower, upper)
         if delay is None or len(starts) < _MAJORITY:
