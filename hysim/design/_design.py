@@ -215,9 +215,11 @@ def design_input(
     >>> bool(max(design.efficiency.values()) <= 1.0), bool(abs(design.u).max() <= 2.0)
     (True, True)
     """
+    if criterion not in ("D", "A", "E"):
+        raise ValueError(f'criterion must be "D", "A" or "E", got {criterion!r}')
     plant = model_of(plant)
     bounds = limits if isinstance(limits, InputLimits) else InputLimits(**limits)
-    subject = _subject(plant, bounds, free, values, noise, criterion)
+    subject = _subject(plant, bounds, free, values, noise)
     rng, in_time = np.random.default_rng(seed), isinstance(plant, ActuatorStructure)
     if in_time:
         inputs = shapes.usual_of_many_speeds(bounds, _highest_frequency(highest_frequency, values or {}, bounds), rng)
@@ -297,12 +299,7 @@ def _highest_frequency(requested: float | None, values: Mapping[str, float], lim
 
 
 def _subject(
-    plant: Any,
-    limits: InputLimits,
-    free: Sequence[str] | None,
-    values: Mapping[str, float] | None,
-    noise: float | None,
-    criterion: str,
+    plant: Any, limits: InputLimits, free: Sequence[str] | None, values: Mapping[str, float] | None, noise: float | None
 ) -> Subject:
     if not isinstance(plant, Law | ActuatorStructure):
         raise TypeError(
@@ -311,8 +308,6 @@ def _subject(
         )
     if isinstance(free, str):
         raise TypeError(f"free must be a sequence of names, got the string {free!r}")
-    if criterion not in ("D", "A", "E"):
-        raise ValueError(f'criterion must be "D", "A" or "E", got {criterion!r}')
     check_positive(noise=noise)
     if isinstance(plant, ActuatorStructure):
         return whole_actuator(plant, limits, values or {}, free, noise)

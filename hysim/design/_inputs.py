@@ -140,7 +140,7 @@ def _multisine(limits: InputLimits, highest: float, power: float, rng: np.random
 
 def random_strokes(limits: InputLimits, rng: np.random.Generator) -> FloatArray:
     """Strokes at the full slew to alternate sides that fill the record; some inputs have short ones, or many holds."""
-    return _segment(limits, rng, 0.0, limits.duration, _HOLD * limits.duration)
+    return _segment(limits, rng, 0.0, limits.duration, _HOLD * limits.duration, speed=1.0, least=0.0)
 
 
 def random_segments(limits: InputLimits, rng: np.random.Generator) -> FloatArray:
@@ -183,20 +183,14 @@ def _last(strokes: FloatArray) -> float:
 
 
 def _segment(
-    limits: InputLimits,
-    rng: np.random.Generator,
-    last: float,
-    lasting: float,
-    mean_hold: float,
-    speed: float = 1.0,
-    least: float = 0.0,
+    limits: InputLimits, rng: np.random.Generator, last: float, lasting: float, pause: float, speed: float, least: float
 ) -> FloatArray:
     """Strokes of a speed to alternate sides, each with its hold at least of a duration [s]."""
     rows, bias, held = [], float(rng.uniform(0.3, 3.0)), float(rng.choice([0.0, 0.2, 0.6]))
     time, side = 0.0, 1.0 if rng.random() < 0.5 else -1.0
     while time < lasting:
         level = last + (side * limits.amplitude - last) * float(rng.random()) ** bias
-        hold = float(rng.exponential(mean_hold)) if rng.random() < held else 0.0
+        hold = float(rng.exponential(pause)) if rng.random() < held else 0.0
         moving = abs(level - last) / (limits.slew * speed)
         hold = max(hold, least - moving)
         time, last, side = time + moving + hold, level, -side

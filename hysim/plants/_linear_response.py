@@ -16,6 +16,7 @@ from hysim.kernels.stepping import complete
 from hysim.models.protocols import Startable
 
 Indices = npt.NDArray[np.int64]
+Transition = tuple[FloatArray, FloatArray, FloatArray]
 _Stepped = tuple[FloatArray, FloatArray, FloatArray, Indices, FloatArray]
 
 _NEVER = 2.0**53  # samples
@@ -160,9 +161,7 @@ def scaled_companion(monic: FloatArray, sample_time: float) -> tuple[FloatArray,
     return F, rate, scaled
 
 
-def transitions(
-    F: FloatArray, spans: FloatArray, g: FloatArray | None = None
-) -> tuple[FloatArray, FloatArray, FloatArray]:
+def transitions(F: FloatArray, spans: FloatArray, g: FloatArray | None = None) -> Transition:
     """A, B0 and B1 of x' = F x + g v over each of the spans (n_sets, n_pieces); see `kernels.linear`."""
     n = F.shape[-1]
     entry = np.eye(n, 1, 1 - n)[:, 0] if g is None else g

@@ -45,22 +45,18 @@ _MOST_BEGUN = 2  # sets of known coordinates beside which points are spread
 
 
 def columns_through(
-    law: Any,
-    law_parameters: Parameters,
-    parts: Parameters,
-    stages: Callable[[Mapping[str, float]], Stages],
-    record: Record,
+    law: Any, shape: Parameters, parts: Parameters, stages: Callable[[Mapping[str, float]], Stages], record: Record
 ) -> FloatArray:
     """Columns (n_sets, n_samples, n_columns + 1) for the law's parameters and those of the other parts."""
     step = record.sample_time
-    n_sets = max((np.size(value) for value in (*law_parameters.values(), *parts.values())), default=1)
-    own, of_law = _distinct(law_parameters, n_sets)
+    n_sets = max((np.size(value) for value in (*shape.values(), *parts.values())), default=1)
+    own, of_law = _distinct(shape, n_sets)
     values, of_parts = _distinct(parts, n_sets)
     chains = [_chain(stages(each), step) for each in values]
     drives = [_voltage(chain, record.u) for chain in chains]
     blocks: dict[tuple[int, int], FloatArray] = {}
     for drive, mine in _by_drive(drives, of_law, of_parts):
-        chosen = {name: np.array([own[k][name] for k in mine]) for name in law_parameters}
+        chosen = {name: np.array([own[k][name] for k in mine]) for name in shape}
         columns = law.regressors(chosen, Record(u=drives[drive], y=drives[drive], t=_times(drives[drive], record)))
         columns = np.broadcast_to(columns, (len(mine), *columns.shape[1:]))
         blocks |= {(drive, k): np.ascontiguousarray(block.T) for k, block in zip(mine, columns, strict=True)}

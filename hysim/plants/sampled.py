@@ -17,7 +17,7 @@ import numpy as np
 from scipy.linalg import matrix_balance
 
 from hysim._basics.frozen import FloatArray, read_only
-from hysim.plants._linear_response import scaled_companion, transitions
+from hysim.plants._linear_response import Transition, scaled_companion, transitions
 from hysim.plants.stages import Creep
 from hysim.plants.state_space import Modes, StateSpace, resting_states
 from hysim.plants.transfer_function import TransferFunction
@@ -157,9 +157,7 @@ def whole_and_part(ratio: float) -> tuple[int, float]:
     return math.floor(ratio), ratio % 1.0
 
 
-def _transition(
-    stage: Stage, step: float, part: float, at: float, linear: bool
-) -> tuple[FloatArray, FloatArray, FloatArray]:
+def _transition(stage: Stage, step: float, part: float, at: float, linear: bool) -> Transition:
     """The states at the part `at` of a sub-step, as matrices of those at its begin and of the three inputs."""
     early, late = min(at, part), max(at - part, 0.0)
     (first, second), begins, ends = (

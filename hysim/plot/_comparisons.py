@@ -76,11 +76,7 @@ def widths(comparison: Comparison, ax: Axes | None = None) -> Axes:
 
 
 def comparison(
-    comparison: Comparison,
-    names: Sequence[str] | None = None,
-    axes: AxesLike | None = None,
-    *,
-    quanta: str = "quanta",
+    comparison: Comparison, names: Sequence[str] | None = None, axes: AxesLike | None = None, *, quanta: str = "quanta"
 ) -> AxesArray:
     """Draw the best models side by side: one row per model, with its loop, its residuals and its loop width.
 

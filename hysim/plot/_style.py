@@ -123,13 +123,7 @@ def one(ax: Axes | None, height: float = 4.0) -> Iterator[Axes]:
 
 @contextmanager
 def several(
-    axes: AxesLike | None,
-    n: int,
-    height: float,
-    *,
-    columns: int = 1,
-    sharex: bool = True,
-    sharey: bool = False,
+    axes: AxesLike | None, n: int, height: float, *, columns: int = 1, sharex: bool = True, sharey: bool = False
 ) -> Iterator[AxesArray]:
     """The first `n` of `axes`; without them new ones in rows of `height` [in], and the house style meanwhile."""
     if axes is not None:

@@ -8,9 +8,10 @@ from typing import Any, Literal, Protocol, get_args, runtime_checkable
 import numpy as np
 import numpy.typing as npt
 
-from hysim._basics.frozen import FloatArray, check_choice, checked, given_items, read_only, vectors
+from hysim._basics.frozen import FloatArray, check_choice, checked, given_items, vectors
 from hysim._basics.results import model_of
 from hysim.plants.structures.ensemble import REDUCTIONS
+from hysim.plants.structures.spectrum import ground_records
 from hysim.plants.structures.structure import Structure
 
 Measure = Literal["rmse", "sse", "max_width", "area", "final", "response"]
@@ -176,9 +177,5 @@ def structure_task(
     names = (measures,) if isinstance(measures, str) else tuple(measures)
     for name in names:
         check_choice("measures", name, REDUCTIONS)
-    if isinstance(ground_accelerations, np.ndarray) or np.ndim(ground_accelerations[0]) == 0:  # type: ignore[index]
-        records = [*np.atleast_2d(np.asarray(ground_accelerations, dtype=float))]
-    else:
-        records = [read_only(each, "ground_accelerations", ndim=1) for each in ground_accelerations]  # type: ignore[union-attr]
-    table = np.array([*zip_longest(*records, fillvalue=0.0)]).T
+    table = np.array([*zip_longest(*ground_records(ground_accelerations), fillvalue=0.0)]).T
     return StructureTask(structure=structure, inputs=table, sample_time=sample_time, measures=names)

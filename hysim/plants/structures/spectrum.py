@@ -121,7 +121,7 @@ def response_spectrum(
     [[2.176, 2.441]]
     """
     h, T = positive_time(sample_time), read_only(periods, "periods", ndim=1)
-    records = _records(ground_accelerations, math.ceil(T.max(initial=0.0) / h))
+    records = ground_records(ground_accelerations, math.ceil(T.max(initial=0.0) / h))
     strengths = np.broadcast_to(read_only(1.0 if strength is None else strength, "strength"), (len(records), T.size))
     check_positive(periods=min(T, default=0.0), yield_input=yield_input, strength=strengths.min(initial=1.0))
     if not 0.0 <= damping < 1.0 <= (1.0 if ductility is None else ductility) < math.inf:
@@ -157,7 +157,8 @@ def response_spectrum(
     return ResponseSpectrum(periods=T, damping=damping, **dict(zip(names, tables, strict=True)))
 
 
-def _records(values: Any, n_zeros: int) -> list[FloatArray]:
+def ground_records(values: Any, n_zeros: int = 0) -> list[FloatArray]:
+    """One record, the rows of a table, or a sequence of records, each continued by zeros."""
     are_several = isinstance(values, list | tuple) and any(np.ndim(row) for row in values[:1])
     rows = values if are_several else np.atleast_2d(read_only(values, "ground_accelerations"))
     return [np.append(read_only(row, "ground_accelerations", ndim=1), np.zeros(n_zeros)) for row in rows]
