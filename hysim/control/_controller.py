@@ -64,7 +64,7 @@ def with_room(state: FloatArray, u: float, reference: float, measurement: float)
 
 
 def compiled_of(step: Any, parameters: Sequence[Any], state: Sequence[Any]) -> CompiledController:
-    """A compiled controller whose parameters and state are these parts, one behind the other."""
+    """A compiled controller whose parameters and state are these parts, one after the other."""
     return CompiledController(step, read_only(np.concatenate(parameters), finite=False), np.concatenate(state))
 
 

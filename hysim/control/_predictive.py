@@ -29,9 +29,7 @@ _STEP = 0.1  # rho, of the geometric mean of these: 30 iterations then miss the 
 _REGULAR = 1e-6  # sigma, of the largest eigenvalue of P
 _CYCLE = 400  # samples of a cycle between the limits, along which slopes are taken
 _FLAT = 0.3  # of the mean slope: a law that is flatter at its reversals would hold the command for long
-_FORGETTING = (
-    1e-12  # noise of each state, of that of the law's output: else a stage at rest, such as a delay, has no filter
-)
+_FORGETTING = 1e-12  # noise of each state, of that of the law's output: else a stage at rest, a delay, has no filter
 
 
 @family

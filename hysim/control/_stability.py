@@ -246,23 +246,18 @@ def judge(
     resting: RestingPlant, controller: Controller, reference: FloatArray, cycle: FloatArray, gain: float
 ) -> tuple[LinearFigures, str]:
     """Figures of the linear loop along a `cycle` with this secant gain, and why the loop does not rest, or ""."""
-    linear = _linear_figures(resting.plant, controller, resting.sample_time, cycle, gain)
+    plant, h = resting.plant, resting.sample_time
+    linear = LinearFigures(math.nan, math.nan, _FASTEST, math.nan)
+    if isinstance(controller, SampledController):
+        loops = [LinearLoop(each, h) for each in (plant, later(plant, h))]
+        along = _closing_slopes(plant, cycle, gain)
+        now, delayed = (max(loop.max_sensitivity(controller, slope) for slope in along) for loop in loops)
+        decay = slowest_decay(loops[0], controller, along) if now < math.inf else 0.0
+        linear = LinearFigures(now, delayed, decay, abs(controller.linear(h).D))
     if linear.max_sensitivity == math.inf:
         return linear, "is unstable"
     asked = float(np.ptp(cycle)) / abs(gain)
     return linear, limit_cycle(resting, controller, reference, linear.decay, asked)
-
-
-def _linear_figures(
-    plant: Actuator, controller: Controller, sample_time: float, cycle: FloatArray, gain: float
-) -> LinearFigures:
-    if not isinstance(controller, SampledController):
-        return LinearFigures(math.nan, math.nan, _FASTEST, math.nan)
-    loops = [LinearLoop(each, sample_time) for each in (plant, later(plant, sample_time))]
-    along = _closing_slopes(plant, cycle, gain)
-    now, delayed = (max(loop.max_sensitivity(controller, slope) for slope in along) for loop in loops)
-    decay = slowest_decay(loops[0], controller, along) if now < math.inf else 0.0
-    return LinearFigures(now, delayed, decay, abs(controller.linear(sample_time).D))
 
 
 def _closing_slopes(plant: Actuator, cycle: FloatArray, gain: float) -> list[float]:

@@ -145,10 +145,8 @@ def archive(
     blank = _description(program, variables, name, version, ""), _source(program, variables, version, "")
     token = f"{{{uuid.uuid5(uuid.NAMESPACE_URL, chr(0).join(blank))}}}"
     source = _source(program, variables, version, token)
-    texts = {
-        "modelDescription.xml": _description(program, variables, name, version, token),
-        f"sources/{name}.c": source,
-    }
+    description = _description(program, variables, name, version, token)
+    texts = {"modelDescription.xml": description, f"sources/{name}.c": source}
     if version == "3.0":
         texts["sources/buildDescription.xml"] = _template("build.xml").substitute(name=name)
     files = {place: text.encode() for place, text in texts.items()} | _libraries(source, name, version, platforms)

@@ -261,13 +261,11 @@ def _assignments(target: str, texts: list[str]) -> list[str]:
     """Statements that fill an array; many equal numbers in a row are a loop."""
     lines, k = [], 0
     for text, run in itertools.groupby(texts):
-        count = len(list(run))
+        count, value = len(list(run)), _without_outer_parentheses(text)
         if count < _MANY:
-            lines += [f"    {target}[{i}] = {_without_outer_parentheses(text)};" for i in range(k, k + count)]
+            lines += [f"    {target}[{i}] = {value};" for i in range(k, k + count)]
         else:
-            lines.append(
-                f"    for (int k = {k}; k < {k + count}; k++) {target}[k] = {_without_outer_parentheses(text)};"
-            )
+            lines.append(f"    for (int k = {k}; k < {k + count}; k++) {target}[k] = {value};")
         k += count
     return lines
 

@@ -95,9 +95,8 @@ class Translation:
             self._structs.add(body.returns)
         result = "void" if body.returns is None else body.returns.c_type  # type: ignore[union-attr]
         arguments = [text for each in parameters for text in _declared(each, scope.c_name(each.name))]
-        comment = (
-            (ast.get_docstring(source.tree) or "").partition("\n\n")[0].replace("\n", "\n   ").replace("*/", "* /")
-        )
+        summary = (ast.get_docstring(source.tree) or "").partition("\n\n")[0]
+        comment = summary.replace("\n", "\n   ").replace("*/", "* /")
         head = f"static {result} {name}({', '.join(arguments) or 'void'})"
         self._texts.append((f"/* {comment} */\n" if comment else "") + f"{head} {{\n{text}}}")
         return Function(name, parameters, body.returns)

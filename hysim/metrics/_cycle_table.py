@@ -272,9 +272,8 @@ def cycle_metrics(
 
 def _outside(u: FloatArray, y: FloatArray, loops: Loops) -> float:
     """Integral of y du over the parts between cycles, less that over the lines that close cycles."""
-    begins, ends = (
-        np.array(sides) for sides in zip(*((c.path.start, c.path.stop - 1) for c in loops.cycles), strict=True)
-    )
+    begins = np.array([cycle.path.start for cycle in loops.cycles])
+    ends = np.array([cycle.path.stop - 1 for cycle in loops.cycles])
     between = zip([0, *ends], [*begins, u.size - 1], strict=True)
     parts = [np.trapezoid(y[begin : end + 1], u[begin : end + 1]) for begin, end in between]
     closing = (y[begins] + y[ends]) / 2 * (u[ends] - u[begins])

@@ -31,12 +31,9 @@ class LoopRows:
         loops = measured_cycles(self.u, 1, TOLERANCE)
         u, rows = loops.of(self.u), loops.of(y)
         branches = [(part, settled(u[part])) for part in (loops.cycles[0].unloading, loops.cycles[0].loading)]
-        inputs = [u[part][order] for part, order in branches]
-        grid = common_inputs(inputs)
-        outputs = [
-            _interpolated(grid, x, rows[:, part][:, order]) for x, (part, order) in zip(inputs, branches, strict=True)
-        ]
-        return np.asarray(outputs[0] - outputs[1])
+        grid = common_inputs([u[part][order] for part, order in branches])
+        unloading, loading = (_interpolated(grid, u[part][order], rows[:, part][:, order]) for part, order in branches)
+        return np.asarray(unloading - loading)
 
     def area(self, y: FloatArray) -> FloatArray:
         """Enclosed area of each row, shape (n_sets,)."""

@@ -31,7 +31,7 @@ from hysim.plants import multi_input_actuator as several
 from hysim.plants.actuator_search import MOST_LATE, as_points, between_samples, columns_through, finer, points
 from hysim.plants.chain import Stages
 from hysim.plants.linear_parts import DAMPING, FREQUENCY, GAIN, CreepBank, LinearParts, Survey
-from hysim.plants.multi_input_actuator import MAIN, InputSum, ModalGains, MultiInputActuator
+from hysim.plants.multi_input_actuator import MAIN, InputSum, ModalGains, MultiInputActuator, seen_by
 from hysim.plants.stages import Amplifier, Creep, Sensor
 from hysim.records import Record
 
@@ -148,11 +148,8 @@ class ActuatorStructure(Subject):
         if not isinstance(law, InputSum):
             stages = parts.stages(parameters)._replace(hysteresis=law, sensor=self.sensor)
             return self.family(**stages._asdict())
-        several = {name: parts.stages(parameters, name=name) for name in law.laws}
-        actuators = [
-            self.family(**several[name]._replace(hysteresis=each)._asdict()) for name, each in law.laws.items()
-        ]
-        return MultiInputActuator(inputs=self.inputs, actuators=tuple(actuators))
+        each = [parts.stages(parameters, name=name)._replace(hysteresis=part) for name, part in law.laws.items()]
+        return MultiInputActuator(inputs=self.inputs, actuators=tuple(self.family(**one._asdict()) for one in each))
 
     def notes(self, record: Record, model: Any) -> tuple[str, ...]:
         """Parameters that the records do not determine, and the values at which they are held."""
@@ -194,7 +191,7 @@ class ActuatorStructure(Subject):
         """The record with the voltages that a known amplifier makes of its commands."""
         if not isinstance(self.amplifier, Amplifier):
             return record
-        others = {name: self.amplifier.voltage(several.seen_by(record, name).u) for name in self.inputs if name != MAIN}
+        others = {name: self.amplifier.voltage(seen_by(record, name).u) for name in self.inputs if name != MAIN}
         return replace(record, u=self.amplifier.voltage(record.u), channels={**record.channels, **others})
 
     def with_law(self, law: Any) -> "ActuatorStructure":
@@ -316,13 +313,11 @@ class ActuatorStructure(Subject):
     def _laws(self, parameters: Parameters, record: Record) -> list[tuple[str, Any, Parameters, Record]]:
         if not isinstance(self.law, InputSum):
             return [(MAIN, self.law, parameters, record)]
-        return [
-            (name, law, own(parameters, name), several.seen_by(record, name)) for name, law in self.law.laws.items()
-        ]
+        return [(name, law, own(parameters, name), seen_by(record, name)) for name, law in self.law.laws.items()]
 
     def _by_mode(self, law: ModalGains, parts: LinearParts, others: Parameters, record: Record) -> FloatArray:
         """Columns (n_sets, n_samples, n_columns + 1) of the inputs through each mode, one, and zero."""
-        law_records = [several.seen_by(record, name) for name in self.inputs]
+        law_records = [seen_by(record, name) for name in self.inputs]
         behind: list[tuple[Parameters, partial[Stages]]] = [(others, partial(parts.stages))]
         if self.modes:
             behind = [(parts.of_mode(others, k), partial(parts.one_mode, k=k)) for k in range(self.modes)]

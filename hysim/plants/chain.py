@@ -212,9 +212,8 @@ class Chain:
             stage.decline.size, stage.rest.size, stage.lag, self.samples_late,
             self.substeps, self.seen_in, self.sensor.quantum,
         ]  # fmt: skip
-        return read_only(
-            np.concatenate([self.amplifier.compiled(self.step).parameters, head, self.linear_block]), finite=False
-        )
+        driver = self.amplifier.compiled(self.step).parameters
+        return read_only(np.concatenate([driver, head, self.linear_block]), finite=False)
 
 
 def linear_stage(creep: Creep | None, vibration: Vibration | None, step: float) -> Stage:

@@ -162,9 +162,8 @@ class InputSum(Subject):
         return without_repetition(joint, lambda x: self.regressors(joint.parameters(x), record)[..., :-1], {}, freedom)
 
     def regressors(self, parameters: Parameters, record: Record) -> FloatArray:
-        return columns_beside(
-            [law.regressors(own(parameters, name), seen_by(record, name)) for name, law in self.laws.items()]
-        )
+        blocks = [law.regressors(own(parameters, name), seen_by(record, name)) for name, law in self.laws.items()]
+        return columns_beside(blocks)
 
     def assemble(self, parameters: Mapping[str, float]) -> "InputSum":
         return InputSum({name: law.assemble(own(parameters, name)) for name, law in self.laws.items()})

@@ -12,17 +12,8 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from hysim._basics.frozen import (
-    FloatArray,
-    Interval,
-    NotNegative,
-    Positive,
-    check_count,
-    check_not_negative,
-    check_positive,
-    check_whole,
-    read_only,
-)
+from hysim._basics import frozen
+from hysim._basics.frozen import FloatArray, Interval, NotNegative, Positive, read_only
 from hysim.models.model import family
 from hysim.plants.state_space import StateSpace
 
@@ -99,8 +90,8 @@ class Amplifier:
         >>> hs.Amplifier.non_inverting(feedback_resistance=9e3, input_resistance=1e3, slew_rate=0.5e6).gain
         10.0
         """
-        check_positive(input_resistance=input_resistance)
-        check_not_negative(
+        frozen.check_positive(input_resistance=input_resistance)
+        frozen.check_not_negative(
             feedback_resistance=feedback_resistance, output_resistance=output_resistance, capacitance=capacitance
         )
         return cls(
@@ -132,7 +123,7 @@ class Amplifier:
         >>> round(ua741.full_power_bandwidth(5.0)), round(ua741.full_power_bandwidth(50.0))
         (15915, 1592)
         """
-        check_positive(amplitude=amplitude)
+        frozen.check_positive(amplitude=amplitude)
         return math.inf if self.slew_rate is None else self.slew_rate / (2.0 * math.pi * amplitude)
 
     def voltage(self, u: npt.ArrayLike) -> FloatArray:
@@ -194,7 +185,7 @@ class Creep:
                 f"time_constants and weights must be equally long, got {len(self.time_constants)} and "
                 f"{len(self.weights)}"
             )
-        check_positive(time_constants=min(self.time_constants, default=1.0))
+        frozen.check_positive(time_constants=min(self.time_constants, default=1.0))
 
     @classmethod
     def per_decade(
@@ -240,7 +231,7 @@ class Creep:
             raise ValueError(f"band must rise from a positive time [s], got {band}")
         if not 0.0 < reference_time < math.inf:
             raise ValueError(f"reference_time must be positive, got {reference_time}")
-        check_count("per_decade_elements", per_decade_elements)
+        frozen.check_count("per_decade_elements", per_decade_elements)
         decades = math.log10(high / low)
         time_constants = np.geomspace(low, high, 1 + math.ceil(decades * per_decade_elements - 1e-9))
         times = np.geomspace(low, high, 1 + math.ceil(decades * _TIMES_PER_DECADE))
@@ -306,7 +297,7 @@ class Sensor:
     seed: int = 0
 
     def __post_init__(self) -> None:
-        check_whole(self.seed, "seed", least=0)
+        frozen.check_whole(self.seed, "seed", least=0)
 
     def noise_samples(self, n: int) -> FloatArray:
         """The noise of the first `n` samples; more samples begin with the same."""

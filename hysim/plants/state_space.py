@@ -113,10 +113,8 @@ def mode(natural_frequency: float, damping_ratio: float, gain: float = 1.0, *, d
     """
     check_positive(natural_frequency=natural_frequency)
     check_not_negative(damping_ratio=damping_ratio)
-    stiffness = natural_frequency**2
-    return TransferFunction(
-        num=(gain * stiffness,), den=(1.0, 2.0 * damping_ratio * natural_frequency, stiffness), delay=delay
-    )
+    damping, stiffness = 2.0 * damping_ratio * natural_frequency, natural_frequency**2
+    return TransferFunction(num=(gain * stiffness,), den=(1.0, damping, stiffness), delay=delay)
 
 
 @family

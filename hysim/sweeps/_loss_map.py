@@ -127,9 +127,8 @@ def loss_map(
     check_positive(amplitudes=swings.min(initial=math.inf), frequencies=rates.min(initial=math.inf))
     if others and not isinstance(model, Dependent):
         raise TypeError(f"a {type(model).__name__} depends on no channel: give a hysim.Dependent, or no channels")
-    wave = (
-        sine(1.0, cycles=1, samples_per_cycle=_SAMPLES) if waveform is None else read_only(waveform, "waveform", ndim=1)
-    )
+    samples = sine(1.0, cycles=1, samples_per_cycle=_SAMPLES) if waveform is None else waveform
+    wave = read_only(samples, "waveform", ndim=1)
     if wave.size < 3 or not abs(wave[-1] - wave[0]) < _STEADY * np.ptp(wave):
         raise ValueError("waveform must be one cycle that ends where it begins: append its first sample to it")
     if abs(np.abs(wave).max() - 1.0) > 0.01:  # by hand: samples may miss the extrema

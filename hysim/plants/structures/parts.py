@@ -301,9 +301,8 @@ def _listed(scalars: Iterable[str]) -> str:
         names[f"{_ELEMENTS}.k.{last}" if is_common else name] = None
     more = len(names) - _SHOWN
     shown = ", ".join(list(names)[:_SHOWN]) + (f" and {more} more" if more > 0 else "")
-    return shown + (
-        f" (k is the place of an element, or {_ALL} for all)" if any(".k." in each for each in names) else ""
-    )
+    legend = f" (k is the place of an element, or {_ALL} for all)"
+    return shown + legend * any(".k." in each for each in names)
 
 
 def _numbers(name: str, value: Any) -> dict[str, float]:

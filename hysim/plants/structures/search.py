@@ -267,11 +267,11 @@ class SearchedStructure(MovingStructure, Subject):
         """Numbers at which the parts of the record, one longer than the other, leave the least error."""
         from scipy.optimize import least_squares
 
-        start = x = space.starts[0]
+        x = space.starts[0]
         energy = np.cumsum(_input(record) ** 2)
         for part in _PARTS:
             n = max(_FEWEST, int(np.searchsorted(energy, part * energy[-1])) + 1)
-            error = _PartError(self, record, space, start, n)
+            error = _PartError(self, record, space, n)
             if not np.isfinite(error(x)).all():
                 continue
             inside = np.clip(x, space.lower + _INSIDE, space.upper - _INSIDE)
@@ -337,10 +337,8 @@ class SearchedStructure(MovingStructure, Subject):
 class _PartError:
     """Error on the first samples of a record, and distances from the start."""
 
-    def __init__(
-        self, structure: SearchedStructure, record: Record, space: SearchSpace, start: FloatArray, n: int
-    ) -> None:
-        self.structure, self.record, self.space, self.start, self.n = structure, record, space, start, n
+    def __init__(self, structure: SearchedStructure, record: Record, space: SearchSpace, n: int) -> None:
+        self.structure, self.record, self.space, self.start, self.n = structure, record, space, space.starts[0], n
         n_sensors = len(_sensors(record)[0])
         self.measured = record.y.reshape(n_sensors, -1)[:, :n]
         self.unit = _MISFIT * float(np.sqrt(np.mean(self.measured**2) * self.measured.size)) or 1.0
