@@ -368,3 +368,21 @@ test_wrong_arguments_are_named = refused(
     ((MODE, T_STEP, STEP), {"controller": hs.BoucWen()}, TypeError, "PID or a TrackingController, got BoucWen"),
     call=lambda arguments, options: hs.tune(*arguments, **options),
 )
+
+
+@pytest.mark.parametrize(("zero", "limits"), [(3.0, (0.0, 100.0)), (-3.0, (0.0, 100.0)), (0.0, (0.0, 50.0))])
+def test_neither_the_zero_of_a_sensor_nor_limits_beyond_the_cycle_keep_a_stage_from_being_tuned(zero, limits):
+    law = hs.BoucWen(beta=0.02, gamma=0.005, feedthrough=0.03, gain=-0.012, u0=0.0, u_range=(0.0, 100.0))
+    cycle, plain = np.array([0.0, 1.0]), hs.Actuator(hysteresis=law)
+    stage = hs.Actuator(hysteresis=replace(law, offset=zero), amplifier=hs.Amplifier(limits=limits))
+    gain = hs.control.secant_gain(plain, cycle)
+    assert hs.control.secant_gain(stage, zero + cycle) == pytest.approx(gain, rel=1e-9)
+    assert hs.tune(stage, 1e-3 * np.arange(200), zero + np.ones(200)).success
+
+
+def test_a_stage_in_the_middle_of_its_range_has_the_gain_along_it():
+    """Neither an input nor an output near zero is known."""
+    law = hs.BoucWen(beta=0.02, gamma=0.005, feedthrough=0.03, gain=-0.02, offset=7.0, u0=60.0, u_range=(60.0, 100.0))
+    y = law.response(hs.signals.triangle(60.0, 100.0, cycles=8, samples_per_cycle=100))[-100:]
+    gain = hs.control.secant_gain(hs.Actuator(hysteresis=law), y)
+    assert gain == pytest.approx(np.ptp(y) / 40.0, rel=0.02)

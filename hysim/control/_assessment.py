@@ -15,7 +15,16 @@ from hysim import signals
 from hysim._basics.frozen import FloatArray, read_only
 from hysim._basics.printing import extent, frozen_result, quantity, summary_text
 from hysim.control._controller import Controller, preview
-from hysim.control._loop import ClosedLoop, RestingPlant, around, as_actuator, sampled, secant_gain, without_memory
+from hysim.control._loop import (
+    ClosedLoop,
+    RestingPlant,
+    around,
+    as_actuator,
+    inverted,
+    sampled,
+    secant_gain,
+    without_memory,
+)
 from hysim.control._stability import judge
 from hysim.control._tracking import is_fed_back
 from hysim.metrics import LoopMetrics, VibrationReduction, loop_metrics, reduction_percent, rmse, vibration_reduction
@@ -370,7 +379,7 @@ def assess_hysteresis(
     samples = _samples_in("a period", period, sample_time)
     reference = signals.triangle(low, high, cycles=cycles, samples_per_cycle=samples)
     opened = open_loop(actuator, reference, sample_time, samples)
-    line = RestingPlant(without_memory(actuator, opened.cycle / opened.secant_gain), sample_time)
+    line = RestingPlant(without_memory(actuator, inverted(actuator, opened.cycle, opened.secant_gain)), sample_time)
     resting = RestingPlant(actuator, sample_time)
     counted = slice(-samples - 1, None)
     loop = _judged(resting, controller, opened.t, reference, opened.cycle, opened.secant_gain, counted, period)
@@ -417,11 +426,12 @@ def open_loop(plant: Any, reference: npt.ArrayLike, sample_time: float, samples_
         )
     creeping = None if actuator.creep is None else cycles
     gain = secant_gain(actuator, r[-samples_per_cycle - 1 :], sample_time, creeping)
+    u = inverted(actuator, r, gain)
     return OpenLoop(
         t=read_only(sample_time * np.arange(r.size)),
         reference=r,
-        u=r / gain,
-        y=RestingPlant(actuator, sample_time).driven(r / gain),
+        u=u,
+        y=RestingPlant(actuator, sample_time).driven(u),
         secant_gain=gain,
         samples_per_cycle=samples_per_cycle,
     )
@@ -537,7 +547,7 @@ def assess_square_wave(
     levels = np.array([low, high])
     gain = secant_gain(actuator, levels)
     resting = RestingPlant(actuator, sample_time)
-    open_y = resting.driven(reference / gain)
+    open_y = resting.driven(inverted(actuator, reference, gain))
     last, last_half = slice(-2 * half, None), slice(-half, None)
     loop = _judged(resting, controller, read_only(t), reference, levels, gain, last, period)
     mode, step = _least_damped(actuator), None

@@ -334,7 +334,7 @@ _STEADY = 1e-12  # of the stroke
 def secant_gain(
     actuator: Actuator, cycle: FloatArray, sample_time: float | None = None, periods: int | None = None
 ) -> float:
-    """Stroke over span of the steady cycle that the voltage ``cycle / secant gain`` drives.
+    """Stroke over span of the steady cycle that the command `inverted` drives; limits of an amplifier do not count.
 
     `cycle` is one period of a reference. Without a sample time it is quasi-static: the law's, times the vibration's DC
     gain. With a number of periods the last of them stands for the steady cycle, which creep approaches slowly. A
@@ -343,11 +343,14 @@ def secant_gain(
     span = float(np.ptp(cycle))
     if actuator.hysteresis is None and sample_time is None:
         return _usable(actuator.dc_gain)
-    low, high = replace(actuator, amplifier=None).level(np.array([0.0, 1.0]))
-    gain = _usable(actuator.dc_gain * float(high - low))
+    if actuator.amplifier is not None:
+        actuator = replace(actuator, amplifier=replace(actuator.amplifier, limits=None))
+    ends = np.array(actuator.u_range or (0.0, 1.0))
+    low, high = replace(actuator, amplifier=None).level(ends)
+    gain = _usable(actuator.dc_gain * float(high - low) / float(np.ptp(ends)))
     before: tuple[float, float] | None = None
     for _ in range(_ITERATIONS):
-        y = steady_cycle(actuator, cycle / gain, sample_time, periods)
+        y = steady_cycle(actuator, inverted(actuator, cycle, gain), sample_time, periods)
         next_gain = _usable(float(np.ptp(y)) / span * gain)
         change = abs(next_gain / gain - 1.0)
         if change <= _CONVERGED:
@@ -359,6 +362,18 @@ def secant_gain(
             f"no voltage drives the plant along the reference: its secant gain does not converge at {gain:g}"
         )
     return next_gain
+
+
+def inverted(actuator: Actuator, y: FloatArray, gain: float) -> FloatArray:
+    """Commands for displacements `y` by a line of this gain, through where the plant rests at a command.
+
+    It is the command zero, or the nearest one in the range on which the law is known.
+    """
+    volts = float(actuator.voltage(0.0))
+    known = volts if actuator.u_range is None else min(max(volts, actuator.u_range[0]), actuator.u_range[1])
+    amplifier = actuator.amplifier
+    u0 = known - volts if amplifier is None or known == volts else amplifier.command(known)
+    return u0 + (y - float(_driven(actuator, np.array([u0]), None)[0])) / gain
 
 
 def steady_cycle(

@@ -17,7 +17,7 @@ from scipy.signal import cont2discrete
 
 from hysim._basics.frozen import FloatArray, Interval, check_positive, read_only
 from hysim.control._controller import Feedback, SampledController
-from hysim.control._loop import as_actuator, secant_gain, slopes
+from hysim.control._loop import as_actuator, inverted, secant_gain, slopes
 from hysim.control._stability import LinearLoop
 from hysim.kernels import controllers as kernels
 from hysim.models.model import family
@@ -130,7 +130,7 @@ def loop_shaping(
         raise ImportError("loop_shaping needs slycot: pip install 'hysim[synthesis]'")
     cycle, actuator = triangle(*stroke, cycles=1, samples_per_cycle=_CYCLE), as_actuator(plant)
     gain = secant_gain(actuator, cycle)
-    along = slopes(actuator, cycle / gain)
+    along = slopes(actuator, inverted(actuator, cycle, gain))
     loops = [LinearLoop(each, positive_time(sample_time)) for each in (plant, *variations)]
     A, B, C, D = _in_w(loops[0].system, 1.0 / actuator.dc_gain, sample_time)
     n, b = B.size, bandwidth

@@ -46,7 +46,7 @@ import numpy.typing as npt
 
 from hysim._basics.frozen import FloatArray, check_positive
 from hysim.control._controller import Controller, Feedback, SampledController, limits_of
-from hysim.control._loop import RestingPlant, as_actuator, secant_gain, slopes
+from hysim.control._loop import RestingPlant, as_actuator, inverted, secant_gain, slopes
 from hysim.control._to_control import to_control
 from hysim.errors import SimulationError
 from hysim.plants.actuator import Actuator
@@ -265,7 +265,9 @@ def _closing_slopes(plant: Actuator, cycle: FloatArray, gain: float) -> list[flo
     if plant.hysteresis is None:
         return [1.0]
     secant = gain / plant.dc_gain
-    return sorted({slope for slope in slopes(plant, cycle / gain) if slope / secant > _CLOSES}) or [secant]
+    return sorted({slope for slope in slopes(plant, inverted(plant, cycle, gain)) if slope / secant > _CLOSES}) or [
+        secant
+    ]
 
 
 def slowest_decay(loop: LinearLoop, controller: SampledController, slopes: Sequence[float]) -> float:

@@ -29,7 +29,7 @@ from scipy.optimize import minimize
 from hysim._basics.frozen import FloatArray, check_choice, check_positive, frozen
 from hysim._basics.printing import frozen_result, summary_text
 from hysim.control._controller import PID, SampledController, limits_of
-from hysim.control._loop import RestingPlant, as_actuator, sampled, secant_gain, slopes
+from hysim.control._loop import RestingPlant, as_actuator, inverted, sampled, secant_gain, slopes
 from hysim.control._stability import LinearLoop, limit_cycle, slowest_decay
 from hysim.control._tracking import TrackingController
 from hysim.models.model import in_brief
@@ -221,7 +221,7 @@ class _PlantLoops:
     def __init__(self, plant: Actuator, cycle: FloatArray, sample_time: float) -> None:
         self.gain = secant_gain(plant, cycle)
         self.secant = self.gain / plant.dc_gain
-        self.slopes = sorted(set(slopes(plant, cycle / self.gain)))
+        self.slopes = sorted(set(slopes(plant, inverted(plant, cycle, self.gain))))
         self.loop = LinearLoop(plant, sample_time)
         self.noise = 0.0 if plant.sensor is None else plant.sensor.noise
         self.volts = 1.0 if plant.amplifier is None else abs(plant.amplifier.gain)
