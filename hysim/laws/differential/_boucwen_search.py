@@ -19,7 +19,7 @@ its own coordinate, between these bounds; bounds from or to zero and infinity cu
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, ClassVar, Self
 
 import numpy as np
 
@@ -28,14 +28,15 @@ from hysim.models.parameters import space_of_chart
 from hysim.models.search_space import Freedom, SearchSpace
 from hysim.records import Record, span_of
 
+Numbers = Mapping[str, float]
 REDUNDANT = (("A", "gain"),)
 _FURTHER = ("b2", "b3", "b4", "b5", "b6")
 _SCALED = {  # parameters with a unit of their own, and their box in it
     "delta": (-5.0, 5.0),
     "z0": (-1.0, 1.0),
 }
-_MEMORY = ("A", "beta", "gamma", "n", *_FURTHER, *_SCALED)
 _PAIR = ("loading", "unloading")
+_SHAPES = (*_PAIR, "beta", "gamma", *_FURTHER)
 _LEAST_UNIT, _LARGEST_UNIT = 1e-290, 1e290  # times 1e17, the largest coefficient, still a number
 _BY_DEFAULT = {"A": 1.0, "beta": 0.5, "gamma": 0.5, "n": 1.0, "z0": 0.0}
 KNEE = float(np.arcsinh(40.0))
@@ -69,32 +70,20 @@ def search_space(
         raise ValueError(f"n must be positive, got {held['n']}")
     if "n" in bounds and not (bounds["n"][0] >= 0.0 and (bounds["n"][0] > 0.0 or np.isinf(bounds["n"][1]))):
         raise ValueError(f"bounds of 'n' must be positive, got {bounds['n']}")
-    signs = {name: pair for name, pair in bounds.items() if name in _MEMORY and np.isinf(pair).any()}
-    limits = {name: pair for name, pair in bounds.items() if name in _MEMORY and name not in signs}
-    chart = _chart({**defaults, **held}, frozenset(defaults) - frozenset(held), limits, frozenset(signs), record)
-    box = {name: limits.get(name, _cut(name, signs.get(name))) for name in chart.coordinates}
+    chart = Chart.of(defaults, held, bounds, record, float(np.abs(record.u).max()))
+    limits = chart.limits
+    box = {name: limits[name] if name in limits else _cut(name, bounds.get(name)) for name in chart.coordinates}
     box |= {"n": (float(np.log(box["n"][0])), float(np.log(box["n"][1])))} if "n" in box else {}
-    lower, upper = (np.array([pair[side] for pair in box.values()]) for side in (0, 1))
     known = {*columns, *("A", "beta", "gamma", "n", "z0")}
     extended = not known.issuperset(defaults)  # what is admissible for such a law is not known
-
-    quadrant = np.array([max(low, 0.0) if name in _PAIR else low for name, (low, _) in box.items()])
-    return space_of_memory(
-        chart,
-        (lower, upper),
-        defaults,
-        columns,
-        held,
-        bounds,
-        freedom,
-        regions={"admissible": (quadrant, upper)} if set(_PAIR) <= set(box) and not extended else {},
-        screened=screened,
-    )
+    quadrant = {name: (max(low, 0.0) if name in _PAIR else low, high) for name, (low, high) in box.items()}
+    regions = {"admissible": sides(quadrant)} if set(_PAIR) <= set(box) and not extended else {}
+    return space_of_memory(chart, box, defaults, columns, held, bounds, freedom, regions=regions, screened=screened)
 
 
 def space_of_memory(
-    chart: Any,
-    box: tuple[FloatArray, FloatArray],
+    chart: "Chart",
+    box: Mapping[str, tuple[float, float]],
     defaults: Mapping[str, float],
     columns: tuple[str, ...],
     held: Mapping[str, float],
@@ -106,7 +95,12 @@ def space_of_memory(
     is_default = freedom.starts_anew and _BY_DEFAULT.items() <= defaults.items()
     start = (chart.in_own_units() if is_default else chart).encode(chart.values)
     others = {"redundant": REDUNDANT, "physical": PHYSICAL, **others}
-    return space_of_chart(chart, box, start, defaults, columns, held, bounds, freedom, state=("z0",), **others)
+    return space_of_chart(chart, sides(box), start, defaults, columns, held, bounds, freedom, state=("z0",), **others)
+
+
+def sides(box: Mapping[str, tuple[float, float]]) -> tuple[FloatArray, FloatArray]:
+    """Lower and upper sides of a box, (n_x,) each."""
+    return np.array([low for low, _ in box.values()]), np.array([high for _, high in box.values()])
 
 
 def _cut(name: str, sign: tuple[float, float] | None) -> tuple[float, float]:
@@ -120,71 +114,92 @@ def _cut(name: str, sign: tuple[float, float] | None) -> tuple[float, float]:
 
 
 @dataclass(frozen=True)
-class _Chart:
+class Chart:
     """Coordinates of the memory's free parameters, and the way there and back."""
 
     coordinates: tuple[str, ...]
-    values: Mapping[str, float]  # every parameter, where it is not free
+    values: Numbers  # every parameter, where it is not free
     limits: Mapping[str, tuple[float, float]]  # parameters that are their own coordinates
     span: float
-    reach: float  # of |u|
+    reach: float  # of |u|, or of its path
     slope: float  # what A is measured in
 
-    def in_own_units(self) -> "_Chart":
+    memory: ClassVar[tuple[str, ...]] = ("A", "beta", "gamma", "n", *_FURTHER, *_SCALED)
+    beside_loading: ClassVar[str] = "unloading"
+
+    @classmethod
+    def of(
+        cls, defaults: Numbers, held: Numbers, bounds: Mapping[str, tuple[float, float]], record: Record, reach: float
+    ) -> Self:
+        """The chart of the parameters that are not held; finite `bounds` are limits of own coordinates."""
+        values = {**defaults, **held}
+        free = [name for name in cls.memory if name in values and name not in held]
+        paired = {"beta", "gamma"} <= {*free} and not {"beta", "gamma"} & {*bounds}
+        combined = {"beta": "loading", "gamma": cls.beside_loading} if paired else {}
+        names = tuple(combined.get(name, name) for name in free)
+        limits = {name: pair for name, pair in bounds.items() if name in free and np.isfinite(pair).all()}
+        return cls(names, values, limits, span_of(record), reach, slope_of(record, values))
+
+    def in_own_units(self) -> Self:
         return replace(self, span=1.0, reach=self.reach / self.span, slope=1.0)
 
     def decode(self, x: FloatArray) -> dict[str, FloatArray]:
         """Parameters of the memory, each (n_sets,), from coordinates (n_sets, n_x)."""
-        raw = dict(zip(self.coordinates, np.atleast_2d(x).T, strict=True))
-        held = {name: np.full(np.atleast_2d(x).shape[0], self.values[name]) for name in _MEMORY if name in self.values}
-        A = raw["A"] * (1.0 if "A" in self.limits else self.slope) if "A" in raw else held["A"]
-        n = np.exp(raw["n"]) if "n" in raw else held["n"]
-        unit = self._unit(A, n)
-        parameters = held | {"A": A, "n": n}
-        shapes = (*_PAIR, "beta", "gamma", *_FURTHER)
-        scaled = {name: shape(raw[name], n) * unit for name in shapes if name in raw}
-        if "loading" in scaled:
-            parameters["beta"] = 0.5 * (scaled["loading"] + scaled["unloading"])
-            parameters["gamma"] = 0.5 * (scaled["loading"] - scaled["unloading"])
-        scaled |= {name: raw[name] * size for name, size in self._sizes(A).items() if name in raw}
-        parameters |= {name: values for name, values in scaled.items() if name not in _PAIR}
-        return parameters | {name: raw[name] for name in self.limits if name not in ("A", "n")}
+        sets = np.atleast_2d(x)
+        raw = dict(zip(self.coordinates, sets.T, strict=True))
+        known = {name: np.full(len(sets), self.values[name]) for name in self.memory if name in self.values}
+        known |= {name: raw[name] for name in self.limits}
+        raw = {name: values for name, values in raw.items() if name == "n" or name not in self.limits}
+        known |= {"A": raw["A"] * self.slope} if "A" in raw else {}
+        known |= {"n": np.exp(raw["n"])} if "n" in raw else {}
+        unit = shape_unit(known["A"], known["n"], self.span)
+        shapes = {name: shape(raw[name], known["n"]) * unit for name in _SHAPES if name in raw}
+        if "loading" in shapes:
+            loading = shapes.pop("loading")
+            unloading = shapes.pop("unloading") if "unloading" in shapes else raw["ratio"] * np.abs(loading)
+            known |= {"beta": 0.5 * (loading + unloading), "gamma": 0.5 * (loading - unloading)}
+        known |= shapes
+        return known | {
+            name: self.sized(name, raw[name]) * size for name, size in self.sizes(known).items() if name in raw
+        }
 
     def encode(self, parameters: Mapping[str, float]) -> FloatArray:
         """Coordinates (n_x,) of one set of parameters."""
-        A, n = np.array(parameters["A"]), np.array(parameters["n"])
-        beta, gamma, unit = parameters["beta"], parameters["gamma"], self._unit(A, n)
-        scaled: dict[str, FloatArray | float] = {
-            "A": A / self.slope,
-            "loading": knee((beta + gamma) / unit, n),
-            "unloading": knee((beta - gamma) / unit, n),
-            "beta": knee(beta / unit, n),
-            "gamma": knee(gamma / unit, n),
-            **{name: knee(parameters[name] / unit, n) for name in _FURTHER if name in parameters},
-            **{name: parameters[name] / size for name, size in self._sizes(A).items() if name in parameters},
+        known = {name: np.array(parameters[name]) for name in self.memory if name in parameters}
+        unit = shape_unit(known["A"], known["n"], self.span)
+        loading, unloading = known["beta"] + known["gamma"], known["beta"] - known["gamma"]
+        shapes = {**known, "loading": loading, "unloading": unloading}
+        raw = {name: knee(shapes[name] / unit, known["n"]) for name in _SHAPES if name in self.coordinates}
+        raw |= {"A": known["A"] / self.slope, "ratio": unloading / np.abs(loading) if loading != 0.0 else 0.0}
+        raw |= {
+            name: self.unsized(name, known[name] / size) for name, size in self.sizes(known).items() if name in known
         }
-        scaled |= {name: parameters[name] for name in self.limits if name in scaled}
-        scaled["n"] = np.log(n)
-        return np.array([float(scaled[name]) for name in self.coordinates])
+        raw |= {name: known[name] for name in self.limits} | {"n": np.log(known["n"])}
+        return np.array([float(raw[name]) for name in self.coordinates])
 
-    def _sizes(self, A: FloatArray) -> dict[str, FloatArray]:
-        """Units of the scaled parameters."""
-        slope = _steepness(A)
+    def sizes(self, known: Mapping[str, FloatArray]) -> dict[str, FloatArray]:
+        """Units of the parameters that have one, by A, beta, gamma and n."""
+        slope = steepness(known["A"])
         return {"delta": slope / self.reach, "z0": slope * self.span}
 
-    def _unit(self, A: FloatArray, n: FloatArray) -> FloatArray:
-        return shape_unit(A, n, self.span)
+    def sized(self, name: str, x: FloatArray) -> FloatArray:
+        """A parameter in its unit, by its coordinate."""
+        return x
+
+    def unsized(self, name: str, value: FloatArray) -> FloatArray:
+        """The coordinate of a parameter in its unit."""
+        return value
 
 
 def shape_unit(A: FloatArray, n: FloatArray, span: float) -> FloatArray:
     """The unit of beta and gamma, |A| / Z^n, where that is a number which the coefficients can be measured in."""
-    slope = _steepness(A)
+    slope = steepness(A)
     with np.errstate(over="ignore", under="ignore", divide="ignore"):
         unit = slope / (slope * span) ** n
     return np.clip(unit, _LEAST_UNIT, _LARGEST_UNIT)
 
 
-def _steepness(A: FloatArray) -> FloatArray:
+def steepness(A: FloatArray) -> FloatArray:
     return np.where(A == 0.0, 1.0, np.abs(A))
 
 
@@ -203,27 +218,6 @@ def knee(coefficient: FloatArray, n: FloatArray) -> float:
         middle = 0.5 * (low + high)
         low, high = (middle, high) if shape(np.array(middle), n) < abs(coefficient) else (low, middle)
     return float(np.copysign(high, coefficient)) if coefficient else 0.0
-
-
-def _chart(
-    values: Mapping[str, float],
-    free: frozenset[str],
-    limits: Mapping[str, tuple[float, float]],
-    signed: frozenset[str],
-    record: Record,
-) -> _Chart:
-    paired = {"beta", "gamma"} <= free and not {"beta", "gamma"} & (limits.keys() | signed)
-    shapes = _PAIR if paired else ("beta", "gamma")
-    order = ("A", *shapes, "n", *_FURTHER, *_SCALED)
-    coordinates = [name for name in order if name in free or (paired and name in _PAIR)]
-    return _Chart(
-        coordinates=tuple(coordinates),
-        values=values,
-        limits=limits,
-        span=span_of(record),
-        reach=float(np.abs(record.u).max()),
-        slope=slope_of(record, values),
-    )
 
 
 def slope_of(record: Record, values: Mapping[str, float]) -> float:
