@@ -97,6 +97,11 @@ class CustomLaw(Law):
         """Parameters and initial values by name."""
         return {**self.parameters, **self.state}
 
+    @classmethod
+    def defaults(cls) -> dict[str, Any]:
+        """Empty: its numbers have no defaults."""
+        return {}
+
     @property
     def columns(self) -> tuple[str, ...]:
         return self.linear
@@ -136,7 +141,7 @@ class CustomLaw(Law):
             if name not in self.linear
         ]
         searched += [Parameter(name, affine=True) for name in self.linear]
-        return declared_space(searched, (), self.scalars, self.initial, record, freedom)
+        return declared_space(self, record, freedom, searched=searched)
 
     def with_scalars(self, scalars: Mapping[str, float]) -> "CustomLaw":
         return replace(

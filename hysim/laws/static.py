@@ -16,7 +16,7 @@ f; T. Hastie, J. R. Stat. Soc. B 58 (1996) 379 for fewer knots than groups; D. R
 """
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from typing import ClassVar, NamedTuple, Self
 
 import numpy as np
@@ -27,9 +27,8 @@ from hysim.kernels import inverses, stepping
 from hysim.models.composable import Composable
 from hysim.models.law import Law
 from hysim.models.model import Example, family
-from hysim.models.parameters import Parameter, space_of
+from hysim.models.parameters import Parameter
 from hysim.models.protocols import UNLIMITED, CompiledLaw, DirectFit, Limits
-from hysim.models.search_space import Freedom, SearchSpace
 from hysim.records import Record
 
 _EQUAL = 1e-9  # of the span: inputs nearer than this are equal; a sine computed twice differs by 1e-15
@@ -328,9 +327,3 @@ class SingleValued(Composable):
         place = equal_inputs(record.u)
         first = np.unique(place, return_index=True)[1]
         return cls(u=record.u[first], y=np.bincount(place, record.y) / np.bincount(place))
-
-
-def linear_space(defaults: Mapping[str, float], freedom: Freedom) -> SearchSpace:
-    """The space of a family whose parameters are all linear, by their defaults."""
-    held = freedom.held(defaults)
-    return space_of((), tuple(defaults), defaults, held, freedom.limits(defaults, held))

@@ -573,10 +573,7 @@ class Law(Placed, Searched, ABC):
 
     def search_space(self, record: Record, freedom: Freedom = ALL_FREE) -> SearchSpace:
         """The box that `hysim.identify` searches, by the declarations in `searched`."""
-        return declared_space(
-            self.searched, self.starts, self.scalars, self.initial, record, freedom, self.screened,
-            defaults=self.defaults(),
-        )  # fmt: skip
+        return declared_space(self, record, freedom)
 
     def freed_in_turn(self) -> tuple[Stage, ...]:
         """The `stages` of the family."""

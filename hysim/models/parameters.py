@@ -80,30 +80,29 @@ class Coordinate(NamedTuple):
 
 
 def declared_space(
-    parameters: Sequence[Parameter],
-    starts: Sequence[Mapping[str, float]],
-    scalars: Mapping[str, float],
-    initial: Sequence[str],
+    law: Any,
     record: Record,
     freedom: Freedom,
-    screened: int | None = None,
     *,
+    searched: Sequence[Parameter] | None = None,
+    starts: Sequence[Mapping[str, float]] | None = None,
     units: Mapping[str, float] | None = None,
-    defaults: Mapping[str, Any] | None = None,
 ) -> SearchSpace:
-    """The search box on one record.
+    """The search box of a law on one record, by its `searched` parameters and `starts` unless others are given.
 
-    `starts` are points in the units of the parameters, from which the search begins beside `scalars`, the law's own
-    values; `initial` are the fields of its initial memory, held at zero where the record begins at rest. A parameter
-    that is not declared is held, unless it is free and bounded. `units` are the record's, by default its `spans`. A
-    number that is the family's by `defaults` is one in these units: the search does not depend on the record's scale.
+    Starts are points in the units of the parameters, from which the search begins beside the law's own `scalars`; its
+    `initial` memory is held at zero where the record begins at rest. A parameter that is not declared is held, unless
+    it is free and bounded. `units` are the record's, by default its `spans`. A number that is the family's by default
+    is one in these units: the search does not depend on the record's scale.
 
     Raises ValueError if the input is constant, `freedom.initial` is unknown, or a name or a bound does not fit.
     """
+    scalars, parameters = law.scalars, law.searched if searched is None else searched
+    starts = law.starts if starts is None else starts
     units, first = units or spans(record), float(record.u[0])
     declared = {parameter.name: parameter for parameter in parameters}
     of = {name: declared.get(name.partition("[")[0]) for name in scalars}
-    resting = tuple(name for name in scalars if name.partition("[")[0] in initial)
+    resting = tuple(name for name in scalars if name.partition("[")[0] in law.initial)
     bounded = {name for name, each in of.items() if each is None and name in {*freedom.free, *freedom.bounds}}
     if unbounded := [name for name in scalars if name in bounded and name not in freedom.bounds]:
         raise ValueError(
@@ -120,14 +119,14 @@ def declared_space(
             box = origin + each.lower * unit, origin + each.upper * unit
             coordinates.append(Coordinate(name, *box, unit, each.log, each.physical))
             values[name] = origin, unit
-    usual = scalars_of(defaults or {}).items() if freedom.starts_anew else ()
+    usual = scalars_of(law.defaults()).items() if freedom.starts_anew else ()
     own = {name: value for name, value in usual if name in values and scalars[name] == value}
     points = [{name: values[name][0] + start[name] * values[name][1] for name in start} for start in (own, *starts)]
     columns = tuple(name for name, each in of.items() if each is not None and each.affine)
     limits = freedom.limits(scalars, held)
     if not freedom.starts_anew:
         coordinates = [each.holding(scalars[each.name]) for each in coordinates]
-    return space_of(coordinates, columns, scalars, held, limits, points, state=resting, screened=screened)
+    return space_of(coordinates, columns, scalars, held, limits, points, state=resting, screened=law.screened)
 
 
 def free_coordinate(name: str, lower: float, upper: float) -> Coordinate:
@@ -163,15 +162,14 @@ def space_of(
         there = [each.encode(value) for each, value in zip(searched, values, strict=True)]
         return np.where(same, starts[0], there)
 
-    return SearchSpace(
+    return SearchSpace.of(
+        defaults,
+        columns,
+        held,
         coordinates=names,
         lower=lower,
         upper=upper,
         starts=np.reshape(starts, (len(points), len(names)))[: None if names else 1],
-        names=tuple(name for name in defaults if name not in held),
-        columns=columns,
-        linear=tuple(name for name in columns if name not in held),
-        held=held,
         parameters=parameters,
         physical={each.name: each.physical for each in searched if each.name not in limits},
         encoded=encoded,
@@ -199,9 +197,8 @@ class Chart(Protocol):
 
 def space_of_chart(
     chart: Chart,
-    box: tuple[FloatArray, FloatArray],
+    box: Mapping[str, tuple[float, float]],
     start: FloatArray,
-    defaults: Mapping[str, float],
     columns: tuple[str, ...],
     held: Mapping[str, float],
     bounds: Mapping[str, tuple[float, float]],
@@ -210,11 +207,11 @@ def space_of_chart(
     physical: Mapping[str, tuple[bool, bool]],
     **others: Any,
 ) -> SearchSpace:
-    """The search in the coordinates of a chart between the sides of its `box`, (n_x,) each, from `start` (n_x,).
+    """The search in the coordinates of a chart between the sides of its `box` by name, from `start` (n_x,).
 
     A search that begins at a law of the user's has a box that holds it, but for the user's `bounds`.
     """
-    lower, upper = box
+    lower, upper = sides(box)
     if not freedom.starts_anew:
         own = chart.encode(chart.values)
         free = np.array([name not in bounds for name in chart.coordinates], dtype=bool)
@@ -228,21 +225,25 @@ def space_of_chart(
     def encoded(parameters: Mapping[str, float]) -> FloatArray:
         return np.asarray(np.clip(chart.encode({**chart.values, **parameters}), lower, upper))
 
-    return SearchSpace(
+    return SearchSpace.of(
+        chart.values,
+        columns,
+        held,
         coordinates=chart.coordinates,
         lower=lower,
         upper=upper,
         starts=np.clip(start, lower, upper)[np.newaxis],
-        names=tuple(name for name in defaults if name not in held),
-        columns=columns,
-        linear=tuple(name for name in columns if name not in held),
-        held=held,
         parameters=decoded,
         bounds={name: pair for name, pair in bounds.items() if name in columns},
         physical={name: physical[name] for name in chart.coordinates if name in physical and name not in bounds},
         encoded=encoded,
         **others,
     )
+
+
+def sides(box: Mapping[str, tuple[float, float]]) -> tuple[FloatArray, FloatArray]:
+    """Lower and upper sides of a box, (n_x,) each."""
+    return np.array([low for low, _ in box.values()]), np.array([high for _, high in box.values()])
 
 
 def spans(record: Record) -> dict[str, float]:

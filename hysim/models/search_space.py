@@ -7,7 +7,7 @@ affine are not searched: for given others, the best ones are the solution of a l
 
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field, replace
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 import numpy.typing as npt
@@ -128,19 +128,17 @@ class SearchSpace:
         return replace(self, lower=lower, upper=upper, regions=regions, outer=outer)
 
     @classmethod
+    def of(cls, every: Iterable[str], columns: tuple[str, ...], held: Mapping[str, float], **others: Any) -> Self:
+        """The space of all parameters that are not `held`; `others` are those of the constructor."""
+        names, linear = (tuple(name for name in each if name not in held) for each in (every, columns))
+        return cls(names=names, columns=columns, linear=linear, held=held, **others)
+
+    @classmethod
     def without_coordinates(cls, names: tuple[str, ...]) -> "SearchSpace":
         """The space of parameters that are all linear."""
         none = np.empty(0)
-        return cls(
-            coordinates=(),
-            lower=none,
-            upper=none,
-            starts=np.empty((1, 0)),
-            names=names,
-            columns=names,
-            linear=names,
-            held={},
-            parameters=lambda x: {},
+        return cls.of(
+            names, names, {}, coordinates=(), lower=none, upper=none, starts=none[np.newaxis], parameters=lambda x: {}
         )
 
 

@@ -196,15 +196,14 @@ class OscillatorStructure(Subject):
         starts, linear = [_scaled(each, factor) for each in starts], Linear(*(factor * value for value in linear))
         box = _Box(held, _limits(linear, held, limits), Record(u=motion.y, y=linear.stiffness * motion.y))
         laws = box.laws(starts[0])
-        return SearchSpace(
+        return SearchSpace.of(
+            NAMES,
+            (),
+            held,
             coordinates=(*box.plant, *laws.coordinates),
             lower=np.concatenate([box.side(0), laws.lower]),
             upper=np.concatenate([box.side(1), laws.upper]),
             starts=np.array([box.encode(one) for one in starts]),
-            names=tuple(name for name in NAMES if name not in held),
-            columns=(),
-            linear=(),
-            held=held,
             parameters=lambda x: box.decode(np.atleast_2d(x), laws),
             physical={**laws.physical, **dict.fromkeys(("damping", "A"), (True, False))},
             redundant=redundant,

@@ -342,16 +342,15 @@ class TransferFunctionStructure(Subject, Composable):
             box.append((earliest / sample_time, latest / sample_time))
         lower, upper = np.array(box).T
         starts, agreed = self._starts(record, lower, upper, known_delay, at_rest=bool(at_rest))
-        return SearchSpace(
+        return SearchSpace.of(
+            names,
+            self.columns,
+            held,
             coordinates=tuple(coordinates),
             lower=lower,
             upper=upper,
             starts=starts,
             screened=None if len(record) < _LONG else 0 if agreed else _SCREENED,
-            names=tuple(name for name in names if name not in held),
-            columns=self.columns,
-            linear=tuple(name for name in self.columns if name not in held),
-            held=held,
             parameters=lambda x: self._searched(np.atleast_2d(x), sample_time, known_delay),
             bounds=limits,
             state=self.columns[self.zeros + 1 :],

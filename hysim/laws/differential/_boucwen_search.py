@@ -24,7 +24,7 @@ from typing import Any, ClassVar, Self
 import numpy as np
 
 from hysim._basics.frozen import FloatArray
-from hysim.models.parameters import space_of_chart
+from hysim.models.parameters import sides, space_of_chart
 from hysim.models.search_space import Freedom, SearchSpace
 from hysim.records import Record, span_of
 
@@ -95,12 +95,7 @@ def space_of_memory(
     is_default = freedom.starts_anew and _BY_DEFAULT.items() <= defaults.items()
     start = (chart.in_own_units() if is_default else chart).encode(chart.values)
     others = {"redundant": REDUNDANT, "physical": PHYSICAL, **others}
-    return space_of_chart(chart, sides(box), start, defaults, columns, held, bounds, freedom, state=("z0",), **others)
-
-
-def sides(box: Mapping[str, tuple[float, float]]) -> tuple[FloatArray, FloatArray]:
-    """Lower and upper sides of a box, (n_x,) each."""
-    return np.array([low for low, _ in box.values()]), np.array([high for _, high in box.values()])
+    return space_of_chart(chart, box, start, columns, held, bounds, freedom, state=("z0",), **others)
 
 
 def _cut(name: str, sign: tuple[float, float] | None) -> tuple[float, float]:

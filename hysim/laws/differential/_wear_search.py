@@ -24,6 +24,7 @@ import numpy as np
 
 from hysim._basics.frozen import FloatArray
 from hysim.laws.differential import _boucwen_search as plain
+from hysim.models.parameters import sides
 from hysim.models.search_space import Freedom, SearchSpace
 from hysim.records import Record
 
@@ -88,7 +89,7 @@ def search_space(
     box = {name: limits.get(name, _BOX[name]) for name in chart.coordinates}
     box |= {"n": (float(np.log(limits["n"][0])), float(np.log(limits["n"][1])))} if "n" in limits else {}
     box |= {"loading": (float(np.arcsinh(_SAME_SIGN)), _BOX["loading"][1])} if pinches and "loading" in box else {}
-    drawn = plain.sides({name: pair if name in limits else _DRAWN.get(name, pair) for name, pair in box.items()})
+    drawn = sides({name: pair if name in limits else _DRAWN.get(name, pair) for name, pair in box.items()})
     physical = _PHYSICAL | ({"loading": (True, False)} if pinches else {})
     return plain.space_of_memory(chart, box, defaults, columns, held, bounds, freedom, physical=physical, drawn=drawn)
 

@@ -85,18 +85,9 @@ def search_space(
         constants = {name: np.full(len(sets), value) for name, value in held.items()}
         return constants | dict(zip(names, sets.T, strict=True))
 
-    return SearchSpace(
-        coordinates=names,
-        lower=lower,
-        upper=upper,
-        starts=np.clip(start, lower, upper)[np.newaxis],
-        names=names,
-        columns=(),
-        linear=(),
-        held=held,
-        parameters=parameters,
-        state=("y0",),
-    )
+    starts = np.clip(start, lower, upper)[np.newaxis]
+    box = {"coordinates": names, "lower": lower, "upper": upper, "starts": starts}
+    return SearchSpace.of(names, (), held, **box, parameters=parameters, state=("y0",))
 
 
 def _units(terms: Mapping[str, Term], defaults: Mapping[str, float], record: Record) -> dict[str, float]:

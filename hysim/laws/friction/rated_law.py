@@ -70,6 +70,11 @@ class TimedLaw(Subject, Placed, ABC):
         """None for `hysim.compare` to try by itself, since friction is no model of an actuator."""
         return {}
 
+    @classmethod
+    def defaults(cls) -> dict[str, Any]:
+        """Values of the fields that have one by default, and a sample time."""
+        return _kind_at_sample_time(cls).defaults()
+
     def placed(self, u0: float | None, u_range: tuple[float, ...] | None = None) -> Self:
         """The law with its memory at `u0`; one without an initial memory begins at the first sample of any input."""
         return super().placed(u0 if self.initial else None, u_range)
@@ -164,11 +169,7 @@ class TimedLaw(Subject, Placed, ABC):
 
     def search_space(self, record: Record, freedom: Freedom = ALL_FREE) -> SearchSpace:
         """The box that `hysim.identify` searches; ValueError also if the record has no even time."""
-        units, defaults = rate_spans(record), self.at_sample_time(record.sample_time).defaults()
-        return declared_space(
-            self.searched, self.starts, self.scalars, self.initial, record, freedom, self.screened,
-            units=units, defaults=defaults,
-        )  # fmt: skip
+        return declared_space(self, record, freedom, units=rate_spans(record))
 
     def regressors(self, parameters: Parameters, record: Record) -> FloatArray:
         return self.at_sample_time(record.sample_time).regressors(parameters, record)
@@ -223,10 +224,7 @@ class AtSampleTime(Law):
         """The box of the family for samples that are the law's sample time apart."""
         times = np.asarray(self.scalars["sample_time"] * np.arange(len(record)), dtype=np.float64)
         timed = replace(record, t=times)
-        units, defaults = rate_spans(timed), self.defaults()
-        return declared_space(
-            self.searched, (), self.scalars, self.initial, record, freedom, units=units, defaults=defaults
-        )
+        return declared_space(self, record, freedom, units=rate_spans(timed))
 
     @classmethod
     def initial_memory(cls, tables: Tables, *, further: int = 0) -> FloatArray:

@@ -129,9 +129,7 @@ class Chan(BranchLaw):
             return super().search_space(record, freedom)
         searched = tuple(_BEHIND_A_GAP.get(each.name, each) for each in self.searched)
         starts = tuple({**start, "saturation": 1.0, "feedthrough": 0.0} for start in self.starts)
-        return declared_space(
-            searched, starts, self.scalars, self.initial, record, freedom, self.screened, defaults=self.defaults()
-        )
+        return declared_space(self, record, freedom, searched=searched, starts=starts)
 
     @classmethod
     def from_ltspice(

@@ -58,7 +58,7 @@ from hysim.kernels import jiles_atherton_inverse as inverse
 from hysim.models.inverse_search import first_input
 from hysim.models.law import Law, Packed, State
 from hysim.models.model import Example, family
-from hysim.models.parameters import Parameter, space_of_chart, spans
+from hysim.models.parameters import Parameter, sides, space_of_chart, spans
 from hysim.models.protocols import UNLIMITED, CompiledLaw, Limits
 from hysim.models.search_space import ALL_FREE, Freedom, Parameters, SearchSpace
 from hysim.models.tables import Tables
@@ -118,55 +118,6 @@ def _check_feedback(law: "JilesAtherton", whose: str) -> None:
         raise ValueError(f"{whose} has He = H + alpha M, got reversible_feedback = {law.reversible_feedback:g}")
     if law.z0 != 0.0:
         raise ValueError(f"{whose} begins demagnetised, got z0 = {law.z0:g}")
-
-
-def search_space(
-    scalars: Mapping[str, float],
-    columns: tuple[str, ...],
-    record: Record,
-    freedom: Freedom,
-    *,
-    is_by_default: bool,
-) -> SearchSpace:
-    """The coordinates, their box and the way back to the user's parameters for one record.
-
-    A search of the law by default begins in the middle of the box.
-
-    Held by default are gain and feedthrough, of which the first could not be told from Ms, and what makes the law
-    another one: an anisotropy that is zero at the start, and reversible_feedback. The feedthrough of a law by default,
-    mu0, is that of a record in A/m and T; it is free in a record whose units are others or not known.
-    """
-    is_of_vacuum = scalars["feedthrough"] == scalars["gain"] == MU0
-    has_other_units = is_of_vacuum and (record.units.get("u"), record.units.get("y")) != _SI
-    further = [name for name in _HELD if name not in freedom.bounds and not (name == "anisotropy" and scalars[name])]
-    known = _COLUMNS[:1] if has_other_units else _COLUMNS
-    alone = tuple((name,) for name in (*known, *further) if name not in freedom.bounds)
-    at_rest = ("z0",) if freedom.starts_at_rest() else ()
-    held = freedom.held(scalars, redundant=alone, at_rest=at_rest)
-    bounds = freedom.limits(scalars, held)
-    if "feedthrough" not in held and "gain" in held and held["gain"] > 0.0:  # no core falls at saturation
-        bounds = {"feedthrough": (0.0, np.inf), **bounds}
-    limits = {name: pair for name, pair in bounds.items() if name in _BOX}
-    for name, pair in limits.items():
-        if not np.isfinite(pair).all() or (name in _LOGS and pair[0] <= 0.0):
-            raise ValueError(f"bounds of {name!r} must be {'positive and ' * (name in _LOGS)}finite, got {pair}")
-    values = {**scalars, **held}
-    unit = spans(record)
-    chart = _Chart(
-        names=tuple(name for name in _BOX if name not in held),
-        values=values,
-        limits=limits,
-        field=unit["h"],
-        magnetisation=0.5 * unit["y"] / (abs(values["gain"]) or 1.0),
-    )
-    lower, upper = np.array([chart.side(name) for name in chart.names]).reshape(-1, 2).T
-    drawn = np.array([chart.side(name) if name in limits else _DRAWN.get(name, _BOX[name]) for name in chart.names])
-    low, high = drawn.reshape(-1, 2).T
-    start = 0.5 * (low + high) if freedom.starts_anew and is_by_default else chart.encode(values)
-    return space_of_chart(
-        chart, (lower, upper), start, scalars, columns, held, bounds, freedom,
-        state=("z0",), physical=_PHYSICAL, screened=_SCREENED, drawn=(low, high),
-    )  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -588,9 +539,37 @@ class JilesAtherton(Law):
         )
 
     def search_space(self, record: Record, freedom: Freedom = ALL_FREE) -> SearchSpace:
-        """The box in the scales of the record's field and magnetisation."""
-        is_by_default = self.arguments == self.defaults()
-        return search_space(self.scalars, self.columns, record, freedom, is_by_default=is_by_default)
+        """The box in the scales of the record's field and magnetisation, in whose middle the law by default begins.
+
+        Held by default are gain and feedthrough, of which the first could not be told from Ms, and what makes the law
+        another one: an anisotropy that is zero at the start, and reversible_feedback. The feedthrough of a law by
+        default, mu0, is that of a record in A/m and T; it is free in a record whose units are others or not known.
+        """
+        scalars, unit = self.scalars, spans(record)
+        has_other_units = (record.units.get("u"), record.units.get("y")) != _SI
+        known = _COLUMNS[:1] if self.feedthrough == self.gain == MU0 and has_other_units else _COLUMNS
+        further = [name for name in _HELD if not (name == "anisotropy" and self.anisotropy)]
+        alone = tuple((name,) for name in (*known, *further) if name not in freedom.bounds)
+        at_rest = ("z0",) if freedom.starts_at_rest() else ()
+        held = freedom.held(scalars, redundant=alone, at_rest=at_rest)
+        bounds = freedom.limits(scalars, held)
+        if "feedthrough" not in held and "gain" in held and held["gain"] > 0.0:  # no core falls at saturation
+            bounds = {"feedthrough": (0.0, np.inf), **bounds}
+        limits = {name: pair for name, pair in bounds.items() if name in _BOX}
+        for name, pair in limits.items():
+            if not np.isfinite(pair).all() or (name in _LOGS and pair[0] <= 0.0):
+                raise ValueError(f"bounds of {name!r} must be {'positive and ' * (name in _LOGS)}finite, got {pair}")
+        values = {**scalars, **held}
+        names = tuple(name for name in _BOX if name not in held)
+        chart = _Chart(names, values, limits, unit["h"], 0.5 * unit["y"] / (abs(values["gain"]) or 1.0))
+        box = {each: chart.side(name) for each, name in zip(chart.coordinates, names, strict=True)}
+        drawn = sides({name: chart.side(name) if name in limits else _DRAWN.get(name, _BOX[name]) for name in names})
+        is_by_default = freedom.starts_anew and self.arguments == self.defaults()
+        start = 0.5 * (drawn[0] + drawn[1]) if is_by_default else chart.encode(values)
+        return space_of_chart(
+            chart, box, start, self.columns, held, bounds, freedom,
+            state=("z0",), physical=_PHYSICAL, screened=_SCREENED, drawn=drawn,
+        )  # fmt: skip
 
     def regressors(self, parameters: Parameters, record: Record) -> FloatArray:
         """Columns M, H, 1 and 0, shape (n_sets, n_samples, 4)."""

@@ -167,8 +167,7 @@ class ParametricPrandtlIshlinskii(Law):
         held = {name: value for name, value in known.items() if name not in freedom.free} | {**freedom.fixed}
         turns = [{}] if names[-1] in held else [{names[-1]: turn} for turn in _TURNS]
         starts = [{"exponent": a, "decay": decay} | turn for a, decay in _DENSITIES for turn in turns]
-        asked, numbers = replace(freedom, fixed=held), (law.scalars, law.initial)
-        return declared_space(law.searched, starts, *numbers, record, asked, law.screened, defaults=self.defaults())
+        return declared_space(law, record, replace(freedom, fixed=held), starts=starts)
 
     def _likely_past(self, record: Record) -> tuple[float, float]:
         """Inputs before the first sample: those of the cycle, unless plays that stand still fit clearly better.
