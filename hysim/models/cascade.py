@@ -8,15 +8,16 @@ is, and so is a transfer function that is given. Of transfer functions alone the
 """
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import reduce
+from itertools import accumulate
 from typing import Any, ClassVar
 
 import numpy as np
 import numpy.typing as npt
 
-from hysim._basics.frozen import FloatArray, checked, read_only
+from hysim._basics.frozen import FloatArray, checked
 from hysim.kernels.stepping import one_behind_the_other
 from hysim.models.compiled_step import startable
 from hysim.models.composable import Composable
@@ -51,7 +52,7 @@ from hysim.models.protocols import (
     placed,
 )
 from hysim.models.search_space import ALL_FREE, Freedom, Parameters, SearchSpace
-from hysim.models.sum import Composite, State, assembled, continued, known_slopes, started, time_of
+from hysim.models.sum import Composite, Driven, assembled, known_slopes, started, time_of
 from hysim.records import Record
 
 
@@ -264,27 +265,9 @@ class Cascade(Composite):
             u_range = u_range if isinstance(stage, InputFilter) else None  # what passes a filter keeps its range
         return Cascade(stages=tuple(stages))
 
-    def response(self, u: npt.ArrayLike, sample_time: float | None = None) -> FloatArray:
-        return reduce(lambda v, stage: response_of(stage, v, sample_time), self.stages, read_only(u, "u", ndim=1))
-
-    def advance(
-        self, u: npt.ArrayLike, state: State | None = None, *, sample_time: float | None = None
-    ) -> tuple[FloatArray, State]:
-        signal, ends = read_only(u, "u", ndim=1), []
-        states: State = (None,) * len(self.stages) if state is None else state
-        if not signal.size:
-            return signal, states
-        for stage, begin in zip(self.stages, states, strict=True):
-            signal, end = continued(stage, signal, sample_time, begin)
-            ends.append(end)
-        return signal, tuple(ends)
-
-    def signals(self, u: npt.ArrayLike, sample_time: float | None = None) -> dict[str, FloatArray]:
-        """Output ``"y"`` and those of the stages by name, such as ``"bouc_wen"``; see `response`."""
-        signal, signals = read_only(u, "u", ndim=1), {}
-        for label, stage in zip(labels(self.stages), self.stages, strict=True):
-            signal = signals[label] = response_of(stage, signal, sample_time)
-        return {"y": signal, **signals}
+    def _driven(self, u: FloatArray, members: Sequence[Driven]) -> tuple[FloatArray, list[FloatArray]]:
+        outputs = [*accumulate(members, lambda v, stage: stage(v), initial=u)][1:]
+        return outputs[-1], outputs
 
     def compiled(self, u0: float = 0.0, *, sample_time: float | None = None) -> CompiledLaw:
         laws, level = [], u0

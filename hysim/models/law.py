@@ -494,7 +494,8 @@ class Law(Placed, Searched, ABC):
         >>> hs.BoucWen.responses({"beta": [0.3, 0.5, 0.7]}, u, reduce="area").round(3).tolist()
         [0.41, 0.595, 0.746]
         """
-        return cls.batch(cls.defaults(), parameters, u).result(reduce, target, workers)
+        laws = _batch(cls, cls.__name__, cls.defaults(), parameters, u, check=cls.check)
+        return laws.result(reduce, target, workers)
 
     def inverse_response(self, y: npt.ArrayLike, u0: float | None = None, state: State | None = None) -> FloatArray:
         """Input that gives the output `y`, monotone between the samples.
@@ -691,17 +692,7 @@ class Law(Placed, Searched, ABC):
 
     def outputs_of(self, parameters: Parameters, u: npt.ArrayLike) -> Batch:
         """As `outputs`, not computed yet; parameters that the constructor would refuse are not refused."""
-        tables, inputs, begin = _tables(type(self).__name__, self.arguments, parameters, u, self.u0)
-        tables = self.completed(tables)
-        return _batch(self.rows, tables, inputs, self.order(tables), self.samples_a_thread, begin)
-
-    @classmethod
-    def batch(cls, defaults: Mapping[str, Any], parameters: Parameters, u: npt.ArrayLike) -> Batch:
-        """Laws by their parameters, those not given by `defaults`, and their inputs."""
-        tables, inputs, begin = _tables(cls.__name__, defaults, parameters, u, None)
-        tables = cls.completed(tables)
-        cls.check(tables)
-        return _batch(cls.rows, tables, inputs, cls.order(tables), cls.samples_a_thread, begin)
+        return _batch(self, type(self).__name__, self.arguments, parameters, u, self.u0)
 
     @classmethod
     def completed(cls, tables: dict[str, FloatArray]) -> dict[str, FloatArray]:
@@ -748,37 +739,36 @@ def _after_first(model: Startable, u0: float) -> CompiledLaw:
     return law
 
 
-def _tables(
-    family: str, defaults: Mapping[str, Any], parameters: Parameters, u: npt.ArrayLike, u0: float | None
-) -> tuple[dict[str, FloatArray], FloatArray, FloatArray | None]:
-    """As `tables_of`, and the inputs at which the memories hold, (n_sets, 1); None for the first samples."""
-    numbers = {name: value for name, value in parameters.items() if name != "u_range"}
-    if numbers.get("u0", u0) is None:
-        return *tables_of(family, defaults, numbers, u), None
-    tables, inputs = tables_of(family, {**defaults, "u0": 0.0 if u0 is None else u0}, numbers, u)
-    begin = tables.pop("u0")
-    return tables, inputs, begin
-
-
 def _batch(
-    rows: Callable[[Tables, FloatArray, FloatArray], None],
-    tables: Tables,
-    u: FloatArray,
-    order: npt.NDArray[np.intp] | None,
-    samples_a_thread: int | None,
-    begin: FloatArray | None,
+    law: Law | type[Law],
+    family: str,
+    defaults: Mapping[str, Any],
+    parameters: Parameters,
+    u: npt.ArrayLike,
+    u0: float | None = None,
+    *,
+    check: Callable[[Tables], None] | None = None,
 ) -> Batch:
-    def compute(sets: Sets, inputs: FloatArray, y: FloatArray) -> None:
+    """Laws by their parameters, those not given by `defaults`, and their inputs; memories hold at `u0` by default."""
+    numbers = {name: value for name, value in parameters.items() if name != "u_range"}
+    place = {} if numbers.get("u0", u0) is None else {"u0": u0 or 0.0}
+    tables, inputs = tables_of(family, {**defaults, **place}, numbers, u)
+    begin = tables.pop("u0", None)
+    tables = law.completed(tables)
+    if check is not None:
+        check(tables)
+
+    def compute(sets: Sets, u: FloatArray, y: FloatArray) -> None:
         own = {name: table[sets] for name, table in tables.items()}
         if begin is None:
-            rows(own, inputs, y)
+            law.rows(own, u, y)
             return
         outputs = np.empty((len(y), y.shape[1] + 1))
-        walked = [begin[sets], np.broadcast_to(inputs, y.shape)]
-        rows(own, read_only(np.concatenate(walked, axis=1)), outputs)
+        walked = [begin[sets], np.broadcast_to(u, y.shape)]
+        law.rows(own, read_only(np.concatenate(walked, axis=1)), outputs)
         y[:] = outputs[:, 1:]
 
-    return Batch(compute, len(next(iter(tables.values()))), u, order, samples_a_thread)
+    return Batch(compute, len(next(iter(tables.values()))), inputs, law.order(tables), law.samples_a_thread)
 
 
 def rows_by_step(step: Step, start: Start, laws: Packed, workspace: int, u: FloatArray, y: FloatArray) -> None:

@@ -2,9 +2,9 @@
 
 import math
 from abc import abstractmethod
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
-from functools import reduce
+from functools import partial, reduce
 from typing import Any, ClassVar
 
 import numpy as np
@@ -56,6 +56,8 @@ from hysim.records import Record
 
 State = tuple[Any, ...]
 """The state of each member."""
+Driven = Callable[[FloatArray], FloatArray]
+"""Output of a member for its input."""
 
 
 class Composite(ByStructure, Composable):
@@ -78,18 +80,43 @@ class Composite(ByStructure, Composable):
         return members
 
     @abstractmethod
+    def _driven(self, u: FloatArray, members: Sequence[Driven]) -> tuple[FloatArray, list[FloatArray]]:
+        """The output for an input, and those of the members, each by a function of the member's own input."""
+
+    def _responses(self, u: npt.ArrayLike, sample_time: float | None) -> tuple[FloatArray, list[FloatArray]]:
+        members = [partial(response_of, member, sample_time=sample_time) for member in self.members]
+        return self._driven(read_only(u, "u", ndim=1), members)
+
     def response(self, u: npt.ArrayLike, sample_time: float | None = None) -> FloatArray:
         """Output (n,) at the samples of `u` (n,), as each member takes it between them.
 
         Only what depends on time needs the `sample_time` [s]. Raises SimulationError if a member diverges, and
         ValueError if `u` is not finite or has not one axis, or no time is given where one is needed.
         """
+        return self._responses(u, sample_time)[0]
 
-    @abstractmethod
+    def signals(self, u: npt.ArrayLike, sample_time: float | None = None) -> dict[str, FloatArray]:
+        """Output ``"y"`` and those of the members by name, such as ``"bouc_wen"``; see `response`."""
+        y, outputs = self._responses(u, sample_time)
+        return {"y": y, **dict(zip(labels(self.members), outputs, strict=True))}
+
     def advance(
         self, u: npt.ArrayLike, state: State | None = None, *, sample_time: float | None = None
     ) -> tuple[FloatArray, State]:
         """As `response`, continued from the members' `state`, and the state after it; TypeError if one cannot be."""
+        inputs = read_only(u, "u", ndim=1)
+        states: State = (None,) * len(self.members) if state is None else state
+        if not inputs.size:
+            return inputs, states
+        ends: list[Any] = []
+
+        def follow(member: Any, begin: Any, v: FloatArray) -> FloatArray:
+            y, end = continued(member, v, sample_time, begin)
+            ends.append(end)
+            return y
+
+        members = [partial(follow, *each) for each in zip(self.members, states, strict=True)]
+        return self._driven(inputs, members)[0], tuple(ends)
 
     @abstractmethod
     def compiled(self, u0: float = 0.0, *, sample_time: float | None = None) -> CompiledLaw:
@@ -336,25 +363,9 @@ class Sum(Composite):
     def placed(self, u0: float | None, u_range: tuple[float, ...] | None = None) -> "Sum":
         return Sum(parts=tuple(placed(part, u0, u_range) for part in self.parts))
 
-    def response(self, u: npt.ArrayLike, sample_time: float | None = None) -> FloatArray:
-        inputs = read_only(u, "u", ndim=1)
-        return _total([response_of(part, inputs, sample_time) for part in self.parts])
-
-    def advance(
-        self, u: npt.ArrayLike, state: State | None = None, *, sample_time: float | None = None
-    ) -> tuple[FloatArray, State]:
-        inputs = read_only(u, "u", ndim=1)
-        states: State = (None,) * len(self.parts) if state is None else state
-        if not inputs.size:
-            return inputs, states
-        pairs = [continued(part, inputs, sample_time, each) for part, each in zip(self.parts, states, strict=True)]
-        return _total([y for y, _ in pairs]), tuple(end for _, end in pairs)
-
-    def signals(self, u: npt.ArrayLike, sample_time: float | None = None) -> dict[str, FloatArray]:
-        """Output ``"y"`` and those of the parts by name, such as ``"dashpot"``; see `response`."""
-        inputs = read_only(u, "u", ndim=1)
-        own = [response_of(part, inputs, sample_time) for part in self.parts]
-        return {"y": _total(own), **dict(zip(labels(self.parts), own, strict=True))}
+    def _driven(self, u: FloatArray, members: Sequence[Driven]) -> tuple[FloatArray, list[FloatArray]]:
+        outputs = [member(u) for member in members]
+        return np.asarray(reduce(np.add, outputs)), outputs
 
     def compiled(self, u0: float = 0.0, *, sample_time: float | None = None) -> CompiledLaw:
         laws = [compiled_law(part, u0, sample_time) for part in self.parts]
@@ -372,7 +383,3 @@ class Sum(Composite):
     def as_structure(self) -> SumStructure:
         """The structure of the same members, those that can be identified as starts."""
         return SumStructure(parts=self.parts)
-
-
-def _total(outputs: list[FloatArray]) -> FloatArray:
-    return np.asarray(reduce(np.add, outputs))
