@@ -166,13 +166,13 @@ def test_a_distribution_is_one_of_the_parameter_and_not_of_its_coordinate():
     law = stats.gamma(4.0, scale=0.5)
     posterior = posed(fit, (rec,), "gaussian", given({"n": law}), None)
     place = posterior.problem.space.coordinates.index("n")
-    prior, scale = posterior.x_prior.own[place]
-    x = np.linspace(posterior.x_prior.lower[place], posterior.x_prior.upper[place], 20_001)
+    prior, scale = posterior.v_prior.own[place]
+    x = np.linspace(posterior.v_prior.lower[place], posterior.v_prior.upper[place], 20_001)
     values = np.exp(prior.log_density(scale.value(x)) + scale.log_slope(x))
     assert np.trapezoid(values, x) == pytest.approx(1.0, abs=1e-6)
-    cube = np.full((3, posterior.n_x), 0.5)
+    cube = np.full((3, posterior.n_x + 1), 0.5)
     cube[:, place] = 0.1, 0.5, 0.9
-    n = posterior.problem.parameters(posterior.x_prior.quantile(cube))["n"]
+    n = posterior.problem.parameters(posterior.v_prior.quantile(cube)[:, :-1])["n"]
     np.testing.assert_allclose(n, law.ppf([0.1, 0.5, 0.9]), rtol=1e-9)
 
 

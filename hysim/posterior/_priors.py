@@ -24,6 +24,7 @@ REACH = 3.0
 
 SIGMA = "sigma"
 
+_LEAST = float(np.finfo(float).tiny)
 _TAIL = 1e-10  # probability beyond each side of the box of a distribution
 _QUARTILES = 1.349  # standard deviations between those of a normal distribution
 _LEVEL = 1e-9  # of the size of a column: a smaller span is none
@@ -119,7 +120,7 @@ def scaled_box(lower: FloatArray, upper: FloatArray, factor: float) -> tuple[Flo
 
 @dataclass(frozen=True)
 class Searched:
-    """Prior of the coordinates x, shape (n_sets, n_x), in a box; `own` are the given ones, by their places."""
+    """Prior of the coordinates x and ln sigma, (n_sets, n_x + 1), in a box; `own` are the given ones, by place."""
 
     lower: FloatArray
     upper: FloatArray
@@ -139,7 +140,7 @@ class Searched:
         return np.where(inside, total, -np.inf)
 
     def quantile(self, share: FloatArray) -> FloatArray:
-        """Coordinates (n_sets, n_x) from numbers that are uniform between 0 and 1."""
+        """Coordinates (n_sets, n_x + 1) from numbers that are uniform between 0 and 1."""
         x = self.lower + share * (self.upper - self.lower)
         for k, (prior, scale) in self.own.items():
             x[:, k] = np.clip(scale.coordinate(prior.quantile(share[:, k])), self.lower[k], self.upper[k])
@@ -158,14 +159,17 @@ class Scale:
         return self.unit * np.exp(x) if self.is_log else self.origin + self.unit * x
 
     def coordinate(self, value: FloatArray) -> FloatArray:
-        return np.log(value / self.unit) if self.is_log else (value - self.origin) / self.unit
+        return np.log(np.maximum(value / self.unit, _LEAST)) if self.is_log else (value - self.origin) / self.unit
 
     def log_slope(self, x: FloatArray) -> FloatArray | float:
         return math.log(abs(self.unit)) + (x if self.is_log else 0.0)
 
 
-def searched(problem: Problem, priors: Mapping[str, Given], factor: float = 1.0) -> Searched:
-    """Prior of the coordinates of a problem whose box has the ends of the given `priors`, enlarged by `factor`."""
+def searched(problem: Problem, priors: Mapping[str, Given], quantum: float | None, factor: float = 1.0) -> Searched:
+    """Prior of the coordinates of a problem and of ln sigma; the box of the former is enlarged by `factor`.
+
+    The box has the ends of the given `priors`; `quantum` is that of rounded data.
+    """
     space = problem.space
     named = {name: priors[key] for name in space.coordinates if (key := _key(name, priors)) is not None}
     fixed = np.array([name in named and named[name].distribution is not None for name in space.coordinates], dtype=bool)
@@ -179,7 +183,10 @@ def searched(problem: Problem, priors: Mapping[str, Given], factor: float = 1.0)
         for k, name in enumerate(space.coordinates)
         if name in named and named[name].distribution is not None
     }
-    return Searched(lower, upper, own)
+    low, high = _ends_of_sigma(problem, priors.get(SIGMA), quantum)
+    if SIGMA in priors and priors[SIGMA].distribution is not None:
+        own[lower.size] = priors[SIGMA], Scale(1.0, 0.0, is_log=True)
+    return Searched(np.append(lower, low), np.append(upper, high), own)
 
 
 def _key(name: str, priors: Mapping[str, Given]) -> str | None:
@@ -267,16 +274,15 @@ def linear(problem: Problem, priors: Mapping[str, Given], factor: float = 1.0) -
     return Linear(own, factor * REACH, span, float(problem.y.mean()))
 
 
-def of_sigma(problem: Problem, priors: Mapping[str, Given], quantum: float | None) -> tuple[float, float, Given | None]:
-    """Ends of ln sigma, and the given prior of sigma if there is one."""
-    if (own := priors.get(SIGMA)) is not None:
+def _ends_of_sigma(problem: Problem, own: Given | None, quantum: float | None) -> tuple[float, float]:
+    """Ends of ln sigma, those of its `own` prior if there is one."""
+    if own is not None:
         if not own.high > 0.0 or (own.distribution is None and not own.low > 0.0):
             raise ValueError(f"the prior of 'sigma' must be positive, got {own}")
-        low = max(own.low, 1e-12 * own.high)
-        return math.log(low), math.log(own.high), own if own.distribution is not None else None
+        return math.log(max(own.low, 1e-12 * own.high)), math.log(own.high)
     span = float(np.ptp(problem.y)) or problem.scale
     low = _SMALLEST * span if quantum is None else _FINEST * quantum
-    return math.log(low), math.log(max(span, 10.0 * low)), None
+    return math.log(low), math.log(max(span, 10.0 * low))
 
 
 def check_names(problem: Problem, free: Sequence[str], priors: Mapping[str, Given]) -> None:

@@ -33,7 +33,7 @@ from scipy.special import log_ndtr, ndtr, ndtri, ndtri_exp
 from hysim._basics.frozen import FloatArray
 from hysim.errors import SimulationError
 from hysim.identification.likelihood import Noise, Problem
-from hysim.posterior._priors import SIGMA, Given, Linear, Searched, linear, of_sigma, searched
+from hysim.posterior._priors import SIGMA, Given, Linear, Searched, linear, searched
 
 _FAR = 9.0  # from which on an end cuts off nothing that is seen in 64 bits
 
@@ -87,10 +87,8 @@ class Target:
 
     problem: Problem
     noise: Noise
-    x_prior: Searched
+    v_prior: Searched  # of the coordinates of the search and ln sigma
     b_prior: Linear
-    sigma_ends: tuple[float, float]  # of ln sigma
-    sigma_given: Given | None
     evaluations: int = field(default=0)
     optima: FloatArray = field(default_factory=lambda: np.empty((0, 0)))
 
@@ -119,30 +117,32 @@ class Target:
         return (*self.problem.space.names, SIGMA)
 
     def priors_in_words(self) -> dict[str, str]:
-        space, ends = self.problem.space, zip(self.x_prior.lower.tolist(), self.x_prior.upper.tolist(), strict=True)
+        space, (*ends, of_sigma) = self.problem.space, np.column_stack([self.v_prior.lower, self.v_prior.upper])
         words = {
             name: f"flat from {low:.4g} to {high:.4g} in the coordinate of the search"
             for name, (low, high) in zip(space.coordinates, ends, strict=True)
         }
-        words |= {space.coordinates[k]: str(own) for k, (own, _) in self.x_prior.own.items()}
         flat = f"flat, within {self.b_prior.reach:g} spans of the output of what it adds to it"
         words |= {name: str(self.b_prior.priors.get(k, flat)) for k, name in enumerate(space.linear)}
-        low, high = np.exp(self.sigma_ends).tolist()
-        return words | {SIGMA: str(self.sigma_given or f"flat in its logarithm from {low:.3g} to {high:.3g}")}
+        low, high = np.exp(of_sigma).tolist()
+        words |= {SIGMA: f"flat in its logarithm from {low:.3g} to {high:.3g}"}
+        return words | {(*space.coordinates, SIGMA)[k]: str(own) for k, (own, _) in self.v_prior.own.items()}
 
     def log_posterior(self, q: FloatArray) -> FloatArray:
         """Logarithm of likelihood times prior in the coordinates q (n_sets, n_dim), -inf outside of the priors."""
-        values = np.full(len(q), -np.inf)
-        x, e, log_sigma = self._parted(q)
-        prior = self._log_prior(q[:, : self.n_x], q[:, -1], x, log_sigma)
+        values, (v, e) = np.full(len(q), -np.inf), self._parted(q)
+        prior = self._log_prior(self.without_linear(q), v)
         for places in self._chunks(np.flatnonzero(np.isfinite(prior))):
-            values[places] = prior[places] + self._given_x(x[places], e[places], log_sigma[places])
+            parts, sigma = self._columns(v[places, :-1]), np.exp(v[places, -1])
+            w, log_volume = self._from_normal(parts, e[places], sigma)
+            density = self._log_likelihood(parts, w, sigma) + self.b_prior.log_density(w, parts.units) + log_volume
+            values[places] = prior[places] + density
         return values
 
     def parameters(self, q: FloatArray) -> FloatArray:
         """The user's parameters and sigma at points, (n_sets, n_names + 1)."""
         theta = self.theta(q)
-        return np.column_stack([self.problem.named(theta), np.exp(self._parted(q)[2])])
+        return np.column_stack([self.problem.named(theta), np.exp(self._parted(q)[0][:, -1])])
 
     def without_linear(self, q: FloatArray) -> FloatArray:
         """v = (x', s') of points, (n_sets, n_x + 1)."""
@@ -150,21 +150,19 @@ class Target:
 
     def prior_draws(self, n: int, rng: np.random.Generator) -> FloatArray:
         """Draws of v = (x', s') from the prior, (n, n_x + 1)."""
-        share = rng.random((n, self.n_x + 1))
-        x, log_sigma = self.x_prior.quantile(share[:, :-1]), self._sigma_quantile(share[:, -1])
-        return self._normal(x, log_sigma)
+        return self._normal(self.v_prior.quantile(rng.random((n, self.n_x + 1))))
 
     def begin_at(self, x: FloatArray, sigma: float) -> None:
         """Take coordinates of optima (n_optima, n_x), and the sigma that they have."""
-        self.optima = self._normal(x, np.full(len(x), np.log(sigma)))
+        self.optima = self._normal(np.column_stack([x, np.full(len(x), np.log(sigma))]))
 
     def marginal(self, v: FloatArray) -> tuple[FloatArray, FloatArray]:
         """About ln of the likelihood with the linear parameters integrated out, and ln of the prior of v, (n_sets,)."""
-        x, log_sigma = self._x_of(v[:, :-1]), self._log_sigma_of(v[:, -1])
-        prior = self._log_prior(v[:, :-1], v[:, -1], x, log_sigma)
+        own = self._values(v)
+        prior = self._log_prior(v, own)
         values = np.full(len(v), _LOWEST)
         for places in self._chunks(np.flatnonzero(np.isfinite(prior))):
-            parts, sigma = self._columns(x[places]), np.exp(log_sigma[places])
+            parts, sigma = self._columns(own[places, :-1]), np.exp(own[places, -1])
             w, log_volume = self._from_normal(parts, np.zeros((len(places), self.n_linear)), sigma)
             density = self.b_prior.log_density(w, parts.units) + log_volume + 0.5 * self.n_linear * _LOG_2PI
             values[places] = np.maximum(self._log_likelihood(parts, w, sigma) + density, _LOWEST)
@@ -172,56 +170,47 @@ class Target:
 
     def theta(self, q: FloatArray) -> FloatArray:
         """Coordinates and linear parameters of points, (n_sets, n_theta)."""
-        x, e, log_sigma = self._parted(q)
+        v, e = self._parted(q)
         b = np.empty_like(e)
         for places in self._chunks(np.arange(len(q))):
-            parts = self._columns(x[places])
-            w, _ = self._from_normal(parts, e[places], np.exp(log_sigma[places]))
+            parts = self._columns(v[places, :-1])
+            w, _ = self._from_normal(parts, e[places], np.exp(v[places, -1]))
             b[places] = w * parts.units[0]
-        return np.concatenate([x, b], axis=1)
+        return np.concatenate([v[:, :-1], b], axis=1)
 
     def log_likelihood_in_cube(self, cube: FloatArray) -> FloatArray:
         """Logarithm of the likelihood at points of the unit cube (n_sets, n_dim), on which the prior is uniform."""
         values = np.empty(len(cube))
         for places in self._chunks(np.arange(len(cube))):
             share = cube[places]
-            parts = self._columns(self.x_prior.quantile(share[:, : self.n_x]))
+            v = self.v_prior.quantile(self.without_linear(share))
+            parts = self._columns(v[:, :-1])
             w = self.b_prior.quantile(share[:, self.n_x : -1], parts.units)
-            values[places] = self._log_likelihood(parts, w, np.exp(self._sigma_quantile(share[:, -1])))
+            values[places] = self._log_likelihood(parts, w, np.exp(v[:, -1]))
         return values
 
-    def _parted(self, q: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
-        return self._x_of(q[:, : self.n_x]), q[:, self.n_x : -1], self._log_sigma_of(q[:, -1])
+    def _parted(self, q: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Coordinates of the search and ln sigma (n_sets, n_x + 1), and e (n_sets, n_linear)."""
+        return self._values(self.without_linear(q)), q[:, self.n_x : -1]
 
-    def _x_of(self, normal: FloatArray) -> FloatArray:
-        lower, upper = self.x_prior.lower, self.x_prior.upper
+    def _values(self, normal: FloatArray) -> FloatArray:
+        """Coordinates of the search and ln sigma, by normal numbers (n_sets, n_x + 1)."""
+        lower, upper = self.v_prior.lower, self.v_prior.upper
         return np.asarray(np.clip(lower + (upper - lower) * ndtr(normal), lower, upper))
 
-    def _log_sigma_of(self, normal: FloatArray) -> FloatArray:
-        low, high = self.sigma_ends
-        return np.asarray(np.clip(low + (high - low) * ndtr(normal), low, high))
-
-    def _normal(self, x: FloatArray, log_sigma: FloatArray) -> FloatArray:
-        lower, upper, (low, high) = self.x_prior.lower, self.x_prior.upper, self.sigma_ends
-        share = np.column_stack([(x - lower) / (upper - lower), (log_sigma - low) / (high - low)])
+    def _normal(self, values: FloatArray) -> FloatArray:
+        share = (values - self.v_prior.lower) / (self.v_prior.upper - self.v_prior.lower)
         return np.asarray(ndtri(np.clip(share, _EDGE, 1.0 - _EDGE)))
 
-    def _log_prior(self, x_normal: FloatArray, normal: FloatArray, x: FloatArray, log_sigma: FloatArray) -> FloatArray:
-        low, high = self.sigma_ends
-        every = np.column_stack([x_normal, normal])
-        slopes = -0.5 * every**2 - 0.5 * _LOG_2PI  # of Phi
-        widths = np.log(self.x_prior.upper - self.x_prior.lower).sum() + np.log(high - low)
-        density = self.x_prior.log_density(x) + self._log_sigma_density(log_sigma)
-        return np.where(np.isfinite(every).all(axis=1), density + slopes.sum(axis=1) + widths, -np.inf)
+    def _log_prior(self, normal: FloatArray, values: FloatArray) -> FloatArray:
+        slopes = -0.5 * normal**2 - 0.5 * _LOG_2PI  # of Phi
+        widths = np.log(self.v_prior.upper - self.v_prior.lower).sum()
+        density = self.v_prior.log_density(values)
+        return np.where(np.isfinite(normal).all(axis=1), density + slopes.sum(axis=1) + widths, -np.inf)
 
     def _chunks(self, places: Any) -> list[Any]:
         size = max(1, _SAMPLES_AT_ONCE // self.problem.y.size)
         return [places[k : k + size] for k in range(0, len(places), size)]
-
-    def _given_x(self, x: FloatArray, e: FloatArray, log_sigma: FloatArray) -> FloatArray:
-        parts, sigma = self._columns(x), np.exp(log_sigma)
-        w, log_volume = self._from_normal(parts, e, sigma)
-        return self._log_likelihood(parts, w, sigma) + self.b_prior.log_density(w, parts.units) + log_volume
 
     def _log_likelihood(self, parts: Columns, w: FloatArray, sigma: FloatArray) -> FloatArray:
         residual = parts.target - (parts.columns @ (w * parts.units[0])[..., np.newaxis])[..., 0]
@@ -271,31 +260,14 @@ class Target:
         triangle, best = self._regression(parts, sigma)
         return solved_within(triangle, best, e, *self.b_prior.ends(parts.units))
 
-    def _log_sigma_density(self, log_sigma: FloatArray) -> FloatArray:
-        low, high = self.sigma_ends
-        inside = (log_sigma >= low) & (log_sigma <= high)
-        if self.sigma_given is None:
-            return np.where(inside, -np.log(high - low), -np.inf)
-        bounded = np.clip(log_sigma, low, high)
-        return np.where(inside, self.sigma_given.log_density(np.exp(bounded)) + bounded, -np.inf)
-
-    def _sigma_quantile(self, share: FloatArray) -> FloatArray:
-        low, high = self.sigma_ends
-        if self.sigma_given is None:
-            return low + share * (high - low)
-        return np.clip(np.log(np.maximum(self.sigma_given.quantile(share), np.exp(low))), low, high)
-
 
 def target(
     problem: Problem, noise: Noise, priors: Mapping[str, Given], quantum: float | None, factor: float = 1.0
 ) -> Target:
     """The posterior of a problem; `factor` enlarges every box but that of sigma."""
-    low, high, own = of_sigma(problem, priors, quantum if noise.name == "quantised" else None)
     return Target(
         problem=problem.close(),
         noise=noise,
-        x_prior=searched(problem, priors, factor),
+        v_prior=searched(problem, priors, quantum if noise.name == "quantised" else None, factor),
         b_prior=linear(problem, priors, factor),
-        sigma_ends=(low, high),
-        sigma_given=own,
     )
