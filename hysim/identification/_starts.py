@@ -88,7 +88,7 @@ class Begun(NamedTuple):
     cut: bool  # whether the user's number of evaluations has ended a part of the search
 
 
-def begun_by_parts(structure: PartByPart, setting: Setting) -> Begun:
+def begun_by_parts(structure: Any, setting: Setting) -> Begun:
     """The structure where the search part by part ends, with what it holds; ValueError as of `identify`."""
     plant, records = structure.over(setting.records, setting.freedom)
     most = setting.max_evaluations

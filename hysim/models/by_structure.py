@@ -82,25 +82,16 @@ class Holding(ByStructure):
 
 
 @dataclass(frozen=True)
-class _Foreign(Subject):
+class _Foreign(ByStructure):
     """A subject of a user's own class, which says nothing of its search."""
 
     subject: Any
 
-    def search_space(self, record: Record, freedom: Freedom = ALL_FREE) -> Any:
-        return self.subject.search_space(record, freedom)
+    assumed_states, variants, forgotten = Searched.assumed_states, Searched.variants, Searched.forgotten
+    in_one_step, longer_past = Searched.in_one_step, Searched.longer_past
 
-    def regressors(self, parameters: Parameters, record: Record) -> Any:
-        return self.subject.regressors(parameters, record)
-
-    def steady(self, parameters: Parameters, record: Record) -> Any:
-        return self.subject.steady(parameters, record)
-
-    def assemble(self, parameters: Mapping[str, float]) -> Any:
-        return self.subject.assemble(parameters)
-
-    def notes(self, record: Record, model: Any) -> Any:
-        return self.subject.notes(record, model)
+    def as_structure(self) -> Any:
+        return self.subject
 
 
 def searched(subject: Any) -> Any:

@@ -6,7 +6,7 @@ Of several inputs each has a law, and the outputs of all are added: creep, frequ
 and each input excites the modes by gains of its own (`hysim.plants.multi_input_actuator`).
 
 What is behind the law is linear: the output is affine in what the law is affine in, and only the law's other parameters
-and those of the parts are searched. The search begins part by part (`hysim.models.protocols.PartByPart`): the law where
+and those of the parts are searched. The search begins part by part (`hysim.identification._starts`): the law where
 the input is slow, the modes and the delay on the fastest record, beside a creep of 1 % a decade, and then all at once.
 
 A parameter is undetermined if its standard error is above its use: 1 % a decade of creep (or half of it), a quarter of
@@ -176,6 +176,7 @@ class ActuatorStructure(Subject):
 
     @property
     def noise(self) -> str:
+        """The noise that its sensor makes, as `identify` names it."""
         return "quantised" if self.sensor is not None and self.sensor.quantum else "gaussian"
 
     @property
@@ -185,6 +186,7 @@ class ActuatorStructure(Subject):
 
     @property
     def fastest(self) -> int:
+        """The record on which the parts that grow are searched."""
         return 0 if self.survey is None else int(self.survey.fastest)
 
     def static(self, record: Record) -> Record:
@@ -195,6 +197,7 @@ class ActuatorStructure(Subject):
         return replace(record, u=self.amplifier.voltage(record.u), channels={**record.channels, **others})
 
     def with_law(self, law: Any) -> "ActuatorStructure":
+        """The structure with another law, or another start of it."""
         return replace(self, law=law)
 
     def behind(self, law: Any) -> "ActuatorStructure":
@@ -215,6 +218,7 @@ class ActuatorStructure(Subject):
 
     @property
     def names(self) -> frozenset[str]:
+        """Names of the parameters of the parts other than the law."""
         boxes = {} if self.survey is None else self.parts([]).boxes()
         return frozenset(f"{part}.{each.name}" for part, (box, _) in boxes.items() for each in box)
 
@@ -225,12 +229,15 @@ class ActuatorStructure(Subject):
         return [replace(self, modes=k, creep=creep, known=known) for k in range(self.modes + 1)]
 
     def points(self, space: SearchSpace, known: Sequence[Mapping[str, float]]) -> FloatArray:
+        """Points of a space of this plant, spread over its last part, with coordinates `known` of a smaller one."""
         return points(space, self.modes, known)
 
     def finer(self, space: SearchSpace, best: FloatArray) -> FloatArray:
+        """Points about the best of `points`, and these."""
         return finer(space, self.modes, best)
 
     def beyond(self, space: SearchSpace, end: FloatArray) -> FloatArray:
+        """The end (1, n_x) of a descent that may rest too early, and points (n, n_x) from which others may go on."""
         return between_samples(space, end)
 
     def trials(self) -> Sequence["ActuatorStructure"]:
@@ -242,6 +249,7 @@ class ActuatorStructure(Subject):
         return [self._delayed(k, self.survey.shortest) for k in range(MOST_LATE)]
 
     def begun(self, starting: Sequence[Mapping[str, float]]) -> "ActuatorStructure":
+        """The structure with a search that begins at these coordinates by name."""
         return replace(self, starting=tuple(dict(each) for each in starting))
 
     def smaller(self, freedom: Freedom) -> tuple["ActuatorStructure", str] | None:
