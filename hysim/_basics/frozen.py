@@ -204,16 +204,11 @@ def _with_advice(cls: type[T]) -> type[T]:
 
 @functools.cache
 def _coercions(cls: Any, finite: bool) -> dict[str, Callable[[Any, str], Any]]:
-    rules: dict[Any, Callable[[Any, str], Any]] = {
-        float: functools.partial(_as_float, finite=finite),
-        tuple[float, ...]: functools.partial(_as_float_tuple, finite=finite),
-        tuple[float, ...] | None: lambda value, name: (
-            None if value is None else _as_float_tuple(value, name, finite=finite)
-        ),
-        FloatArray: functools.partial(read_only, finite=finite),
-        FloatArray | None: lambda value, name: None if value is None else read_only(value, name, finite=finite),
-        float | None: lambda value, name: None if value is None else _as_float(value, name, finite=finite),
-    }
+    own: dict[Any, Callable[..., Any]] = {float: _as_float, tuple[float, ...]: _as_float_tuple, FloatArray: read_only}
+    rules: dict[Any, Callable[[Any, str], Any]] = {}
+    for kind, coerce in own.items():
+        rules[kind] = functools.partial(coerce, finite=finite)
+        rules[kind | None] = functools.partial(_if_any, rules[kind])
     hints = typing.get_type_hints(cls)
     kinds = {field.name: field.metadata.get("kind", hints[field.name]) for field in dataclasses.fields(cls)}
     coercions = {name: rules.get(kind) for name, kind in kinds.items()}
@@ -259,6 +254,10 @@ def _check_kind(value: Any, name: str, kinds: tuple[Any, ...]) -> None:
         names = [each.__name__ for each in kinds if each is not types.NoneType]
         words = f"a {', a '.join(names[:-1])} or a {names[-1]}" if names[1:] else f"of {names[0]}"
         raise TypeError(f"{name} must be {words}, got {type(value).__name__}")
+
+
+def _if_any(coerce: Callable[[Any, str], Any], value: Any, name: str) -> Any:
+    return None if value is None else coerce(value, name)
 
 
 def _as_float(value: Any, name: str, *, finite: bool) -> float:

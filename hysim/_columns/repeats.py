@@ -19,13 +19,12 @@ from hysim._columns.turning import NEAR, ROUNDING, TOLERANCE, turns
 _CLOSING = 2.0  # largest steps of the input, by which a record may end before its first input
 
 
-def repeated_cycle(u: FloatArray, tolerance: float | None = None) -> int | None:
-    """Number of samples of the cycle with which `u` (n,) begins, or None; `tolerance` is a share of the span."""
+def repeated_cycle(u: FloatArray) -> int | None:
+    """Number of samples of the cycle with which `u` (n,) begins, or None."""
     span = float(np.ptp(u))
     if span == 0.0:
         return None
-    if tolerance is None:
-        tolerance = max(TOLERANCE, min(reach(input_noise(u)) / span, MOST_IGNORED))
+    tolerance = max(TOLERANCE, min(reach(input_noise(u)) / span, MOST_IGNORED))
     plateaus = turns(u, tolerance).plateaus
     levels = u[[first for first, _ in plateaus]]
     inner = levels[1:-1]

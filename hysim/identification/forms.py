@@ -12,6 +12,7 @@ import numpy as np
 
 from hysim._release import __version__
 from hysim.models import storage
+from hysim.models.model import is_model
 
 _INFINITE = ("inf", "-inf")
 
@@ -40,7 +41,7 @@ class Stored:
 
 
 def to_plain(value: Any) -> Any:
-    if storage.is_model(value):
+    if is_model(value):
         return storage.to_document(value)
     if is_dataclass(value) and not isinstance(value, type):
         contents = {field.name: to_plain(vars(value)[field.name]) for field in fields(value)}

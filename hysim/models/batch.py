@@ -8,7 +8,7 @@ forgets it, so that a million sets need no million rows.
     final             the last output
 """
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from typing import Literal, NamedTuple
 
 import numpy as np
@@ -101,7 +101,8 @@ class Batch(NamedTuple):
 
         def work(start: int, stop: int) -> None:
             y = np.empty((min(size, stop - start), n_samples))
-            for block in _blocks(start, stop, size):
+            for first in range(start, stop, size):
+                block = slice(first, min(first + size, stop))
                 sets = block if self.order is None else self.order[block]
                 part = y[: block.stop - block.start]
                 self.compute(sets, self._inputs(sets), part)
@@ -122,7 +123,3 @@ class Batch(NamedTuple):
         rows = self.u[sets]
         rows.setflags(write=False)  # as kernels take them
         return rows
-
-
-def _blocks(start: int, stop: int, size: int) -> Iterator[slice]:
-    return (slice(first, min(first + size, stop)) for first in range(start, stop, size))

@@ -122,18 +122,14 @@ class CascadeStructure(Subject, Composable):
 
     def assumed_states(self, record: Record) -> tuple[str, ...]:
         """The states that the stages from the carrier on leave to the record; a cascade has no cycle ahead of it."""
-        stage_record = self._record_at(labels(self.stages)[self.carrier], record)
-        return tuple(state for state in common_states(self._with_state, stage_record) if state != "periodic")
+        stages = [*zip(labels(self.stages), self.stages, strict=True)][self.carrier :]
+        with_state = {label: stage for label, stage in stages if isinstance(stage, Identifiable)}
+        states = common_states(with_state, self._record_at(stages[0][0], record))
+        return tuple(state for state in states if state != "periodic")
 
     def variants(self) -> tuple[Variant, ...]:
         carrier = {labels(self.stages)[self.carrier]: self.stages[self.carrier]}
         return combined_variants(carrier, lambda others: replace(self, stages=exchanged(self.stages, others)))
-
-    @property
-    def _with_state(self) -> dict[str, Any]:
-        """The stages whose state can be free, by their labels: the carrier, and the structures after it."""
-        stages = list(zip(labels(self.stages), self.stages, strict=True))[self.carrier :]
-        return {label: stage for label, stage in stages if isinstance(stage, Identifiable)}
 
     @property
     def _by_label(self) -> dict[str, Any]:

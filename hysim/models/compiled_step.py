@@ -3,12 +3,14 @@
 import functools
 import inspect
 from collections.abc import Callable
-from typing import Any
+from typing import Any, TypeVar
 
 from numba.core.dispatcher import Dispatcher
 
-from hysim.kernels.stepping import START, STEP, Start, Step, by_address, compile_start, compile_step
+from hysim.kernels.stepping import STEP, Start, Step, by_address, compile_start, compile_step
 from hysim.models.protocols import Startable, Stepwise
+
+_Kernel = TypeVar("_Kernel", Step, Start)
 
 
 def startable(thing: Any, sample_time: float | None = None) -> Startable:
@@ -29,15 +31,9 @@ def compiled_start(function: Callable[[Any, Any, float], None]) -> Start:
 
 
 @functools.lru_cache(maxsize=256)
-def pointer(step: Step) -> Step:
-    """A compiled step as kernels are given it again and again: numba would look up its address in each call."""
-    return by_address(step, STEP.signature)
-
-
-@functools.lru_cache(maxsize=256)
-def start_pointer(start: Start) -> Start:
-    """A compiled start, as `pointer`."""
-    return by_address(start, START.signature)
+def pointer(kernel: _Kernel, kind: Any = STEP) -> _Kernel:
+    """A step, or a `START`, as kernels are given it again and again: numba would look up its address in each call."""
+    return by_address(kernel, kind.signature)
 
 
 def _is_kernel(function: Any) -> bool:

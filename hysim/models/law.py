@@ -23,9 +23,9 @@ from hysim._basics.parallel import in_pieces
 from hysim._columns.turning import TOLERANCE
 from hysim.errors import SimulationError, warn_beyond
 from hysim.kernels import stepping
-from hysim.kernels.stepping import Start, Step, drive
+from hysim.kernels.stepping import START, Start, Step, drive
 from hysim.models.batch import Batch, Reduction, Sets
-from hysim.models.compiled_step import compiled_start, compiled_step, pointer, start_pointer
+from hysim.models.compiled_step import compiled_start, compiled_step, pointer
 from hysim.models.composable import Placed
 from hysim.models.inverse_search import check_reached, inverse_at_rest, inverse_response, not_reached, searched_inverse
 from hysim.models.parameters import Parameter, declared_space
@@ -97,6 +97,8 @@ class Law(Placed, Searched, ABC):
         without it.
     initial : tuple of str
         Fields that are the initial memory; they stand in the state behind the last input. By default ``("z0",)``.
+    step_fields : tuple of str
+        Fields in the order in which the step takes them; by default all but the initial memory, as they are declared.
     further_memory : int
         Further numbers of the memory, which stand in the state behind the initial ones and are zero at first.
     searched : tuple of Parameter
@@ -131,6 +133,7 @@ class Law(Placed, Searched, ABC):
     tolerance: ClassVar[float] = _EXACT
     start: ClassVar[Any] = staticmethod(stepping.start)
     initial: ClassVar[tuple[str, ...]] = ("z0",)
+    step_fields: ClassVar[tuple[str, ...]] = ()
     further_memory: ClassVar[int] = 0
     searched: ClassVar[tuple[Parameter, ...]] = ()
     starts: ClassVar[tuple[Mapping[str, float], ...]] = ()
@@ -168,7 +171,7 @@ class Law(Placed, Searched, ABC):
         """Laws as the step takes them: by default the fields one after the other, and the initial memory."""
         own = sum(tables[name].shape[1] for name in cls.initial)
         memory = cls.initial_memory(tables, further=max(cls.further_memory, cls.hidden_states - own))
-        constants = [table for name, table in tables.items() if name not in cls.initial]
+        constants = [tables[name] for name in cls.step_fields or tables if name not in cls.initial]
         if cls.hidden_states:
             constants.insert(0, np.full((len(memory), 1), cls.tolerance))
         return Packed(np.concatenate([memory[:, :0], *constants], axis=1), memory)
@@ -777,4 +780,4 @@ def rows_by_step(step: Step, start: Start, laws: Packed, workspace: int, u: Floa
 
     parameters, memory = (read_only(table, finite=False) for table in laws)
     with np.errstate(all="ignore"):
-        drive_each(pointer(step), start_pointer(start), parameters, memory, workspace, u, y, 0, len(y))
+        drive_each(pointer(step), pointer(start, START), parameters, memory, workspace, u, y, 0, len(y))

@@ -83,24 +83,25 @@ def _in_words(self: Any) -> str:
 
 def in_brief(value: Any) -> str:
     """A model in one line: its family, and the parameters that differ from their defaults."""
-    if not _is_model(value):
+    if not is_model(value):
         return type(value).__name__
     defaults = {each.name: each.default for each in fields(value)}
     told = [
-        f"{name} = {in_brief(each) if _is_model(each) else value_in_words(each)}"
+        f"{name} = {in_brief(each) if is_model(each) else value_in_words(each)}"
         for name, each in items(value).items()
         if isinstance(each, np.ndarray) or each != defaults[name]
     ]
     return f"{type(value).__name__} ({', '.join(told)})" if told else type(value).__name__
 
 
-def _is_model(value: Any) -> bool:
+def is_model(value: Any) -> bool:
+    """Whether a value is of a family in the registry."""
     return FAMILIES.get(type(value).__name__) is type(value)
 
 
 def _models_in(name: str, value: Any) -> dict[str, Any]:
     members = {f"{name}[{k}]": each for k, each in enumerate(value)} if isinstance(value, tuple) else {name: value}
-    return {place: each for place, each in members.items() if _is_model(each)}
+    return {place: each for place, each in members.items() if is_model(each)}
 
 
 def every_family() -> dict[str, type]:

@@ -15,7 +15,7 @@ from hysim._basics.frozen import given_items, last_names
 from hysim._basics.results import model_of
 from hysim._names import MODULE_OF
 from hysim._release import __version__
-from hysim.models.model import FAMILIES, every_family
+from hysim.models.model import FAMILIES, every_family, is_model
 
 _DEEPEST = 100  # lists and mappings in each other: a chain of chains takes three for a model
 _MOST_DIGITS = 4_300  # which Python converts by default
@@ -166,10 +166,6 @@ def _one_line(error: Exception) -> str:
 def _shown(value: Any) -> str:
     text = repr(value)
     return text if len(text) <= _BRIEF else f"{text[: _BRIEF - 4]} ..."
-
-
-def is_model(value: Any) -> bool:
-    return FAMILIES.get(type(value).__name__) is type(value)
 
 
 def is_document(value: Any) -> bool:

@@ -10,8 +10,19 @@ from hysim.models.parameters import Parameter
 from hysim.models.stages import Stage
 
 
+class HardeningLaw(Law):
+    """A law whose slope lies between those of the elastic line and of hardening."""
+
+    stiffness: float
+    hardening: float
+
+    @property
+    def known_slopes(self) -> tuple[float, float]:
+        return min(self.hardening, self.stiffness), max(self.hardening, self.stiffness)
+
+
 @family
-class Bilinear(Law):
+class Bilinear(HardeningLaw):
     """Bilinear law with kinematic and isotropic hardening, the Hardening and Steel01 of OpenSees.
 
     ::
@@ -91,10 +102,6 @@ class Bilinear(Law):
             z = math.copysign(1.0 + state[2], z)
         state[0], state[1] = u, z
         return float(parameters[4] + parameters[1] * u + (parameters[0] - parameters[1]) * parameters[2] * z)
-
-    @property
-    def known_slopes(self) -> tuple[float, float]:
-        return min(self.hardening, self.stiffness), max(self.hardening, self.stiffness)
 
     @classmethod
     def from_opensees(cls, *, sigmaY: float, E: float, H_iso: float = 0.0, H_kin: float = 0.0) -> Self:

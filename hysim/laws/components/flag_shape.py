@@ -7,13 +7,13 @@ x_0, U(x)), however it is sampled.
 from typing import ClassVar, Self
 
 from hysim._basics.frozen import FloatArray
-from hysim.models.law import Law
+from hysim.laws.components.bilinear import HardeningLaw
 from hysim.models.model import Example, family
 from hysim.models.parameters import Parameter
 
 
 @family
-class FlagShape(Law):
+class FlagShape(HardeningLaw):
     """Flag-shaped law: rocking walls, post-tensioned joints, shape memory alloys, ring springs.
 
     ::
@@ -81,10 +81,6 @@ class FlagShape(Law):
         z = min(z, min(1.0, max(x, parameters[3] - 1.0)))
         state[0], state[1], state[2] = u, x, z
         return float(parameters[1] * u + (parameters[0] - parameters[1]) * parameters[2] * z)
-
-    @property
-    def known_slopes(self) -> tuple[float, float]:
-        return min(self.hardening, self.stiffness), max(self.hardening, self.stiffness)
 
     @classmethod
     def from_opensees(cls, *, k1: float, k2: float, sigAct: float, beta: float) -> Self:

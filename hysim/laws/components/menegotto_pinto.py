@@ -24,14 +24,14 @@ from typing import ClassVar, Self
 
 from hysim._basics.frozen import FloatArray
 from hysim.kernels.elementary import bent
-from hysim.models.law import Law
+from hysim.laws.components.bilinear import HardeningLaw
 from hysim.models.model import Example, family
 from hysim.models.parameters import Parameter
 from hysim.models.stages import Stage
 
 
 @family
-class MenegottoPinto(Law):
+class MenegottoPinto(HardeningLaw):
     """Menegotto-Pinto law of steel with Filippou's isotropic hardening, the Steel02 of OpenSees.
 
     ::
@@ -163,10 +163,6 @@ class MenegottoPinto(Law):
             state[9] = max(furthest, u) if s > 0.0 else min(furthest, u)
         state[0] = u
         return float(parameters[11] + parameters[1] * u + (parameters[0] - parameters[1]) * unit * state[1])
-
-    @property
-    def known_slopes(self) -> tuple[float, float]:
-        return min(self.hardening, self.stiffness), max(self.hardening, self.stiffness)
 
     @classmethod
     def from_opensees(

@@ -4,13 +4,13 @@ import math
 from typing import ClassVar, Self
 
 from hysim._basics.frozen import FloatArray
-from hysim.models.law import Law
+from hysim.laws.components.bilinear import HardeningLaw
 from hysim.models.model import Example, family
 from hysim.models.parameters import Parameter
 
 
 @family
-class OriginOriented(Law):
+class OriginOriented(HardeningLaw):
     """Origin-oriented law: below the largest input so far, the force goes on the line from there to the origin.
 
     ::
@@ -70,10 +70,6 @@ class OriginOriented(Law):
         x, k = u / parameters[2], 1 if u > 0.0 else 2
         state[0], state[k] = u, max(state[k], abs(x) - 1.0)
         return float(parameters[1] * u + (parameters[0] - parameters[1]) * parameters[2] * x / (1.0 + state[k]))
-
-    @property
-    def known_slopes(self) -> tuple[float, float]:
-        return min(self.hardening, self.stiffness), max(self.hardening, self.stiffness)
 
     @classmethod
     def from_opensees(

@@ -164,7 +164,9 @@ class Chart:
         unit = shape_unit(known["A"], known["n"], self.span)
         loading, unloading = known["beta"] + known["gamma"], known["beta"] - known["gamma"]
         shapes = {**known, "loading": loading, "unloading": unloading}
-        raw = {name: knee(shapes[name] / unit, known["n"]) for name in _SHAPES if name in self.coordinates}
+        raw: dict[str, Any] = {
+            name: knee(shapes[name] / unit, known["n"]) for name in _SHAPES if name in self.coordinates
+        }
         raw |= {"A": known["A"] / self.slope, "ratio": unloading / np.abs(loading) if loading != 0.0 else 0.0}
         raw |= {
             name: self.unsized(name, known[name] / size) for name, size in self.sizes(known).items() if name in known

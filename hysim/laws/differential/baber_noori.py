@@ -2,10 +2,29 @@
 
 The two materials of OpenSees that change with the energy count it as e' = (1 - alpha) ko u' z, ours is e' = u' z, so
 that rates go over by the factor (1 - alpha) ko. Source: OpenSees command manual, uniaxialMaterial BoucWen and BWBN.
+
+The box in which a law that wears off or pinches is searched, in its own scales.
+
+The memory of such a law saturates at the yield memory z_u, often far below what the input's span would make of it, and
+the energy that wears it grows by z_u for each unit of the input's path. With U the span of the input, P the length of
+its path, k the knee and l the shape coefficients of `hysim.laws.differential._boucwen_search`, the coordinates are
+
+    loading       c,  k = sinh(c):  z_u = |A| U / k for a memory that saturates, k from 1/3 to 500 drawn
+    ratio         (beta - gamma) / |beta + gamma|, from -1 to 3 drawn
+    n             log n
+    delta_nu, delta_eta    asinh(delta z_u P), and delta_a likewise with delta_a z_u P / |A|
+    p             log(p z_u P)
+    psi           log(psi / z_u), and delta_psi as the rates with delta_psi P
+    lambda_       log lambda_
+    z0            z0 / z_u
+    zeta_s, q     themselves
+
+Rates are not negative: damage does not heal. A parameter that the user bounds is its own coordinate within its bounds.
 """
 
 import math
-from dataclasses import replace
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
 from typing import Any, Self
 
 import numpy as np
@@ -14,12 +33,13 @@ import numpy.typing as npt
 from hysim._basics.frozen import FloatArray
 from hysim.kernels.elementary import power
 from hysim.kernels.stepping import inlined_kernel
-from hysim.laws.differential import _boucwen_search, _wear_search
+from hysim.laws.differential import _boucwen_search
 from hysim.laws.differential._memory_law import MemoryLaw
 from hysim.laws.differential.boucwen import BoucWen
 from hysim.laws.differential.polynomial_boucwen import PolynomialBoucWen
 from hysim.models.by_structure import Holding
 from hysim.models.model import Example, family
+from hysim.models.parameters import sides
 from hysim.models.search_space import ALL_FREE, Freedom, Parameters, SearchSpace
 from hysim.models.stages import Stage, Subset
 from hysim.models.tables import Tables
@@ -52,6 +72,69 @@ _SPREAD = Stage(
 _WEARING = ("delta_a", "delta_nu", "delta_eta", "zeta_s")
 _LARGEST_EXPONENT = 700.0
 _WIDTHS, _BESIDE = 0.7, 4.0  # of the bell: the most that a step goes within it, and where it begins
+_LARGEST = 600.0  # knee of the loading branch; smaller yield memories are below what a record resolves
+_SAME_SIGN = 0.02  # smallest knee of a law that pinches, whose loading coefficient is positive
+_BOX = {
+    "A": (-10.0, 10.0),
+    "loading": (-_boucwen_search.KNEE, float(np.arcsinh(_LARGEST))),
+    "ratio": (-10.0, 10.0),
+    "beta": (-_boucwen_search.KNEE, _boucwen_search.KNEE),
+    "gamma": (-_boucwen_search.KNEE, _boucwen_search.KNEE),
+    "n": (float(np.log(0.5)), float(np.log(10.0))),
+    "delta_a": (0.0, 4.0),
+    "delta_nu": (0.0, 4.0),
+    "delta_eta": (0.0, 4.0),
+    "zeta_s": (0.0, 0.999),
+    "q": (-1.0, 1.0),
+    "p": (float(np.log(0.05)), float(np.log(300.0))),
+    "psi": (float(np.log(0.02)), float(np.log(5.0))),
+    "delta_psi": (0.0, 4.0),
+    "lambda_": (float(np.log(0.02)), float(np.log(10.0))),
+    "z0": (-3.0, 3.0),
+}
+_DRAWN = {
+    "loading": (float(np.arcsinh(1.0 / 3.0)), float(np.arcsinh(500.0))),
+    "ratio": (-1.0, 3.0),
+    "delta_psi": (0.0, 2.0),
+    "z0": (-1.0, 1.0),
+}
+_RATES = ("delta_a", "delta_nu", "delta_eta", "delta_psi")
+_PHYSICAL = {  # damage does not heal, and a slope along a branch does not change its sign
+    **_boucwen_search.PHYSICAL,
+    **dict.fromkeys(_RATES, (True, False)),
+    "zeta_s": (True, True),
+}
+_LOGS = ("p", "psi", "lambda_")
+
+
+@dataclass(frozen=True)
+class _Chart(_boucwen_search.Chart):
+    """Coordinates of the free parameters of the memory, with the length of the input's path as the reach."""
+
+    memory = tuple(name for name in _BOX if name not in ("loading", "ratio"))
+    beside_loading = "ratio"
+
+    def sizes(self, known: Mapping[str, FloatArray]) -> dict[str, FloatArray]:
+        slope = _boucwen_search.steepness(known["A"])
+        coefficient = (known["beta"] + known["gamma"]) / _boucwen_search.shape_unit(known["A"], known["n"], self.span)
+        yielding = slope * self.span * np.maximum(coefficient, 1.0) ** (-1.0 / known["n"])
+        worn, one = yielding * self.reach, np.ones_like(slope)
+        return {
+            "delta_a": slope / worn,
+            **dict.fromkeys(("delta_nu", "delta_eta", "p"), one / worn),
+            "psi": yielding,
+            "delta_psi": one / self.reach,
+            **dict.fromkeys(("lambda_", "zeta_s", "q"), one),
+            "z0": yielding,
+        }
+
+    def sized(self, name: str, x: FloatArray) -> FloatArray:
+        return np.asarray(np.sinh(x) if name in _RATES else np.exp(x) if name in _LOGS else x)
+
+    def unsized(self, name: str, value: FloatArray) -> FloatArray:
+        if name in _LOGS:
+            return np.log(np.maximum(value, 1e-300))
+        return np.asarray(np.arcsinh(value) if name in _RATES else value)
 
 
 @inlined_kernel
@@ -315,7 +398,22 @@ class BoucWenBaberNoori(MemoryLaw):
         if all(held.get(name, 1.0) == 0.0 for name in _WEARING):
             every = replace(freedom, fixed={**held, **freedom.fixed})
             return _boucwen_search.search_space(self.scalars, self.columns, record, every)
-        return _wear_search.search_space(self.scalars, self.columns, record, freedom, held)
+        bounds = freedom.limits(self.scalars, held)
+        for name, pair in bounds.items():
+            if name in _Chart.memory and not np.isfinite(pair).all():
+                raise ValueError(f"bounds of {name!r} must be finite, got {pair}")
+            if name in ("n", *_LOGS) and pair[0] <= 0.0:
+                raise ValueError(f"bounds of {name!r} must be positive, got {pair}")
+        chart = _Chart.of(self.scalars, held, bounds, record, float(np.abs(np.diff(record.u)).sum()))
+        limits, pinches = chart.limits, held.get("zeta_s", 1.0) != 0.0
+        box = {name: limits.get(name, _BOX[name]) for name in chart.coordinates}
+        box |= {"n": (float(np.log(limits["n"][0])), float(np.log(limits["n"][1])))} if "n" in limits else {}
+        box |= {"loading": (float(np.arcsinh(_SAME_SIGN)), _BOX["loading"][1])} if pinches and "loading" in box else {}
+        drawn = sides({name: pair if name in limits else _DRAWN.get(name, pair) for name, pair in box.items()})
+        physical = _PHYSICAL | ({"loading": (True, False)} if pinches else {})
+        return _boucwen_search.space_of_memory(
+            chart, box, self.scalars, self.columns, held, bounds, freedom, physical=physical, drawn=drawn
+        )
 
     def steady(self, parameters: Parameters, record: Record) -> dict[str, FloatArray]:
         """Initial memory of a steady cycle; ValueError for a law that degrades or pinches: it has no steady cycle."""

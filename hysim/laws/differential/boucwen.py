@@ -38,7 +38,7 @@ from hysim._basics.frozen import FloatArray
 from hysim.kernels import boucwen as kernels
 from hysim.kernels import stepping
 from hysim.laws.differential._boucwen_law import BoucWenLaw, BoucWenStep
-from hysim.laws.differential.boucwen_inverse import BoucWenInverse, InverseState
+from hysim.laws.differential.boucwen_inverse import BoucWenInverse
 from hysim.laws.differential.limit_cycle import LimitCycle
 from hysim.models.law import Packed, State
 from hysim.models.model import Example, family
@@ -404,11 +404,8 @@ class EquivalentBoucWen(BoucWenStep):
         """The law's inverse as an object, where its slope keeps its sign; see `hysim.BoucWen.inverse`."""
         return self.bouc_wen.inverse()
 
-    def inverse_begun(self, y: FloatArray, u0: float | None, state: State | InverseState | None) -> CompiledLaw:
-        return self.bouc_wen.inverse_begun(y, u0, state)
-
-    def unreached(self, sample: int, y: float, inverse: CompiledLaw) -> str:
-        return self.bouc_wen.unreached(sample, y, inverse)
+    def inverted(self, y: FloatArray, u0: float | None, state: State | None) -> FloatArray:
+        return self.bouc_wen.inverted(y, u0, state)
 
     def compiled_inverse(self, u0: float, limits: Limits = UNLIMITED, sample_time: float = math.inf) -> CompiledLaw:
         return self.bouc_wen.compiled_inverse(u0, limits)

@@ -322,10 +322,6 @@ class CoreFieldStructure:
     def _channel(self, record: Record) -> FloatArray:
         return np.asarray(0.0 if self.channel is None else value_in(record.channels, self.channel, "the record"))
 
-    def _is_later(self, record: Record) -> npt.NDArray[np.bool_]:
-        """Whether a sample is past the share that is known."""
-        return np.arange(len(record)) >= self.known * len(record)
-
     def _rows(self, law: Any, at: tuple[float, ...], record: Record) -> Iterator[tuple[slice, FloatArray]]:
         """Some samples at a time, and their terms times the polynomials of the channel, (n, n_weights * n_places)."""
         along = np.broadcast_to(weights_at(at, self._channel(record)), (len(record), len(at)))
@@ -341,7 +337,7 @@ class CoreFieldStructure:
         """Squared error of the rest of a record for each of the `_SPREADS`, by weights without it and its begin."""
         terms, values = law.terms(record), solution.reshape(-1, len(at))
         own = values @ np.mean(np.atleast_2d(weights_at(at, self._channel(record))), axis=0)
-        begin = np.flatnonzero(~self._is_later(record))
+        begin = np.flatnonzero(np.arange(len(record)) < self.known * len(record))
         tells = begin[settled(record.u[begin], law.thresholds)]
         errors = [record.y - terms @ corrected(own, terms[tells], record.y[tells], spread) for spread in _SPREADS]
         return np.array(errors) ** 2 @ share

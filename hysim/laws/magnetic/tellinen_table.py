@@ -8,7 +8,7 @@ import numpy as np
 from hysim._basics.frozen import check_whole
 from hysim.kernels import tellinen_table as kernels
 from hysim.metrics import loop_metrics
-from hysim.models.law import Law, Packed
+from hysim.models.law import Law
 from hysim.models.model import Example, family
 from hysim.models.parameters import Parameter
 from hysim.models.tables import Tables
@@ -71,6 +71,7 @@ class TellinenTable(Law):
         title="Magnetic core: Tellinen's branches from a table",
     )  # fmt: skip
     step = staticmethod(kernels.step)
+    step_fields = ("offset", "feedthrough", "inputs", "lower", "upper")
     within: ClassVar = {"z0": ("of a size of at most", 1.0)}
     searched = (
         Parameter("feedthrough", unit="y/u", affine=True),
@@ -93,12 +94,6 @@ class TellinenTable(Law):
                 raise ValueError(f"the branch {name} must not fall")
         if (lower > upper).any():
             raise ValueError("the branch upper must not lie below the branch lower")
-
-    @classmethod
-    def pack(cls, tables: Tables) -> Packed:
-        """Parameters (offset, feedthrough, inputs, lower, upper), and the memory (u, z)."""
-        names = ("offset", "feedthrough", "inputs", "lower", "upper")
-        return Packed(np.concatenate([tables[name] for name in names], axis=1), cls.initial_memory(tables))
 
     @classmethod
     def candidates(cls) -> dict[str, Any]:

@@ -11,11 +11,10 @@ from hysim._basics.frozen import FloatArray, read_only
 from hysim.kernels import energy_plays as kernels
 from hysim.laws.operators._bank import Bank
 from hysim.laws.operators._bank_search import Axis, BankStructure
-from hysim.models.law import Law, Packed
+from hysim.models.law import Law
 from hysim.models.model import Example, family
 from hysim.models.parameters import Parameter
 from hysim.models.search_space import Parameters
-from hysim.models.tables import Tables
 from hysim.records import Record
 
 _SPACING = 2.0  # of the thresholds: finer towards zero
@@ -80,12 +79,7 @@ class EnergyPlays(Bank, Law):
     z0: tuple[float, ...] = (0.0,)
 
     step = staticmethod(kernels.step)
-
-    @classmethod
-    def pack(cls, tables: Tables) -> Packed:
-        """Parameters (offset, feedthrough, field, thresholds, weights), and the memory (u, positions)."""
-        names = ("offset", "feedthrough", "field", "thresholds", "weights")
-        return Packed(np.concatenate([tables[name] for name in names], axis=1), cls.initial_memory(tables))
+    step_fields = ("offset", "feedthrough", "field", "thresholds", "weights")
 
     @classmethod
     def structure(  # type: ignore[override]  # its weights have one sign

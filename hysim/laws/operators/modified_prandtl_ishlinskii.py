@@ -6,7 +6,6 @@ either side. Where these sums have one sign it has an inverse of its own kind, e
     c'_0 = 1 / c_0,    c'_j = -c_j / (s_j s_(j-1)),    d'_j = sum_(i<=j) c_i (d_j - d_i)
 """
 
-import math
 from dataclasses import replace
 from typing import ClassVar
 
@@ -18,10 +17,8 @@ from hysim.laws.operators._bank import Bank
 from hysim.laws.operators._bank_search import BankStructure, check_dead_zones, dead_zone, named
 from hysim.laws.operators._play_sums import EXAMPLE, PlaySum
 from hysim.laws.operators.prandtl_ishlinskii import PrandtlIshlinskii, wrong_sum
-from hysim.models.inverse_search import searched_inverse
-from hysim.models.law import State
+from hysim.models.law import Law, State
 from hysim.models.model import Example, family
-from hysim.models.protocols import UNLIMITED, CompiledLaw, Limits
 from hysim.models.tables import Tables
 
 
@@ -133,8 +130,7 @@ class ModifiedPrandtlIshlinskii(Bank, PlaySum):
         thresholds, weights = zip(*((d, c) for d, c in ranked if d >= 0.0), strict=True)
         return PrandtlIshlinskii(thresholds=tuple(np.abs(thresholds).tolist()), weights=weights)
 
-    def compiled_inverse(self, u0: float, limits: Limits = UNLIMITED, sample_time: float = math.inf) -> CompiledLaw:
-        return searched_inverse(self, self.compiled(u0), limits=limits)
+    compiled_inverse = Law.compiled_inverse
 
     def refusal(self) -> str | None:
         """Why the law has no inverse: r_0 > 0, no dead zone of threshold zero, or weights whose sums change sign."""
