@@ -12,7 +12,7 @@ from hysim._names import among
 from hysim.design._inputs import InputLimits, usual
 from hysim.identification.likelihood import Expected, density
 from hysim.models.law import Law
-from hysim.models.parts import own
+from hysim.models.parts import own, share_of
 from hysim.models.search_space import Freedom
 from hysim.plants.actuator_structure import ActuatorStructure
 from hysim.plants.linear_parts import BELOW_NYQUIST, DAMPING, FREQUENCY, GAIN
@@ -211,8 +211,7 @@ def _expected(
         if unknown := [name for name in free if name not in every]:
             raise ValueError(f"free has {unknown[0]!r}; the parameters are {among(unknown[0], every)}")
         freedom = Freedom(fixed={name: known[name] for name in every if name not in free}, free=tuple(free))
-    share = Freedom(fixed=own(freedom.fixed, _LAW), free=tuple(own(dict.fromkeys(freedom.free), _LAW)))
-    space = structure.law.search_space(structure.scaled_on, share)
+    space = structure.law.search_space(structure.scaled_on, share_of(freedom, _LAW))
     coordinates = dict(zip((f"{_LAW}.{name}" for name in space.coordinates), space.starts[0].tolist(), strict=True))
     for part, (box, _) in structure.parts([]).boxes().items():
         coordinates |= {f"{part}.{each.name}": float(each.encode(known[f"{part}.{each.name}"])) for each in box}

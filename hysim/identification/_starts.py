@@ -37,7 +37,7 @@ from hysim.identification._search import apart, brief_optimum, chosen, descended
 from hysim.identification._uncertainty import uncertainty
 from hysim.metrics.criteria import information
 from hysim.models.dependent_structure import DependentStructure
-from hysim.models.parts import own
+from hysim.models.parts import share_of
 from hysim.models.protocols import Identifiable, PartByPart
 from hysim.models.search_space import Freedom
 from hysim.models.varying import weights
@@ -128,11 +128,7 @@ def _with_law(plant: Any, setting: Setting) -> tuple[Any, _Law]:
     """The plant whose law begins where the law alone is best, and that law."""
     k, law, freedom = plant.slowest, plant.law, setting.freedom
     record = plant.static(setting.records[k])
-    share = Freedom(
-        fixed=own(freedom.fixed, "hysteresis"),
-        free=tuple(own(dict.fromkeys(freedom.free), "hysteresis")),
-        bounds=own(freedom.bounds, "hysteresis"),
-    )
+    share = replace(share_of(freedom, "hysteresis"), starts_anew=False)
     alone = replace(setting.only([k]), records=[record], freedom=share, max_evaluations=None)
     is_open = decides(law, [record])
     if alone.initial is None and is_open:

@@ -9,7 +9,7 @@ from hysim._basics.frozen import LAST, items, own_items
 from hysim._basics.results import model_of
 from hysim.models.model import Example
 from hysim.models.protocols import Responding
-from hysim.models.tables import arguments_of, scalars_of
+from hysim.models.tables import Tables, arguments_of, check_signs, check_within, scalars_of
 
 
 class _Kind(NamedTuple):
@@ -84,6 +84,12 @@ class Placed(Composable):
     within: ClassVar[Mapping[str, tuple[str, float]]] = {}
     # Any, so that type checkers take BoucWen(**parameters) with a dict of floats
     u_range: Any = field(default=None, compare=False, metadata={**LAST, "kind": tuple[float, ...] | None})
+
+    @classmethod
+    def check(cls, tables: Tables) -> None:
+        """Raise a ValueError where the tables, every field over sets, hold parameters that are no law."""
+        check_signs(tables, cls.positive, cls.not_negative)
+        check_within(tables, cls.within)
 
     @property
     def arguments(self) -> dict[str, Any]:

@@ -15,7 +15,7 @@ import numpy as np
 from hysim._basics.frozen import FloatArray
 from hysim._names import among
 from hysim.models.by_structure import searched
-from hysim.models.parts import own
+from hysim.models.parts import share_of
 from hysim.models.protocols import Variant
 from hysim.models.search_space import Freedom, SearchSpace
 from hysim.records import Record
@@ -90,14 +90,8 @@ def declared(spaces: Mapping[str, Space], freedom: Freedom) -> dict[str, SearchS
 
 
 def _of_part(label: str, space: Space, freedom: Freedom) -> SearchSpace:
-    share = replace(
-        freedom,
-        fixed=own(freedom.fixed, label),
-        free=tuple(own(dict.fromkeys(freedom.free), label)),
-        bounds=own(freedom.bounds, label),
-    )
     try:
-        return space(share)
+        return space(share_of(freedom, label))
     except ValueError as error:
         raise ValueError(f"{label}: {error}") from None
 

@@ -34,7 +34,7 @@ from hysim.models.search_space import ALL_FREE, Freedom, Parameters, SearchSpace
 from hysim.models.slope import HOOKS, states_of, step_of
 from hysim.models.stages import Simpler, Stage, Subset
 from hysim.models.steady_cycle import Pass, PassOf, fixed_point
-from hysim.models.tables import Tables, check_signs, check_within, table_of_one, tables_of
+from hysim.models.tables import Tables, table_of_one, tables_of
 from hysim.records import Record
 
 if TYPE_CHECKING:
@@ -154,12 +154,6 @@ class Law(Placed, Searched, ABC):
             cls.step = staticmethod(step)
 
     # ------------------------------------------------------------------------------ what a family may say more
-
-    @classmethod
-    def check(cls, tables: Tables) -> None:
-        """Raise a ValueError where the tables, every field over sets, hold parameters that are no law."""
-        check_signs(tables, cls.positive, cls.not_negative)
-        check_within(tables, cls.within)
 
     @staticmethod
     def output(p: Any, x: float, u: float) -> float:

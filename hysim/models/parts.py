@@ -3,6 +3,7 @@
 import functools
 import re
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from typing import Any, TypeVar
 
 import numpy as np
@@ -10,6 +11,7 @@ import numpy as np
 from hysim._basics.frozen import FloatArray, read_only
 from hysim.kernels.stepping import Start, Step, complete, paired, self_starting, started_both
 from hysim.models.protocols import CompiledLaw, OfFamily, Responding, Startable, Steppable, needed_time, needs_time
+from hysim.models.search_space import Freedom
 
 
 def labels(parts: Sequence[Any]) -> tuple[str, ...]:
@@ -92,3 +94,9 @@ def compiled_law(part: Any, u0: float, sample_time: float | None) -> CompiledLaw
 
 def own(parameters: Mapping[str, Any], label: str) -> dict[str, Any]:
     return {name[len(label) + 1 :]: value for name, value in parameters.items() if name.startswith(f"{label}.")}
+
+
+def share_of(freedom: Freedom, label: str) -> Freedom:
+    """The user's wishes about the parameters of one part."""
+    free = tuple(own(dict.fromkeys(freedom.free), label))
+    return replace(freedom, fixed=own(freedom.fixed, label), free=free, bounds=own(freedom.bounds, label))

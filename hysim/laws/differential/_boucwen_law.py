@@ -28,7 +28,7 @@ from hysim.laws.differential import boucwen_inverse, limit_cycle
 from hysim.laws.differential._memory_law import MemoryLaw
 from hysim.laws.differential.boucwen_inverse import BoucWenInverse, InverseState
 from hysim.laws.differential.limit_cycle import LimitCycle
-from hysim.models.law import Law, Packed, State, Stepping
+from hysim.models.law import Law, State, Stepping
 from hysim.models.protocols import UNLIMITED, CompiledLaw, Limits
 from hysim.models.tables import Tables
 from hysim.records import Record
@@ -244,11 +244,6 @@ class BoucWenLaw(BoucWenStep, MemoryLaw):
         kind = model.stability_class
         bounded = f"of stability class {kind}" if kind != "none" else "of no stability class: other inputs may escape"
         return (f"the law is {bounded}" + ("" if model.admissible else ", and may create energy"),)
-
-    @classmethod
-    def pack(cls, tables: Tables) -> Packed:
-        """Parameters (A, beta, gamma, n, gain, offset, c1, c2, ...) and memory (u, z)."""
-        return Packed(cls.joined(tables, "A", "beta", "gamma", "n"), cls.initial_memory(tables))
 
     def divergence(self, sample: int, u: float, y: float) -> str:
         loading, unloading = self.beta + self.gamma, self.beta - self.gamma

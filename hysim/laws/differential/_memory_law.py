@@ -62,11 +62,6 @@ class MemoryLaw(Law):
         n = tables["n"][:, 0]
         return None if (np.diff(n) >= 0.0).all() else np.argsort(n, kind="stable")
 
-    @classmethod
-    def joined(cls, tables: Tables, *names: str) -> FloatArray:
-        """Columns of these fields, then gain, offset and the coefficients of the polynomial."""
-        return np.concatenate([tables[name] for name in (*names, "gain", "offset", cls.polynomial)], axis=1)
-
     @property
     def coefficient_names(self) -> tuple[str, ...]:
         """One name for each coefficient of the polynomial, as in `scalars`."""

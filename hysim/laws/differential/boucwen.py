@@ -87,6 +87,7 @@ class BoucWen(BoucWenLaw):
     units: ClassVar = {"n": "1", "feedthrough": "y/u", "offset": "y"}
     example = Example({"beta": 0.6, "gamma": 0.2, "feedthrough": 0.1}, (-2.0, 2.0), title="Bouc-Wen")
     polynomial: ClassVar[str] = "feedthrough"
+    step_fields = ("A", "beta", "gamma", "n", "gain", "offset", "feedthrough")
 
     A: float = 1.0
     beta: float = 0.5

@@ -82,12 +82,12 @@ class GeneralizedBoucWen(MemoryLaw):
     def pack(cls, tables: Tables) -> Packed:
         """Parameters of four Bouc-Wen laws, for a falling and a rising u, each below and above zero; memory (u, z)."""
         A, beta, gamma, n, b2, b3, b4, b5, b6 = (tables[name] for name in ("A", "beta", "gamma", "n", *_SECTORS))
-        laws = []
+        output, laws = [tables[name] for name in ("gain", "offset", "input_coefficients")], []
         for direction in (-1.0, 1.0):
             for side in (-1.0, 1.0):
                 both = direction * side
                 bend = gamma + both * b2 + direction * b4 + side * b6
-                laws += [A, beta + both * b3 + direction * b5, bend, n, cls.joined(tables)]
+                laws += [A, beta + both * b3 + direction * b5, bend, n, *output]
         return Packed(np.concatenate(laws, axis=1), cls.initial_memory(tables))
 
     @property

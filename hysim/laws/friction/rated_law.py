@@ -23,7 +23,7 @@ from hysim.models.law import Law, State
 from hysim.models.parameters import Parameter, declared_space, rate_spans
 from hysim.models.protocols import CompiledLaw, Startable, Subject, needed_time, positive_time
 from hysim.models.search_space import ALL_FREE, Freedom, Parameters, SearchSpace
-from hysim.models.tables import Tables, check_signs
+from hysim.models.tables import Tables
 from hysim.records import Record
 
 if TYPE_CHECKING:
@@ -54,11 +54,6 @@ class TimedLaw(Subject, Placed, ABC):
     dynamic: ClassVar[bool] = True
 
     # ------------------------------------------------------------------------------ what a family may say more
-
-    @classmethod
-    def check(cls, tables: Tables) -> None:
-        """Raise a ValueError where the tables, every field over sets, hold parameters that are no law."""
-        check_signs(tables, cls.positive, cls.not_negative)
 
     @classmethod
     def further(cls, tables: Tables) -> int:
