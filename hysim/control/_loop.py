@@ -259,7 +259,7 @@ class RestingPlant:
     def __init__(
         self, plant: Any, sample_time: float, u0: float | None = None, substeps: int | None = None, chain: Any = None
     ) -> None:
-        self.plant = plant if isinstance(plant, Structure) else as_actuator(plant)
+        self.plant: Any = plant if chain is not None else as_actuator(plant)
         self.sample_time, self.u0 = sample_time, standing(self.plant, u0)
         self.chain = self.plant.chain(sample_time, substeps) if chain is None else chain
         self.state = self.chain.rest(self.u0)

@@ -245,7 +245,8 @@ class Target:
         unit, centre, spread = parts.units
         n_sets, n = unit.shape
         scale = np.column_stack([unit, np.ones(n_sets)]) / self.noise.spread(sigma)[:, np.newaxis]
-        likely = np.linalg.qr(np.concatenate([parts.columns, parts.target[..., np.newaxis]], axis=2), mode="r")
+        every = np.concatenate([parts.columns, parts.target[..., np.newaxis]], axis=2)
+        likely = np.asarray(np.linalg.qr(every, mode="r"))
         both = np.zeros((n_sets, likely.shape[1] + n, n + 1))
         both[:, :-n] = likely * scale[:, np.newaxis]
         both[:, -n + np.arange(n), np.arange(n)] = 1.0 / spread
