@@ -213,6 +213,8 @@ def around(
     signals = resting.run(controller, r, progress, float(times[0]))
     sensor, amplifier = chain.sensor, chain.amplifier
     within = amplifier.voltage(signals.command) == amplifier.gain * signals.command + amplifier.offset
+    low, high = limits_of(controller) or (-math.inf, math.inf)
+    at_end = ((signals.drive <= low) | (signals.drive >= high)) & (signals.drive != resting.u0)
     noise = np.zeros(1)
     if sensor.noise:
         silent = resting.quiet().attempt(controller, r)
@@ -232,7 +234,7 @@ def around(
         "u0": resting.u0,
         "lowest_u": float(signals.u.min()),
         "highest_u": float(signals.u.max()),
-        "limited_samples": int(np.count_nonzero((signals.drive != signals.command) | ~within)),
+        "limited_samples": int(np.count_nonzero((signals.drive != signals.command) | at_end | ~within)),
         "held_samples": signals.held,
         "voltage_noise_rms": float(np.sqrt(np.mean(noise**2))),
         "voltage_noise_peak": float(np.abs(noise).max()),
