@@ -45,6 +45,16 @@ test_too_few_samples_are_counted = refused(
 )
 
 
+def test_a_sample_that_carries_the_fit_and_an_offset_of_a_sensor_are_said():
+    rng, u = np.random.default_rng(0), hs.signals.triangle(-3.0, 3.0, cycles=3, samples_per_cycle=80)
+    y = hs.Dahl(stiffness=2.0).response(u) + 0.02 * rng.standard_normal(u.size)
+    assert hs.identify(hs.Dahl, hs.Record(u=u, y=y)).warnings == ()
+    shifted = hs.identify(hs.Line, hs.Record(u=u, y=y + 9.0), fixed={"offset": 0.0})
+    assert any("mostly its mean" in each for each in shifted.warnings)
+    wrong = hs.identify(hs.Dahl, hs.Record(u=u, y=np.where(np.arange(u.size) == 50, 1e9, y)))
+    assert any(each.startswith("sample 50 alone") for each in wrong.warnings)
+
+
 @pytest.mark.parametrize("kind", KINDS)
 @pytest.mark.parametrize("noise", ["gaussian", "quantised", "robust"])
 def test_as_many_samples_as_parameters_leave_no_standard_error(kind, noise):

@@ -335,6 +335,12 @@ def test_a_model_that_is_worse_by_a_third_is_seen_in_four_hundred_samples():
     assert np.mean([probability(*pair) < 0.05 for pair in zip(a, b, strict=True)]) > 0.9
 
 
+def test_a_test_in_other_units_is_refused_and_one_in_the_same_is_printed(table1):
+    other = hs.Record(u=table1.u, y=1e3 * table1.y, units={"u": "V", "y": "nm"})
+    assert_refused("same units, got y in nm and um", hs.compare, {"line": hs.Line}, table1, test=other)
+    assert "test rmse" in str(hs.compare({"line": hs.Line, "play": hs.Play}, table1, test=table1, cross_validate=None))
+
+
 def test_a_record_that_is_given_twice_counts_once(table1):
     once = hs.compare({"line": hs.Line, "play": hs.Play}, table1, cross_validate=5)
     copy = hs.Record(u=table1.u, y=table1.y)

@@ -303,6 +303,7 @@ def _trial(records: Sequence[Record], test: Record | int | None) -> _Trial | Non
         return None
     record = records[-1]
     if (drive := as_record(test, "compare")) is not None:
+        several([*records, drive], "compare")  # which raises where units differ
         return _Trial(record, drive, begin=0, own_state=True)
     if not isinstance(test, int) or isinstance(test, bool):
         raise TypeError(f"test takes a Record or a number of last cycles, got {test!r}")

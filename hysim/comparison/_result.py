@@ -231,7 +231,7 @@ class Comparison:
         best = [row.name for row in self.ranked()]
         unknown = [row.name for row in self.rows if math.isnan(row.cv_rmse)]
         by_name = {row["name"]: row for row in rows(self)}
-        names = ("name", "n_parameters", "fit_percent", "rmse", "cv_rmse", "rmse_ratio", "max_width")
+        names = ("name", "n_parameters", "fit_percent", "rmse", "cv_rmse", "rmse_ratio", "test_rmse", "max_width")
         selected = [column for column in columns(self) if column.name in names]
         ordered = [by_name[name] for name in best + unknown]
         table = [["", *(column.heading for column in selected[1:])]]

@@ -1,5 +1,6 @@
 """Measures of a fit, whiteness of residuals, error of the loop width, cross-validation from the optima of all data."""
 
+import math
 from collections.abc import Sequence
 from typing import Any, TypedDict
 
@@ -15,11 +16,14 @@ from hysim.identification._descent import Descent
 from hysim.identification._noise import Gaussian, Noise
 from hysim.identification._problem import Problem
 from hysim.identification._uncertainty import output_slopes
+from hysim.identification.forms import RESTING, ROUNDING
 from hysim.metrics.rows import LoopRows
-from hysim.models.protocols import needs_time
+from hysim.models.protocols import Rescalable, needs_time
 from hysim.records import Record
 
 _MOST_LAGS = 20
+_ALONE = 0.5  # of the rms residual, in one sample or in the mean; by hand
+_FEW = 20  # samples, too few to say so
 _SHARE_OF_NOISE = 0.3  # of the residuals: below it noise of the input adds less than 5 % to them
 
 
@@ -60,6 +64,23 @@ def whiteness(residual: FloatArray, n_parameters: int) -> float:
     correlation = np.array([centred[k:] @ centred[:-k] for k in range(1, lags + 1)]) / power
     statistic = n * (n + 2) * np.sum(correlation**2 / (n - np.arange(1, lags + 1)))
     return float(chi2.sf(statistic, lags))
+
+
+def odd_residuals(problem: Problem, residual: FloatArray) -> list[str]:
+    """Sentences on a sample that carries a fit, and on a record or sensor whose residual is mostly its mean."""
+    counted, n = np.where(problem.weights > 0.0, residual, 0.0), np.count_nonzero(problem.weights)
+    rms, k, several = float(np.sqrt(counted @ counted / n)), int(np.argmax(np.abs(counted))), len(problem.parts) > 1
+    if rms <= max(RESTING * float(np.std(problem.y)), ROUNDING * problem.scale):
+        return []
+    told = [f'sample {k} alone makes most of the residual: leave it out by weights=, or take noise="robust"']
+    told = told if n > _FEW and abs(counted[k]) > _ALONE * math.sqrt(n) * rms else []
+    for place, (record, own) in enumerate(problem.pieces):
+        n_sensors = len(record) // record.input.size if isinstance(record, Rescalable) else 1
+        for sensor, part in enumerate(np.split(counted[own], n_sensors)):
+            if part.size > _FEW and abs(part.mean()) > _ALONE * max(float(np.sqrt(np.mean(part**2))), rms):
+                of = f" of sensor {sensor}" * (n_sensors > 1) + f" of record {place}" * several
+                told.append(f"the residual{of} is mostly its mean {part.mean():.3g}: an offset that the model lacks")
+    return told
 
 
 def rate_noise_warning(models: Sequence[Any], records: Sequence[Record]) -> str:

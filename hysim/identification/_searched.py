@@ -10,7 +10,7 @@ from hysim import metrics
 from hysim._basics.frozen import FloatArray
 from hysim.identification._assumptions import Treated
 from hysim.identification._descent import Descent
-from hysim.identification._diagnostics import bootstrap, fit_measures, loop_widths, width_stderr
+from hysim.identification._diagnostics import bootstrap, fit_measures, loop_widths, odd_residuals, width_stderr
 from hysim.identification._noise import Gaussian, Noise, Quantised, Robust
 from hysim.identification._problem import Problem
 from hysim.identification._profile import Profile, profiles, threshold
@@ -226,6 +226,7 @@ class Search:
                     reasons=(*known.stopped, *known.reasons),
                     success=best.converged,
                 ),
+                *odd_residuals(problem, residual),
             ),
         )
 

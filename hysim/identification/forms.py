@@ -82,8 +82,8 @@ def _field(value: Any, hint: Any, kinds: Sequence[type]) -> Any:
 CONSTANT = "the output is constant: the fit in percent is not defined, and the output shows no effect of the input"
 SWAPPED = "the input and the output may be swapped"
 _CORRELATED = 1e-3  # probability of white residuals
-_RESTING = 1e-6  # of the output's standard deviation: smaller residuals are the end of a descent
-_ROUNDING = 1e-12  # of the output's size
+RESTING = 1e-6  # of the output's standard deviation: smaller residuals are the end of a descent
+ROUNDING = 1e-12  # of the output's size
 
 
 def sentences(
@@ -103,6 +103,6 @@ def sentences(
     if unknown := [name for name, value in stderr.items() if np.isnan(value)]:
         why = f": {'; '.join(reasons)}" if reasons else ""
         warnings.append(f"no standard error for {', '.join(unknown)}{why}")
-    if stderr and whiteness < _CORRELATED and rmse > max(_RESTING * spread, _ROUNDING * size):
+    if stderr and whiteness < _CORRELATED and rmse > max(RESTING * spread, ROUNDING * size):
         warnings.append("residuals are correlated (p < 0.001): the intervals are too narrow")
     return tuple(warnings)
