@@ -249,8 +249,8 @@ def identify(
             worse = "the fit is negative: the mean of y predicts it better" if fit.fit_percent < 0.0 else ""
             doubts += [implausible(off), rate_noise_warning(on_their_records, records), worse]
             fit = _marked(fit, danger(off, searched_on, fit.regions.get("admissible")), admissible)
-        given = np.empty(0) if shares is None else np.concatenate(shares)
-        return replace(fit, warnings=(*fit.warnings, *filter(None, doubts)), weights=given, bounds=options.bounds)
+        every = np.empty(0) if shares is None else np.concatenate(shares)
+        return replace(fit, warnings=(*fit.warnings, *filter(None, doubts)), weights=every, bounds=options.bounds)
 
 
 def _refuse_for_any(subject: Any, options: Mapping[str, Any]) -> None:
