@@ -120,7 +120,9 @@ def test_a_stored_identification_comes_back():
     assert fit.model == hs.BoucWen(**fit.estimates)
     assert fit.estimates["beta"] == pytest.approx(0.7, rel=0.01)
     stored = json.loads((FOLDER / "identification.json").read_text())
-    stored["identification"]["fields"] |= {"unsafe": "", "choice": None}  # for which 0.1 did not look
+    since = json.loads(fit.to_json())["identification"]["fields"]  # what 0.1 did not know
+    stored["identification"]["fields"] |= {name: since[name] for name in ("unsafe", "choice", "weights", "bounds")}
+    assert (fit.unsafe, fit.choice, fit.weights.size, fit.bounds) == ("", None, 0, {})
     assert json.loads(fit.to_json()) == stored | {"hysim": hs.__version__}
 
 

@@ -11,7 +11,7 @@ kd = Kp Td, with b = c = 1 and T_f = 0. `hysim.kernels.controllers` has the samp
 import math
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
-from typing import Any, NamedTuple, Protocol, Self, runtime_checkable
+from typing import Any, ClassVar, NamedTuple, Protocol, Self, runtime_checkable
 
 import numpy as np
 import numpy.typing as npt
@@ -117,6 +117,8 @@ class Feedback(NamedTuple):
 
 class SteppedController(ABC):
     """Frozen settings of a controller that is stepped from sample to sample."""
+
+    keeps_limits: ClassVar[bool] = False  # in what it computes, so that a loop cannot see that they hold it
 
     @abstractmethod
     def compiled(self, sample_time: float, u0: float = 0.0, y0: float = 0.0) -> CompiledController:

@@ -17,7 +17,7 @@ from hysim._basics.frozen import FloatArray, read_only, vectors
 from hysim._basics.printing import extent, frozen_result, quantity, summary_text
 from hysim._basics.progress import Reports, along, reports
 from hysim._basics.results import model_of
-from hysim.control._controller import Controller, begun, held_samples, limits_of, preview
+from hysim.control._controller import Controller, SteppedController, begun, held_samples, limits_of, preview
 from hysim.errors import SimulationError, warn_beyond, warn_limited
 from hysim.laws.static import Line
 from hysim.models.model import in_brief
@@ -213,7 +213,8 @@ def around(
     signals = resting.run(controller, r, progress, float(times[0]))
     sensor, amplifier = chain.sensor, chain.amplifier
     within = amplifier.voltage(signals.command) == amplifier.gain * signals.command + amplifier.offset
-    low, high = limits_of(controller) or (-math.inf, math.inf)
+    keeps = isinstance(controller, SteppedController) and controller.keeps_limits
+    low, high = (limits_of(controller) if keeps else None) or (-math.inf, math.inf)
     at_end = ((signals.drive <= low) | (signals.drive >= high)) & (signals.drive != resting.u0)
     noise = np.zeros(1)
     if sensor.noise:

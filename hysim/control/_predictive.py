@@ -4,7 +4,7 @@ import functools
 import itertools
 import math
 from dataclasses import replace
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 from scipy.linalg import block_diag, solve_discrete_are, toeplitz
@@ -74,6 +74,8 @@ class PredictiveControl(SteppedController):
     >>> bool(run.y.max() < 1.04 and abs(run.y[-1] - 1.0) < 1e-3)
     True
     """
+
+    keeps_limits: ClassVar[bool] = True
 
     model: Any
     horizon: Positive
