@@ -368,15 +368,17 @@ def secant_gain(
 
 
 def inverted(actuator: Actuator, y: FloatArray, gain: float) -> FloatArray:
-    """Commands for displacements `y` by a line of this gain, through where the plant rests at a command.
+    """Commands for displacements `y` by a line of this gain: ``y / gain`` where the plant rests near zero at zero.
 
-    It is the command zero, or the nearest one in the range on which the law is known.
+    Where it rests farther from there than the span of `y`, or zero is outside the range on which the law is known, the
+    line goes through the displacement at the nearest command in this range.
     """
     volts = float(actuator.voltage(0.0))
     known = volts if actuator.u_range is None else min(max(volts, actuator.u_range[0]), actuator.u_range[1])
     amplifier = actuator.amplifier
     u0 = known - volts if amplifier is None or known == volts else amplifier.command(known)
-    return u0 + (y - float(_driven(actuator, np.array([u0]), None)[0])) / gain
+    y0 = float(_driven(actuator, np.array([u0]), None)[0])
+    return y / gain if u0 == 0.0 and abs(y0) <= np.ptp(y) else u0 + (y - y0) / gain
 
 
 def steady_cycle(
