@@ -157,6 +157,7 @@ def _described(
         errors = _fitted_again(family, records, weights, folds)
     else:
         errors = fit.smoother.left_out(residual, folds)
+    errors = np.where(kept, errors, np.nan)
     measures = fit_measures(y[kept], residual[kept], n_parameters)
     return Identification(
         model=fit.models[0],

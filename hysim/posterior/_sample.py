@@ -346,7 +346,8 @@ def sample_posterior(
         Name of a free parameter, or ``"sigma"``, to (low, high) or a frozen distribution of scipy.stats. (low, high) is
         flat in the coordinate of the search, which is the logarithm where the search has one; linear parameters are
         flat in themselves. A distribution is one of the parameter. By default coordinates are flat in the box of the
-        search, and linear parameters flat within three spans of the output of what they add to it.
+        search, and linear parameters flat within three spans of the output of what they add to it; bounds that were
+        given to `identify` are ends of flat priors, and its weights hold.
     initial : str or sequence of str, optional
         As it was passed to `hysim.identify`; needed where it was ``"periodic"`` or ``"still"``.
     samples : int
@@ -368,7 +369,8 @@ def sample_posterior(
     ------
     ValueError
         If the records are others than those of the fit, a name or an option is unknown, a parameter has no finite box
-        and no prior, or no parameters near the fit have a probability.
+        and no prior, no parameters near the fit have a probability, or weights other than 0 and one more meet noise
+        that is not normal.
     ImportError
         If emcee is not installed: ``pip install 'hysim[bayes]'``.
 
