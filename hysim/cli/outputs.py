@@ -135,7 +135,7 @@ def to_json(document: Mapping[str, Any]) -> str:
 
 _OF_IDENTIFY = (
     "bounds", "cross_validate", "free", "initial", "max_evaluations", "weights", "excitation", "resolution", "t",
-    "admissible", "channels", "fixed",
+    "admissible", "channels", "fixed", "noise",
 )  # fmt: skip
 OF_OTHER_COMMANDS = {name: f"hysim identify {flag(name)}" for name in _OF_IDENTIFY} | {
     "priors": "hysim posterior --prior"
