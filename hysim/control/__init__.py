@@ -16,7 +16,7 @@ from hysim.control._assessment import (
 from hysim.control._controller import PID, Controller, begun, held_samples, preview
 from hysim.control._filters import DampingLoop, ModeInverse, Notch, Shaper
 from hysim.control._learning import IterativeLearning, LearnedTrials, RepetitiveControl
-from hysim.control._loop import ClosedLoop, RestingPlant, as_actuator, close_loop, inverted, secant_gain, slopes
+from hysim.control._loop import ClosedLoop, RestingPlant, as_actuator, close_loop, secant_gain, slopes
 from hysim.control._loop_shaping import LinearController, loop_shaping
 from hysim.control._predictive import PredictiveControl
 from hysim.control._stability import LinearLoop, bandwidth, later
@@ -30,6 +30,6 @@ __all__ = [
     "ModeInverse", "Notch", "OpenLoop", "PredictiveControl", "RepetitiveControl", "RestingPlant", "Shaper",
     "SquareWaveAssessment", "StepAssessment", "TrackingController", "Trial", "Tuning", "as_actuator",
     "assess_hysteresis", "assess_loop", "assess_square_wave", "assess_step", "bandwidth", "begun", "close_loop",
-    "driven_by", "held_samples", "inverted", "later", "loop_shaping", "open_loop", "preview", "secant_gain", "slopes",
+    "driven_by", "held_samples", "later", "loop_shaping", "open_loop", "preview", "secant_gain", "slopes",
     "to_control", "tune",
 ]  # fmt: skip

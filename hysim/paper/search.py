@@ -32,7 +32,7 @@ from scipy.optimize import differential_evolution, minimize
 
 from hysim import signals
 from hysim._basics.frozen import FloatArray, frozen
-from hysim.control import PID, LinearLoop, RestingPlant, as_actuator, inverted, later, secant_gain, slopes
+from hysim.control import PID, LinearLoop, RestingPlant, as_actuator, later, secant_gain, slopes
 from hysim.datasets import PIXEL
 from hysim.metrics import step_metrics
 from hysim.plants.actuator import Actuator
@@ -465,7 +465,7 @@ def slopes_along(actuator: Actuator, cycle: FloatArray) -> tuple[float, ...]:
     """Least and largest slope of the law along a cycle of the reference [um/V]; 1 without a law."""
     if actuator.hysteresis is None:
         return (1.0,)
-    return tuple(sorted(slopes(actuator, inverted(actuator, cycle, secant_gain(actuator, cycle)))))
+    return tuple(sorted(slopes(actuator, cycle / secant_gain(actuator, cycle))))
 
 
 def volts_per_pixel(controller: PID, sample_time: float) -> float:
