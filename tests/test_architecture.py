@@ -121,6 +121,16 @@ FOLDERS = {
 LEAST = 300  # lines of code, below which a module is not divided
 
 
+@pytest.mark.parametrize("path", MODULES, ids=lambda path: str(path.relative_to(PACKAGE)))
+def test_a_module_gives_a_name_once(path):
+    """A second constant of a name, as after a merge of modules, would change what the first one decides."""
+    targets = [
+        each for node in ast.parse(path.read_text()).body if isinstance(node, ast.Assign) for each in node.targets
+    ]
+    names = [node.id for target in targets for node in ast.walk(target) if isinstance(node, ast.Name)]
+    assert [name for name in names if names.count(name) > 1] == []
+
+
 def test_rooms_have_no_rooms_inside():
     """But laws of five kinds, and structures among the plants."""
     nested = {str(path.parent.relative_to(PACKAGE)) for path in MODULES}

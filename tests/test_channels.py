@@ -368,6 +368,9 @@ def test_an_unknown_channel_is_estimated_with_its_error(fit):
     beyond = hs.estimate_channel(fit, record(play(4.5), 0.0), "T", bounds=(1.0, 6.0))
     assert beyond.estimates["T"] == pytest.approx(4.5, abs=0.05)
     assert any("outside the range 1 to 4" in each for each in beyond.warnings)
+    within = hs.estimate_channel(fit, record(play(4.5), 0.0), "T", bounds=(1.0, 4.0))
+    assert within.estimates["T"] == 4.0
+    assert "T is at its physical bound 4" in within.message
     assert_refused("not on 'I'", hs.estimate_channel, fit, unknown, "I")
     with pytest.raises(TypeError, match="takes a law that depends on channels"):
         hs.estimate_channel(hs.Play(), unknown, "T")

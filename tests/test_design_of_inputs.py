@@ -1,5 +1,7 @@
 """Inputs that tell most of a law, within limits."""
 
+import dataclasses
+
 import numpy as np
 import pytest
 from strategies import assert_refused
@@ -23,6 +25,11 @@ def test_the_input_keeps_its_limits_and_tells_more_than_the_usual_ones(design):
     assert design.u[0] == 0.0
     assert set(design.efficiency) == {"triangle", "fading triangle", "multisine"}
     assert max(design.efficiency.values()) < 0.95
+
+
+def test_no_limit_of_the_slew_makes_no_more_strokes_than_samples():
+    fast = dataclasses.replace(LIMITS, slew=1e12)
+    assert hs.design_input(LAW, limits=fast, free=FREE, noise=NOISE, **FEW).u.size == 161
 
 
 def test_usual_inputs_keep_the_limits_too():

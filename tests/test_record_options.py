@@ -126,6 +126,8 @@ def test_without_times_samples_belong_together_by_their_numbers(folder):
 def test_joined_times_have_the_unit_of_the_input_and_lie_within_its_own():
     slow = hs.Record(t=[0.0, 1.0, 2.0], u=[0.0, 10.0, 20.0], y=[0.0, 0.0, 0.0], units={"t": "s"})
     fast = hs.Record(t=[-10.0, 500.0, 1500.0, 2600.0], u=[0.0] * 4, y=[9.0, 1.0, 2.0, 9.0], units={"t": "ms"})
+    in_hours = dataclasses.replace(slow, units={"t": "h"})
+    assert hs.join_records(in_hours, in_hours).units["t"] == "h"
     joined = hs.join_records(slow, fast)
     assert (joined.t.tolist(), joined.u.tolist(), joined.y.tolist()) == ([0.5, 1.5], [5.0, 15.0], [1.0, 2.0])
     with pytest.raises(ValueError, match=r"the output's times, -0\.01 to 2\.6, are not within the input's, 5 to 7"):

@@ -75,6 +75,7 @@ def test_a_sawtooth_hits_both_ends_of_every_line(low, span, cycles, n):
 
 @given(LEVEL, st.floats(0.01, 10.0), CYCLES, st.integers(1, 20))
 def test_a_square_wave_has_two_values(low, span, cycles, half):
+    assert hs.signals.square(0, 1, cycles=1, samples_per_half=2).dtype == float
     u = hs.signals.square(low, low + span, cycles=cycles, samples_per_half=half).reshape(cycles, 2, half)
     assert (u[:, 0] == low).all()
     assert (u[:, 1] == low + span).all()

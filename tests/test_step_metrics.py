@@ -200,6 +200,7 @@ def test_an_open_loop_without_overshoot_has_none_to_take_away():
         (np.arange(9.0), np.zeros(9), "at least 10 samples, got 9"),
         (np.arange(10.0), np.full(10, np.nan), "y must be finite, got nan at index 0"),
         (np.arange(10.0), np.zeros((10, 1)), "y must have 1 axis"),
+        (-np.arange(10.0), np.zeros(10), "t must increase from sample to sample, got -1 after -?0"),
     ],
 )
 def test_wrong_arguments_are_named(t, y, message):

@@ -40,6 +40,14 @@ def test_a_gain_that_fades_is_followed(record, method):
     assert track.residual == pytest.approx(record.y - track.predicted)
 
 
+@pytest.mark.parametrize("law", [hs.Bilinear(stiffness=1.2), hs.MenegottoPinto(stiffness=1.2)])
+def test_a_law_of_several_memories_is_followed(law):
+    u = hs.signals.triangle(-3.0, 3.0, cycles=4, samples_per_cycle=40)
+    y = law.response(u) + 0.01 * np.random.default_rng(0).standard_normal(u.size)
+    track = hs.track_parameters(law, hs.Record(u=u, y=y), ["stiffness"], drift={"stiffness": 0.05}, noise=0.01)
+    assert track["stiffness"][-1] == pytest.approx(1.2, rel=0.05)
+
+
 def test_errors_and_band_of_a_walk_are_those_that_the_filter_expects():
     rng = np.random.default_rng(8)
     gain = 1.0 + 0.2 / np.sqrt(U.size) * np.cumsum(rng.standard_normal(U.size))

@@ -14,6 +14,8 @@ _BASES = frozenset(
 
 def power_of_ten(old: str, new: str) -> int:
     """The power of ten that converts a value from the old unit to the new one; ValueError if only a prefix cannot."""
+    if old == new:  # whatever it is
+        return 0
     (before, base), (after, other) = prefixed(old), prefixed(new)
     if base != other:
         raise ValueError(f"{old!r} cannot become {new!r}: only the prefix of a unit can change")

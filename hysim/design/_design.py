@@ -25,7 +25,7 @@ class InputDesign:
     Attributes
     ----------
     t, u : array, shape (n_samples,)
-        Times [s] and input [unit of u], which begins at zero.
+        Times [s] and input [unit of u], which begins at the centre of its limits.
     levels, holds : array, shape (n_levels,)
         Turning points of the input [unit of u], holds there [s]; the last may lie past the end. Empty for a usual one.
     expected_stderr : mapping

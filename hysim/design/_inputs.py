@@ -126,7 +126,8 @@ def triangle(limits: InputLimits, speed: float = 1.0, *, fading: bool = False) -
 
 
 def _cycles(limits: InputLimits, speed: float = 1.0) -> float:
-    return max(1.0, limits.duration * speed * limits.slew / (4.0 * limits.amplitude))
+    by_slew = limits.duration * speed * limits.slew / (4.0 * limits.amplitude)
+    return max(1.0, min(by_slew, 0.5 * limits.duration / limits.sample_time))
 
 
 def _multisine(limits: InputLimits, highest: float, power: float, rng: np.random.Generator) -> FloatArray:
@@ -140,7 +141,7 @@ def _multisine(limits: InputLimits, highest: float, power: float, rng: np.random
 
 def random_strokes(limits: InputLimits, rng: np.random.Generator) -> FloatArray:
     """Strokes at the full slew to alternate sides that fill the record; some inputs have short ones, or many holds."""
-    return _segment(limits, rng, 0.0, limits.duration, _HOLD * limits.duration, speed=1.0, least=0.0)
+    return _segment(limits, rng, 0.0, limits.duration, _HOLD * limits.duration, speed=1.0, least=limits.sample_time)
 
 
 def random_segments(limits: InputLimits, rng: np.random.Generator) -> FloatArray:

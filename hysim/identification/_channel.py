@@ -237,6 +237,7 @@ class _UnknownChannel(Subject):
         joint: SearchSpace = replace(
             own,
             held=held,
+            physical={**own.physical, self.channel: (True, True)},  # where the box ends, whatever lies beyond
             coordinates=(self.channel, *own.coordinates),
             lower=np.append(alone.lower, own.lower),
             upper=np.append(alone.upper, own.upper),

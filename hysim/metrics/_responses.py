@@ -265,6 +265,9 @@ def _normalised(t: npt.ArrayLike, y: npt.ArrayLike) -> tuple[FloatArray, FloatAr
     times, outputs = vectors(t=t, y=y)
     if times.size < 10:
         raise ValueError(f"the response to a step needs at least 10 samples, got {times.size}")
+    if not (np.diff(times) > 0.0).all():
+        k = int(np.argmax(np.diff(times) <= 0.0))
+        raise ValueError(f"t must increase from sample to sample, got {times[k + 1]:g} after {times[k]:g}")
     initial, final = float(outputs[0]), float(outputs[-(outputs.size // 10) :].mean())
     scale = final - initial
     eta = (outputs - initial) / scale if abs(scale) > ROUNDING * float(np.ptp(outputs)) else np.full(times.size, np.nan)

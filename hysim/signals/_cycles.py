@@ -105,7 +105,8 @@ def square(low: float, high: float, *, cycles: int, samples_per_half: int) -> Fl
     """
     checked_span(low, high)
     return np.tile(
-        np.repeat([low, high], checked_count("samples_per_half", samples_per_half)), checked_count("cycles", cycles)
+        np.repeat([float(low), float(high)], checked_count("samples_per_half", samples_per_half)),
+        checked_count("cycles", cycles),
     )
 
 

@@ -17,6 +17,8 @@ from scipy import optimize, special
 from hysim._basics.frozen import FloatArray, vectors
 from hysim._basics.printing import frozen_result, summary_text
 
+_FLAT = 1e-6  # slope of a curve that does not rise, with rounding; by hand
+
 
 @frozen_result
 class Fragility:
@@ -117,8 +119,10 @@ def fragility(
         return -float(z @ below + (n - z) @ above) / n.sum(), rows @ slopes / n.sum()
 
     line = optimize.minimize(loss, [0.0, 1.0], jac=True, method="BFGS", options={"gtol": 1e-10}).x
-    if line[1] <= 0.0:
-        raise ValueError("the share of records above the limit falls with the intensity: are the counts in its order?")
+    if line[1] <= _FLAT:
+        raise ValueError(
+            "the share of records above the limit does not rise with the intensity: are the counts in its order?"
+        )
     dispersion = logs.std() / line[1]
     covariance = _covariance(line @ rows, n, dispersion, same_records)
     numbers = np.array([np.exp(np.log(x).mean() - line[0] * dispersion), dispersion])

@@ -191,7 +191,7 @@ def _filtered(
     count, covariance = step.size, last.covariance.copy()
     covariance[range(count), range(count)] += step**2
     points = last.mean + _sigma_points(covariance)
-    memory = np.column_stack([np.full(len(points), last.before), points[:, count:]])
+    memory = np.ascontiguousarray(np.column_stack([np.full(len(points), last.before), points[:, count:]]))
     outputs = copies.moved(points[:, :count], memory, last.before, u)
     points[:, count:] = memory[:, 1:]
     usable = np.isfinite(outputs) & np.isfinite(points).all(axis=1)
@@ -207,7 +207,7 @@ def _filtered(
 
 
 def _sigma_points(covariance: FloatArray) -> FloatArray:
-    size = covariance.diagonal().copy()
+    size = np.maximum(covariance.diagonal(), 0.0)
     scale = np.sqrt(np.where(size > 0.0, size, 1.0))
     values, vectors = np.linalg.eigh(covariance / np.outer(scale, scale))
     spread = scale[:, np.newaxis] * vectors * np.sqrt(np.maximum(values, _LEAST) * len(scale))
@@ -342,7 +342,7 @@ class ParameterTrack:
 
 
 _STEPS = (1.0, 0.5, 0.25)  # decades
-_LEAST, _MOST = -4.0, 1.0  # decades beside the first sizes
+_SMALLEST, _LARGEST = -4.0, 1.0  # decades beside the first sizes
 
 
 def most_likely(
@@ -359,7 +359,7 @@ def most_likely(
             for k in np.flatnonzero(searched):
                 for direction in (-step, step):
                     trial = exponents.copy()
-                    trial[k] = min(max(trial[k] + direction, _LEAST), _MOST)
+                    trial[k] = min(max(trial[k] + direction, _SMALLEST), _LARGEST)
                     value = best if trial[k] == exponents[k] else log_likelihood(sizes * 10.0**trial)
                     if value > best:
                         exponents, best, improved = trial, value, True

@@ -217,8 +217,8 @@ def steepest(parameters: Mapping[str, FloatArray]) -> FloatArray:
 
 _NEAR, _FAR, _BETWEEN = 0.4, 0.034, 0.55  # b(q), fitted to Langevin's curve
 _DEPTH = 40.0  # of the exponent: beyond, nothing is left
-_PLACES, _SHARES = np.polynomial.legendre.leggauss(64)
-_PLACES = 0.5 * (1.0 + _PLACES)
+_NODES, _SHARES = np.polynomial.legendre.leggauss(64)
+_PLACES = 0.5 * (1.0 + _NODES)
 
 
 @family
