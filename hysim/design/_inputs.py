@@ -141,7 +141,9 @@ def _multisine(limits: InputLimits, highest: float, power: float, rng: np.random
 
 def random_strokes(limits: InputLimits, rng: np.random.Generator) -> FloatArray:
     """Strokes at the full slew to alternate sides that fill the record; some inputs have short ones, or many holds."""
-    return _segment(limits, rng, 0.0, limits.duration, _HOLD * limits.duration, speed=1.0, least=limits.sample_time)
+    is_at_once = limits.slew * limits.sample_time > 2.0 * limits.amplitude  # a stroke, within a sample
+    least = limits.sample_time if is_at_once else 0.0
+    return _segment(limits, rng, 0.0, limits.duration, _HOLD * limits.duration, speed=1.0, least=least)
 
 
 def random_segments(limits: InputLimits, rng: np.random.Generator) -> FloatArray:
