@@ -122,6 +122,7 @@ def test_rounded_values_have_the_probability_of_their_interval(sigma):
             assert value == pytest.approx(direct, rel=1e-6)
 
 
+@pytest.mark.extra("emcee")
 def test_weights_and_bounds_of_a_fit_are_those_of_its_posterior():
     """Samples of weight zero have no say, others that of their weight, and a bound is the end of a flat prior."""
     rng, u = np.random.default_rng(3), hs.signals.triangle(-1.0, 1.0, cycles=4, samples_per_cycle=40)
