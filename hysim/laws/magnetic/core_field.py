@@ -212,7 +212,7 @@ def condition(model: Any, known: Record) -> CoreField:
 
     A gain of all weights and a constant are free; each weight is then normal with a standard deviation of
     `CoreField.spread` times that of the noise, and the most likely ones are those of a Bayesian update. A stretch of
-    less than a cycle hardly tells a gain from a constant: the prediction may then be several times worse than without.
+    less than a cycle cannot distinguish a gain from a constant: the prediction may then be several times worse.
 
     Parameters
     ----------
@@ -383,7 +383,7 @@ class _Normal(NamedTuple):
 
     @classmethod
     def of(cls, pieces: Iterable[tuple[FloatArray, FloatArray, FloatArray, Fold]]) -> "_Normal":
-        """Of rows (n, n_weights), outputs, shares and folds (n,), some samples at a time."""
+        """Sums over pieces of the samples: rows (n, n_weights), outputs, shares and folds (n,)."""
         sums: dict[int, Any] = {}
         for rows, y, share, own in pieces:
             for fold in np.unique(own).tolist():
