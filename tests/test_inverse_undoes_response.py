@@ -296,3 +296,10 @@ def test_the_output_is_reached_to_a_few_roundings_of_its_terms(law):
     again = law.response(law.inverse_response(y))
     terms = np.abs(y) + np.abs(law.offset) + np.abs(law.gain * law.memory(u)) + np.abs(u)
     assert (np.abs(again - y) <= 4.0 * 2.0**-52 * terms).all()  # 1.2 is measured
+
+
+@pytest.mark.parametrize(("n", "amplitude"), [(8.0, 75.0), (40.0, 2.0), (50.0, 2.0)])
+def test_an_output_that_rises_within_a_rounding_of_the_input_is_passed(n, amplitude):
+    """A law without yield far out, where the memory falls back at once when the input turns."""
+    law, u = hs.BoucWen(beta=1.0, gamma=-1.0, n=n, feedthrough=0.2), amplitude * np.sin(np.linspace(0.0, 20.0, 600))
+    np.testing.assert_allclose(law.response(law.inverse_response(law.response(u), u[0])), law.response(u), rtol=1e-12)

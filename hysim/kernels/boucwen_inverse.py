@@ -150,7 +150,7 @@ def solve(
     if not (steepness > 0.0 and back > -_FLAT * steepness):
         return False
     at_start = rounding(y, u, z, parameters)
-    behind, beyond = u, direction * math.inf
+    behind, beyond, ahead = u, direction * math.inf, steepness
     before_last = last = math.inf
     target = u + direction * gap / steepness
     for _ in range(MAX_STEPS):
@@ -162,7 +162,7 @@ def solve(
         if abs(error) <= noise < math.inf:
             return True
         if error < 0.0 and steepness > 0.0:
-            behind = target
+            behind, ahead = target, steepness
         else:
             beyond = target
         if not error >= 0.0:
@@ -173,9 +173,12 @@ def solve(
         if not inside or (not math.isinf(beyond) and abs(move) > 0.5 * before_last):
             trial = 0.5 * (behind + beyond)
             move = abs(trial - target)
+        if trial == target and math.isinf(beyond):  # the output rises within a rounding of the input
+            trial = target + direction * 2.0 * max(_EPSILON * abs(target), _SMALLEST)
         if trial in (behind, beyond, target):
+            steepest = max(steepness, ahead)
             return bool(
-                abs(error) < math.inf and abs(error) <= _ROUNDINGS * (noise + _EPSILON * abs(target) * steepness)
+                abs(error) < math.inf and abs(error) <= _ROUNDINGS * (noise + _EPSILON * abs(target) * steepest)
             )
         before_last, last = last, abs(move)
         target = trial
