@@ -370,7 +370,9 @@ test_wrong_arguments_are_named = refused(
 )
 
 
-@pytest.mark.parametrize(("zero", "limits"), [(3.0, (0.0, 100.0)), (-3.0, (0.0, 100.0)), (0.0, (0.0, 50.0))])
+@pytest.mark.parametrize(
+    ("zero", "limits"), [(3.0, (0.0, 100.0)), (-3.0, (0.0, 100.0)), (0.0, (0.0, 50.0)), (3.0, (5.0, 50.0))]
+)
 def test_neither_the_zero_of_a_sensor_nor_limits_beyond_the_cycle_keep_a_stage_from_being_tuned(zero, limits):
     law = hs.BoucWen(beta=0.02, gamma=0.005, feedthrough=0.03, gain=-0.012, u0=0.0, u_range=(0.0, 100.0))
     cycle, plain = np.array([0.0, 1.0]), hs.Actuator(hysteresis=law)

@@ -25,6 +25,7 @@ from hysim.models.protocols import Remembering, Responding, standing
 from hysim.plants.actuator import Actuator
 from hysim.plants.actuator import as_actuator as as_actuator
 from hysim.plants.chain import Signals
+from hysim.plants.stages import Amplifier
 from hysim.plants.structures.moving import ControlledStructure
 from hysim.plants.structures.structure import Structure
 from hysim.records import even_step
@@ -346,8 +347,7 @@ def secant_gain(
     span = float(np.ptp(cycle))
     if actuator.hysteresis is None and sample_time is None:
         return _usable(actuator.dc_gain)
-    if actuator.amplifier is not None:
-        actuator = replace(actuator, amplifier=replace(actuator.amplifier, limits=None))
+    actuator = _unlimited(actuator)
     ends = np.array(actuator.u_range or (0.0, 1.0))
     low, high = replace(actuator, amplifier=None).level(ends)
     gain = _usable(actuator.dc_gain * float(high - low) / float(np.ptp(ends)))
@@ -373,12 +373,17 @@ def inverted(actuator: Actuator, y: FloatArray, gain: float) -> FloatArray:
     Where it rests farther from there than the span of `y`, or zero is outside the range on which the law is known, the
     line goes through the displacement at the nearest command in this range.
     """
-    volts = float(actuator.voltage(0.0))
+    actuator = _unlimited(actuator)
+    volts, amplifier = float(actuator.voltage(0.0)), actuator.amplifier or Amplifier()
     known = volts if actuator.u_range is None else min(max(volts, actuator.u_range[0]), actuator.u_range[1])
-    amplifier = actuator.amplifier
-    u0 = known - volts if amplifier is None or known == volts else amplifier.command(known)
+    u0 = 0.0 if known == volts else amplifier.command(known)
     y0 = float(_driven(actuator, np.array([u0]), None)[0])
     return y / gain if u0 == 0.0 and abs(y0) <= np.ptp(y) else u0 + (y - y0) / gain
+
+
+def _unlimited(actuator: Actuator) -> Actuator:
+    amplifier = actuator.amplifier
+    return actuator if amplifier is None else replace(actuator, amplifier=replace(amplifier, limits=None))
 
 
 def steady_cycle(

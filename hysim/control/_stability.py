@@ -265,9 +265,8 @@ def _closing_slopes(plant: Actuator, cycle: FloatArray, gain: float) -> list[flo
     if plant.hysteresis is None:
         return [1.0]
     secant = gain / plant.dc_gain
-    return sorted({slope for slope in slopes(plant, inverted(plant, cycle, gain)) if slope / secant > _CLOSES}) or [
-        secant
-    ]
+    along = slopes(plant, inverted(plant, cycle, gain))
+    return sorted({slope for slope in along if slope / secant > _CLOSES}) or [secant]
 
 
 def slowest_decay(loop: LinearLoop, controller: SampledController, slopes: Sequence[float]) -> float:

@@ -226,7 +226,7 @@ class Linear:
 
     def units(self, columns: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Unit of each parameter, and centre and standard deviation of its prior in units, (n_sets, n_linear)."""
-        along = np.ascontiguousarray(np.swapaxes(columns, 1, 2))  # in which extremes take a fifth of the time
+        along = np.ascontiguousarray(np.swapaxes(columns, 1, 2))  # extremes across the memory are slow
         low, high = along.min(axis=2), along.max(axis=2)
         size = np.maximum(np.abs(low), np.abs(high))
         is_level = high - low <= _LEVEL * size

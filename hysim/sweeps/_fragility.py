@@ -120,9 +120,7 @@ def fragility(
 
     line = optimize.minimize(loss, [0.0, 1.0], jac=True, method="BFGS", options={"gtol": 1e-10}).x
     if line[1] <= _FLAT:
-        raise ValueError(
-            "the share of records above the limit does not rise with the intensity: are the counts in its order?"
-        )
+        raise ValueError("the share above the limit does not rise with the intensity: are the counts in its order?")
     dispersion = logs.std() / line[1]
     covariance = _covariance(line @ rows, n, dispersion, same_records)
     numbers = np.array([np.exp(np.log(x).mean() - line[0] * dispersion), dispersion])
