@@ -123,6 +123,25 @@ def test_parameters_are_declared_affine_if_the_output_is_affine_in_them(name):
     assert affine == {each.name for each in law.searched if each.affine and each.name in values}
 
 
+@pytest.mark.parametrize("name", [name for name, each in hs.families().items() if getattr(each, "starts", ())])
+def test_the_output_is_affine_in_all_these_together(name):
+    """A product of two of them, as of a damping and the memory that it damps, would be no law that was searched."""
+    family = hs.families()[name]
+    law, (low, high) = family(**family.example.fields), family.example.between
+    u = low + (high - low) * (0.5 + 0.5 * np.linspace(0.2, 1.0, 200) * np.sin(np.linspace(0.0, 12.0, 200)))
+    record = hs.Record(u=u, y=u, t=0.01 * np.arange(u.size))
+    columns = law.search_space(record).columns
+    numbers = dict(zip(columns, np.random.default_rng(1).uniform(0.5, 1.5, len(columns)), strict=True))
+    other = law.with_scalars(law.scalars | numbers)
+    *parts, rest = law.regressors({key: np.array([value]) for key, value in law.scalars.items()}, record)[0].T
+    np.testing.assert_allclose(
+        rest + sum(numbers[key] * part for key, part in zip(columns, parts, strict=True)),
+        hs.simulate(other, record.t, u).y,
+        rtol=1e-9,
+        atol=1e-9 * max(np.abs(part).max() for part in [*parts, rest]),
+    )
+
+
 def test_the_families_are_the_laws_of_the_registry_in_the_order_of_the_public_names():
     laws = {name for name, each in every_family().items() if each.__module__.startswith("hysim.laws.")}
     assert set(hs.families()) == laws

@@ -5,7 +5,7 @@ affine in it, and it is solved for; or it is neither, and held.
 """
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, NamedTuple, Protocol
 
 import numpy as np
@@ -21,8 +21,9 @@ class Parameter:
     """The treatment of a field of a family by `hysim.identify`.
 
     `lower` and `upper` are the box in units of `unit`: a quotient of the spans of input and output such as ``"y/u"``;
-    ``"h"`` is half the span of the input. The box of a parameter with `from_first` stands about the first input, and
-    one with `log` is searched on a log scale. The output is affine in an `affine` parameter, which needs no box.
+    ``"h"`` is half the span of the input. A quotient of two other parameters stands for their values in the law: the
+    box of ``"breakaway/sigma0"`` moves with both. The box of a parameter with `from_first` stands about the first
+    input, and one with `log` is searched on a log scale. The output is affine in an `affine` parameter, which needs no box.
     `physical` says whether the lower and the upper side of the box is a limit of physics or of the law: the search is
     not stopped there, as it is at other sides.
     """
@@ -110,12 +111,15 @@ def declared_space(
         )
     chosen = freedom.held(scalars, at_rest=resting if freedom.starts_at_rest() else ())
     held = {name: scalars[name] for name, each in of.items() if each is None and name not in bounded} | chosen
-    coordinates, values = [], {}
+    coordinates, values, shares = [], {}, {}
     for name, each in of.items():
         if each is None:
             coordinates += [free_coordinate(name, *freedom.bounds[name])] if name in bounded else []
         elif not each.affine:
-            unit, origin = unit_of(each.unit, units), first if each.from_first else 0.0
+            is_share = scalars.keys() >= {*each.unit.split("/")}
+            if is_share and name not in {*held, *freedom.bounds}:
+                shares[name] = each.unit.split("/")
+            unit, origin = 1.0 if is_share else unit_of(each.unit, units), first if each.from_first else 0.0
             box = origin + each.lower * unit, origin + each.upper * unit
             coordinates.append(Coordinate(name, *box, unit, each.log, each.physical))
             values[name] = origin, unit
@@ -123,10 +127,32 @@ def declared_space(
     own = {name: value for name, value in usual if name in values and scalars[name] == value}
     points = [{name: values[name][0] + start[name] * values[name][1] for name in start} for start in (own, *starts)]
     columns = tuple(name for name, each in of.items() if each is not None and each.affine)
-    limits = freedom.limits(scalars, held)
+    limits, shown = freedom.limits(scalars, held), scalars | _as_shares(scalars, shares)
     if not freedom.starts_anew:
-        coordinates = [each.holding(scalars[each.name]) for each in coordinates]
-    return space_of(coordinates, columns, scalars, held, limits, points, state=resting, screened=law.screened)
+        coordinates = [each.holding(shown[each.name]) for each in coordinates]
+    space = space_of(coordinates, columns, shown, held, limits, points, state=resting, screened=law.screened)
+    return _with_shares(space, scalars, shares) if shares else space
+
+
+def _as_shares(parameters: Mapping[str, float], shares: Mapping[str, Sequence[str]]) -> dict[str, float]:
+    """These parameters in units of a quotient of two others."""
+    return {name: parameters[name] * parameters[below] / parameters[above] for name, (above, below) in shares.items()}
+
+
+def _with_shares(
+    space: SearchSpace, scalars: Mapping[str, float], shares: Mapping[str, Sequence[str]]
+) -> SearchSpace:
+    """The space in which the coordinates of these parameters are shares of a quotient of two others."""
+
+    def parameters(x: FloatArray) -> dict[str, FloatArray]:
+        known = space.parameters(x)
+        return known | {name: known[name] * known[above] / known[below] for name, (above, below) in shares.items()}
+
+    def encoded(parameters: Mapping[str, float]) -> FloatArray:
+        assert space.encoded is not None
+        return space.encoded({**parameters, **_as_shares({**scalars, **parameters}, shares)})
+
+    return replace(space, parameters=parameters, encoded=encoded)
 
 
 def free_coordinate(name: str, lower: float, upper: float) -> Coordinate:

@@ -99,7 +99,7 @@ class LuGre(RatedLaw):
         Parameter("breakaway", 1e-3, 1e1, unit="y", log=True),
         Parameter("stribeck_velocity", 1e-4, 1e1, unit="v", log=True),
         Parameter("offset", affine=True),
-        Parameter("z0", affine=True),
+        Parameter("z0", -1.0, 1.0, unit="breakaway/sigma0", physical=(True, True)),
     )
     starts: ClassVar = tuple(
         {"sigma0": 0.4 / length, "coulomb": 0.4, "breakaway": level, "stribeck_velocity": velocity}
