@@ -230,3 +230,30 @@ def test_the_structure_knows_how_the_record_begins():
 @pytest.mark.parametrize(("u", "tolerance", "message"), [([], 1e-9, "one period"), ([1.0], 0.0, "tolerance must be")])
 def test_a_period_that_is_none_is_refused(u, tolerance, message):
     assert_refused(message, plant().periodic_response, u, STEP, tolerance=tolerance)
+
+
+@pytest.mark.parametrize(("mass", "damping", "sample_time"), [(1e-3, 2.0, 0.01), (1.0, 100.0, 0.02)])
+def test_a_plant_of_more_than_critical_damping_is_found_with_stable_steps(mass, damping, sample_time):
+    """Four steps of order 6 a sample would be unstable for the first, and the second has eight times the critical."""
+    truth = hs.BoucWenOscillator(
+        mass=mass, damping=damping, stiffness=20.0, law=hs.BoucWen(A=20.0, beta=5.0, gamma=2.0)
+    )
+    t = sample_time * np.arange(250)
+    u = 20.0 * (np.sin(0.07 * np.arange(250)) + 0.6 * np.sin(0.17 * np.arange(250) + 1.0))
+    clean = truth.response(u, sample_time)
+    y = clean + 0.01 * clean.std() * np.random.default_rng(0).standard_normal(250)
+    fit = hs.identify(hs.BoucWenOscillator.structure(), hs.Record(u=u, y=y, t=t), fixed={"n": 1.0})
+    assert fit.rmse < 1.05 * np.sqrt(np.mean((y - clean) ** 2))
+    assert abs(fit.estimates["damping"] - damping) < 4.0 * fit.stderr["damping"] < 0.05 * damping
+    finer = replace(fit.model, substeps=None).response(u, sample_time)
+    assert np.abs(finer - fit.model.response(u, sample_time)).max() < 1e-6 * np.ptp(y)
+
+
+def test_steps_that_are_too_coarse_are_said(monkeypatch):
+    monkeypatch.setattr("hysim.plants.oscillator._LARGEST_ANGLE", 2.6)
+    plant = hs.BoucWenOscillator(mass=1.0, damping=100.0, stiffness=20.0, law=hs.BoucWen(A=20.0), substeps=1)
+    t = 0.025 * np.arange(250)
+    record = hs.Record(u=np.sin(t), y=replace(plant, substeps=None).response(np.sin(t), 0.025), t=t)
+    (note,) = hs.BoucWenOscillator.structure(oversampling=1).notes(record, plant)
+    assert note.startswith("the steps are too coarse: with twice as many the output moves by")
+    assert hs.BoucWenOscillator.structure(oversampling=8).notes(record, plant) == ()

@@ -139,9 +139,7 @@ def _as_shares(parameters: Mapping[str, float], shares: Mapping[str, Sequence[st
     return {name: parameters[name] * parameters[below] / parameters[above] for name, (above, below) in shares.items()}
 
 
-def _with_shares(
-    space: SearchSpace, scalars: Mapping[str, float], shares: Mapping[str, Sequence[str]]
-) -> SearchSpace:
+def _with_shares(space: SearchSpace, scalars: Mapping[str, float], shares: Mapping[str, Sequence[str]]) -> SearchSpace:
     """The space in which the coordinates of these parameters are shares of a quotient of two others."""
 
     def parameters(x: FloatArray) -> dict[str, FloatArray]:

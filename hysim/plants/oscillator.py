@@ -62,6 +62,7 @@ Period = Callable[[FloatArray], FloatArray]
 """State (3,) after a period, from that before; SimulationError if it diverges."""
 
 _ANGLE = 0.1  # largest phase of the mode in a default step: errors of 1e-7 of the output on the Noel-Schoukens system
+_LARGEST_ANGLE = 1.0  # in any step of "split", which is unstable beyond 3
 _SETTLING_CHUNK = 1 << 13
 
 
@@ -157,7 +158,8 @@ class BoucWenOscillator:
         Newmark's constant average acceleration with the trapezoidal rule for z; Strang's splitting.
     substeps : int, optional
         Steps between two samples, the one control of accuracy. By default as few as turn the phase of the mode (all
-        springs at the start) by at most 0.1 rad each. Twice as many show the remaining error.
+        springs at the start) by at most 0.1 rad each. Twice as many show the remaining error. ``"split"`` takes more
+        where a step would turn the mode by more than 1 rad, or damping would change the velocity as fast.
     initial_state : (float, float)
         Displacement [m] and velocity [m/s] at the first sample; empty for rest.
 
@@ -384,10 +386,13 @@ class BoucWenOscillator:
         y, velocity = self.initial_state or (0.0, 0.0)
         return OscillatorState(u, y, velocity, self.law.z0)
 
-    def _substeps(self, sample_time: float) -> int:
-        if self.substeps is not None:
-            return self.substeps
-        return whole_substeps(max(self.natural_frequency, abs(self.damping) / self.mass) * sample_time / _ANGLE)
+    def steps_of(self, sample_time: float) -> int:
+        """Steps in a sample time [s]."""
+        angle = max(self.natural_frequency, abs(self.damping) / self.mass) * sample_time
+        if self.substeps is None:
+            return whole_substeps(angle / _ANGLE)
+        more = whole_substeps(angle / self.substeps / _LARGEST_ANGLE) if self.method == "split" else 1
+        return self.substeps * more
 
     def _states(
         self, u: npt.ArrayLike, sample_time: float, state: OscillatorState | None = None
@@ -416,7 +421,7 @@ class BoucWenOscillator:
     def _compiled(self, sample_time: float) -> Callable[[float, FloatArray, FloatArray, FloatArray], int]:
         """The kernel with everything but the input, the state before it, and the states to come."""
         law, (slope, *curve) = self.law, self._coefficients
-        stiffness, substeps, held = self.stiffness + slope, self._substeps(sample_time), self.hold == "zoh"
+        stiffness, substeps, held = self.stiffness + slope, self.steps_of(sample_time), self.hold == "zoh"
         plant = [self.mass, self.damping, stiffness, law.offset, law.gain, law.A, law.beta, law.gamma, law.n]
         constants = substeps, held, np.array(plant), np.array(curve)
         if self.method in ("newmark", "runge-kutta"):

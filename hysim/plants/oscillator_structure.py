@@ -33,6 +33,9 @@ from hysim.plants import equation_of_motion as equations
 from hysim.plants.equation_of_motion import Excitation, Linear, Method, Motion
 from hysim.records import Record, span_of
 
+_MOST_STEPS = 1000  # between two samples: a mass with less inertia than asks for more cannot be told from none
+_COARSE = 0.1  # of the residual, an error of the steps that is said
+_NOISE_FREE = 1e-6  # of the range of the output, an error that matters even to a record without noise
 _FREQUENCIES = 8  # tried where no linear plant is near
 _SCREENED = 256
 _IMPROVED = 3  # of the screened points
@@ -160,8 +163,8 @@ class OscillatorStructure(Subject):
     """An oscillator to be identified; see `BoucWenOscillator.structure`, whose class is `family`.
 
     The box reaches from a tenth of the mass that the search begins with to ten times that mass, from no damping to
-    twice the critical one, and to ten times the stiffness of small motions for both springs; that of the law is the
-    one of `hysim.BoucWen`, with the displacement as its input and A not negative.
+    twice the critical one or that of small motions, and to ten times the stiffness of small motions for both springs;
+    that of the law is the one of `hysim.BoucWen`, with the displacement as its input and A not negative.
     """
 
     family: type
@@ -212,19 +215,13 @@ class OscillatorStructure(Subject):
 
     def regressors(self, parameters: Parameters, record: Record) -> FloatArray:
         """The output itself, shape (n_sets, n_samples, 1), sets on threads; inf for a set that diverges."""
-        force, step = self.fine_input(record.u), record.sample_time / self.oversampling
         sets = np.stack(np.broadcast_arrays(*(np.atleast_1d(parameters[name]) for name in NAMES)), axis=1)
-        outputs = np.full((len(sets), len(record), 1), np.inf)
+        outputs = np.empty((len(sets), len(record), 1))
 
         def simulate(begin: int, end: int) -> None:
             for k in range(begin, end):
                 plant = replace(self.assemble(dict(zip(NAMES, sets[k].tolist(), strict=True))), substeps=1)
-                run = plant.response if self.period is None else plant.periodic_response
-                try:
-                    y = run(force, step)
-                except SimulationError:
-                    continue
-                outputs[k, :, 0] = np.resize(self.sampled(y), len(record))
+                outputs[k, :, 0] = self._output(plant, record)
 
         in_chunks(simulate, len(sets), minimum=1)
         return outputs
@@ -241,6 +238,25 @@ class OscillatorStructure(Subject):
             method=self.method,
             substeps=self.oversampling,
         )
+
+    def notes(self, record: Record, model: Any) -> tuple[str, ...]:
+        """The error of the steps, where that is not small beside the residual."""
+        if self.method != "split":
+            return ()
+        coarse, fine = (self._output(replace(model, substeps=substeps), record) for substeps in (1, 2))
+        error, rmse = (float(np.sqrt(np.mean((coarse - other) ** 2))) for other in (fine, record.y))
+        text = f"the steps are too coarse: with twice as many the output moves by {error:.2g} rms, give oversampling="
+        return (text,) if error > _COARSE * rmse and error > _NOISE_FREE * float(np.ptp(record.y)) else ()
+
+    def _output(self, plant: Any, record: Record) -> FloatArray:
+        """Output (n_samples,) at the samples of the record; inf where it diverges or takes too many steps."""
+        force, step = self.fine_input(record.u), record.sample_time / self.oversampling
+        run = plant.response if self.period is None else plant.periodic_response
+        try:
+            y = run(force, step) if plant.steps_of(step) <= _MOST_STEPS else np.full(force.size, np.inf)
+        except SimulationError:
+            y = np.full(force.size, np.inf)
+        return np.resize(self.sampled(y), len(record))
 
     def motion(self, record: Record) -> Motion:
         """Force and displacement from which the start is computed; of a periodic record, the mean period."""
@@ -333,7 +349,7 @@ def _limits(
     """The user's bounds, those of the plant and of A completed by the default box."""
     units = {
         "mass": linear.mass,
-        "damping": 2.0 * np.sqrt(linear.mass * linear.stiffness),
+        "damping": max(2.0 * np.sqrt(linear.mass * linear.stiffness), linear.damping),
         "stiffness": linear.stiffness,
         "A": linear.stiffness,
     }
