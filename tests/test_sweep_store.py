@@ -20,7 +20,7 @@ from strategies import assert_refused
 from test_sweep import bits
 
 import hysim as hs
-from hysim.sweeps import _space, _store, _sweep
+from hysim.sweeps import _chunks, _store, _sweep
 
 GRID = {"a": [1.0, 2.0, 3.0, 4.0], "b": [1, 2]}
 
@@ -267,7 +267,7 @@ def test_what_is_bound_to_a_task_belongs_to_its_study(path):
     hs.sweep(times(2.0), GRID, store=path)
     hs.sweep(times(2.0), GRID, store=path)
     digests = {
-        _sweep.identity(times(kind(order)), _space.space_of(GRID), 0)["task"]
+        _sweep.identity(times(kind(order)), _chunks.space_of(GRID), 0)["task"]
         for kind in (set, frozenset)
         for order in ([0, 8], [8, 0])
     }  # of one place in a table of eight

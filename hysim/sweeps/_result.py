@@ -21,8 +21,7 @@ from hysim._basics.frozen import FloatArray
 from hysim._basics.printing import csv_text, frozen_result, summary_text
 from hysim._names import among
 from hysim.interop import dataset, frame
-from hysim.sweeps._chunks import Table, seeds
-from hysim.sweeps._space import Column, Space, saltelli
+from hysim.sweeps._chunks import Column, Space, Table, saltelli, seeds
 from hysim.sweeps._store import opened
 
 

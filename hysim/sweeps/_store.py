@@ -33,8 +33,7 @@ from typing import Any, Literal, NamedTuple, TypeVar
 
 import numpy as np
 
-from hysim.sweeps._chunks import Layout, Rows, Table
-from hysim.sweeps._space import Column, Space
+from hysim.sweeps._chunks import Column, Layout, Rows, Space, Table
 
 T = TypeVar("T")
 

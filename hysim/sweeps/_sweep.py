@@ -33,9 +33,8 @@ from hysim._basics.libraries import is_installed
 from hysim._basics.parallel import GLANCE, cores, processes, threads
 from hysim._basics.progress import Line, Progress, Reports, reports
 from hysim._release import __version__
-from hysim.sweeps._chunks import Chunk, Rows, Table, Task, computed, seeds, shown
+from hysim.sweeps._chunks import Chunk, Column, Rows, Space, Table, Task, computed, seeds, shown, space_of
 from hysim.sweeps._result import Sweep, result_of
-from hysim.sweeps._space import Column, Space, space_of
 from hysim.sweeps._store import ON_CHANGE, OnChange, Store, opened
 
 _CHUNK, _OF_A_CLUSTER, _SHORTEST = 0.25, 1.0, 0.002  # seconds
