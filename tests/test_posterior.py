@@ -16,11 +16,11 @@ from strategies import assert_refused, refused
 
 import hysim as hs
 from hysim.identification.likelihood import density
-from hysim.posterior import _log_evidence, _sampler, log_evidence
-from hysim.posterior._log_evidence import bridge_evidence
-from hysim.posterior._priors import REACH, given, scaled_box
+from hysim.posterior import _evidence, _sampler, log_evidence
+from hysim.posterior._evidence import bridge_evidence
 from hysim.posterior._sample import posed, walkers_of
 from hysim.posterior._sampler import effective_samples, sampled, split_rhat
+from hysim.posterior._target import REACH, given, scaled_box
 
 SIGMA = 0.05
 KNOWN = {"sigma": (SIGMA * (1.0 - 1e-9), SIGMA * (1.0 + 1e-9))}
@@ -375,7 +375,7 @@ def test_bridge_sampling_has_the_closed_form(cubic):
 
 @pytest.mark.extra("dynesty")
 def test_nested_sampling_has_the_closed_form(monkeypatch):
-    monkeypatch.setattr(_log_evidence, "_WALK", 6)  # enough for a normal posterior of three numbers
+    monkeypatch.setattr(_evidence, "_WALK", 6)  # enough for a normal posterior of three numbers
     rec, fit = fitted_line(12)
     found = log_evidence(fit, rec, priors=KNOWN, factor=2.0, live_points=20)
     truth = log_evidence_of_cubic(rec, np.column_stack([np.ones(12), rec.u])) - 2 * math.log(2.0)  # two boxes, doubled

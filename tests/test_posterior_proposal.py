@@ -9,12 +9,11 @@ from scipy import special, stats
 
 import hysim as hs
 from hysim.posterior import _proposal
-from hysim.posterior._log_evidence import _error
-from hysim.posterior._priors import given
+from hysim.posterior._evidence import _error
 from hysim.posterior._proposal import grown, mixture, particles, proposal_for
 from hysim.posterior._sample import posed
 from hysim.posterior._sampler import around_optima
-from hysim.posterior._target import between, solved_within
+from hysim.posterior._target import between, given, solved_within
 
 NOWHERE = np.empty((0, 9))
 

@@ -18,9 +18,8 @@ from hysim.identification import Identification, Width
 from hysim.identification.likelihood import Problem, again, density, optima
 from hysim.metrics.rows import LoopRows
 from hysim.models.protocols import needs_time
-from hysim.posterior._priors import Given, check_names, given
 from hysim.posterior._sampler import Chains, effective_samples, sampled, split_rhat
-from hysim.posterior._target import Target, target
+from hysim.posterior._target import Given, Target, check_names, given, target
 from hysim.records import Record, even_step, several
 
 LARGEST_RHAT = 1.05
