@@ -152,9 +152,9 @@ from hysim.plants.structures.structure import StaticResponse as StaticResponse
 from hysim.plants.structures.spectrum import response_spectrum as response_spectrum
 from hysim.plants.structures.spectrum import ResponseSpectrum as ResponseSpectrum
 from hysim.plants.transfer_function import TransferFunction as TransferFunction
-from hysim.plants.state_space import StateSpace as StateSpace
-from hysim.plants.state_space import Modes as Modes
-from hysim.plants.state_space import mode as mode
+from hysim.plants.transfer_function import StateSpace as StateSpace
+from hysim.plants.transfer_function import Modes as Modes
+from hysim.plants.transfer_function import mode as mode
 from hysim.plants.stages import Creep as Creep
 from hysim.plants.stages import Amplifier as Amplifier
 from hysim.plants.stages import Sensor as Sensor

@@ -191,7 +191,7 @@ def test_abilities_are_asked_for_by_protocols_and_not_by_names():
         for node in nodes(path)
         if isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and node.func.id in ("getattr", "hasattr")
     ]
-    assert sorted(set(calls)) == ["_basics/frozen.py", "plants/state_space.py"]
+    assert sorted(set(calls)) == ["_basics/frozen.py", "plants/transfer_function.py"]
     assert len(calls) <= 20
 
 

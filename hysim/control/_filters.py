@@ -40,7 +40,7 @@ from hysim._basics.frozen import Count, FloatArray, NotNegative, Positive, check
 from hysim.control._controller import Feedback
 from hysim.models.model import family
 from hysim.plants.sampled import sampled, vibration_stage
-from hysim.plants.state_space import mode
+from hysim.plants.transfer_function import mode
 
 
 class _Filter(ABC):

@@ -34,8 +34,8 @@ from hysim.models.model import family
 from hysim.models.protocols import CompiledController, law_at, positive_time
 from hysim.plants.actuator import Actuator, as_actuator
 from hysim.plants.stages import Amplifier, Sensor
-from hysim.plants.state_space import StateSpace
 from hysim.plants.structures.structure import Structure
+from hysim.plants.transfer_function import StateSpace
 from hysim.signals import triangle
 
 Spectrum = npt.NDArray[np.complex128]

@@ -22,7 +22,7 @@ from hysim.control._stability import LinearLoop
 from hysim.kernels import controllers as kernels
 from hysim.models.model import family
 from hysim.models.protocols import CompiledController, positive_time
-from hysim.plants.state_space import StateSpace
+from hysim.plants.transfer_function import StateSpace
 from hysim.signals import triangle
 
 _FAST = 50.0  # of 1 / sample_time: poles of the controller beyond have settled

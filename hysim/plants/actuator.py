@@ -18,8 +18,7 @@ from hysim.plants.actuator_structure import ActuatorStructure
 from hysim.plants.chain import Chain, ChainState, Stages, linear_chain
 from hysim.plants.sampled import Stage, Vibration
 from hysim.plants.stages import Amplifier, Creep, Sensor
-from hysim.plants.state_space import linear_plant
-from hysim.plants.transfer_function import TransferFunction
+from hysim.plants.transfer_function import TransferFunction, linear_plant
 from hysim.records import Record
 
 

@@ -32,8 +32,7 @@ from hysim.models.search_space import Freedom, Parameters, SearchSpace
 from hysim.plants.chain import Stages
 from hysim.plants.multi_input_actuator import MAIN, MultiInputActuator
 from hysim.plants.stages import Amplifier, Creep
-from hysim.plants.state_space import Modes
-from hysim.plants.transfer_function import TransferFunction
+from hysim.plants.transfer_function import Modes, TransferFunction
 from hysim.records import Record, span_of
 
 _REFERENCE = 0.1  # [s]

@@ -19,8 +19,7 @@ from scipy.linalg import matrix_balance
 from hysim._basics.frozen import FloatArray, read_only
 from hysim.plants._linear_response import Transition, scaled_companion, transitions
 from hysim.plants.stages import Creep
-from hysim.plants.state_space import Modes, StateSpace, resting_states
-from hysim.plants.transfer_function import TransferFunction
+from hysim.plants.transfer_function import Modes, StateSpace, TransferFunction, resting_states
 
 _WHOLE = 1e-6  # of a sub-step: a delay this close to a whole number of them is one
 

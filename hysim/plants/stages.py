@@ -15,7 +15,7 @@ import numpy.typing as npt
 from hysim._basics import frozen
 from hysim._basics.frozen import FloatArray, Interval, NotNegative, Positive, read_only
 from hysim.models.model import family
-from hysim.plants.state_space import StateSpace
+from hysim.plants.transfer_function import StateSpace
 
 _TIMES_PER_DECADE = 20  # at which a bank of creep is fitted
 

@@ -11,7 +11,7 @@ from hysim._basics.progress import Reports
 from hysim.laws.differential.polynomial_boucwen import PolynomialBoucWen
 from hysim.plants.actuator import Actuator
 from hysim.plants.stages import Amplifier
-from hysim.plants.state_space import mode
+from hysim.plants.transfer_function import mode
 from hysim.records import Record
 from hysim.rig._camera import Camera, Frames
 from hysim.rig._drive import Drive
