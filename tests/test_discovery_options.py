@@ -11,8 +11,7 @@ from strategies import assert_refused, refused
 import hysim as hs
 from hysim.discovery import _discover, _refinement
 from hysim.discovery._refinement import FreeRun
-from hysim.discovery._search import Library, Options, searched
-from hysim.discovery._selection import MOST_WORK
+from hysim.discovery._search import MOST_WORK, Library, Options, searched
 from hysim.laws.differential.duhem_runs import free_runs
 from hysim.laws.differential.terms import memory_terms
 

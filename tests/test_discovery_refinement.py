@@ -14,9 +14,8 @@ import hysim as hs
 from hysim.discovery import _result
 from hysim.discovery._discover import left_out_rmse
 from hysim.discovery._hidden_memory import cases, memory_arrays
-from hysim.discovery._refinement import _SCHEDULE, AnyExponent, FreeRun, Terms, bic_of
-from hysim.discovery._search import Library, Options, searched
-from hysim.discovery._selection import INDISTINCT, Search, pruned
+from hysim.discovery._refinement import _SCHEDULE, AnyExponent, FreeRun, Terms
+from hysim.discovery._search import INDISTINCT, Library, Options, Search, pruned, searched
 from hysim.identification.marquardt import SumOfSquares, descend, differences
 from hysim.kernels import memory_terms
 from hysim.laws.differential.terms import RELAXATION, Term, bouc_wen_terms
@@ -192,7 +191,7 @@ def test_a_memory_at_rest_is_one_number_less_and_begins_at_zero():
     assert (of_free.n_parameters, of_rest.n_parameters) == (6, 5)
     assert of_rest.unknowns[-1] == pytest.approx(of_rest.unknowns[4] + record.u[0] * of_rest.unknowns[3], rel=1e-15)
     assert of_free.cost <= of_rest.cost < 1.1 * of_free.cost
-    assert of_rest.bic == bic_of(of_rest.cost, len(record), 5) < of_free.bic
+    assert of_rest.bic == free_run.bic_of(of_rest.cost, 5) < of_free.bic
     spread = np.sqrt(np.diag(of_rest.covariance))
     assert spread[-1] == 0.0
     assert (spread[:-1] > 0.0).all()
@@ -283,7 +282,7 @@ def test_a_structure_could_win_if_its_bic_with_the_starts_of_all_records_may_be_
     records = record_of(LAW.memory, CYCLES, noise=0.05), record_of(LAW.memory, multisine(150), noise=0.05)
     search = Search(FreeRun(records), (), rests=rests)
     found = search.refine(Terms(terms(["u'", "|u'| z", "u' |z|"])), np.array([1.0, -0.6, -0.3, 0.0, 0.0]))
-    bound = bic_of(found.cost, search.free_run.n_samples, 2 + starts)
+    bound = search.free_run.bic_of(found.cost, 2 + starts)
     assert bound < found.bic
     assert search.could_win(2, bound - INDISTINCT + 1e-6)
     assert not search.could_win(2, bound - INDISTINCT - 1e-6)

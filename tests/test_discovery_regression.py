@@ -15,7 +15,7 @@ import hysim as hs
 from hysim.discovery import _slopes
 from hysim.discovery._hidden_memory import TermRegression
 from hysim.discovery._refinement import Terms
-from hysim.discovery._selection import best_subsets, is_complete, preferred, thinning
+from hysim.discovery._search import best_subsets, is_complete, preferred, thinning
 from hysim.discovery._slopes import branches, feature, signs_of, slopes, smoothed, weak_rows
 from hysim.laws.differential.terms import Term, duhem_terms, memory_terms, named_terms, power_term, symmetric
 

@@ -3,7 +3,7 @@
     z' = sum c_k phi_k(u', |u'|, u, z),    y = offset + feedthrough u + gain z
 
 Regression of the slope along the loading length, and PySINDy's optimizers from dense to sparse (`_slopes`), refinement
-by simulation error (`_refinement`), choice of one structure (`_selection`, `_search`), and the verdict (`_judgement`).
+by simulation error (`_refinement`), choice of one structure (`_search`), and the verdict (`_judgement`).
 """
 
 import math
@@ -21,8 +21,7 @@ from hysim._basics.progress import Progress, Reports, reports
 from hysim.discovery._judgement import HYSTERESIS, LAG, NO_STRUCTURE, Trial, competitors, doubts, judge
 from hysim.discovery._refinement import DIVERGED, AnyExponent, Candidate, FreeRun, Samples, Work
 from hysim.discovery._result import Discovery, coefficients, law_from
-from hysim.discovery._search import Library, Options, Outcome, or_any_exponent, searched
-from hysim.discovery._selection import MOST_WORK
+from hysim.discovery._search import MOST_WORK, Library, Options, Outcome, or_any_exponent, searched
 from hysim.discovery._slopes import FORMS, check, signs_of
 from hysim.identification import folds
 from hysim.identification.swapped import swapped_columns

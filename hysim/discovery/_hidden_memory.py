@@ -41,7 +41,7 @@ from hysim import metrics, signals
 from hysim._basics.frozen import FloatArray
 from hysim._basics.parallel import in_chunks
 from hysim.discovery._judgement import HYSTERESIS, LAG, NO_STRUCTURE, signed_area
-from hysim.discovery._selection import best_subsets
+from hysim.discovery._search import best_subsets
 from hysim.discovery._slopes import independent, sparse_path
 from hysim.errors import SimulationError
 from hysim.identification import folds

@@ -173,7 +173,8 @@ class Candidate(Generic[S]):
 
     @cached_property
     def bic(self) -> float:
-        return bic_of(self.cost, self.residual.size, self.n_parameters)
+        n_samples = self.residual.size
+        return information(self.cost / n_samples, n_samples, self.n_parameters, floor=FLOOR)
 
     @property
     def covariance(self) -> FloatArray:
@@ -194,15 +195,6 @@ class Candidate(Generic[S]):
         size = self.structure.size
         spread = np.sqrt(np.diag(self.covariance)[:size])
         return np.where(spread > 0.0, np.abs(self.unknowns[:size]) / np.where(spread > 0.0, spread, 1.0), np.inf)
-
-
-def cost_of(bic: float, n_samples: int, n_parameters: int) -> float:
-    """Sum of squared residuals, in squared strokes, with this BIC; negative if no sum has this BIC."""
-    return n_samples * (math.exp((bic - n_parameters * math.log(n_samples)) / n_samples) - FLOOR**2)
-
-
-def bic_of(cost: float, n_samples: int, n_parameters: int) -> float:
-    return information(cost / n_samples, n_samples, n_parameters, floor=FLOOR)
 
 
 @dataclass
@@ -245,6 +237,14 @@ class FreeRun:
     @cached_property
     def n_samples(self) -> int:
         return sum(map(len, self.visible))
+
+    def bic_of(self, cost: float, n_parameters: int) -> float:
+        return information(cost / self.n_samples, self.n_samples, n_parameters, floor=FLOOR)
+
+    def cost_of(self, bic: float, n_parameters: int) -> float:
+        """Sum of squared residuals, in squared strokes, with this BIC; negative if no sum has this BIC."""
+        n = self.n_samples
+        return n * (math.exp((bic - n_parameters * math.log(n)) / n) - FLOOR**2)
 
     @cached_property
     def largest(self) -> Record:
