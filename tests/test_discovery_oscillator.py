@@ -11,8 +11,8 @@ from strategies import assert_refused, needs_compiled, refused
 
 import hysim as hs
 from hysim.discovery import _oscillator
-from hysim.discovery._hidden_memory import HiddenMemory, cases, diverges
-from hysim.discovery._oscillator import recorded
+from hysim.discovery._hidden_memory import HiddenMemory, cases
+from hysim.discovery._oscillator import diverges, recorded
 from hysim.identification import identify
 from hysim.laws.differential.terms import RELAXATION, Term, bouc_wen_terms, memory_terms
 

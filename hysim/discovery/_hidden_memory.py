@@ -18,13 +18,6 @@ thresholds are accompanied by plain elimination.
 
 About a law that simulates the record well the residual is white and the slopes are free of noise. Unlike one of z' on
 noisy signals, this regression has no bias, and its standard errors and BIC are right.
-
-hysim has models of these discovered oscillators:
-
-    z' = A y' - beta |y'| |z|^(n-1) z - gamma y' |z|^n    BoucWenOscillator
-    z' = A y' - r z                                       TransferFunction, since all of it is linear:
-
-    Y / U = (s + r) / ((m s^2 + c s + k) (s + r) + A s)
 """
 
 import itertools
@@ -37,23 +30,19 @@ import numpy as np
 import numpy.typing as npt
 from scipy.interpolate import CubicSpline
 
-from hysim import metrics, signals
 from hysim._basics.frozen import FloatArray
 from hysim._basics.parallel import in_chunks
-from hysim.discovery._judgement import HYSTERESIS, LAG, NO_STRUCTURE, signed_area
 from hysim.discovery._search import best_subsets
 from hysim.discovery._slopes import independent, sparse_path
 from hysim.errors import SimulationError
 from hysim.identification import folds
 from hysim.identification.marquardt import Schedule, SumOfSquares, descend
 from hysim.kernels import memory_terms as kernels
-from hysim.laws.differential.boucwen import BoucWen
-from hysim.laws.differential.terms import RELAXATION, Term, bouc_wen_exponent, bouc_wen_terms
+from hysim.laws.differential.terms import RELAXATION, Term, bouc_wen_terms, memory_terms, symmetric
 from hysim.metrics.criteria import information
 from hysim.plants.equation_of_motion import Filter, Linear, Motion, filtering, interpolated
-from hysim.plants.oscillator import ATTEMPTS, BoucWenOscillator, attracting_state
+from hysim.plants.oscillator import ATTEMPTS, attracting_state
 from hysim.plants.oscillator_structure import OscillatorStructure
-from hysim.plants.transfer_function import TransferFunction
 from hysim.records import Record
 
 FLOOR = 1e-5  # of the rms output: smaller residuals are no evidence of a term
@@ -176,11 +165,18 @@ def term_regression(
 POWERS = (1.0, 2.0, 3.0)
 SHARES = (0.2, 0.5, 0.8)  # of the stiffness of small motions, in A
 PLANT = ("mass", "damping", "stiffness")
+SPRING = bouc_wen_terms(1.0)[0]
 
 OSCILLATOR_SCHEDULE = Schedule(failure=5.0, least=1e-12)
 
 _FINER = 4  # increments of y for each sample
 _DEGREE = 3
+
+
+class State(NamedTuple):
+    y: float
+    velocity: float
+    z: float
 
 
 class Oscillator(NamedTuple):
@@ -253,6 +249,16 @@ class HiddenMemory:
         self._basis = np.linalg.qr(self._columns / np.linalg.norm(self._columns, axis=0))[0]
         self._size = float(np.linalg.norm(force))
 
+    @staticmethod
+    def library(degree: int, symmetry: str | None) -> tuple[Term, ...]:
+        """The terms by their power of z, without combinations of earlier ones."""
+        if degree not in (1, 2, 3):
+            raise ValueError(f"degree must be 1, 2 or 3, got {degree!r}")
+        if symmetry not in (None, "odd"):
+            raise ValueError(f'symmetry must be None or "odd", got {symmetry!r}')
+        ordered = sorted(memory_terms(degree), key=lambda term: (term.degree, term.is_even_in_memory, term.rectified))
+        return symmetric((*ordered, RELAXATION), symmetry)
+
     def fit(self, terms: Sequence[Term]) -> Regressed | None:
         """Law of these terms, u' first, from the best of several starts; None if all diverge."""
         spring = self.linear.stiffness
@@ -262,13 +268,12 @@ class HiddenMemory:
 
     def nearest(self) -> Regressed | None:
         """Bouc-Wen law with a whole n, or linear relaxation, of the smallest error; None if all diverge."""
-        laws = [bouc_wen_terms(n) for n in POWERS] + [(bouc_wen_terms(1.0)[0], RELAXATION)]
+        laws = [bouc_wen_terms(n) for n in POWERS] + [(SPRING, RELAXATION)]
         return _best(map(self.fit, laws))
 
     def regression(self, library: Sequence[Term]) -> TermRegression:
         """Regression on all terms, about z = A y, of the force that a linear spring does not explain."""
-        spring = bouc_wen_terms(1.0)[0]
-        terms = (spring, *(term for term in library if term != spring))
+        terms = (SPRING, *(term for term in library if term != SPRING))
         share = 1.0 - self.known.get("stiffness", 0.5 * self.linear.stiffness) / self.linear.stiffness
         x = np.array([share * self.linear.stiffness, *np.zeros(len(terms) - 1)])
         rows = self._memory(terms, x)
@@ -342,78 +347,6 @@ def _along(motion: Motion, linear: Linear) -> _Along:
     places = np.arange((motion.y.size - 1) * _FINER + 1) / _FINER
     fine = CubicSpline(np.arange(motion.y.size), motion.y)(places)
     return _Along(filtering(motion, linear), np.diff(fine), h, slice(None, None, _FINER))
-
-
-RATE_DEPENDENT = "rate-dependent hysteresis"
-
-Model = BoucWenOscillator | TransferFunction
-
-SPRING = bouc_wen_terms(1.0)[0]
-_CYCLES = 10
-_SAMPLES = 128
-
-
-class State(NamedTuple):
-    y: float
-    velocity: float
-    z: float
-
-
-def verdict(terms: Iterable[Term]) -> str:
-    present = set(terms)
-    if RELAXATION in present:
-        return LAG if present <= {SPRING, RELAXATION} else RATE_DEPENDENT
-    return HYSTERESIS if present - {SPRING} else NO_STRUCTURE
-
-
-def model(
-    plant: Mapping[str, float], law: Mapping[Term, float], structure: OscillatorStructure, state: State
-) -> Model | None:
-    """Model of an oscillator that begins in a state; None if hysim has no such model."""
-    kind, n = verdict(law), bouc_wen_exponent(law)
-    if kind == LAG:
-        return _lag(plant, law[RELAXATION], law.get(SPRING, 0.0), structure.hold, state)
-    if n is None and kind != NO_STRUCTURE:
-        return None
-    A, dissipative, conservative = (law.get(term, 0.0) for term in bouc_wen_terms(n or 1.0))
-    shape = {"A": A, "beta": -dissipative, "gamma": -conservative, "n": n or 1.0}
-    oscillator: BoucWenOscillator = structure.assemble({**plant, **shape})
-    if not any(state):
-        return oscillator
-    return replace(oscillator, initial_state=state[:2], law=replace(oscillator.law, z0=state.z))
-
-
-def diverges(oscillator: Model | None, y: FloatArray) -> bool:
-    """Whether a model's memory diverges on cycles over the range of the displacements `y`, or a lag is unstable."""
-    if isinstance(oscillator, TransferFunction):
-        return bool((oscillator.poles.real > 0.0).any())
-    try:
-        steady_loop(oscillator, y)
-    except SimulationError:
-        return True
-    return False
-
-
-def steady_loop(oscillator: Model | None, y: FloatArray) -> tuple[float, float]:
-    """Relative width and signed area of the memory's loop over the range of `y`; nan if it is no Bouc-Wen law."""
-    law = oscillator.law if isinstance(oscillator, BoucWenOscillator) else None
-    if not isinstance(law, BoucWen):
-        return np.nan, np.nan
-    u = signals.triangle(float(y.min()), float(y.max()), cycles=_CYCLES, samples_per_cycle=_SAMPLES)
-    loop = metrics.loop_metrics(u, law.gain * law.memory(u))
-    return loop.relative_width, signed_area(loop)
-
-
-def _lag(plant: Mapping[str, float], relaxation: float, A: float, hold: str, state: State) -> TransferFunction:
-    m, c, k = plant["mass"], plant["damping"], plant["stiffness"]
-    without_memory = np.polymul([m, c, k], [1.0, -relaxation])
-    force = -c * state.velocity - k * state.y - state.z  # of the free response, which no input pushes
-    return TransferFunction(
-        num=(1.0, -relaxation),
-        den=tuple(np.polyadd(without_memory, [A, 0.0]).tolist()),
-        hold="zoh" if hold == "zoh" else "foh",
-        initial_state=(state.y, state.velocity, force / m) if any(state) else (),
-    )
 
 
 _DIFFERENCES = (3e-4, 3e-5, 3e-6)  # of a parameter, for its slope: the first with which nothing diverges

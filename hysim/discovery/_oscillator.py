@@ -10,44 +10,32 @@
    where terms come in about these too, the law of these terms. All this is done for each structure of the records.
 5. Of all refined laws that do not diverge, the linear spring among them, the one of the lowest BIC is taken; every
    number that has a standard error counts as a parameter.
+
+hysim has models of these discovered oscillators:
+
+    z' = A y' - beta |y'| |z|^(n-1) z - gamma y' |z|^n    BoucWenOscillator
+    z' = A y' - r z                                       TransferFunction, since all of it is linear:
+
+    Y / U = (s + r) / ((m s^2 + c s + k) (s + r) + A s)
 """
 
 import contextlib
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
 
-from hysim import metrics
+from hysim import metrics, signals
 from hysim._basics.frozen import FloatArray, check_positive
 from hysim._basics.progress import Progress, Reports, reports
-from hysim.discovery._hidden_memory import (
-    PLANT,
-    RATE_DEPENDENT,
-    SPRING,
-    HiddenMemory,
-    Oscillator,
-    Response,
-    State,
-    TermRegression,
-    diverges,
-    model,
-    steady_loop,
-    verdict,
-)
-from hysim.discovery._judgement import NO_STRUCTURE
+from hysim.discovery._hidden_memory import PLANT, SPRING, HiddenMemory, Oscillator, Response, State, TermRegression
+from hysim.discovery._judgement import HYSTERESIS, LAG, NO_STRUCTURE, signed_area
 from hysim.discovery._result import OscillatorDiscovery
+from hysim.errors import SimulationError
 from hysim.identification import identify
-from hysim.laws.differential.terms import (
-    RELAXATION,
-    Term,
-    bouc_wen_exponent,
-    bouc_wen_terms,
-    law_text,
-    memory_terms,
-    symmetric,
-)
+from hysim.laws.differential.boucwen import BoucWen
+from hysim.laws.differential.terms import RELAXATION, Term, bouc_wen_exponent, bouc_wen_terms, law_text
 from hysim.metrics.criteria import information
 from hysim.plants.equation_of_motion import Linear, linear_plant
 from hysim.plants.oscillator import BoucWenOscillator
@@ -69,6 +57,68 @@ _NO_MODEL = (
     "relaxation."
 )
 _DIVERGES = "A law of lower BIC diverges on cycles over the measured range, and is left out."
+_CYCLES, _SAMPLES = 10, 128  # of the path along which a memory shows its steady loop
+
+RATE_DEPENDENT = "rate-dependent hysteresis"
+
+Model = BoucWenOscillator | TransferFunction
+
+
+def verdict(terms: Iterable[Term]) -> str:
+    present = set(terms)
+    if RELAXATION in present:
+        return LAG if present <= {SPRING, RELAXATION} else RATE_DEPENDENT
+    return HYSTERESIS if present - {SPRING} else NO_STRUCTURE
+
+
+def model(
+    plant: Mapping[str, float], law: Mapping[Term, float], structure: OscillatorStructure, state: State
+) -> Model | None:
+    """Model of an oscillator that begins in a state; None if hysim has no such model."""
+    kind, n = verdict(law), bouc_wen_exponent(law)
+    if kind == LAG:
+        return _lag(plant, law[RELAXATION], law.get(SPRING, 0.0), structure.hold, state)
+    if n is None and kind != NO_STRUCTURE:
+        return None
+    A, dissipative, conservative = (law.get(term, 0.0) for term in bouc_wen_terms(n or 1.0))
+    shape = {"A": A, "beta": -dissipative, "gamma": -conservative, "n": n or 1.0}
+    oscillator: BoucWenOscillator = structure.assemble({**plant, **shape})
+    if not any(state):
+        return oscillator
+    return replace(oscillator, initial_state=state[:2], law=replace(oscillator.law, z0=state.z))
+
+
+def diverges(oscillator: Model | None, y: FloatArray) -> bool:
+    """Whether a model's memory diverges on cycles over the range of the displacements `y`, or a lag is unstable."""
+    if isinstance(oscillator, TransferFunction):
+        return bool((oscillator.poles.real > 0.0).any())
+    try:
+        steady_loop(oscillator, y)
+    except SimulationError:
+        return True
+    return False
+
+
+def steady_loop(oscillator: Model | None, y: FloatArray) -> tuple[float, float]:
+    """Relative width and signed area of the memory's loop over the range of `y`; nan if it is no Bouc-Wen law."""
+    law = oscillator.law if isinstance(oscillator, BoucWenOscillator) else None
+    if not isinstance(law, BoucWen):
+        return np.nan, np.nan
+    u = signals.triangle(float(y.min()), float(y.max()), cycles=_CYCLES, samples_per_cycle=_SAMPLES)
+    loop = metrics.loop_metrics(u, law.gain * law.memory(u))
+    return loop.relative_width, signed_area(loop)
+
+
+def _lag(plant: Mapping[str, float], relaxation: float, A: float, hold: str, state: State) -> TransferFunction:
+    m, c, k = plant["mass"], plant["damping"], plant["stiffness"]
+    without_memory = np.polymul([m, c, k], [1.0, -relaxation])
+    force = -c * state.velocity - k * state.y - state.z  # of the free response, which no input pushes
+    return TransferFunction(
+        num=(1.0, -relaxation),
+        den=tuple(np.polyadd(without_memory, [A, 0.0]).tolist()),
+        hold="zoh" if hold == "zoh" else "foh",
+        initial_state=(state.y, state.velocity, force / m) if any(state) else (),
+    )
 
 
 class _Fitted(NamedTuple):
@@ -441,7 +491,7 @@ def discover_oscillator(
     {"u'": 50000, "|u'| z": -800, "u' |z|": 300}
     """
     records = several(record_or_records, "discover_oscillator")
-    library = _library(degree, symmetry)
+    library = HiddenMemory.library(degree, symmetry)
     known = _known_plant({"mass": mass, "damping": damping, "stiffness": stiffness})
     chosen = _structure(records, structure)
     others = () if structure is not None or chosen.period is None else (replace(chosen, hold="foh"),)
@@ -455,16 +505,6 @@ def recorded(record: Record) -> OscillatorStructure:
     if period is None or not _is_steady(record.y, period):
         return BoucWenOscillator.structure()
     return BoucWenOscillator.structure(initial="periodic", period=period, hold="band-limited")
-
-
-def _library(degree: int, symmetry: str | None) -> tuple[Term, ...]:
-    """The terms by their power of z, without combinations of earlier ones."""
-    if degree not in (1, 2, 3):
-        raise ValueError(f"degree must be 1, 2 or 3, got {degree!r}")
-    if symmetry not in (None, "odd"):
-        raise ValueError(f'symmetry must be None or "odd", got {symmetry!r}')
-    ordered = sorted(memory_terms(degree), key=lambda term: (term.degree, term.is_even_in_memory, term.rectified))
-    return symmetric((*ordered, RELAXATION), symmetry)
 
 
 def _structure(records: Sequence[Record], structure: OscillatorStructure | None) -> OscillatorStructure:
