@@ -15,20 +15,11 @@ from hysim import signals
 from hysim._basics.frozen import FloatArray, read_only
 from hysim._basics.printing import extent, frozen_result, quantity, summary_text
 from hysim.control._controller import Controller, preview
-from hysim.control._loop import (
-    ClosedLoop,
-    RestingPlant,
-    around,
-    as_actuator,
-    inverted,
-    sampled,
-    secant_gain,
-    without_memory,
-)
+from hysim.control._loop import ClosedLoop, RestingPlant, around, inverted, sampled, secant_gain, without_memory
 from hysim.control._stability import judge
 from hysim.control._tracking import is_fed_back
 from hysim.metrics import LoopMetrics, VibrationReduction, loop_metrics, reduction_percent, rmse, vibration_reduction
-from hysim.plants.actuator import Actuator
+from hysim.plants.actuator import Actuator, as_actuator
 
 
 @frozen_result

@@ -22,8 +22,7 @@ from hysim.errors import SimulationError, warn_beyond, warn_limited
 from hysim.laws.static import Line
 from hysim.models.model import in_brief
 from hysim.models.protocols import Remembering, Responding, standing
-from hysim.plants.actuator import Actuator
-from hysim.plants.actuator import as_actuator as as_actuator
+from hysim.plants.actuator import Actuator, as_actuator
 from hysim.plants.chain import Signals
 from hysim.plants.stages import Amplifier
 from hysim.plants.structures.moving import ControlledStructure

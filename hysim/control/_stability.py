@@ -46,10 +46,10 @@ import numpy.typing as npt
 
 from hysim._basics.frozen import FloatArray, check_positive
 from hysim.control._controller import Controller, Feedback, SampledController, limits_of
-from hysim.control._loop import RestingPlant, as_actuator, inverted, secant_gain, slopes
+from hysim.control._loop import RestingPlant, inverted, secant_gain, slopes
 from hysim.control._to_control import to_control
 from hysim.errors import SimulationError
-from hysim.plants.actuator import Actuator
+from hysim.plants.actuator import Actuator, as_actuator
 from hysim.plants.stages import Sensor
 
 _FREQUENCIES = 300

@@ -19,13 +19,13 @@ import numpy as np
 from hysim._basics.frozen import FloatArray
 from hysim._basics.results import model_of
 from hysim.control._controller import PID
-from hysim.control._loop import as_actuator, is_controller
+from hysim.control._loop import is_controller
 from hysim.control._tracking import InverseFeedforward, TrackingController
 from hysim.errors import SimulationError
 from hysim.kernels import boucwen_inverse
 from hysim.laws.differential.boucwen_inverse import BoucWenInverse
 from hysim.models.protocols import CompiledController, Continuable, Remembering, positive_time
-from hysim.plants.actuator import Actuator
+from hysim.plants.actuator import Actuator, as_actuator
 from hysim.plants.chain import Chain, ChainState
 from hysim.plants.oscillator import BoucWenOscillator, OscillatorState
 from hysim.plants.sampled import sampled
