@@ -149,8 +149,8 @@ from hysim.plants.structures.parts import Rayleigh as Rayleigh
 from hysim.plants.structures.parts import ModalDamping as ModalDamping
 from hysim.plants.structures.structure import shear_frame as shear_frame
 from hysim.plants.structures.structure import StaticResponse as StaticResponse
-from hysim.plants.structures.spectrum import response_spectrum as response_spectrum
-from hysim.plants.structures.spectrum import ResponseSpectrum as ResponseSpectrum
+from hysim.plants.structures.structure import response_spectrum as response_spectrum
+from hysim.plants.structures.structure import ResponseSpectrum as ResponseSpectrum
 from hysim.plants.transfer_function import TransferFunction as TransferFunction
 from hysim.plants.transfer_function import StateSpace as StateSpace
 from hysim.plants.transfer_function import Modes as Modes

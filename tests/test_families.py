@@ -28,7 +28,7 @@ ALLOWED: dict[tuple[str, ...], tuple[str, ...]] = {
     ("plants/oscillator.py",): ("BoucWen", "PolynomialBoucWen"),
     ("plants/oscillator_structure.py",): ("BoucWen",),
     # What is linear, or is linearised, has a line in place of a law, and a viscous part is moved exactly.
-    ("control/", "plants/chain.py", "plants/multi_input_actuator.py", "plants/structures/spectrum.py"): ("Line",),
+    ("control/", "plants/chain.py", "plants/multi_input_actuator.py", "plants/structures/structure.py"): ("Line",),
     ("plants/structures/parts.py",): ("Dashpot", "Line"),
     # The filter of small reversals is what a fit of a noisy input has in front of any law.
     ("identification/_assumptions.py", "identification/_measured.py"): ("ReversalFilter",),

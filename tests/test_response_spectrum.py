@@ -7,7 +7,7 @@ import pytest
 from strategies import assert_refused, refused
 
 import hysim as hs
-from hysim.plants.structures import spectrum as module
+from hysim.plants.structures import structure as module
 
 DT, PERIODS = 0.02, np.array([0.1, 0.3, 0.7, 1.6])
 QUAKES = [hs.signals.ground_motion(3.0, duration=d, sample_time=DT, seed=k) for k, d in enumerate((6.0, 10.0))]

@@ -25,7 +25,7 @@ from hysim.models.protocols import Remembering, Responding, standing
 from hysim.plants.actuator import Actuator, as_actuator
 from hysim.plants.chain import Signals
 from hysim.plants.stages import Amplifier
-from hysim.plants.structures.moving import ControlledStructure
+from hysim.plants.structures.assembly import ControlledStructure
 from hysim.plants.structures.structure import Structure
 from hysim.records import even_step
 from hysim.simulation import columns_of, dataset_of_signals, frame_of_signals

@@ -11,7 +11,7 @@ from hysim._basics.prefixes import in_unit, label
 from hysim._basics.results import model_of
 from hysim.control import ClosedLoop
 from hysim.models.protocols import Responding
-from hysim.plants.structures.spectrum import ResponseSpectrum
+from hysim.plants.structures.structure import ResponseSpectrum
 from hysim.plot._style import MANY, MEASURED, POINTS, AxesArray, AxesLike, joined, line, one, several, upright
 from hysim.records import Record, as_record
 from hysim.simulation import Simulation, columns_of, free_run, has_elements

@@ -11,8 +11,7 @@ import numpy.typing as npt
 from hysim._basics.frozen import FloatArray, check_choice, checked, given_items, vectors
 from hysim._basics.results import model_of
 from hysim.plants.structures.ensemble import REDUCTIONS
-from hysim.plants.structures.spectrum import ground_records
-from hysim.plants.structures.structure import Structure
+from hysim.plants.structures.structure import Structure, ground_records
 
 Measure = Literal["rmse", "sse", "max_width", "area", "final", "response"]
 _WITH_TARGET = ("rmse", "sse")

@@ -30,7 +30,7 @@ from hysim.errors import SimulationError
 from hysim.models.parameters import Coordinate, free_coordinate, space_of
 from hysim.models.protocols import Subject
 from hysim.models.search_space import ALL_FREE, Freedom, Parameters, SearchSpace
-from hysim.plants.structures.moving import MovingStructure
+from hysim.plants.structures.assembly import MovingStructure
 from hysim.plants.structures.parts import OF_ELEMENTS, OF_NODES, expanded, is_shared, scalars_of, sharing, unknown
 from hysim.records import Record, check_increasing, even_step, span_of
 
