@@ -26,8 +26,8 @@ import numpy.typing as npt
 
 from hysim._basics.frozen import FloatArray, read_only
 from hysim.laws.differential.boucwen import BoucWen
-from hysim.plants.equation_of_motion import decimated, interpolated
 from hysim.plants.oscillator import BoucWenOscillator
+from hysim.plants.oscillator_structure import decimated, interpolated
 from hysim.records import Record
 from hysim.signals import multisine
 

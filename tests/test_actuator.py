@@ -10,7 +10,7 @@ from strategies import assert_refused, bounded_laws, refused, short_inputs
 
 import hysim as hs
 from hysim.kernels.stepping import drive
-from hysim.plants.sampled import sampled, vibration_stage
+from hysim.plants.stages import sampled, vibration_stage
 
 MODE = hs.TransferFunction(num=(0.3, 1.0), den=(1.0, 0.4, 2.0), delay=0.13)
 LAW = hs.BoucWen(n=1.5, gain=0.5, feedthrough=1.0, offset=0.2)

@@ -5,7 +5,7 @@ import pytest
 from strategies import needs_compiled, refused
 
 import hysim as hs
-from hysim.plants.equation_of_motion import decimated
+from hysim.plants.oscillator_structure import decimated
 
 # Eight of the 153 000 samples of the published, noise-free sine-sweep output (Noel and Schoukens 2016,
 # doi 10.4121/12967592, file yval_sinesweep), read from the published pair and printed with 17 digits.

@@ -14,7 +14,7 @@ from hysim.discovery import discover
 from hysim.discovery._hidden_memory import Oscillator, Response
 from hysim.discovery._oscillator import Search, _Fitted, _tried
 from hysim.laws.differential.terms import RELAXATION, Term, bouc_wen_terms, power_term
-from hysim.plants.equation_of_motion import linear_plant
+from hysim.plants.oscillator_structure import linear_plant
 
 STEP = 1.0 / 750.0
 PLANT = {"mass": 2.0, "damping": 10.0, "stiffness": 5e4}

@@ -8,7 +8,7 @@ from strategies import COMPILED, assert_refused, needs_compiled, refused
 
 import hysim as hs
 from hysim.models.search_space import Freedom
-from hysim.plants.equation_of_motion import decimated, interpolated, interpolated_record
+from hysim.plants.oscillator_structure import decimated, interpolated, interpolated_record
 
 TRUTH = {"mass": 2.0, "damping": 10.0, "stiffness": 5e4, "A": 5e4, "beta": 800.0, "gamma": -300.0, "n": 1.0}
 STEP = 1.0 / 750.0

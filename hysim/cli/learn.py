@@ -200,7 +200,7 @@ def calls() -> dict[str, Callable[[], object]]:
 
     from hysim.models.model import candidates
     from hysim.models.protocols import Invertible, needs_time
-    from hysim.plants.equation_of_motion import METHODS
+    from hysim.plants.oscillator_structure import METHODS
 
     u, record = np.sin(np.linspace(0.0, 13.0, 200)), hs.datasets.table1()
     t = 0.01 * np.arange(u.size)

@@ -39,7 +39,7 @@ import numpy.typing as npt
 from hysim._basics.frozen import Count, FloatArray, NotNegative, Positive, check_count, check_positive
 from hysim.control._controller import Feedback
 from hysim.models.model import family
-from hysim.plants.sampled import sampled, vibration_stage
+from hysim.plants.stages import sampled, vibration_stage
 from hysim.plants.transfer_function import mode
 
 

@@ -28,8 +28,7 @@ from hysim.models.protocols import CompiledController, Continuable, Remembering,
 from hysim.plants.actuator import Actuator, as_actuator
 from hysim.plants.chain import Chain, ChainState
 from hysim.plants.oscillator import BoucWenOscillator, OscillatorState
-from hysim.plants.sampled import sampled
-from hysim.plants.stages import Sensor
+from hysim.plants.stages import Sensor, sampled
 from hysim.plants.transfer_function import TransferFunction
 
 Rule = Callable[[float, FloatArray, FloatArray, Any], FloatArray]
@@ -230,7 +229,7 @@ def _continuous(actuator: Actuator) -> Any:
 
 
 def _discrete(actuator: Actuator, sample_time: float) -> Any:
-    """The linear chain of `hysim.plants.sampled`, its held values in a chain of further states."""
+    """The linear chain of `hysim.plants.stages`, its held values in a chain of further states."""
     import control
 
     linear, delay = actuator.linear(sample_time)

@@ -3,9 +3,9 @@
     m y'' + c y' + k y + z = u,    z' = sum of coefficients times terms in (y', z)
 
 For given coefficients z follows from y by integration, so that no noise is differentiated. Both sides of the equation
-of motion are filtered alike (`hysim.plants.equation_of_motion`); m, c and k are projected out, and a Gauss-Newton step
-is a regression on the slopes of z. Only the curvature of the memory distinguishes A from k: the descent begins from
-several shares of the stiffness. Noise lengthens the path of y, a bias of about a percent; a simulation refines it.
+of motion are filtered alike (`hysim.plants.oscillator_structure`); m, c and k are projected out, and a Gauss-Newton
+step is a regression on the slopes of z. Only the curvature of the memory distinguishes A from k: the descent begins
+from several shares of the stiffness. Noise lengthens the path of y, a bias of about a percent; a simulation refines it.
 
 **The regression** is that of an oscillator's output on the terms of its memory, the plant projected out. Columns are
 scaled so that the coefficients of all terms together have standard errors of one: a threshold is then a number of
@@ -40,9 +40,8 @@ from hysim.identification.marquardt import Schedule, SumOfSquares, descend
 from hysim.kernels import memory_terms as kernels
 from hysim.laws.differential.terms import RELAXATION, Term, bouc_wen_terms, memory_terms, symmetric
 from hysim.metrics.criteria import information
-from hysim.plants.equation_of_motion import Filter, Linear, Motion, filtering, interpolated
 from hysim.plants.oscillator import ATTEMPTS, attracting_state
-from hysim.plants.oscillator_structure import OscillatorStructure
+from hysim.plants.oscillator_structure import Filter, Linear, Motion, OscillatorStructure, filtering, interpolated
 from hysim.records import Record
 
 FLOOR = 1e-5  # of the rms output: smaller residuals are no evidence of a term

@@ -37,9 +37,8 @@ from hysim.identification import identify
 from hysim.laws.differential.boucwen import BoucWen
 from hysim.laws.differential.terms import RELAXATION, Term, bouc_wen_exponent, bouc_wen_terms, law_text
 from hysim.metrics.criteria import information
-from hysim.plants.equation_of_motion import Linear, linear_plant
 from hysim.plants.oscillator import BoucWenOscillator
-from hysim.plants.oscillator_structure import OscillatorStructure
+from hysim.plants.oscillator_structure import Linear, OscillatorStructure, linear_plant
 from hysim.plants.transfer_function import TransferFunction
 from hysim.records import Record, several
 

@@ -28,8 +28,7 @@ from hysim.kernels.stepping import Start, Step, complete
 from hysim.models.law import Law
 from hysim.models.protocols import Startable, Stepwise, needs_time, standing
 from hysim.plants.actuator import as_stepwise
-from hysim.plants.sampled import Vibration
-from hysim.plants.stages import Amplifier, Creep
+from hysim.plants.stages import Amplifier, Creep, Vibration
 
 _ANNOTATED = MappingProxyType({"float": Scalar.DOUBLE, "int": Scalar.INT, "bool": Scalar.BOOL})
 _VECTORS = Vector(), Vector()

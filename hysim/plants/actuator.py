@@ -16,8 +16,7 @@ from hysim.models.model import family
 from hysim.models.protocols import CompiledLaw, Startable, law_at, needs_time, placed
 from hysim.plants.actuator_structure import ActuatorStructure
 from hysim.plants.chain import Chain, ChainState, Stages, linear_chain
-from hysim.plants.sampled import Stage, Vibration
-from hysim.plants.stages import Amplifier, Creep, Sensor
+from hysim.plants.stages import Amplifier, Creep, Sensor, Stage, Vibration
 from hysim.plants.transfer_function import TransferFunction, linear_plant
 from hysim.records import Record
 

@@ -16,9 +16,8 @@ from hysim.kernels import loop as kernels
 from hysim.laws.static import Line
 from hysim.models.compiled_step import startable
 from hysim.models.protocols import CompiledController, CompiledLaw, Startable, law_at, positive_time
-from hysim.plants import sampled as linear
-from hysim.plants.sampled import Stage, Vibration
-from hysim.plants.stages import Amplifier, Creep, Sensor
+from hysim.plants import stages as linear
+from hysim.plants.stages import Amplifier, Creep, Sensor, Stage, Vibration
 
 _chain_step = functools.lru_cache(maxsize=256)(kernels.chain_step)
 _chain_start = functools.lru_cache(maxsize=256)(kernels.chain_start)

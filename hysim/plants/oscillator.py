@@ -47,9 +47,8 @@ from hysim.laws.differential.boucwen import BoucWen
 from hysim.laws.differential.polynomial_boucwen import PolynomialBoucWen
 from hysim.models.model import family
 from hysim.models.protocols import needed_time, positive_time
-from hysim.plants.equation_of_motion import METHODS as METHODS
-from hysim.plants.equation_of_motion import Excitation, Method
-from hysim.plants.oscillator_structure import OscillatorStructure
+from hysim.plants.oscillator_structure import METHODS as METHODS
+from hysim.plants.oscillator_structure import Excitation, Method, OscillatorStructure
 
 ATTEMPTS = (16, 32, 64, 128, 256)  # periods gone through before each search for a fixed point, and before giving up
 MARGIN = 1e-5  # below 1, of a multiplier that attracts: differences find it to about 1e-6
