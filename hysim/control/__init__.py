@@ -17,10 +17,9 @@ from hysim.control._controller import PID, Controller, begun, held_samples, prev
 from hysim.control._filters import DampingLoop, ModeInverse, Notch, Shaper
 from hysim.control._learning import IterativeLearning, LearnedTrials, RepetitiveControl
 from hysim.control._loop import ClosedLoop, RestingPlant, close_loop, secant_gain, slopes
-from hysim.control._predictive import PredictiveControl
 from hysim.control._stability import LinearLoop, bandwidth, later
 from hysim.control._to_control import to_control
-from hysim.control._tracking import AdaptiveInverse, InverseFeedforward, TrackingController
+from hysim.control._tracking import AdaptiveInverse, InverseFeedforward, PredictiveControl, TrackingController
 from hysim.control._tune import LinearController, Trial, Tuning, loop_shaping, tune
 from hysim.plants.actuator import as_actuator
 

@@ -128,6 +128,10 @@ class SteppedController(ABC):
         """Samples by which the reference must be known ahead of its time."""
         return 0
 
+    def scratch(self, sample_time: float) -> int:
+        """Elements at the end of the state that a step writes before it reads them."""
+        return 0
+
     def initial(self, sample_time: float, u: float | None = None, y: float = 0.0) -> CompiledController:
         """State to `step` from, at rest at a command and a displacement; ValueError for a bad sample time [s].
 

@@ -18,11 +18,9 @@ import numpy as np
 
 from hysim._basics.frozen import FloatArray
 from hysim._basics.results import model_of
-from hysim.control._controller import PID
+from hysim.control._controller import PID, SteppedController
 from hysim.control._loop import is_controller
-from hysim.control._tracking import InverseFeedforward, TrackingController
 from hysim.errors import SimulationError
-from hysim.kernels import boucwen_inverse
 from hysim.laws.differential.boucwen_inverse import BoucWenInverse
 from hysim.models.protocols import CompiledController, Continuable, Remembering, positive_time
 from hysim.plants.actuator import Actuator, as_actuator
@@ -89,7 +87,8 @@ def controller_system(controller: Any, sample_time: float) -> Any:
     compiled = CompiledController(*controller.compiled(sample_time, 0.0, 0.0))
     at_rest = compiled.state
     carried = np.isfinite(at_rest)  # other places are written before they are read
-    carried[at_rest.size - _scratch(controller, sample_time) :] = False
+    if isinstance(controller, SteppedController):
+        carried[at_rest.size - controller.scratch(sample_time) :] = False
 
     def stepped(x: FloatArray, inputs: FloatArray) -> tuple[float, FloatArray]:
         state = at_rest.copy()
@@ -142,18 +141,6 @@ def _memory_names(law: Any, state: FloatArray) -> list[str]:
     size = len(law.advance(state[:1])[1]) if remembers else state.size
     others = ["z"] if size == 2 else [f"z[{i}]" for i in range(size - 1)]
     return ["v", *others][:size]
-
-
-def _scratch(controller: Any, sample_time: float) -> int:
-    """How many elements at the end of a controller's state are room for the charts of a Bouc-Wen law."""
-    forward = controller.feedforward if isinstance(controller, TrackingController) else controller
-    if not isinstance(forward, InverseFeedforward):
-        return 0
-    block = forward.block(sample_time, 0.0)
-    if block.step is not boucwen_inverse.step:
-        return 0
-    creeping = 0 if forward.creep is None else len(forward.creep.weights)
-    return block.state.size - creeping - boucwen_inverse.N_OWN - 2  # behind the law's input and memory
 
 
 def to_control(plant: Any, sample_time: float | None = None) -> Any:
