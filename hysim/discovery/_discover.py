@@ -138,12 +138,9 @@ def discover(
     check(optimizer)
     if route == "oscillator":
         raise ValueError("an oscillator has its own verb: hs.discover_oscillator(record)")
-    for name, value, allowed in (
-        ("route", route, ("auto", "memory", "output")),
-        ("derivative", derivative, ("auto", *FORMS)),
-        ("initial", initial, ("auto", "free", "rest")),
-    ):
-        check_choice(name, value, allowed)
+    check_choice("route", route, ("auto", "memory", "output"))
+    check_choice("derivative", derivative, ("auto", *FORMS))
+    check_choice("initial", initial, ("auto", "free", "rest"))
     of_memory, *of_output = (
         replace(each, rests=_rests(initial, each, records)) for each in _libraries(route, library, degree, symmetry)
     )

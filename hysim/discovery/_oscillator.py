@@ -27,7 +27,7 @@ from typing import NamedTuple
 import numpy as np
 
 from hysim import metrics, signals
-from hysim._basics.frozen import FloatArray, check_positive
+from hysim._basics.frozen import FloatArray, Positive, checked, items
 from hysim._basics.progress import Progress, Reports, reports
 from hysim.discovery._hidden_memory import PLANT, SPRING, HiddenMemory, Oscillator, Response, State, TermRegression
 from hysim.discovery._judgement import HYSTERESIS, LAG, NO_STRUCTURE, signed_area
@@ -491,7 +491,8 @@ def discover_oscillator(
     """
     records = several(record_or_records, "discover_oscillator")
     library = HiddenMemory.library(degree, symmetry)
-    known = _known_plant({"mass": mass, "damping": damping, "stiffness": stiffness})
+    parts = items(_KnownPlant(mass=mass, damping=damping, stiffness=stiffness))
+    known = {name: value for name, value in parts.items() if value is not None}
     chosen = _structure(records, structure)
     others = () if structure is not None or chosen.period is None else (replace(chosen, hold="foh"),)
     search = Search(Response(chosen, records, known), library, seed, progress or (lambda done, total: None))
@@ -519,18 +520,13 @@ def _structure(records: Sequence[Record], structure: OscillatorStructure | None)
     return structure
 
 
-def _known_plant(plant: Mapping[str, float | None]) -> dict[str, float]:
-    known = {}
-    for name, value in plant.items():
-        if value is None:
-            continue
-        if isinstance(value, bool) or not isinstance(value, (int, float, np.number)):
-            raise TypeError(f"{name} must be a number, got {value!r}")
-        if not np.isfinite(value):
-            raise ValueError(f"{name} must be finite, got {value}")
-        known[name] = float(value)
-    check_positive(mass=known.get("mass"))
-    return known
+@checked
+class _KnownPlant:
+    """Parts of the plant that the user knows."""
+
+    mass: Positive | None
+    damping: float | None
+    stiffness: float | None
 
 
 def _period(u: FloatArray) -> int | None:
