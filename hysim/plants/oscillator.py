@@ -80,12 +80,9 @@ def attracting_state(period: Period, state: FloatArray, scale: FloatArray, toler
     try:
         start = state / units
         before = change(start)
-        solution = _newton(change, start, before, tolerance)
+        x, slopes, multipliers = _newton(change, start, before, tolerance)
     except (SimulationError, np.linalg.LinAlgError):
         return None
-    if solution is None:
-        return None
-    x, slopes, multipliers = solution
     is_near = np.linalg.norm(before - slopes @ (start - x)) <= _PREDICTED * np.linalg.norm(before)
     sizes = np.abs(multipliers[_moves(multipliers)])
     if is_near and np.all(sizes < 1.0 - MARGIN):
@@ -98,10 +95,8 @@ def attracting_state(period: Period, state: FloatArray, scale: FloatArray, toler
     return None
 
 
-def _newton(
-    change: Period, x: FloatArray, mismatch: FloatArray, tolerance: float
-) -> tuple[FloatArray, FloatArray, FloatArray] | None:
-    """Fixed point, J - I and the multipliers there."""
+def _newton(change: Period, x: FloatArray, mismatch: FloatArray, tolerance: float) -> tuple[FloatArray, ...]:
+    """Fixed point, J - I and the multipliers there; SimulationError if the mismatch does not fall."""
     for _ in range(_MOST_STEPS):
         slopes = np.column_stack([(change(x + _DIFFERENCE * axis) - mismatch) / _DIFFERENCE for axis in np.eye(3)])
         multipliers, modes = np.linalg.eig(slopes + np.eye(3))
@@ -114,9 +109,9 @@ def _newton(
             if np.linalg.norm(trial) < np.linalg.norm(mismatch):
                 break
         else:
-            return None
+            break
         x, mismatch = x + share * step, trial
-    return None
+    raise SimulationError("Newton's method finds no steady motion")
 
 
 def _moves(multipliers: FloatArray) -> np.ndarray:
