@@ -74,15 +74,16 @@ def columns_through(
     values, of_parts = _distinct(parts, n_sets)
     chains = [_chain(stages(each), step) for each in values]
     drives = [_voltage(chain, record.u) for chain in chains]
+    first = [next(j for j, other in enumerate(drives) if np.array_equal(drive, other)) for drive in drives]
+    pairs, which = np.unique(np.stack([of_parts, of_law], axis=1), axis=0, return_inverse=True)
     blocks: dict[tuple[int, int], FloatArray] = {}
-    for drive, mine in _by_drive(drives, of_law, of_parts):
+    for drive in sorted({first[part] for part in of_parts}):
+        mine = sorted({k for part, k in pairs.tolist() if first[part] == drive})
         chosen = {name: np.array([own[k][name] for k in mine]) for name in shape}
         columns = law.regressors(chosen, Record(u=drives[drive], y=drives[drive], t=_times(drives[drive], record)))
         columns = np.broadcast_to(columns, (len(mine), *columns.shape[1:]))
         blocks |= {(drive, k): np.ascontiguousarray(block.T) for k, block in zip(mine, columns, strict=True)}
-    first = _first_of_equal(drives)
     n_columns = len(next(iter(blocks.values())))
-    pairs, which = np.unique(np.stack([of_parts, of_law], axis=1), axis=0, return_inverse=True)
     out = np.empty((len(pairs), n_columns, len(record)))
 
     def work(start: int, stop: int) -> None:
@@ -130,16 +131,6 @@ def _voltage(chain: Chain, u: FloatArray) -> FloatArray:
 
 def _times(drive: FloatArray, record: Record) -> FloatArray:
     return record.sample_time * len(record) / drive.size * np.arange(float(drive.size))
-
-
-def _first_of_equal(drives: list[FloatArray]) -> list[int]:
-    return [next(j for j, other in enumerate(drives) if np.array_equal(drive, other)) for drive in drives]
-
-
-def _by_drive(drives: list[FloatArray], of_law: Rows, of_parts: Rows) -> list[tuple[int, list[int]]]:
-    first = np.array(_first_of_equal(drives))
-    pairs = {(int(drive), int(k)) for drive, k in zip(first[of_parts], of_law, strict=True)}
-    return [(drive, sorted(k for d, k in pairs if d == drive)) for drive in sorted({drive for drive, _ in pairs})]
 
 
 def as_points(space: SearchSpace, known: Sequence[Mapping[str, float]]) -> FloatArray:
