@@ -78,8 +78,7 @@ class Steinmetz:
         """
         arrays = {"frequency": frequency, "amplitude": amplitude, "loss": loss}
         columns = [read_only(values, name) for name, values in arrays.items()]
-        for name, column in zip(arrays, columns, strict=True):
-            check_positive(**{name: float(column.min(initial=math.inf))})
+        check_positive(**{name: float(each.min(initial=math.inf)) for name, each in zip(arrays, columns, strict=True)})
         f, B, P = (np.log(column).ravel() for column in np.broadcast_arrays(*columns))
         (ln_k, alpha, beta), _, rank, _ = np.linalg.lstsq(np.column_stack([np.ones(f.size), f, B]), P)
         if rank < 3:

@@ -40,8 +40,6 @@ def minor_loops(result: InputOutput, ax: Axes | None = None, *, tolerance: float
     """
     (result,) = drawable((result,), "minor_loops")
     cycles = _cycles_up_and_down(result.u, tolerance)
-    if not cycles:
-        raise ValueError("the input is constant: there is no loop to draw")
     by_size = dict(sorted(cycles.items(), key=lambda cycle: -cycle[1]))
     amplitude = in_unit("Amplitude", units_of(result).get("u", ""))
     return _coloured(result, by_size, Normalize(0.0, max(cycles.values())), amplitude, ax)
@@ -63,8 +61,6 @@ def cycles(result: InputOutput, ax: Axes | None = None, *, tolerance: float = TO
     """
     (result,) = drawable((result,), "cycles")
     numbers = {place: float(k) for k, place in enumerate(_cycles_up_and_down(result.u, tolerance), 1)}
-    if not numbers:
-        raise ValueError("the input is constant: there is no loop to draw")
     return _coloured(result, numbers, Normalize(1.0, max(2.0, len(numbers))), "Cycle", ax)
 
 
@@ -167,6 +163,8 @@ def animate(
 def _cycles_up_and_down(u: FloatArray, tolerance: float) -> dict[tuple[int, int], float]:
     """First sample and stop of each rising branch with the falling one after it, and half the fall of the input."""
     branches = turns(u, tolerance).branches
+    if not branches:
+        raise ValueError("the input is constant: there is no loop to draw")
     rises = [float(u[branch.stop - 1] - u[branch.start]) for branch in branches]
     begins = [k for k, rise in enumerate(rises) if k == 0 or (rise > 0.0 and k + 1 < len(rises))]
     cycles = {}
