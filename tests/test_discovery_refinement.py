@@ -270,10 +270,10 @@ def test_a_number_within_two_standard_errors_of_zero_is_taken_out():
     names = ["u'", "u' z", "u' |z|", "|u'|", "|u'| z"]
     whole = free_run.refine(Terms(terms(names), rest=True), np.array([[1.0, 0.0, -0.3, 0.0, -0.6, 0.0]]))
     assert (np.sort(whole.significance)[:2] < 2.0).all()
-    small = pruned(free_run, whole, frozenset(), 1e-12)
+    small = pruned(free_run, whole, frozenset())
     assert small.structure.terms == terms(["u'", "u' |z|", "|u'| z"])
     assert (small.significance >= 2.0).all()
-    assert pruned(free_run, small, frozenset(), 1e-12) is small
+    assert pruned(free_run, small, frozenset()) is small
 
 
 @pytest.mark.parametrize(("rests", "starts"), [((False,), 2), ((False, True), 0)])

@@ -116,9 +116,7 @@ class InverseFeedforward(WithoutFeedback):
         step = _with_inverse(kernels.invert, inverse)
         return CompiledController(step, read_only(parameters, finite=False), np.append(u0, state))
 
-    def block(
-        self, sample_time: float, u0: float, commands: tuple[float, float] = (-math.inf, math.inf)
-    ) -> CompiledLaw:
+    def block(self, sample_time: float, u0: float, commands: Interval = (-math.inf, math.inf)) -> CompiledLaw:
         """Compiled inverse at rest at the command `u0`, for commands within these limits."""
         amplifier, law = self.amplifier or Amplifier(), Line(slope=1.0) if self.law is None else self.law
         lowest, highest = sorted(amplifier.voltage(commands).tolist())

@@ -70,10 +70,9 @@ def verdict(terms: Iterable[Term]) -> str:
     return HYSTERESIS if present - {SPRING} else NO_STRUCTURE
 
 
-def model(
-    plant: Mapping[str, float], law: Mapping[Term, float], structure: OscillatorStructure, state: State
-) -> Model | None:
+def model(oscillator: Oscillator, structure: OscillatorStructure, state: State) -> Model | None:
     """Model of an oscillator that begins in a state; None if hysim has no such model."""
+    plant, law = oscillator
     kind, n = verdict(law), bouc_wen_exponent(law)
     if kind == LAG:
         return _lag(plant, law[RELAXATION], law.get(SPRING, 0.0), structure.hold, state)
@@ -81,10 +80,10 @@ def model(
         return None
     A, dissipative, conservative = (law.get(term, 0.0) for term in bouc_wen_terms(n or 1.0))
     shape = {"A": A, "beta": -dissipative, "gamma": -conservative, "n": n or 1.0}
-    oscillator: BoucWenOscillator = structure.assemble({**plant, **shape})
+    at_rest: BoucWenOscillator = structure.assemble({**plant, **shape})
     if not any(state):
-        return oscillator
-    return replace(oscillator, initial_state=state[:2], law=replace(oscillator.law, z0=state.z))
+        return at_rest
+    return replace(at_rest, initial_state=state[:2], law=replace(at_rest.law, z0=state.z))
 
 
 def diverges(oscillator: Model | None, y: FloatArray) -> bool:
@@ -141,7 +140,7 @@ class _Fitted(NamedTuple):
     @property
     def diverges(self) -> bool:
         response = self.search.response
-        return diverges(model(*self.oscillator, response.structure, State(0.0, 0.0, 0.0)), response.widest)
+        return diverges(model(self.oscillator, response.structure, State(0.0, 0.0, 0.0)), response.widest)
 
 
 class _Tried(NamedTuple):
@@ -339,7 +338,7 @@ class Search(NamedTuple):
         coefficients = _by_name(law)
         inclusion = _by_name(regression.inclusion(np.random.default_rng(self.seed), N_DRAWS))
         states = response.initial_states(fitted.oscillator)
-        models = [model(plant, law, response.structure, state) for state in states]
+        models = [model(fitted.oscillator, response.structure, state) for state in states]
         nothing = (_NO_MODEL,) if models[0] is None else ()
         warnings = (*nothing, *warnings, *fitted.warnings, *_warnings(tried, inclusion))
         free_exponent = {"n": bouc_wen_exponent(law) or np.nan} if "n" in fitted.stderr else {}

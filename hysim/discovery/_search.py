@@ -321,9 +321,7 @@ def preferred(candidates: Sequence[Candidate[Terms]], letter: str) -> Candidate[
     return min(rivals, key=lambda c: (c.n_parameters, not is_plain(c.structure, letter), c.bic))
 
 
-def pruned(
-    free_run: FreeRun, candidate: Candidate[Terms], required: frozenset[str], tolerance: float
-) -> Candidate[Terms]:
+def pruned(free_run: FreeRun, candidate: Candidate[Terms], required: frozenset[str]) -> Candidate[Terms]:
     structure = candidate.structure
     for k in np.argsort(candidate.significance).tolist():
         smaller = structure.of(structure.names[:k] + structure.names[k + 1 :])
@@ -334,9 +332,9 @@ def pruned(
             continue
         start = np.delete(candidate.unknowns, k)
         worst = free_run.cost_of(candidate.bic + INDISTINCT, candidate.n_parameters - 1)
-        refined = free_run.refine(smaller, start[np.newaxis], tolerance=tolerance, hopeless=worst)
+        refined = free_run.refine(smaller, start[np.newaxis], tolerance=POLISH, hopeless=worst)
         if refined and refined.bic <= candidate.bic + INDISTINCT and refined.settles() >= candidate.settles():
-            return pruned(free_run, refined, required, tolerance)
+            return pruned(free_run, refined, required)
     return candidate
 
 
@@ -531,7 +529,7 @@ def _on_all_samples(free_run: FreeRun, search: Search, library: Library, seed: i
     restarted = _restarted(search.free_run, search.tried[chosen.structure] or chosen, seed, restarts)
     starts = np.stack([chosen.unknowns, restarted.unknowns])
     polished = free_run.refine(chosen.structure, starts, tolerance=POLISH) or chosen
-    return pruned(free_run, polished, search.required, POLISH)
+    return pruned(free_run, polished, search.required)
 
 
 def _restarted(free_run: FreeRun, chosen: Candidate[Terms], seed: int, restarts: int) -> Candidate[Terms]:
@@ -560,9 +558,7 @@ def shifted(slopes: Slopes, terms: tuple[Term, ...], *, feedthrough: bool, offse
     return tuple(Start(slopes.regression(terms, *place), *place) for place in dict.fromkeys(chosen))
 
 
-def or_any_exponent(
-    free_run: FreeRun, of_memory: Outcome, chosen: Outcome
-) -> Candidate[Terms] | Candidate[AnyExponent]:
+def or_any_exponent(free_run: FreeRun, of_memory: Outcome, chosen: Outcome) -> Candidate[Any]:
     """The chosen law, or the Bouc-Wen law of any exponent where its BIC is lower; `of_memory` is the outcome for z."""
     thin, best = of_memory.search.free_run, chosen.searched
     if chosen.candidate.cost < free_run.n_samples * ALIKE**2:

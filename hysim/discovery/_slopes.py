@@ -193,12 +193,12 @@ class Rows:
     window: FloatArray | None = None
     stride: int = 1
 
-    def columns(self, feature: Feature, feedthrough: float = 0.0, offset: float = 0.0) -> FloatArray:
+    def columns(self, feature: Feature, feedthrough: float, offset: float) -> FloatArray:
         """Right side, shape (n_rows, n_terms)."""
         values = feature(self.u, self.y - feedthrough * self.u - offset, self.direction)
         return self._summed(values * self.length[:, np.newaxis])
 
-    def target(self, feedthrough: float = 0.0) -> FloatArray:
+    def target(self, feedthrough: float) -> FloatArray:
         """Left side for z = y - feedthrough u, shape (n_rows,)."""
         return self.slope - feedthrough * self._summed((self.direction * self.length)[:, np.newaxis])[:, 0]
 
@@ -330,9 +330,7 @@ class Slopes:
 
     rows: tuple[Rows, ...]
 
-    def equations(
-        self, features: Feature, feedthrough: float = 0.0, offset: float = 0.0
-    ) -> tuple[FloatArray, FloatArray]:
+    def equations(self, features: Feature, feedthrough: float, offset: float) -> tuple[FloatArray, FloatArray]:
         """Right sides (n_rows, n_terms) and left side (n_rows,) for z = y - feedthrough u - offset."""
         columns = np.concatenate([rows.columns(features, feedthrough, offset) for rows in self.rows])
         return columns, np.concatenate([rows.target(feedthrough) for rows in self.rows])

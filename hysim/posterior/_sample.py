@@ -19,7 +19,7 @@ from hysim.identification.likelihood import Problem, again, density, optima
 from hysim.metrics.rows import LoopRows
 from hysim.models.protocols import needs_time
 from hysim.posterior._sampler import Chains, effective_samples, sampled, split_rhat
-from hysim.posterior._target import Given, Target, check_names, given, target
+from hysim.posterior._target import Given, Target, check_names, given, linear, searched
 from hysim.records import Record, even_step, several
 
 LARGEST_RHAT = 1.05
@@ -421,7 +421,9 @@ def posed(
     if kind.name != "gaussian" and np.unique(fit.weights[fit.weights > 0.0]).size > 1:
         raise ValueError(f'samples of different weights are for noise="gaussian", got {kind.name!r}')
     check_names(problem, fit.free_names, priors)
-    posterior = target(problem, kind, priors, records[0].resolution, factor)
+    quantum = records[0].resolution if kind.name == "quantised" else None
+    v_prior, b_prior = searched(problem, priors, quantum, factor), linear(problem, priors, factor)
+    posterior = Target(problem.close(), kind, v_prior, b_prior)
     posterior.begin_at(optima(fit, problem, bounds, initial), fit.sigma)
     return posterior
 

@@ -546,15 +546,3 @@ class Target:
             return e, np.zeros(len(e))
         triangle, best = self._regression(parts, sigma)
         return solved_within(triangle, best, e, *self.b_prior.ends(parts.units))
-
-
-def target(
-    problem: Problem, noise: Noise, priors: Mapping[str, Given], quantum: float | None, factor: float = 1.0
-) -> Target:
-    """The posterior of a problem; `factor` enlarges every box but that of sigma."""
-    return Target(
-        problem=problem.close(),
-        noise=noise,
-        v_prior=searched(problem, priors, quantum if noise.name == "quantised" else None, factor),
-        b_prior=linear(problem, priors, factor),
-    )
