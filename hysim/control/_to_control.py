@@ -9,7 +9,6 @@ just before the new command u[k], so that no command reaches the output of its o
 answers to the inputs at once. Both are functions of their arguments alone, and states are counted from rest at u = 0.
 """
 
-import math
 from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
@@ -69,7 +68,7 @@ def oscillator_system(plant: BoucWenOscillator, sample_time: float | None) -> An
     def slope(t: float, x: FloatArray, u: FloatArray, params: Any) -> FloatArray:
         y, velocity, z = (x + start).tolist()
         force = weight * float(u[0]) - plant.damping * velocity - (float(elastic_force(y)) + law.gain * z)
-        against = law.gamma * velocity + law.beta * abs(velocity) * math.copysign(1.0, z)
+        against = law.gamma * velocity + law.beta * abs(velocity) * np.copysign(1.0, z)
         return np.array([velocity, force / plant.mass, law.A * velocity - abs(z) ** law.n * against])
 
     def update(t: float, x: FloatArray, u: FloatArray, params: Any) -> FloatArray:

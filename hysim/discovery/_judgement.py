@@ -23,7 +23,6 @@ The start of each record is never left out, since it determines the initial stat
 others do not count, unless all are. A slow trend of each record is taken out of every residual.
 """
 
-import itertools
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -192,7 +191,7 @@ def at_one_rate(record: Record) -> list[Samples]:
 
 
 def _crossings(record: Record, edges: FloatArray) -> list[list[float]]:
-    bands: list[list[float]] = [[] for _ in itertools.pairwise(edges)]
+    bands: list[list[float]] = [[] for _ in edges[1:]]
     for branch in record.branches(TOLERANCE):
         sign = 1.0 if branch.u[-1] > branch.u[0] else -1.0
         reached, first, count = np.unique(np.maximum.accumulate(sign * branch.u), return_index=True, return_counts=True)

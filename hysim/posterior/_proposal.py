@@ -29,7 +29,6 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-import numpy.typing as npt
 
 from hysim._basics.frozen import FloatArray
 from hysim.posterior._target import Target
@@ -341,7 +340,8 @@ def particles(target: Target, rng: np.random.Generator) -> tuple[FloatArray, Flo
         step = _next_power(value, 1.0 - power)
         power += step
         weight = np.exp(step * (value - value.max()))
-        chosen = _resampled(weight / weight.sum(), rng, len(v))
+        places = (np.arange(len(v)) + rng.random()) / len(v)
+        chosen = np.minimum(np.searchsorted(np.cumsum(weight / weight.sum()), places), len(v) - 1)
         v, value, prior = v[chosen], value[chosen], prior[chosen]
         v, value, prior = _settled(target, v, value, prior, power, rng)
         early = v if power <= _EARLY or not early.size else early
@@ -373,11 +373,6 @@ def _next_power(value: FloatArray, most: float) -> float:
         middle = 0.5 * (low + high)
         low, high = (middle, high) if _effective_share(middle * value) >= _HALF else (low, middle)
     return max(high, 1e-12)
-
-
-def _resampled(weight: FloatArray, rng: np.random.Generator, n: int) -> npt.NDArray[np.intp]:
-    places = (np.arange(n) + rng.random()) / n
-    return np.minimum(np.searchsorted(np.cumsum(weight), places), weight.size - 1)
 
 
 def moved(

@@ -15,7 +15,6 @@ that the store of a shard is one like all others, and stores are merged by enter
 """
 
 import inspect
-import math
 import time
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import FIRST_COMPLETED, CancelledError, Future, ProcessPoolExecutor, ThreadPoolExecutor, wait
@@ -303,7 +302,7 @@ class _Run:
         self.running: dict[Future[list[Rows]], int] = {}  # numbers of tasks
         self.sent, self.largest, self.seconds_a_task = 0, 0, 0.0
         self.done, self.n_chunks = self.total - self.places.size, 0
-        self.begin, self.busy, self.limit = time.monotonic(), workers.clock(), math.inf if limit is None else limit
+        self.begin, self.busy, self.limit = time.monotonic(), workers.clock(), np.inf if limit is None else limit
 
     def run(self) -> None:
         self.progress(self.done, self.total)
