@@ -203,11 +203,7 @@ def searched(problem: Problem, priors: Mapping[str, Given], quantum: float | Non
     if not np.isfinite([lower, upper]).all():
         name = space.coordinates[int(np.argmax(~np.isfinite(lower) | ~np.isfinite(upper)))]
         raise ValueError(f"{name!r} has no finite search box: pass priors={{{name!r}: (low, high)}}")
-    own = {
-        k: (named[name], _scale(problem, k))
-        for k, name in enumerate(space.coordinates)
-        if name in named and named[name].distribution is not None
-    }
+    own = {k: (named[space.coordinates[k]], _scale(problem, k)) for k in np.flatnonzero(fixed).tolist()}
     low, high = _ends_of_sigma(problem, priors.get(SIGMA), quantum)
     if SIGMA in priors and priors[SIGMA].distribution is not None:
         own[lower.size] = priors[SIGMA], Scale(1.0, 0.0, is_log=True)
