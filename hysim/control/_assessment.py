@@ -57,16 +57,15 @@ class LoopAssessment:
     closed: ClosedLoop
 
     def __str__(self) -> str:
-        return summary_text(
-            [f"LoopAssessment: {'stable' if self.stable else self.message}, tracking rms {self.tracking_rms:.4g}"],
-            {
-                "maximum sensitivity": f"{self.max_sensitivity:.4g}, with one sample more of delay "
-                f"{self.max_sensitivity_with_delay:.4g}",
-                "at a limit": f"{self.limited_percent:.3g} % of the samples",
-                "command": f"moves by {self.command_jump:.4g} when the measurement moves by one",
-                "period": "" if math.isnan(self.period) else quantity(self.period, "s"),
-            },
-        )
+        lines = [f"LoopAssessment: {'stable' if self.stable else self.message}, tracking rms {self.tracking_rms:.4g}"]
+        rows = {
+            "maximum sensitivity": f"{self.max_sensitivity:.4g}, with one sample more of delay "
+            f"{self.max_sensitivity_with_delay:.4g}",
+            "at a limit": f"{self.limited_percent:.3g} % of the samples",
+            "command": f"moves by {self.command_jump:.4g} when the measurement moves by one",
+            "period": "" if math.isnan(self.period) else quantity(self.period, "s"),
+        }
+        return summary_text(lines, rows)
 
     def row(self, quantum: float | None = None) -> dict[str, float | bool | None]:
         """The columns that a table should give with every reduction: numbers, None where one is infinite or unknown.
@@ -243,20 +242,19 @@ class HysteresisAssessment:
         what = "lag" if self.is_lag else "hysteresis"
         reduction = self.lag_reduction_percent if self.is_lag else self.hysteresis_reduction_percent
         drive, y = driven_by(self.closed), self.closed.units.get("y", "")
-        return summary_text(
-            [f"HysteresisAssessment: {what} reduction {reduction:.2f} %, tracking rms {self.tracking_rms:.4g}"],
-            {
-                "not stable": self.loop.message,
-                "width": f"open {self.open_width:.4g}, {drive} {quantity(self.closed_width, y)}",
-                "width without the memory": ""
-                if self.is_lag
-                else f"open {self.open_lag_width:.4g}, {drive} {quantity(self.lag_width, y)}",
-                "tracking rms": f"open {self.open_tracking_rms:.4g}, {drive} {quantity(self.tracking_rms, y)}",
-                "closure gap": quantity(self.closure_gap, y),
-                "secant gain": f"{self.secant_gain:.4g}",
-                "voltage": extent(self.closed.u, self.closed.units.get("u", "")),
-            },
-        )
+        lines = [f"HysteresisAssessment: {what} reduction {reduction:.2f} %, tracking rms {self.tracking_rms:.4g}"]
+        rows = {
+            "not stable": self.loop.message,
+            "width": f"open {self.open_width:.4g}, {drive} {quantity(self.closed_width, y)}",
+            "width without the memory": ""
+            if self.is_lag
+            else f"open {self.open_lag_width:.4g}, {drive} {quantity(self.lag_width, y)}",
+            "tracking rms": f"open {self.open_tracking_rms:.4g}, {drive} {quantity(self.tracking_rms, y)}",
+            "closure gap": quantity(self.closure_gap, y),
+            "secant gain": f"{self.secant_gain:.4g}",
+            "voltage": extent(self.closed.u, self.closed.units.get("u", "")),
+        }
+        return summary_text(lines, rows)
 
 
 @frozen_result
@@ -279,10 +277,8 @@ class StepAssessment:
     def __str__(self) -> str:
         u, y = (self.closed.units.get(signal, "") for signal in "uy")
         ends = f"from {self.closed.y[0]:.4g} to {quantity(self.closed.reference[-1], y)}"
-        return summary_text(
-            [f"StepAssessment {ends}, voltage {extent(self.closed.u, u)}", f"  {self.reduction}"],
-            {"at a limit": f"{self.loop.limited_percent:.3g} % of the samples", "not stable": self.loop.message},
-        )
+        rows = {"at a limit": f"{self.loop.limited_percent:.3g} % of the samples", "not stable": self.loop.message}
+        return summary_text([f"StepAssessment {ends}, voltage {extent(self.closed.u, u)}", f"  {self.reduction}"], rows)
 
 
 @frozen_result
@@ -311,14 +307,13 @@ class SquareWaveAssessment:
     loop: LoopAssessment
 
     def __str__(self) -> str:
-        return summary_text(
-            [
-                f"SquareWaveAssessment: tracking rms {self.tracking_rms:.4g}, open loop {self.open_tracking_rms:.4g}",
-                f"  peak excess {self.peak_excess_percent:.2f} %, open loop {self.open_peak_excess_percent:.2f} %",
-                "" if self.reduction is None else f"  {self.reduction}",
-            ],
-            {"not stable": self.loop.message},
-        )
+        lines = [
+            f"SquareWaveAssessment: tracking rms {self.tracking_rms:.4g}, open loop {self.open_tracking_rms:.4g}",
+            f"  peak excess {self.peak_excess_percent:.2f} %, open loop {self.open_peak_excess_percent:.2f} %",
+            "" if self.reduction is None else f"  {self.reduction}",
+        ]
+        rows = {"not stable": self.loop.message}
+        return summary_text(lines, rows)
 
 
 def driven_by(run: ClosedLoop) -> str:

@@ -366,10 +366,9 @@ class LearnedTrials:
 
     def __str__(self) -> str:
         first, last = quantity(self.rms[0]), quantity(self.rms[-1])
-        return summary_text(
-            [f"LearnedTrials: {self.rms.size} trials, rms error {first} in the first and {last} in the last"],
-            {"each trial": ", ".join(f"{value:.3g}" for value in self.rms), "condition": str(self.condition)},
-        )
+        lines = [f"LearnedTrials: {self.rms.size} trials, rms error {first} in the first and {last} in the last"]
+        rows = {"each trial": ", ".join(f"{value:.3g}" for value in self.rms), "condition": str(self.condition)}
+        return summary_text(lines, rows)
 
 
 @functools.lru_cache(maxsize=32)

@@ -82,19 +82,18 @@ class ClosedLoop:
         t, u, y = (self.units.get(signal, unit) for signal, unit in (("t", "s"), ("u", ""), ("y", "")))
         rms = float(np.sqrt(np.mean((self.reference - self.y) ** 2)))
         conditions = self.conditions
-        return summary_text(
-            [f"ClosedLoop: {self.t.size} samples to {quantity(self.t[-1], t)}, tracking rms {quantity(rms, y)}"],
-            {
-                "reference": extent(self.reference, y),
-                "displacement": extent(self.y, y),
-                "voltage": f"{extent(self.u, u)}, limited at {conditions.get('limited_samples', 'unknown')} samples",
-                "plant": in_brief(conditions["plant"]) if "plant" in conditions else "",
-                "controller": in_brief(conditions["controller"]) if "controller" in conditions else "",
-                "conditions": ", ".join(
-                    f"{name.replace('_', ' ')} {conditions[name]:.4g}" for name in _SHOWN if conditions.get(name)
-                ),
-            },
-        )
+        lines = [f"ClosedLoop: {self.t.size} samples to {quantity(self.t[-1], t)}, tracking rms {quantity(rms, y)}"]
+        rows = {
+            "reference": extent(self.reference, y),
+            "displacement": extent(self.y, y),
+            "voltage": f"{extent(self.u, u)}, limited at {conditions.get('limited_samples', 'unknown')} samples",
+            "plant": in_brief(conditions["plant"]) if "plant" in conditions else "",
+            "controller": in_brief(conditions["controller"]) if "controller" in conditions else "",
+            "conditions": ", ".join(
+                f"{name.replace('_', ' ')} {conditions[name]:.4g}" for name in _SHOWN if conditions.get(name)
+            ),
+        }
+        return summary_text(lines, rows)
 
     @property
     def columns(self) -> dict[str, FloatArray]:

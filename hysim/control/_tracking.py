@@ -125,11 +125,9 @@ class InverseFeedforward(WithoutFeedback):
         declines, weights = np.expm1(-sample_time / np.array(creep.time_constants)), np.array(creep.weights)
         scale = 1.0 / (creep.instant_gain - float(weights @ declines))
         head = [amplifier.gain, amplifier.offset, weights.size, scale]
-        return CompiledLaw(
-            inverse.step,
-            np.concatenate([head, weights, declines, inverse.parameters]),
-            np.concatenate([np.full(weights.size, inverse.state[1]), inverse.state]),
-        )
+        parameters = np.concatenate([head, weights, declines, inverse.parameters])
+        state = np.concatenate([np.full(weights.size, inverse.state[1]), inverse.state])
+        return CompiledLaw(inverse.step, parameters, state)
 
     def scratch(self, sample_time: float) -> int:
         """Room for the charts of a Bouc-Wen law."""

@@ -204,19 +204,18 @@ class Tuning:
 
     def __str__(self) -> str:
         bounds = "within" if self.success else "NOT within"
-        return summary_text(
-            [
-                f"Tuning: {type(self.controller).__name__} {bounds} its bounds, objective {self.objective:.4g} of the "
-                "reference's span"
-            ],
-            {
-                "controller": in_brief(self.controller),
-                "sensitivity": f"at most {self.max_sensitivity:.4g}",
-                "margins": f"gain {self.gain_margin:.4g}, phase {self.phase_margin:.4g} degrees",
-                "noise": f"{self.voltage_noise:.4g} rms of voltage" if self.voltage_noise else "",
-                "search": self.message,
-            },
-        )
+        lines = [
+            f"Tuning: {type(self.controller).__name__} {bounds} its bounds, objective {self.objective:.4g} of the "
+            "reference's span"
+        ]
+        rows = {
+            "controller": in_brief(self.controller),
+            "sensitivity": f"at most {self.max_sensitivity:.4g}",
+            "margins": f"gain {self.gain_margin:.4g}, phase {self.phase_margin:.4g} degrees",
+            "noise": f"{self.voltage_noise:.4g} rms of voltage" if self.voltage_noise else "",
+            "search": self.message,
+        }
+        return summary_text(lines, rows)
 
 
 def front(trials: Iterable[Trial]) -> tuple[Trial, ...]:

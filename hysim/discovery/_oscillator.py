@@ -281,12 +281,8 @@ class Search(NamedTuple):
         fixed = {"n": bouc_wen_exponent(terms) or 1.0} if terms else {}
         lacking = zip(_LAW, bouc_wen_terms(fixed.get("n", 1.0)), strict=True)
         fixed |= {name: 0.0 for name, term in lacking if terms and term not in (SPRING, *terms)}
-        fit = identify(
-            self.response.structure,
-            self.response.records,
-            fixed={**fixed, **self.response.known},
-            bounds={} if terms else {"n": _EXPONENTS},
-        )
+        response, bounds = self.response, {} if terms else {"n": _EXPONENTS}
+        fit = identify(response.structure, response.records, fixed={**fixed, **response.known}, bounds=bounds)
         numbers = fit.estimates
         law = dict(zip(_LAW, bouc_wen_terms(numbers["n"]), strict=True))
         coefficients = {

@@ -287,14 +287,10 @@ class FreeRun:
         def slopes(x: FloatArray, residual: FloatArray) -> FloatArray:
             return differences(residuals, x, residual, central=not is_ranked)
 
-        reached = descend(
-            SumOfSquares(residuals, slopes, lower / units, upper / units),
-            starts[[np.argmin(costs)]] / units,
-            relative=tolerance,
-            steps=int(max(_FEWEST_STEPS, min(affordable, _STEPS_TO_RANK if is_ranked else _STEPS))),
-            hopeless=hopeless,
-            schedule=_SCHEDULE,
-        )
+        problem = SumOfSquares(residuals, slopes, lower / units, upper / units)
+        begin = starts[[np.argmin(costs)]] / units
+        steps = int(max(_FEWEST_STEPS, min(affordable, _STEPS_TO_RANK if is_ranked else _STEPS)))
+        reached = descend(problem, begin, relative=tolerance, steps=steps, hopeless=hopeless, schedule=_SCHEDULE)
         x, residual = reached.x[0], reached.evaluated[0][0]
         unknowns = x * units
         first = [self._first(structure, unknowns[np.newaxis], k)[0] for k in range(len(self.records))]

@@ -156,20 +156,19 @@ class _Discovered(Stored, ABC):
     def __str__(self) -> str:
         scores = self.scores
         numbers = [f"{name} {value:.4g}{self._spread(name)}" for name, value in self._numbers.items()]
-        return summary_text(
-            [
-                f"{type(self).__name__}: {self.verdict}, fit {scores['fit_percent']:.2f} %, rmse {scores['rmse']:.4g}, "
-                f"{self.n_parameters} parameters",
-                f"  {self.equation}",
-                wrapped(numbers),
-            ],
-            {
-                "initial state": self._initial_state("{:.4g}"),
-                **self._rows(full=False),
-                "warnings": " ".join(self.warnings),
-                "search": self.message,
-            },
-        )
+        lines = [
+            f"{type(self).__name__}: {self.verdict}, fit {scores['fit_percent']:.2f} %, rmse {scores['rmse']:.4g}, "
+            f"{self.n_parameters} parameters",
+            f"  {self.equation}",
+            wrapped(numbers),
+        ]
+        rows = {
+            "initial state": self._initial_state("{:.4g}"),
+            **self._rows(full=False),
+            "warnings": " ".join(self.warnings),
+            "search": self.message,
+        }
+        return summary_text(lines, rows)
 
     def summary(self) -> str:
         """The result in a few lines."""

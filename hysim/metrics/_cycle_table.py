@@ -144,17 +144,16 @@ class CycleMetrics:
     def __str__(self) -> str:
         many = "1 cycle" if len(self) == 1 else f"{len(self)} cycles"
         known = self.equivalent_damping[~np.isnan(self.equivalent_damping)]
-        return summary_text(
-            [f"CycleMetrics: {many} from u = {self.level:.6g}, energy {self.energy.sum():.4g} in all"],
-            {
-                "amplitude": extent(self.amplitude),
-                "largest width": extent(self.max_width),
-                "energy": f"{extent(self.energy)} in a cycle, {self.energy_outside:.4g} outside of the cycles",
-                "stiffness": extent(self.secant_stiffness),
-                "damping": f"{extent(known)} of the critical" if known.size else "needs a positive stiffness",
-                "sign": self.sign_convention,
-            },
-        )
+        lines = [f"CycleMetrics: {many} from u = {self.level:.6g}, energy {self.energy.sum():.4g} in all"]
+        rows = {
+            "amplitude": extent(self.amplitude),
+            "largest width": extent(self.max_width),
+            "energy": f"{extent(self.energy)} in a cycle, {self.energy_outside:.4g} outside of the cycles",
+            "stiffness": extent(self.secant_stiffness),
+            "damping": f"{extent(known)} of the critical" if known.size else "needs a positive stiffness",
+            "sign": self.sign_convention,
+        }
+        return summary_text(lines, rows)
 
     @property
     def cumulative_energy(self) -> FloatArray:

@@ -150,24 +150,22 @@ class LoopMetrics:
         if self.crossings:
             loop = f"loop that crosses itself at u = {', '.join(quantity(at, u) for at in self.crossings)}"
         cycles = "the last cycle" if self.n_cycles == 1 else f"the mean of {self.n_cycles} cycles"
-        return summary_text(
-            [f"LoopMetrics: {loop}, {cycles}, largest width {quantity(self.max_width, y)}"],
-            {
-                "largest width": f"{quantity(self.max_width, y)} at u = {f'{self.max_width_at:.6g} {u}'.rstrip()}"
-                + (f", {100.0 * self.relative_width:.2f} % of the stroke" if self.stroke > 0.0 else ""),
-                "mean width": f"{quantity(self.mean_width, y)}, at mid span {quantity(self.mid_width, y)}",
-                "stroke": f"{quantity(self.stroke, y)} over u of {extent(self.u, u)}",
-                "area": f"{quantity(self.area, product)}, energy {quantity(self.energy, product)}",
-                "lobes": "; ".join(
-                    f"u of {extent((lobe.low, lobe.high), u)}: {lobe.orientation}, "
-                    f"area {quantity(lobe.area, product)}, width {quantity(lobe.max_width, y)}"
-                    for lobe in (self.lobes if self.crossings else ())
-                ),
-                "closure gap": quantity(self.closure_gap, y),
-                "stiffness": f"{quantity(self.secant_stiffness, ratio)}, {self._damping_in_words()}",
-                "sign": self.sign_convention if self.orientation == "counterclockwise" else "",
-            },
-        )
+        rows = {
+            "largest width": f"{quantity(self.max_width, y)} at u = {f'{self.max_width_at:.6g} {u}'.rstrip()}"
+            + (f", {100.0 * self.relative_width:.2f} % of the stroke" if self.stroke > 0.0 else ""),
+            "mean width": f"{quantity(self.mean_width, y)}, at mid span {quantity(self.mid_width, y)}",
+            "stroke": f"{quantity(self.stroke, y)} over u of {extent(self.u, u)}",
+            "area": f"{quantity(self.area, product)}, energy {quantity(self.energy, product)}",
+            "lobes": "; ".join(
+                f"u of {extent((lobe.low, lobe.high), u)}: {lobe.orientation}, "
+                f"area {quantity(lobe.area, product)}, width {quantity(lobe.max_width, y)}"
+                for lobe in (self.lobes if self.crossings else ())
+            ),
+            "closure gap": quantity(self.closure_gap, y),
+            "stiffness": f"{quantity(self.secant_stiffness, ratio)}, {self._damping_in_words()}",
+            "sign": self.sign_convention if self.orientation == "counterclockwise" else "",
+        }
+        return summary_text([f"LoopMetrics: {loop}, {cycles}, largest width {quantity(self.max_width, y)}"], rows)
 
     def _damping_in_words(self) -> str:
         if math.isnan(self.equivalent_damping):
@@ -432,23 +430,20 @@ class MagneticMetrics:
         u, y = ((units or {}).get(signal, own) for signal, own in (("u", "A/m"), ("y", "T")))
         is_si, initial, largest = (u, y) == ("A/m", "T"), self.initial_permeability, self.maximum_permeability
         density = "J/m^3" if is_si else f"{y} {u}"
-        return summary_text(
-            [f"MagneticMetrics: {self.energy:.4g} {density} a cycle at {self.peak_induction:.4g} {y}"],
-            {
-                "coercivity": f"{self.coercivity:.4g} {u}",
-                "remanence": f"{self.remanence:.4g} {y}",
-                "peak": f"{self.peak_field:.4g} {u}",
-                "permeability": f"amplitude {self.amplitude_permeability:.4g}, largest {self.largest_permeability:.4g}"
-                if is_si
-                else "",
-                "initial curve": f"from {initial:.4g}, at most {largest:.4g}"
-                if is_si and not math.isnan(initial)
-                else "",
-                "slope": f"{self.saturated_slope:.4g} {y}/{f'({u})' if '/' in u else u} near the ends",
-                "closure": f"{self.closure}: {self.end_width:.2g} {y} wide near the ends, gap {self.closure_gap:.2g} "
-                f"{y}, noise {self.noise:.2g} {y}",
-            },
-        )
+        lines = [f"MagneticMetrics: {self.energy:.4g} {density} a cycle at {self.peak_induction:.4g} {y}"]
+        rows = {
+            "coercivity": f"{self.coercivity:.4g} {u}",
+            "remanence": f"{self.remanence:.4g} {y}",
+            "peak": f"{self.peak_field:.4g} {u}",
+            "permeability": f"amplitude {self.amplitude_permeability:.4g}, largest {self.largest_permeability:.4g}"
+            if is_si
+            else "",
+            "initial curve": f"from {initial:.4g}, at most {largest:.4g}" if is_si and not math.isnan(initial) else "",
+            "slope": f"{self.saturated_slope:.4g} {y}/{f'({u})' if '/' in u else u} near the ends",
+            "closure": f"{self.closure}: {self.end_width:.2g} {y} wide near the ends, gap {self.closure_gap:.2g} "
+            f"{y}, noise {self.noise:.2g} {y}",
+        }
+        return summary_text(lines, rows)
 
     def to_dict(self) -> dict[str, float]:
         """The measures by name, as numbers."""

@@ -180,10 +180,8 @@ class VibrationReduction:
             "settling time": self.settling_time_reduction_percent,
         }
         words = (f"{name} {'undefined' if math.isnan(each) else f'{each:.2f} %'}" for name, each in figures.items())
-        return summary_text(
-            [f"VibrationReduction: {', '.join(words)}"],
-            {"open loop": _in_words(self.open), "closed loop": _in_words(self.closed)},
-        )
+        rows = {"open loop": _in_words(self.open), "closed loop": _in_words(self.closed)}
+        return summary_text([f"VibrationReduction: {', '.join(words)}"], rows)
 
 
 def _in_words(response: StepMetrics) -> str:

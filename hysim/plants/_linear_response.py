@@ -49,11 +49,8 @@ def affine_columns(
 
     def work(start: int, stop: int) -> None:
         each = slice(start, stop)
-        kernels.columns(
-            *(A[each], B0[each], B1[each], level, rise, lags[each], parts[each], scaled[each], back[each]),
-            sample == "end",
-            out[each],
-        )
+        plants = A[each], B0[each], B1[each], level, rise, lags[each], parts[each], scaled[each], back[each]
+        kernels.columns(*plants, sample == "end", out[each])
 
     in_chunks(work, n_sets, minimum=1 + _SAMPLES_PER_THREAD // u.size)
     return out

@@ -187,12 +187,8 @@ class Chain:
             row, stage.decline, stage.A.ravel(), stage.B.ravel(), stage.rest, law.parameters,
         ]  # fmt: skip
         state = [np.zeros(kernels.N_PLACE + 2), law.state, np.zeros(2 * order + stage.lag + 3)]
-        return Startable(
-            _chain_step(law.step),
-            read_only(np.concatenate(parts), finite=False),
-            np.concatenate(state),
-            _chain_start(law.step, law.start),
-        )
+        step, start = _chain_step(law.step), _chain_start(law.step, law.start)
+        return Startable(step, read_only(np.concatenate(parts), finite=False), np.concatenate(state), start)
 
     @property
     def output_row(self) -> FloatArray:

@@ -511,12 +511,9 @@ def _limits(
     linear: Linear, held: Mapping[str, float], user: Mapping[str, tuple[float, float]]
 ) -> dict[str, tuple[float, float]]:
     """The user's bounds, those of the plant and of A completed by the default box."""
-    units = {
-        "mass": linear.mass,
-        "damping": max(2.0 * np.sqrt(linear.mass * linear.stiffness), linear.damping),
-        "stiffness": linear.stiffness,
-        "A": linear.stiffness,
-    }
+    mass, damping, stiffness = linear
+    damping = max(2.0 * np.sqrt(mass * stiffness), damping)
+    units = {"mass": mass, "damping": damping, "stiffness": stiffness, "A": stiffness}
     limits = dict(user)
     for name in units.keys() - held.keys():
         own = tuple(float(units[name] * side) for side in _BOX[name])

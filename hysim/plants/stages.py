@@ -354,14 +354,8 @@ class Stage(NamedTuple):
         F[:n, :n], F[n:, :n], F[n:, n:] = slower * self.F, np.outer(other.g, self.C), other.F
         with np.errstate(invalid="ignore"):
             rest = np.concatenate([self.rest, other.rest * self.dc_gain])
-        return Stage(
-            F,
-            np.concatenate([slower * self.g, other.g * self.D]),
-            np.concatenate([other.D * self.C, other.C]),
-            other.D * self.D,
-            rest,
-            other.rate,
-        )
+        g, C = np.concatenate([slower * self.g, other.g * self.D]), np.concatenate([other.D * self.C, other.C])
+        return Stage(F, g, C, other.D * self.D, rest, other.rate)
 
 
 class SampledStage(NamedTuple):

@@ -316,17 +316,12 @@ class Evidence:
         probable = self.probabilities()
         boxes = [f"ln Z, boxes x {factor:g}" for factor in self.factors]
         head = ["model", "parameters", "fit [%]", *boxes, "probability"]
-        table = [
-            [
-                row.name,
-                str(row.n_parameters),
-                f"{row.fit_percent:.2f}",
-                *(f"{value:.2f} +- {error:.2f}" for value, error in zip(row.log_evidence, row.error, strict=True)),
-                f"{probable[row.name]:.2g}",
-            ]
-            for row in self.rows
-        ]
-        return "\n".join([self._head(), *aligned([head, *table]), self.sentence])
+        table = [head]
+        for row in self.rows:
+            logs = (f"{value:.2f} +- {error:.2f}" for value, error in zip(row.log_evidence, row.error, strict=True))
+            share = f"{probable[row.name]:.2g}"
+            table.append([row.name, str(row.n_parameters), f"{row.fit_percent:.2f}", *logs, share])
+        return "\n".join([self._head(), *aligned(table), self.sentence])
 
     def __str__(self) -> str:
         probable = self.probabilities()

@@ -253,13 +253,11 @@ def _parts(v: FloatArray, weight: FloatArray, base: Proposal) -> Proposal:
 def _together(base: Proposal, added: list[Proposal], n: int) -> Proposal:
     """The mixture from which `n` points were drawn, in all."""
     every = [(base, _FIRST), *((each, _EACH * len(each.centres)) for each in added)]
-    return Proposal(
-        np.concatenate([each.centres for each, _ in every]),
-        np.concatenate([each.roots for each, _ in every]),
-        np.concatenate([each.share * count / n for each, count in every]),
-        base.n_x,
-        base.n_linear,
+    centres, roots = (
+        np.concatenate(each) for each in zip(*((one.centres, one.roots) for one, _ in every), strict=True)
     )
+    share = np.concatenate([each.share * count / n for each, count in every])
+    return Proposal(centres, roots, share, base.n_x, base.n_linear)
 
 
 _PARTICLES, _PARTICLES_EACH = 1024, 256  # by hand: at most, and for each number in v

@@ -75,13 +75,12 @@ class Prediction:
     def __str__(self) -> str:
         low, high = self.band
         width = self.loop_width
-        return summary_text(
-            [f"Prediction of {len(self.outputs)} draws at {self.u.size} samples, bands at {100.0 * self.level:g} %"],
-            {
-                "output": f"band {quantity(float((high - low).mean()))} wide on average",
-                "loop width": f"{width.value:.4g}, from {width.lower:.4g} to {width.upper:.4g}" if width else "",
-            },
-        )
+        lines = [f"Prediction of {len(self.outputs)} draws at {self.u.size} samples, bands at {100.0 * self.level:g} %"]
+        rows = {
+            "output": f"band {quantity(float((high - low).mean()))} wide on average",
+            "loop width": f"{width.value:.4g}, from {width.lower:.4g} to {width.upper:.4g}" if width else "",
+        }
+        return summary_text(lines, rows)
 
 
 @frozen_result
@@ -245,14 +244,12 @@ class Posterior:
     def __str__(self) -> str:
         ends = self.interval()
         values = [f"{name} {self.mean[name]:.4g} [{ends[name][0]:.4g}, {ends[name][1]:.4g}]" for name in self.names]
-        return summary_text(
-            [self._head(), wrapped(values, most=5)],
-            {
-                "chains": f"{self.n_walkers} walkers, R-hat at most {max(self.rhat.values()):.3f}, "
-                f"{100.0 * self.acceptance:.0f} % of the moves accepted",
-                "warnings": "; ".join(self.warnings),
-            },
-        )
+        rows = {
+            "chains": f"{self.n_walkers} walkers, R-hat at most {max(self.rhat.values()):.3f}, "
+            f"{100.0 * self.acceptance:.0f} % of the moves accepted",
+            "warnings": "; ".join(self.warnings),
+        }
+        return summary_text([self._head(), wrapped(values, most=5)], rows)
 
     def _head(self) -> str:
         fewest = min(self.effective_samples.values())

@@ -208,18 +208,9 @@ class _Ensemble:
     def __init__(self, emcee: Any, target: Target, walkers: int, proposal: Proposal, reaching: Proposal) -> None:
         self.target, self.proposal, self.reaching = target, proposal, reaching
         self.walkers, self.acceptance = walkers, float("nan")
-        moves = emcee.moves
-        self.sampler = emcee.EnsembleSampler(
-            walkers,
-            target.n_dim,
-            target.log_posterior,
-            vectorize=True,
-            moves=[
-                (moves.MHMove(self._independent), 0.7),
-                (moves.DEMove(), 0.15),
-                (moves.DEMove(gamma0=0.1), 0.15),
-            ],
-        )
+        evolution = emcee.moves.DEMove
+        moves = [(emcee.moves.MHMove(self._independent), 0.7), (evolution(), 0.15), (evolution(gamma0=0.1), 0.15)]
+        self.sampler = emcee.EnsembleSampler(walkers, target.n_dim, target.log_posterior, vectorize=True, moves=moves)
 
     def _independent(self, q: FloatArray, random: Any) -> tuple[FloatArray, FloatArray]:
         """Draws from the proposal for all walkers, and ln of the ratio of its densities at q and at the draws."""

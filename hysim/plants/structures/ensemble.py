@@ -157,10 +157,8 @@ def _one_by_one(structure: Any, numbers: Mapping[str, FloatArray], n_sets: int) 
         raise ValueError("all sets begin with the same initial_state")
     mass, damping, stiffness = (np.concatenate([each.matrices[k] for each in made]) for k in (0, 1, 2))
     directions = np.concatenate([each.matrices.directions for each in made])
-    return (
-        first.laws,
-        read_only(np.stack([each.laws.parameters for each in made]), finite=False),
-        read_only(np.stack([each.laws.states for each in made]), finite=False),
-        read_only(np.stack([each.elastic_slopes for each in made])),
-        assembly.Matrices(mass, damping, stiffness, first.drift_matrix, directions),
-    )
+    constants = read_only(np.stack([each.laws.parameters for each in made]), finite=False)
+    memories = read_only(np.stack([each.laws.states for each in made]), finite=False)
+    slopes = read_only(np.stack([each.elastic_slopes for each in made]))
+    matrices = assembly.Matrices(mass, damping, stiffness, first.drift_matrix, directions)
+    return first.laws, constants, memories, slopes, matrices

@@ -112,10 +112,9 @@ class StructureRecord:
 
     def __str__(self) -> str:
         names = ", ".join(f"{signal}[:, {column}]" for signal, column in self.sensors)
-        return summary_text(
-            [f"StructureRecord {self.name}".rstrip() + f": {len(self)} samples every {self.sample_time:.4g} s"],
-            {"sensors": names},
-        )
+        lines = [f"StructureRecord {self.name}".rstrip() + f": {len(self)} samples every {self.sample_time:.4g} s"]
+        rows = {"sensors": names}
+        return summary_text(lines, rows)
 
     @property
     def signals(self) -> dict[str, FloatArray]:
@@ -126,12 +125,8 @@ class StructureRecord:
     @property
     def sensors(self) -> tuple[Sensor, ...]:
         """Name of the signal, and the column, of each sensor that is there."""
-        return tuple(
-            (name, column)
-            for name, values in self.signals.items()
-            for column in range(values.shape[1])
-            if not np.isnan(values[:, column]).any()
-        )
+        present = {name: np.flatnonzero(~np.isnan(values).any(axis=0)) for name, values in self.signals.items()}
+        return tuple((name, column) for name, columns in present.items() for column in columns.tolist())
 
     @property
     def sample_time(self) -> float:

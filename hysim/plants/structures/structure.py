@@ -88,14 +88,12 @@ class StaticResponse:
         return np.asarray(self.factor * self.pattern.sum())
 
     def __str__(self) -> str:
-        return summary_text(
-            [f"StaticResponse: {self.control.size} equilibria"],
-            {
-                "control": extent(self.control, "m"),
-                "base shear": extent(self.base_shear, "N"),
-                "residual": f"{self.residual.max(initial=0.0):.1e}",
-            },
-        )
+        rows = {
+            "control": extent(self.control, "m"),
+            "base shear": extent(self.base_shear, "N"),
+            "residual": f"{self.residual.max(initial=0.0):.1e}",
+        }
+        return summary_text([f"StaticResponse: {self.control.size} equilibria"], rows)
 
 
 class _Equilibrium(NamedTuple):
