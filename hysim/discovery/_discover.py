@@ -157,10 +157,7 @@ def discover(
     share = _SEARCHES / (1 + len(of_output))
 
     def outcomes_of(
-        libraries: Sequence[Library],
-        how: Options,
-        best: float = math.inf,
-        masks: tuple[Samples, ...] | None = None,
+        libraries: Sequence[Library], how: Options, best: float = math.inf, masks: tuple[Samples, ...] | None = None
     ) -> list[Outcome]:
         every = (searched(records, library, how, best=best, masks=masks) for library in libraries)
         return [outcome for outcome in every if outcome is not None]
@@ -251,11 +248,7 @@ def _libraries(
 
 
 def _discovery(
-    records: tuple[Record, ...],
-    outcome: Outcome,
-    candidate: Candidate[Any],
-    others: Trial,
-    seed: int,
+    records: tuple[Record, ...], outcome: Outcome, candidate: Candidate[Any], others: Trial, seed: int
 ) -> Discovery:
     letter, structure = outcome.library.letter, candidate.structure
     law = law_from(candidate, records, "z" if isinstance(structure, AnyExponent) else letter)

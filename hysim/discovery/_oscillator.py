@@ -322,11 +322,7 @@ class Search(NamedTuple):
         return _tried(fitted, regression if _is_polynomial(fitted.terms) else replace(regression, n_others=1))
 
     def _described(
-        self,
-        tried: _Tried,
-        elastic: _Fitted,
-        regressed: Mapping[Term, float],
-        warnings: tuple[str, ...] = (),
+        self, tried: _Tried, elastic: _Fitted, regressed: Mapping[Term, float], warnings: tuple[str, ...] = ()
     ) -> OscillatorDiscovery:
         fitted, regression, structures = tried.fitted, tried.regression, tried.structures
         plant, law = fitted.oscillator

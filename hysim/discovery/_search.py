@@ -71,12 +71,7 @@ class Subsets(NamedTuple):
 
 
 def best_subsets(
-    jacobian: FloatArray,
-    residual: FloatArray,
-    x: FloatArray,
-    removable: npt.NDArray[np.bool_],
-    *,
-    width: int = WIDTH,
+    jacobian: FloatArray, residual: FloatArray, x: FloatArray, removable: npt.NDArray[np.bool_], *, width: int = WIDTH
 ) -> Iterator[Subsets]:
     """The `width` best subsets of each size, from all columns down to those that are not `removable` (n,).
 

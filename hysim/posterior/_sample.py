@@ -170,13 +170,7 @@ class Posterior:
         return {name: (low, high) for name, (low, high) in ends.items()}
 
     def predict(
-        self,
-        u: npt.ArrayLike,
-        *,
-        t: npt.ArrayLike | None = None,
-        n: int = 400,
-        level: float = 0.95,
-        seed: int = 0,
+        self, u: npt.ArrayLike, *, t: npt.ArrayLike | None = None, n: int = 400, level: float = 0.95, seed: int = 0
     ) -> Prediction:
         """Bands of the output, and of the loop width, for an input `u` (n_samples,) [unit of u].
 
@@ -389,12 +383,7 @@ def sample_posterior(
         posterior = posed(fit, records, noise, own, initial)
         number = walkers_of(posterior.n_dim, walkers, samples)
         chains = sampled(
-            posterior,
-            walkers=number,
-            samples=samples,
-            seed=seed,
-            most_steps=most_steps,
-            progress=progress or None,
+            posterior, walkers=number, samples=samples, seed=seed, most_steps=most_steps, progress=progress or None
         )
         return described(fit, posterior, chains, samples, seed)
 

@@ -176,8 +176,7 @@ def sampled(
     proposal, reaching = proposal_for(target, around_optima(target, rng), rng, least)
     sampler = _Ensemble(emcee, target, walkers, proposal, reaching)
     state = emcee.State(
-        _first(target, proposal, walkers, rng),
-        random_state=np.random.RandomState(rng.integers(2**31)).get_state(),
+        _first(target, proposal, walkers, rng), random_state=np.random.RandomState(rng.integers(2**31)).get_state()
     )
     state, tau, spent = sampler.warmed(state, most_steps, rng)
     thin = max(1, int(tau / _DRAWS_PER_TIME))
