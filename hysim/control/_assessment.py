@@ -482,12 +482,9 @@ def assess_step(
     open_y = resting.driven(resting.u0 + np.where(waits, 0.0, step / gain))
     decay_rate = -_least_damped(actuator).real
     reduction = vibration_reduction(t[:after], open_y, loop.closed.y[before:], decay_rate=decay_rate)
-    return StepAssessment(
-        reduction=reduction if loop.stable else replace(reduction, **_UNKNOWN),
-        open_y=open_y,
-        closed=loop.closed,
-        loop=loop,
-    )
+    if not loop.stable:
+        reduction = replace(reduction, **_UNKNOWN)
+    return StepAssessment(reduction=reduction, open_y=open_y, closed=loop.closed, loop=loop)
 
 
 def assess_square_wave(

@@ -57,9 +57,8 @@ class _Filter(ABC):
 
     def linear(self, sample_time: float) -> Feedback:
         b0, b1, b2, a1, a2 = self.coefficients(sample_time)
-        return Feedback(
-            np.array([[-a1, 1.0], [-a2, 0.0]]), np.array([b1 - a1 * b0, b2 - a2 * b0]), np.array([1.0, 0.0]), float(b0)
-        )
+        A, B = np.array([[-a1, 1.0], [-a2, 0.0]]), np.array([b1 - a1 * b0, b2 - a2 * b0])
+        return Feedback(A, B, np.array([1.0, 0.0]), float(b0))
 
 
 @family

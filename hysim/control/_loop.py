@@ -239,16 +239,13 @@ def around(
         "voltage_noise_rms": float(np.sqrt(np.mean(noise**2))),
         "voltage_noise_peak": float(np.abs(noise).max()),
     }
+    by_name = signals._asdict()
     return ClosedLoop(
         t=times,
         reference=r,
         error=r - signals.measurement,
-        command=signals.command,
-        drive=signals.drive,
-        u=signals.u,
         z=resting.memory(signals),
-        y=signals.y,
-        measurement=signals.measurement,
+        **{name: by_name[name] for name in (*_OF_COMMAND, "y", "measurement")},
         conditions=conditions,
         units=units or {},
         signals=signals.others,

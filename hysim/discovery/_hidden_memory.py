@@ -328,9 +328,8 @@ class HiddenMemory:
         return np.asarray(rows - self._basis @ (self._basis.T @ rows))
 
     def _stacked(self, signals: Sequence[FloatArray], power: int) -> FloatArray:
-        return np.concatenate(
-            [each.filtered(signal, power) for each, signal in zip(self._along, signals, strict=True)], axis=-1
-        )
+        filtered = [each.filtered(signal, power) for each, signal in zip(self._along, signals, strict=True)]
+        return np.concatenate(filtered, axis=-1)
 
 
 def _best(laws: Iterable[Regressed | None]) -> Regressed | None:
@@ -398,9 +397,7 @@ class Response:
 
     def initial_states(self, oscillator: Oscillator) -> tuple[State, ...]:
         """State at the first sample of each record: rest, or that of the steady motion under a periodic input."""
-        runs = [
-            self._run(oscillator, *force_and_step) if self.structure.period else None for force_and_step in self._inputs
-        ]
+        runs = [self._run(oscillator, *drive) if self.structure.period else None for drive in self._inputs]
         missing = np.nan if self.structure.period else 0.0
         return tuple(State(*([missing] * 3 if run is None else run[1].tolist())) for run in runs)
 

@@ -377,9 +377,8 @@ class Search(NamedTuple):
 
 def _tried(fitted: _Fitted, regression: TermRegression) -> _Tried:
     law = tuple(term for term in regression.terms if term in fitted.terms)
-    structures = sorted(
-        (regression.path() | {law}) - {()}, key=lambda terms: (-len(terms), regression.bic(terms), terms)
-    )
+    tried = (regression.path() | {law}) - {()}
+    structures = sorted(tried, key=lambda terms: (-len(terms), regression.bic(terms), terms))
     return _Tried(fitted, regression, structures, regression.best(structures))
 
 

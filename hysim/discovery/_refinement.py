@@ -225,9 +225,7 @@ class FreeRun:
     def visible(self) -> tuple[Record, ...]:
         if self.masks is None:
             return self.records
-        return tuple(
-            Record(u=record.u[mask], y=record.y[mask]) for record, mask in zip(self.records, self.masks, strict=True)
-        )
+        return tuple(Record(u=r.u[mask], y=r.y[mask]) for r, mask in zip(self.records, self.masks, strict=True))
 
     @cached_property
     def stroke(self) -> float:

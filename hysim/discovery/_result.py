@@ -48,10 +48,8 @@ def law_from(candidate: Candidate[Any], records: Sequence[Record], letter: str) 
     structure, unknowns = candidate.structure, candidate.unknowns
     numbers = partial(_numbers, structure, letter)
     values = numbers(unknowns[: structure.size])
-    models = tuple(
-        _model(structure, values, letter, float(y0), float(record.u[0]))
-        for y0, record in zip(unknowns[structure.size :], records, strict=True)
-    )
+    starts = unknowns[structure.size :].tolist()
+    models = tuple(_model(structure, values, letter, y0, float(r.u[0])) for y0, r in zip(starts, records, strict=True))
     terms = _coefficients(values)
     parameters = {name: value for name, value in values.items() if name in OTHERS}
     shifts = {name: value for name, value in parameters.items() if name != "n"}

@@ -169,9 +169,7 @@ def thinning(record: Record, most: int) -> npt.NDArray[np.intp]:
 
 def thinned(free_run: FreeRun) -> FreeRun:
     samples = [thinning(record, SEARCHED // len(free_run.records)) for record in free_run.records]
-    records = tuple(
-        Record(u=r.u[included], y=r.y[included]) for r, included in zip(free_run.records, samples, strict=True)
-    )
+    records = tuple(Record(u=r.u[k], y=r.y[k]) for r, k in zip(free_run.records, samples, strict=True))
     masks = free_run.masks and tuple(mask[included] for mask, included in zip(free_run.masks, samples, strict=True))
     return FreeRun(records, masks, free_run.signs, free_run.work)
 
@@ -425,9 +423,8 @@ class Outcome:
         stride = max(1, -(-len(regression.slope) // _ENSEMBLE_ROWS))
         n_terms = len(self.candidate.structure.terms)
         threshold = max((t for t, structure in self.path if len(structure.terms) >= n_terms), default=0.0)
-        shares = inclusion(
-            regression.features[::stride], regression.slope[::stride], threshold, n_models=_ENSEMBLE, seed=seed
-        )
+        features, slope = regression.features[::stride], regression.slope[::stride]
+        shares = inclusion(features, slope, threshold, n_models=_ENSEMBLE, seed=seed)
         names = (term.named(self.library.letter) for term in regression.terms)
         return dict(zip(names, shares.tolist(), strict=True))
 

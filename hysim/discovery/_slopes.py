@@ -319,9 +319,8 @@ class Regression:
     def ridge(self, terms: Sequence[Term], weight: float) -> FloatArray:
         """Coefficients (n_terms,) of a law with these terms alone, by ridge regression."""
         included = [self.terms.index(term) for term in terms]
-        return np.asarray(
-            ridge(self.features[:, included], self.slope, weight) * self.slope_size / self.sizes[included]
-        )
+        scaled = ridge(self.features[:, included], self.slope, weight)
+        return np.asarray(scaled * self.slope_size / self.sizes[included])
 
 
 @dataclass(frozen=True)

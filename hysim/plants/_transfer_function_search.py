@@ -109,9 +109,8 @@ def _refined(structure: Any, record: Record, delay: float, cutoff: float, *, at_
             output = known @ numerator
             cost = float(np.sum((record.y - output) ** 2))
             simulated = affine_columns(monic, output, h, hold="foh")[0, :, : poles + 1]
-        theta = _instrumental(
-            np.column_stack([-simulated[:, 1:], known]), np.column_stack([-measured[:, 1:], known]), measured[:, 0]
-        )
+        instruments, regressors = (np.column_stack([-each[:, 1:], known]) for each in (simulated, measured))
+        theta = _instrumental(instruments, regressors, measured[:, 0])
         if not np.isfinite(theta).all():
             return None
         roots = np.roots(np.append(1.0, theta[:poles])).astype(complex)

@@ -282,9 +282,7 @@ class ActuatorStructure(Subject):
         survey = Survey.of(records)
         quantum = 0.0 if self.sensor is None else self.sensor.quantum
         if quantum:
-            records = [
-                replace(record, resolution=quantum) if record.resolution is None else record for record in records
-            ]
+            records = [replace(each, resolution=quantum) if each.resolution is None else each for each in records]
         bank = linear_parts.creep_bank(self.creep, survey.shortest, survey.longest)
         idle = {f"creep.weights[{k}]": 0.0 for k in bank.idle} if isinstance(bank, CreepBank) else {}
         idle = {name: value for name, value in idle.items() if name not in {*freedom.free, *freedom.bounds}}

@@ -84,11 +84,8 @@ class CreepBank:
             return Creep(time_constants=self.time_constants, weights=tuple(weights.tolist()))
         weights = values["percent"] * np.array(self.unit) * (taus / self.reference) ** values.get("slope", 0.0)
         at_reference = -np.expm1(-self.reference / taus)
-        return Creep(
-            time_constants=self.time_constants,
-            weights=tuple(weights.tolist()),
-            instant_gain=1.0 - float(weights @ at_reference),
-        )
+        instant = 1.0 - float(weights @ at_reference)
+        return Creep(time_constants=self.time_constants, weights=tuple(weights.tolist()), instant_gain=instant)
 
     @property
     def remark(self) -> str:

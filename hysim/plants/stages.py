@@ -107,12 +107,8 @@ class Amplifier:
         frozen.check_not_negative(
             feedback_resistance=feedback_resistance, output_resistance=output_resistance, capacitance=capacitance
         )
-        return cls(
-            gain=1.0 + feedback_resistance / input_resistance,
-            limits=limits,
-            slew_rate=slew_rate,
-            time_constant=output_resistance * capacitance,
-        )
+        gain, time_constant = 1.0 + feedback_resistance / input_resistance, output_resistance * capacitance
+        return cls(gain=gain, limits=limits, slew_rate=slew_rate, time_constant=time_constant)
 
     @property
     def dynamic(self) -> bool:
@@ -252,11 +248,8 @@ class Creep:
         growth = -np.expm1(-times[:, np.newaxis] / time_constants) - at_reference
         of_one, _ = nnls(growth, np.log10(times / reference_time))
         weights = percent / 100.0 * of_one
-        return cls(
-            time_constants=tuple(time_constants.tolist()),
-            weights=tuple(weights.tolist()),
-            instant_gain=1.0 - float(weights @ at_reference),
-        )
+        instant = 1.0 - float(weights @ at_reference)
+        return cls(time_constants=tuple(time_constants.tolist()), weights=tuple(weights.tolist()), instant_gain=instant)
 
     @property
     def dc_gain(self) -> float:
@@ -457,9 +450,8 @@ def whole_and_part(ratio: float) -> tuple[int, float]:
 def _transition(stage: Stage, step: float, part: float, at: float, linear: bool) -> Transition:
     """The states at the part `at` of a sub-step, as matrices of those at its begin and of the three inputs."""
     early, late = min(at, part), max(at - part, 0.0)
-    (first, second), begins, ends = (
-        stack[0] for stack in transitions(stage.F[np.newaxis], stage.rate * step * np.array([[early, late]]), stage.g)
-    )
+    spans = stage.rate * step * np.array([[early, late]])
+    (first, second), begins, ends = (stack[0] for stack in transitions(stage.F[np.newaxis], spans, stage.g))
     pieces = _linear_pieces(part, early, late) if linear else _HELD
     B = np.zeros((3, stage.g.size))
     for row, (begin, middle, turn, end) in enumerate(zip(*pieces, strict=True)):

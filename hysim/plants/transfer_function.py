@@ -292,9 +292,7 @@ class TransferFunctionStructure(Subject, Composable):
             raise ValueError(f"there must be at least one pole, and no more zeros than poles, got {self!r}")
 
     def __str__(self) -> str:
-        poles, zeros = (
-            f"{n} {what}{'' if n == 1 else 's'}" for n, what in ((self.poles, "pole"), (self.zeros, "zero"))
-        )
+        poles, zeros = (f"{n} {what}{'s' * (n != 1)}" for n, what in ((self.poles, "pole"), (self.zeros, "zero")))
         late = ", free delay" if self.delay is None else f", delay {self.delay:g} s" if self.delay else ""
         return f"{poles}, {zeros}{late}"
 

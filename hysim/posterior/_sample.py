@@ -381,10 +381,8 @@ def sample_posterior(
     own = given(priors or {})
     with one_blas_thread():
         posterior = posed(fit, records, noise, own, initial)
-        number = walkers_of(posterior.n_dim, walkers, samples)
-        chains = sampled(
-            posterior, walkers=number, samples=samples, seed=seed, most_steps=most_steps, progress=progress or None
-        )
+        n = walkers_of(posterior.n_dim, walkers, samples)
+        chains = sampled(posterior, walkers=n, samples=samples, seed=seed, most_steps=most_steps, progress=progress)
         return described(fit, posterior, chains, samples, seed)
 
 

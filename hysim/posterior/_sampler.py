@@ -24,7 +24,6 @@ sizes from each optimum, the likely of these points survive, and moves of differ
 the shape of the population whatever its scales.
 """
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
@@ -32,6 +31,7 @@ import numpy as np
 
 from hysim._basics.frozen import FloatArray
 from hysim._basics.libraries import optional
+from hysim._basics.progress import Reports
 from hysim.posterior._proposal import EARLY_SHARE, GOOD, POOR, Proposal, mixture, moved, proposal_for
 from hysim.posterior._target import Target
 
@@ -167,7 +167,7 @@ def sampled(
     samples: int,
     seed: int,
     most_steps: int,
-    progress: Callable[[int, int], None] | None = None,
+    progress: Reports = None,
 ) -> Chains:
     """Chains with so many effective samples of each parameter, or with `most_steps` steps if these come first."""
     emcee = optional("emcee", "sampling a posterior", "bayes")
@@ -175,9 +175,8 @@ def sampled(
     least = GOOD if samples >= _MANY else POOR
     proposal, reaching = proposal_for(target, around_optima(target, rng), rng, least)
     sampler = _Ensemble(emcee, target, walkers, proposal, reaching)
-    state = emcee.State(
-        _first(target, proposal, walkers, rng), random_state=np.random.RandomState(rng.integers(2**31)).get_state()
-    )
+    first = _first(target, proposal, walkers, rng)
+    state = emcee.State(first, random_state=np.random.RandomState(rng.integers(2**31)).get_state())
     state, tau, spent = sampler.warmed(state, most_steps, rng)
     thin = max(1, int(tau / _DRAWS_PER_TIME))
     parts: list[Any] = []
@@ -197,7 +196,7 @@ def sampled(
             parameters = np.concatenate([parameters, further.reshape(-1, *parameters.shape[1:])])
             effective = worst(parameters)[0]
         tau = max(len(q) * thin * walkers / effective, 1.0)
-        if progress is not None:
+        if progress:
             progress(min(int(effective), samples), samples)
         if is_enough and (effective >= samples or spent >= most_steps):
             return Chains(q, parameters, log_density, sampler.acceptance, sampler.proposal)

@@ -55,9 +55,8 @@ def reduced(
         A, loads, np.ascontiguousarray(rates), slopes, parameters, states,
         np.array(np.broadcast_to(values.get("scale", np.ones(1)), n_sets)),
     )  # fmt: skip
-    plant = Plant(
-        A[0], loads[0], np.zeros((n, n)), np.zeros((0, n)), np.array([float(structure.excitation == "force")])
-    )
+    pushing = np.array([float(structure.excitation == "force")])
+    plant = Plant(A[0], loads[0], np.zeros((n, n)), np.zeros((0, n)), pushing)
     x = read_only(structure.initial_state or np.zeros(2 * n))
     with np.errstate(all="ignore"):
         follow_each(
