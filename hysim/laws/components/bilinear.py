@@ -1,6 +1,7 @@
 """The bilinear law with kinematic and isotropic hardening."""
 
 import math
+from dataclasses import dataclass
 from typing import ClassVar, Self
 
 from hysim._basics.frozen import FloatArray
@@ -9,12 +10,15 @@ from hysim.models.model import Example, family
 from hysim.models.parameters import Parameter
 from hysim.models.stages import Stage
 
+SLOPES = tuple(Parameter(name, unit="y/u", affine=True) for name in ("stiffness", "hardening"))
 
+
+@dataclass(frozen=True, kw_only=True, eq=False)
 class HardeningLaw(Law):
     """A law whose slope lies between those of the elastic line and of hardening."""
 
-    stiffness: float
-    hardening: float
+    stiffness: float = 1.0
+    hardening: float = 0.05
 
     @property
     def known_slopes(self) -> tuple[float, float]:
@@ -68,8 +72,6 @@ class Bilinear(HardeningLaw):
     [0.0, 1.2, -0.9]
     """
 
-    stiffness: float = 1.0
-    hardening: float = 0.05
     yield_input: float = 1.0
     isotropic: float = 0.0
     offset: float = 0.0
@@ -82,8 +84,7 @@ class Bilinear(HardeningLaw):
     units: ClassVar = {"z0": "1"}
     example = Example({"hardening": 0.1, "isotropic": 0.03}, (-4.0, 4.0), title="Bilinear law", group="Devices")
     searched = (
-        Parameter("stiffness", unit="y/u", affine=True),
-        Parameter("hardening", unit="y/u", affine=True),
+        *SLOPES,
         Parameter("yield_input", 1e-3, 3.0, unit="u", log=True),
         Parameter("isotropic", 0.0, 0.99, physical=(True, True)),
         Parameter("offset", unit="y", affine=True),

@@ -7,7 +7,7 @@ x_0, U(x)), however it is sampled.
 from typing import ClassVar, Self
 
 from hysim._basics.frozen import FloatArray
-from hysim.laws.components.bilinear import HardeningLaw
+from hysim.laws.components.bilinear import SLOPES, HardeningLaw
 from hysim.models.model import Example, family
 from hysim.models.parameters import Parameter
 
@@ -53,8 +53,6 @@ class FlagShape(HardeningLaw):
     [0.0, 1.2, 0.38, 0.0]
     """
 
-    stiffness: float = 1.0
-    hardening: float = 0.05
     activation: float = 1.0
     loss: float = 0.8
 
@@ -65,8 +63,7 @@ class FlagShape(HardeningLaw):
     further_memory = 2
     example = Example({"hardening": 0.1}, (-4.0, 4.0), title="Flag: self-centring brace", group="Devices")
     searched = (
-        Parameter("stiffness", unit="y/u", affine=True),
-        Parameter("hardening", unit="y/u", affine=True),
+        *SLOPES,
         Parameter("activation", 1e-3, 3.0, unit="u", log=True),
         Parameter("loss", 0.0, 2.0, physical=(True, True)),
     )

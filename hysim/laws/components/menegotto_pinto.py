@@ -24,7 +24,7 @@ from typing import ClassVar, Self
 
 from hysim._basics.frozen import FloatArray
 from hysim.kernels.elementary import bent
-from hysim.laws.components.bilinear import HardeningLaw
+from hysim.laws.components.bilinear import SLOPES, HardeningLaw
 from hysim.models.model import Example, family
 from hysim.models.parameters import Parameter
 from hysim.models.stages import Stage
@@ -96,7 +96,6 @@ class MenegottoPinto(HardeningLaw):
     [0.0, 435.8, -315.438, -400.144]
     """
 
-    stiffness: float = 1.0
     hardening: float = 0.02
     yield_input: float = 1.0
     R0: float = 20.0
@@ -122,8 +121,7 @@ class MenegottoPinto(HardeningLaw):
         group="Devices",
     )
     searched = (
-        Parameter("stiffness", unit="y/u", affine=True),
-        Parameter("hardening", unit="y/u", affine=True),
+        *SLOPES,
         Parameter("yield_input", 1e-3, 3.0, unit="u", log=True),
         Parameter("R0", 1.0, 60.0, log=True),
         Parameter("cR1", 0.0, 0.999, physical=(True, True)),

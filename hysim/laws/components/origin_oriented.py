@@ -4,7 +4,7 @@ import math
 from typing import ClassVar, Self
 
 from hysim._basics.frozen import FloatArray
-from hysim.laws.components.bilinear import HardeningLaw
+from hysim.laws.components.bilinear import SLOPES, HardeningLaw
 from hysim.models.model import Example, family
 from hysim.models.parameters import Parameter
 
@@ -49,19 +49,13 @@ class OriginOriented(HardeningLaw):
     [0.0, 1.2, 0.6, -1.0]
     """
 
-    stiffness: float = 1.0
-    hardening: float = 0.05
     yield_input: float = 1.0
 
     positive = ("yield_input",)
     initial: ClassVar[tuple[str, ...]] = ()
     further_memory = 2
     example = Example({"hardening": 0.1}, (-4.0, 4.0), title="Origin-oriented: shear wall", group="Devices")
-    searched = (
-        Parameter("stiffness", unit="y/u", affine=True),
-        Parameter("hardening", unit="y/u", affine=True),
-        Parameter("yield_input", 1e-3, 3.0, unit="u", log=True),
-    )
+    searched = (*SLOPES, Parameter("yield_input", 1e-3, 3.0, unit="u", log=True))
     starts = tuple({"yield_input": share} for share in (0.03, 0.1, 0.3))
 
     @staticmethod

@@ -7,6 +7,7 @@ u is the input, z the memory, y the output; time has no part in it.
 """
 
 from collections.abc import Callable, Mapping
+from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, ClassVar, Self
 
@@ -24,7 +25,17 @@ from hysim.models.tables import Tables
 from hysim.records import Record
 
 
-class MemoryLaw(Law):
+@dataclass(frozen=True, kw_only=True, eq=False)
+class ShapedLaw(Law):
+    """A law with the parameters of a Bouc-Wen memory in front of those of its family."""
+
+    A: float = 1.0
+    beta: float = 0.5
+    gamma: float = 0.5
+    n: float = 1.0
+
+
+class MemoryLaw(ShapedLaw):
     """A law with one memory z, and an output that is a polynomial of u plus gain z.
 
     Its inverse is exact to the rounding of the output's terms, or to 1e-10 of the range for a law by its slope.
@@ -37,10 +48,6 @@ class MemoryLaw(Law):
     units: ClassVar[Mapping[str, str]] = {"n": "1", "offset": "y"}
 
     slope: ClassVar[Any]
-    A: float
-    beta: float
-    gamma: float
-    n: float
     gain: float
     offset: float
     z0: float

@@ -35,13 +35,13 @@ from hysim.kernels.elementary import power
 from hysim.kernels.stepping import inlined_kernel
 from hysim.laws.differential import _boucwen_search
 from hysim.laws.differential._memory_law import MemoryLaw
-from hysim.laws.differential.boucwen import BoucWen
+from hysim.laws.differential.boucwen import bouc_wen_with
 from hysim.laws.differential.polynomial_boucwen import PolynomialBoucWen
 from hysim.models.by_structure import Holding
 from hysim.models.model import Example, family
 from hysim.models.parameters import sides
 from hysim.models.search_space import ALL_FREE, Freedom, Parameters, SearchSpace
-from hysim.models.stages import Stage, Subset
+from hysim.models.stages import Stage
 from hysim.models.tables import Tables
 from hysim.records import Record
 
@@ -205,10 +205,6 @@ class BoucWenBaberNoori(MemoryLaw):
     [0.0, 0.780431, -0.69475, 0.588304]
     """
 
-    A: float = 1.0
-    beta: float = 0.5
-    gamma: float = 0.5
-    n: float = 1.0
     delta_a: float = 0.0
     delta_nu: float = 0.0
     delta_eta: float = 0.0
@@ -234,11 +230,7 @@ class BoucWenBaberNoori(MemoryLaw):
         group="Devices",
         units={"u": "mm", "y": "kN"},
     )  # fmt: skip
-    contains = Subset(
-        BoucWen,
-        neutral={"delta_a": 0.0, "delta_nu": 0.0, "delta_eta": 0.0, "zeta_s": 0.0, "input_coefficients": 0.0},
-        names={"feedthrough": "input_coefficients[0]"},
-    )
+    contains = bouc_wen_with(*_WEARING)
     stages = (_WEAR, _PINCHING, _SPREAD)
     samples_a_thread = 2_000
 

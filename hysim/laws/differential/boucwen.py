@@ -43,6 +43,7 @@ from hysim.laws.differential.limit_cycle import LimitCycle
 from hysim.models.law import Packed, State
 from hysim.models.model import Example, family
 from hysim.models.protocols import UNLIMITED, CompiledLaw, Limits
+from hysim.models.stages import Subset
 from hysim.models.tables import Tables
 
 
@@ -89,10 +90,6 @@ class BoucWen(BoucWenLaw):
     polynomial: ClassVar[str] = "feedthrough"
     step_fields = ("A", "beta", "gamma", "n", "gain", "offset", "feedthrough")
 
-    A: float = 1.0
-    beta: float = 0.5
-    gamma: float = 0.5
-    n: float = 1.0
     feedthrough: float = 0.0
     gain: float = 1.0
     offset: float = 0.0
@@ -324,6 +321,12 @@ class BoucWen(BoucWenLaw):
         same = self.to_opensees_original()
         names = {"elastic_modulus": "E", "yield_stress": "fy", "hardening": "alphaL", "beta": "beta", "n": "eta"}
         return {name: same[theirs] for name, theirs in names.items()}
+
+
+def bouc_wen_with(*terms: str) -> Subset:
+    """The Bouc-Wen law in a law with further terms, which vanish for zeros, and a polynomial of the input."""
+    neutral = dict.fromkeys((*terms, "input_coefficients"), 0.0)
+    return Subset(BoucWen, neutral=neutral, names={"feedthrough": "input_coefficients[0]"})
 
 
 def _of_material(law: BoucWen) -> dict[str, float]:

@@ -8,11 +8,10 @@ from hysim._basics.frozen import FloatArray
 from hysim.kernels import generalized as kernels
 from hysim.laws.differential import _boucwen_law as facts
 from hysim.laws.differential._memory_law import MemoryLaw
-from hysim.laws.differential.boucwen import BoucWen
+from hysim.laws.differential.boucwen import bouc_wen_with
 from hysim.models.law import Packed, Stepping
 from hysim.models.model import Example, family
 from hysim.models.search_space import Freedom
-from hysim.models.stages import Subset
 from hysim.models.tables import Tables
 from hysim.records import Record
 
@@ -55,10 +54,6 @@ class GeneralizedBoucWen(MemoryLaw):
     [0.0, 0.719164, -0.325835, 0.534028]
     """
 
-    A: float = 1.0
-    beta: float = 0.5
-    gamma: float = 0.5
-    n: float = 1.0
     b2: float = 0.0
     b3: float = 0.0
     b4: float = 0.0
@@ -70,11 +65,7 @@ class GeneralizedBoucWen(MemoryLaw):
     input_coefficients: tuple[float, ...] = (0.0,)
 
     example = Example({"beta": 0.5, "gamma": 0.2, "b2": 0.1, "b4": 0.1}, (-2.0, 2.0), title="Generalised Bouc-Wen")
-    contains = Subset(
-        BoucWen,
-        neutral={**dict.fromkeys(_SECTORS, 0.0), "input_coefficients": 0.0},
-        names={"feedthrough": "input_coefficients[0]"},
-    )
+    contains = bouc_wen_with(*_SECTORS)
     step = staticmethod(kernels.step)
     workspace: ClassVar[int] = kernels.N_STATE - 2
 

@@ -1,9 +1,8 @@
 """The sum of the Bouc-Wen law and a polynomial of the input, for asymmetric loops."""
 
 from hysim.laws.differential._boucwen_law import BoucWenLaw
-from hysim.laws.differential.boucwen import BoucWen
+from hysim.laws.differential.boucwen import bouc_wen_with
 from hysim.models.model import Example, family
-from hysim.models.stages import Subset
 
 
 @family
@@ -32,10 +31,6 @@ class PolynomialBoucWen(BoucWenLaw):
     [0.0, 1.467879, 0.307799]
     """
 
-    A: float = 1.0
-    beta: float = 0.5
-    gamma: float = 0.5
-    n: float = 1.0
     gain: float = 1.0
     offset: float = 0.0
     z0: float = 0.0
@@ -48,4 +43,4 @@ class PolynomialBoucWen(BoucWenLaw):
         group="Devices",
         units={"u": "V", "y": "um"},
     )
-    contains = Subset(BoucWen, neutral={"input_coefficients": 0.0}, names={"feedthrough": "input_coefficients[0]"})
+    contains = bouc_wen_with()

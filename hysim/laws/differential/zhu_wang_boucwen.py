@@ -12,9 +12,8 @@ from typing import Any
 from hysim.kernels.elementary import power
 from hysim.kernels.zhu_wang import ramp
 from hysim.laws.differential._memory_law import MemoryLaw
-from hysim.laws.differential.boucwen import BoucWen
+from hysim.laws.differential.boucwen import bouc_wen_with
 from hysim.models.model import Example, family
-from hysim.models.stages import Subset
 
 
 @family
@@ -51,10 +50,6 @@ class ZhuWangBoucWen(MemoryLaw):
     [0.0, 0.742484, -0.101879, 0.70305]
     """
 
-    A: float = 1.0
-    beta: float = 0.5
-    gamma: float = 0.5
-    n: float = 1.0
     delta: float = 0.0
     gain: float = 1.0
     offset: float = 0.0
@@ -65,11 +60,7 @@ class ZhuWangBoucWen(MemoryLaw):
     example = Example({"beta": 0.5, "gamma": 0.2, "delta": 0.15}, (-2.0, 2.0), title="Zhu-Wang: asymmetric")
     samples_a_thread = 2_000
     screened = 1024  # a step costs twenty times that of the Bouc-Wen law
-    contains = Subset(
-        BoucWen,
-        neutral={"delta": 0.0, "input_coefficients": 0.0},
-        names={"feedthrough": "input_coefficients[0]"},
-    )
+    contains = bouc_wen_with("delta")
 
     @staticmethod
     def slope(p: Any, z: float, u: float, s: float) -> float:

@@ -10,7 +10,7 @@ stop is a play of the negative weight beside a line, so with c = feedthrough + s
     y = offset + c u + sum_i v_i z_i,    v_i = w_i or -w_i
 """
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import ClassVar
 
 import numpy as np
@@ -140,6 +140,14 @@ class Bank(Elements, ByStructure):
         one_signed = None if self.is_one_signed() else False
         axes = {each.parameter.name: own[each.parameter.name] for each in self.axes}
         return replace(self.structure(), thresholds=thresholds, one_signed=one_signed, own=axes)
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Plays(Bank):
+    """Several plays, whose thresholds and weights stand in front of the other fields of their family."""
+
+    thresholds: tuple[float, ...] = ()
+    weights: tuple[float, ...] = ()
 
 
 class Clamps(Elements, Law):

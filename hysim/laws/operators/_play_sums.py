@@ -8,7 +8,7 @@ import numpy.typing as npt
 
 from hysim._basics.frozen import FloatArray, checked, read_only
 from hysim.kernels import play_sums as kernels
-from hysim.laws.operators._bank import Bank
+from hysim.laws.operators._bank import Plays
 from hysim.laws.operators._bank_search import rows_of
 from hysim.laws.operators.prandtl_ishlinskii import PrandtlIshlinskii
 from hysim.models.law import Law, Packed, State
@@ -81,11 +81,9 @@ class PlaySum(Law):
 
 
 @checked
-class PlaysAtSampleTime(Bank, PlaySum):
+class PlaysAtSampleTime(Plays, PlaySum):
     """The law at one sample time, with thresholds ``r_i + width |u_k - u_(k-1)|``."""
 
-    thresholds: tuple[float, ...] = ()
-    weights: tuple[float, ...] = ()
     width: float = 0.0
     offset: float = 0.0
     z0: tuple[float, ...] = (0.0,)

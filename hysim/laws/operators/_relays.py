@@ -27,7 +27,7 @@ only if no memory tells it. The user frees others by name.
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import Any, ClassVar
 
 import numpy as np
@@ -215,15 +215,16 @@ def _independent(columns: FloatArray, order: list[int]) -> set[int]:
     return independent
 
 
+@dataclass(frozen=True, kw_only=True, eq=False)
 class RelayLaw(ByStructure, Law):
-    """A bank of weighted relays; a law says whether they are spread over their intervals, and adds its fields."""
+    """A bank of weighted relays; a law says whether they are spread over their intervals."""
 
     spread: ClassVar[bool]
     units: ClassVar[Mapping[str, str]] = {"levels": "u", "weights": "y", "offset": "y", "z0": "u"}
-    levels: tuple[float, ...]
-    weights: tuple[float, ...]
-    offset: float
-    z0: tuple[float, ...]
+    levels: tuple[float, ...] = ()
+    weights: tuple[float, ...] = ()
+    offset: float = 0.0
+    z0: tuple[float, ...] = ()
 
     step = staticmethod(kernels.step)
 

@@ -9,7 +9,7 @@ import numpy.typing as npt
 
 from hysim._basics.frozen import FloatArray, read_only
 from hysim.kernels import energy_plays as kernels
-from hysim.laws.operators._bank import Bank
+from hysim.laws.operators._bank import Plays
 from hysim.laws.operators._bank_search import Axis, BankStructure
 from hysim.models.law import Law
 from hysim.models.model import Example, family
@@ -21,7 +21,7 @@ _SPACING = 2.0  # of the thresholds: finer towards zero
 
 
 @family
-class EnergyPlays(Bank, Law):
+class EnergyPlays(Plays, Law):
     """Energy-based plays, ``y = offset + feedthrough u + sum_i w_i L(z_i / field)`` over plays of the thresholds r_i.
 
     ``z_i(k) = min(max(z_i(k-1), u_k - r_i), u_k + r_i)`` is the reversible field of cell i, what a pinning force r_i
@@ -71,8 +71,6 @@ class EnergyPlays(Bank, Law):
         group="Magnetic cores",
     )
 
-    thresholds: tuple[float, ...] = ()
-    weights: tuple[float, ...] = ()
     field: float = 1.0
     feedthrough: float = 0.0
     offset: float = 0.0

@@ -7,7 +7,7 @@ import numpy as np
 import numpy.typing as npt
 
 from hysim._basics.frozen import FloatArray, read_only
-from hysim.laws.operators._bank import Bank
+from hysim.laws.operators._bank import Plays
 from hysim.laws.operators._bank_search import IDENTITY, Axis, BankStructure, named, table_of
 from hysim.laws.operators._play_sums import EXAMPLE, PlaySum
 from hysim.models.model import Example, family
@@ -24,7 +24,7 @@ _AXES = (
 
 
 @family
-class GeneralizedPrandtlIshlinskii(Bank, PlaySum):
+class GeneralizedPrandtlIshlinskii(Plays, PlaySum):
     """Generalised Prandtl-Ishlinskii law: plays that the input pushes through envelope functions.
 
     ::
@@ -65,8 +65,6 @@ class GeneralizedPrandtlIshlinskii(Bank, PlaySum):
     ([0.0, 1.428055, 1.225622, -1.428055], [0.0, 1.0, 0.5, -1.0])
     """
 
-    thresholds: tuple[float, ...] = ()
-    weights: tuple[float, ...] = ()
     left: tuple[float, ...] = IDENTITY
     right: tuple[float, ...] = ()
     offset: float = 0.0

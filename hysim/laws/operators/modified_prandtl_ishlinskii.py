@@ -13,7 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 from hysim._basics.frozen import FloatArray, read_only
-from hysim.laws.operators._bank import Bank
+from hysim.laws.operators._bank import Plays
 from hysim.laws.operators._bank_search import BankStructure, check_dead_zones, dead_zone, named
 from hysim.laws.operators._play_sums import EXAMPLE, PlaySum
 from hysim.laws.operators.prandtl_ishlinskii import PrandtlIshlinskii, wrong_sum
@@ -23,7 +23,7 @@ from hysim.models.tables import Tables
 
 
 @family
-class ModifiedPrandtlIshlinskii(Bank, PlaySum):
+class ModifiedPrandtlIshlinskii(Plays, PlaySum):
     """Modified Prandtl-Ishlinskii law: plays, followed by dead zones, for loops that are not odd.
 
     ::
@@ -58,8 +58,6 @@ class ModifiedPrandtlIshlinskii(Bank, PlaySum):
     ([0.0, 2.5, 1.75, -2.0], [0.0, 1.0, 0.5, -1.0])
     """
 
-    thresholds: tuple[float, ...] = ()
-    weights: tuple[float, ...] = ()
     dead_zones: tuple[float, ...] = (0.0,)
     dead_zone_weights: tuple[float, ...] = (1.0,)
     offset: float = 0.0

@@ -4,6 +4,7 @@ Sources: M. A. Krasnosel'skii and A. V. Pokrovskii, Systems with Hysteresis, 198
 """
 
 from collections.abc import Callable
+from dataclasses import dataclass
 from typing import ClassVar
 
 import numpy as np
@@ -15,8 +16,35 @@ from hysim.models.parameters import Parameter
 from hysim.models.search_space import Parameters
 
 
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Element(Clamps):
+    """A single play or stop."""
+
+    threshold: float = 1.0
+    gain: float = 1.0
+    offset: float = 0.0
+    z0: float = 0.0
+
+    not_negative = ("threshold",)
+    searched = (
+        Parameter("threshold", 1e-3, 1.5, unit="h", physical=(True, False)),
+        Parameter("z0", -1.0, 1.0, unit="h", from_first=True),
+        Parameter("gain", unit="y/u", affine=True),
+        Parameter("offset", unit="y", affine=True),
+    )
+    starts = tuple({"threshold": share, "z0": 0.0} for share in (0.1, 0.3, 0.6))
+    screened = 256
+
+    def columns_by(
+        self, outputs: Callable[[Parameters, FloatArray], FloatArray], parameters: Parameters, u: FloatArray
+    ) -> FloatArray:
+        """Columns z (or u - z), 1 and 0 of the output, shape (n_sets, n_samples, 3)."""
+        element = outputs({**parameters, "gain": 1.0, "offset": 0.0}, u)
+        return np.stack([element, np.ones_like(element), np.zeros_like(element)], axis=-1)
+
+
 @family
-class Play(Clamps):
+class Play(Element):
     """Play (backlash) of half width r, ``y = offset + gain z`` with ``z_k = min(max(z_(k-1), u_k - r), u_k + r)``.
 
     Exact at the samples of an input that is monotone between them. The loop runs counterclockwise.
@@ -42,32 +70,11 @@ class Play(Clamps):
     [0.0, 1.5, 1.5, 0.5]
     """
 
-    threshold: float = 1.0
-    gain: float = 1.0
-    offset: float = 0.0
-    z0: float = 0.0
-
     example = Example({"threshold": 0.25}, title="Play")
-    not_negative = ("threshold",)
-    searched = (
-        Parameter("threshold", 1e-3, 1.5, unit="h", physical=(True, False)),
-        Parameter("z0", -1.0, 1.0, unit="h", from_first=True),
-        Parameter("gain", unit="y/u", affine=True),
-        Parameter("offset", unit="y", affine=True),
-    )
-    starts = tuple({"threshold": share, "z0": 0.0} for share in (0.1, 0.3, 0.6))
-    screened = 256
-
-    def columns_by(
-        self, outputs: Callable[[Parameters, FloatArray], FloatArray], parameters: Parameters, u: FloatArray
-    ) -> FloatArray:
-        """Columns z (or u - z), 1 and 0 of the output, shape (n_sets, n_samples, 3)."""
-        element = outputs({**parameters, "gain": 1.0, "offset": 0.0}, u)
-        return np.stack([element, np.ones_like(element), np.zeros_like(element)], axis=-1)
 
 
 @family
-class Stop(Clamps):
+class Stop(Element):
     """Stop (elastic-perfectly plastic element), ``y = offset + gain (u - z)`` with the z of `Play`.
 
     A spring, fixed at z, that slips at the elongation r. The loop runs clockwise.
@@ -93,15 +100,8 @@ class Stop(Clamps):
     [0.0, 0.5, 0.0, -0.5]
     """
 
-    threshold: float = 1.0
-    gain: float = 1.0
-    offset: float = 0.0
-    z0: float = 0.0
-
     example = Example({"threshold": 0.4}, title="Stop")
     stops: ClassVar[bool] = True
-    not_negative = Play.not_negative
-    searched, starts, screened, columns_by = Play.searched, Play.starts, Play.screened, Play.columns_by
 
     @property
     def saturation(self) -> float:

@@ -19,7 +19,7 @@ import numpy.typing as npt
 
 from hysim._basics.frozen import FloatArray, read_only
 from hysim.kernels import inverses
-from hysim.laws.operators._bank import Bank, Clamps
+from hysim.laws.operators._bank import Clamps, Plays
 from hysim.models.law import State
 from hysim.models.model import Example, family
 from hysim.models.protocols import UNLIMITED, CompiledLaw, Limits
@@ -28,7 +28,7 @@ _CONSISTENT = 1e-9  # of the largest threshold: what rounding may add to the dis
 
 
 @family
-class PrandtlIshlinskii(Bank, Clamps):
+class PrandtlIshlinskii(Plays, Clamps):
     """Prandtl-Ishlinskii law, ``y = offset + sum w_i z_i`` over plays of the thresholds r_i.
 
     ``z_i(k) = min(max(z_i(k-1), u_k - r_i), u_k + r_i)``. Positive weights give the counterclockwise loops of
@@ -70,8 +70,6 @@ class PrandtlIshlinskii(Bank, Clamps):
         stack=True,
     )
 
-    thresholds: tuple[float, ...] = ()
-    weights: tuple[float, ...] = ()
     offset: float = 0.0
     z0: tuple[float, ...] = (0.0,)
 

@@ -78,11 +78,6 @@ class PreisachRelays(RelayLaw):
     )
     spread: ClassVar[bool] = False
 
-    levels: tuple[float, ...] = ()
-    weights: tuple[float, ...] = ()
-    offset: float = 0.0
-    z0: tuple[float, ...] = ()
-
 
 @family
 class Preisach(RelayLaw):
@@ -119,11 +114,6 @@ class Preisach(RelayLaw):
 
     spread: ClassVar[bool] = True
     example = Example({"levels": tuple(_GRID.tolist()), "weights": relay_weights(_GRID, _two_bells)}, title="Preisach")
-
-    levels: tuple[float, ...] = ()
-    weights: tuple[float, ...] = ()
-    offset: float = 0.0
-    z0: tuple[float, ...] = ()
 
     @classmethod
     def from_everett(cls, levels: npt.ArrayLike, everett: npt.ArrayLike, *, offset: float = 0.0) -> Self:

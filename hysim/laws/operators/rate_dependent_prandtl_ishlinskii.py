@@ -20,7 +20,7 @@ import numpy.typing as npt
 
 from hysim._basics.frozen import FloatArray, check_positive, items, read_only
 from hysim._names import among
-from hysim.laws.operators._bank import Bank
+from hysim.laws.operators._bank import Plays
 from hysim.laws.operators._bank_search import Axis, table_of
 from hysim.laws.operators._play_sums import EXAMPLE, PlaysAtSampleTime
 from hysim.laws.operators.prandtl_ishlinskii import PrandtlIshlinskii
@@ -36,7 +36,7 @@ from hysim.records import Record
 
 
 @family
-class RateDependentPrandtlIshlinskii(Bank, Placed):
+class RateDependentPrandtlIshlinskii(Plays, Placed):
     """Rate-dependent Prandtl-Ishlinskii law, ``y = offset + sum w_i z_i``, thresholds ``r_i + beta |u'|``.
 
     ::
@@ -75,8 +75,6 @@ class RateDependentPrandtlIshlinskii(Bank, Placed):
     [0.0, 1.0, 0.0]
     """
 
-    thresholds: tuple[float, ...] = ()
-    weights: tuple[float, ...] = ()
     beta: float = 0.0
     offset: float = 0.0
     z0: tuple[float, ...] = (0.0,)
