@@ -28,21 +28,13 @@ def begin(state: FloatArray, memory: FloatArray, first: float) -> None:
     state[0] = first
 
 
-@signed_kernel(void(STEP, START, TABLE, TABLE, int64, TABLE, ROWS, int64, int64))
+@signed_kernel(void(STEP, START, TABLE, TABLE, int64, TABLE, ROWS))
 def drive_each(
-    step: Step,
-    begun: Start,
-    parameters: FloatArray,
-    memory: FloatArray,
-    scratch: int,
-    u: FloatArray,
-    out: FloatArray,
-    start: int,
-    stop: int,
+    step: Step, begun: Start, parameters: FloatArray, memory: FloatArray, scratch: int, u: FloatArray, out: FloatArray
 ) -> None:
-    """Outputs of the laws `start` to `stop - 1`, which `begun` starts; one that diverges is a row of inf."""
+    """Outputs of many laws, which `begun` starts; one that diverges is a row of inf."""
     state = np.zeros(memory.shape[1] + scratch)
-    for i in range(start, stop):
+    for i in range(out.shape[0]):
         row = u[min(i, u.shape[0] - 1)]
         if row.size == 0:
             continue

@@ -15,11 +15,12 @@ the two terms balance: then a and c are plus or minus one, and what is left is o
 """
 
 import math
+from collections.abc import Callable
 
 import numpy as np
 
 from hysim._basics.frozen import FloatArray
-from hysim.kernels._compile import borrowed, inlined, inner, kernel
+from hysim.kernels._compile import borrowed, inlined, inner, kernel, pasted
 from hysim.kernels.charts import N_WORK, in_chart, power_flow, prepare_exponent
 from hysim.kernels.elementary import (
     DECAY_REACH,
@@ -37,6 +38,9 @@ from hysim.kernels.elementary import (
 
 # The first places of a law's workspace: last u and z, for `step`; then w*, 1/w* and |a|/w* loading, and unloading.
 _LOADING, _UNLOADING = 2, 5
+Move = Callable[[float, float, float, float, float], float]
+"""A memory after a way, from the memory, the way, A, and two more numbers."""
+
 _EXTREME = 690.0  # of |log w*|, beyond which one of the two terms counts as vanished, and of |log(A/c)| for a power
 _N_ALIKE = 2  # steps in one direction after another, from which on a run is tried: in noise it ends where it begins
 
@@ -128,62 +132,27 @@ def prepare_side(A: float, c: float, n: float, side: int, work: FloatArray) -> N
 @kernel
 def linear_path(A: float, beta: float, gamma: float, last_u: float, z: float, u: FloatArray, out: FloatArray) -> int:
     """Memory of n = 1 at the samples of `u` from (last_u, z) into `out`: the first sample that is not finite, or -1."""
-    loading, unloading = beta + gamma, beta - gamma
-    k = n_alike = 0
-    last_du = 0.0
-    while k < u.size:
-        du = u[k] - last_u
-        z = z if du == 0.0 else linear_advance(z, du, A, loading, unloading)
-        last_u = u[k]
-        out[k] = z
-        if not math.isfinite(z):
-            return k
-        k += 1
-        n_alike = n_alike + 1 if du * last_du >= 0.0 else 0
-        last_du = du
-        if n_alike == _N_ALIKE:
-            n_alike = 0
-            k = linear_run(A, loading, unloading, du, u, out, k)
-            last_u, z = u[k - 1], out[k - 1]
-    return -1
-
-
-@inlined
-def linear_run(A: float, loading: float, unloading: float, du: float, u: FloatArray, out: FloatArray, k: int) -> int:
-    """Go on from sample k - 1 while the input moves as by `du` and z keeps its sign: the first sample not reached.
-
-    The rate is the same for the whole run, so that a sample does not wait for the sign of the one before.
-    """
-    direction, last_u = math.copysign(1.0, du), u[k - 1]
-    along = direction * out[k - 1]
-    side = math.copysign(1.0, along)
-    rate = loading if along > 0.0 else unloading
-    if A == 0.0 or along == 0.0:
-        return k
-    while k < u.size:
-        length = direction * (u[k] - last_u)
-        if length != 0.0:
-            if not (length > 0.0 and abs(rate * length) <= DECAY_REACH):
-                break
-            along = short_flow(along, A, rate, length)
-            if not 0.0 < side * along < math.inf:
-                break
-            last_u = u[k]
-        out[k] = direction * along
-        k += 1
-    return k
+    return elementary_path(linear_advance, linear_part, A, beta, gamma, last_u, z, u, out)
 
 
 @kernel
 def quadratic_path(A: float, beta: float, gamma: float, last_u: float, z: float, u: FloatArray, out: FloatArray) -> int:
     """As `linear_path`, for n = 2."""
+    return elementary_path(quadratic_advance, quadratic_part, A, beta, gamma, last_u, z, u, out)
+
+
+@pasted
+def elementary_path(
+    whole: Move, part: Move, A: float, beta: float, gamma: float, last: float, z: float, u: FloatArray, out: FloatArray
+) -> int:
+    """As `linear_path`, by the `whole` flow of an exponent and the `part` of it that runs take."""
     loading, unloading = beta + gamma, beta - gamma
     k = n_alike = 0
     last_du = 0.0
     while k < u.size:
-        du = u[k] - last_u
-        z = z if du == 0.0 else quadratic_advance(z, du, A, loading, unloading)
-        last_u = u[k]
+        du = u[k] - last
+        z = z if du == 0.0 else whole(z, du, A, loading, unloading)
+        last = u[k]
         out[k] = z
         if not math.isfinite(z):
             return k
@@ -192,14 +161,19 @@ def quadratic_path(A: float, beta: float, gamma: float, last_u: float, z: float,
         last_du = du
         if n_alike == _N_ALIKE:
             n_alike = 0
-            k = quadratic_run(A, loading, -unloading, du, u, out, k)
-            last_u, z = u[k - 1], out[k - 1]
+            k = run(part, A, loading, unloading, du, u, out, k)
+            last, z = u[k - 1], out[k - 1]
     return -1
 
 
-@inlined
-def quadratic_run(A: float, loading: float, unloading: float, du: float, u: FloatArray, out: FloatArray, k: int) -> int:
-    """As `linear_run`, for n = 2."""
+@pasted
+def run(
+    part: Move, A: float, loading: float, unloading: float, du: float, u: FloatArray, out: FloatArray, k: int
+) -> int:
+    """Go on from sample k - 1 while the input moves as by `du` and z keeps its sign: the first sample not reached.
+
+    The rate is the same for the whole run, so that a sample does not wait for the sign of the one before.
+    """
     direction, last_u = math.copysign(1.0, du), u[k - 1]
     along = direction * out[k - 1]
     side = math.copysign(1.0, along)
@@ -209,13 +183,7 @@ def quadratic_run(A: float, loading: float, unloading: float, du: float, u: Floa
     while k < u.size:
         length = direction * (u[k] - last_u)
         if length != 0.0:
-            y = A * rate * length * length
-            if not (length > 0.0 and abs(y) <= TANGENT_REACH):
-                break
-            tangent = short_tangent(y, length)
-            if side * (along + A * tangent) <= 0.0:  # as `quadratic_advance` decides, to the last bit
-                break
-            along = quadratic_flow(along, A, rate, tangent)
+            along = part(along, length, A, rate, side)
             if not 0.0 < side * along < math.inf:
                 break
             last_u = u[k]
@@ -224,20 +192,28 @@ def quadratic_run(A: float, loading: float, unloading: float, du: float, u: Floa
     return k
 
 
+@inlined
+def linear_part(along: float, length: float, A: float, rate: float, side: float) -> float:
+    """Value of n = 1 after a short way on this `side` of zero, nan where the way is not short or not ahead."""
+    is_short = length > 0.0 and abs(rate * length) <= DECAY_REACH and A != 0.0
+    return short_flow(along, A, rate, length) if is_short else math.nan
+
+
+@inlined
+def quadratic_part(along: float, length: float, A: float, rate: float, side: float) -> float:
+    """As `linear_part`, for n = 2."""
+    y = A * (side * rate) * length * length
+    tangent = short_tangent(y, length)
+    # whether it crosses zero, as `quadratic_advance` decides, to the last bit
+    if not (length > 0.0 and abs(y) <= TANGENT_REACH) or side * (along + A * tangent) <= 0.0:
+        return math.nan
+    return quadratic_flow(along, A, side * rate, tangent)
+
+
 @kernel
-def power_path(
-    A: float,
-    beta: float,
-    gamma: float,
-    n: float,
-    last_u: float,
-    z: float,
-    u: FloatArray,
-    work: FloatArray,
-    out: FloatArray,
-) -> int:
-    """As `linear_path`, for other n; `work` comes from `prepare`."""
-    charts = borrowed(work)
+def power_path(law: FloatArray, last_u: float, z: float, u: FloatArray, work: FloatArray, out: FloatArray) -> int:
+    """As `linear_path`, for other n; `law` begins with (A, beta, gamma, n), and `work` comes from `prepare`."""
+    A, beta, gamma, n, charts = law[0], law[1], law[2], law[3], borrowed(work)
     for k in range(u.size):
         du = u[k] - last_u
         z = z if du == 0.0 else power_advance(z, du, A, beta, gamma, n, charts)
@@ -248,32 +224,30 @@ def power_path(
     return -1
 
 
-def batch(parameters: FloatArray, output: FloatArray, u: FloatArray, out: FloatArray, start: int, stop: int) -> None:
-    """Outputs of the laws `start` to `stop - 1`.
+def batch(parameters: FloatArray, output: FloatArray, u: FloatArray, out: FloatArray) -> None:
+    """Outputs of many laws.
 
     `parameters` is (n_sets, 5) with columns A, beta, gamma, n, z0; `output` is (n_sets, 2 + degree) with
     columns gain, offset, c1, c2, ...; `u` is (1, n_samples) or (n_sets, n_samples); `out` is
     (n_sets, n_samples). A law that diverges is a row of inf. Neighbours of equal n share their charts.
     """
-    n = parameters[start:stop, 3]
+    n = parameters[:, 3]
     linear, quadratic = n == 1.0, n == 2.0
     if u.shape[1] == 0:
         return
     if linear.any():  # a kernel for each kind of exponent: none is compiled that no law needs
-        linear_batch(parameters, output, u, out, start, stop)
+        linear_batch(parameters, output, u, out)
     if quadratic.any():
-        quadratic_batch(parameters, output, u, out, start, stop)
+        quadratic_batch(parameters, output, u, out)
     if not (linear | quadratic).all():
-        power_batch(parameters, output, u, out, start, stop)
+        power_batch(parameters, output, u, out)
 
 
 @kernel
-def linear_batch(
-    parameters: FloatArray, output: FloatArray, u: FloatArray, out: FloatArray, start: int, stop: int
-) -> None:
+def linear_batch(parameters: FloatArray, output: FloatArray, u: FloatArray, out: FloatArray) -> None:
     """As `batch`, for the laws of n = 1; those on one input go side by side."""
-    several, side_by_side = np.empty((N_ROWS, N_AT_ONCE)), start
-    for i in range(start, stop):
+    several, side_by_side = np.empty((N_ROWS, N_AT_ONCE)), 0
+    for i in range(out.shape[0]):
         A, beta, gamma, n, z0 = parameters[i]
         if n == 1.0:
             row = u[min(i, u.shape[0] - 1)]
@@ -281,18 +255,16 @@ def linear_batch(
             if u.shape[0] > 1:
                 lost = linear_path(A, beta, gamma, row[0], z0, row, out[i])
             elif i >= side_by_side:
-                count = count_linear(parameters, i, stop)
+                count = count_linear(parameters, i)
                 linear_rows(parameters, i, count, row, several, out)
                 side_by_side = i + count
             finish(lost < 0 and math.isfinite(out[i, row.size - 1]), output[i], row, out[i])
 
 
 @kernel
-def quadratic_batch(
-    parameters: FloatArray, output: FloatArray, u: FloatArray, out: FloatArray, start: int, stop: int
-) -> None:
+def quadratic_batch(parameters: FloatArray, output: FloatArray, u: FloatArray, out: FloatArray) -> None:
     """As `batch`, for the laws of n = 2."""
-    for i in range(start, stop):
+    for i in range(out.shape[0]):
         A, beta, gamma, n, z0 = parameters[i]
         if n == 2.0:
             row = u[min(i, u.shape[0] - 1)]
@@ -301,18 +273,16 @@ def quadratic_batch(
 
 
 @kernel
-def power_batch(
-    parameters: FloatArray, output: FloatArray, u: FloatArray, out: FloatArray, start: int, stop: int
-) -> None:
+def power_batch(parameters: FloatArray, output: FloatArray, u: FloatArray, out: FloatArray) -> None:
     """As `batch`, for the laws of other n."""
     work, last_n = np.empty(N_WORK), 0.0
-    for i in range(start, stop):
+    for i in range(out.shape[0]):
         A, beta, gamma, n, z0 = parameters[i]
         if n != 1.0 and n != 2.0:
             row = u[min(i, u.shape[0] - 1)]
             prepare(A, beta, gamma, n, last_n, work)
             last_n = n
-            lost = power_path(A, beta, gamma, n, row[0], z0, row, work, out[i])
+            lost = power_path(parameters[i], row[0], z0, row, work, out[i])
             finish(lost < 0, output[i], row, out[i])
 
 

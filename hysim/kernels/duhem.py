@@ -62,23 +62,14 @@ def start(parameters: FloatArray, state: FloatArray, u0: float) -> None:
 
 
 @kernel
-def batch(
-    parameters: FloatArray,
-    z0: FloatArray,
-    u: FloatArray,
-    bound: float,
-    most: int,
-    out: FloatArray,
-    begin: int,
-    end: int,
-) -> int:
-    """Memories of the laws `begin` to `end - 1` into `out`, (n_sets, n_samples); returns the slopes that they take.
+def batch(parameters: FloatArray, z0: FloatArray, u: FloatArray, bound: float, most: int, out: FloatArray) -> int:
+    """Memories of many laws into `out`, (n_sets, n_samples); returns the slopes that they take.
 
     `parameters` is (n_sets, n_parameters), `z0` is (n_sets,), `u` is (1, n_samples) or (n_sets, n_samples). A law that
     goes beyond the `bound`, or needs more than `most` steps from one sample to the next, is a row of inf.
     """
     total, state = 0, np.zeros(N_STATE)
-    for i in range(begin, end if u.shape[1] > 0 else begin):
+    for i in range(out.shape[0] if u.shape[1] > 0 else 0):
         row = u[min(i, u.shape[0] - 1)]
         state[0], state[1], state[-1] = row[0], z0[i], 0.0  # no slope is known yet
         for k in range(row.size):

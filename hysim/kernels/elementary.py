@@ -207,9 +207,9 @@ _A, _LOADING, _UNLOADING, _MEMORY, _ANEW = range(N_ROWS)
 
 
 @inlined
-def count_linear(parameters: FloatArray, start: int, stop: int) -> int:
+def count_linear(parameters: FloatArray, start: int) -> int:
     """How many laws from `start` on, N_AT_ONCE at most, have n = 1."""
-    end = min(stop, start + N_AT_ONCE)
+    end = min(parameters.shape[0], start + N_AT_ONCE)
     i = start
     while i < end and parameters[i, 3] == 1.0:
         i += 1

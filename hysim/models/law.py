@@ -774,4 +774,4 @@ def rows_by_step(step: Step, start: Start, laws: Packed, workspace: int, u: Floa
 
     parameters, memory = (read_only(table, finite=False) for table in laws)
     with np.errstate(all="ignore"):
-        drive_each(pointer(step), pointer(start, START), parameters, memory, workspace, u, y, 0, len(y))
+        drive_each(pointer(step), pointer(start, START), parameters, memory, workspace, u, y)

@@ -279,8 +279,11 @@ class _Equation:
         memory = read_only(np.stack([np.broadcast_to(law[name], len(x)) for name in names], axis=1))
         output = read_only(np.tile([1.0, 0.0, 0.0], (len(x), 1)))
         w = np.empty((len(x), self.along.size))
-        along = self.along[np.newaxis]
-        in_chunks(lambda begin, end: kernels.batch(memory, output, along, w, begin, end), len(x), minimum=8)
+
+        def work(begin: int, end: int) -> None:
+            kernels.batch(memory[begin:end], output[begin:end], self.along[np.newaxis], w[begin:end])
+
+        in_chunks(work, len(x), minimum=8)
         if self.periodic:
             w = w[:, self.along.size // 2 :]
         with np.errstate(invalid="ignore", over="ignore"):

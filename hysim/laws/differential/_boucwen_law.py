@@ -104,7 +104,7 @@ class BoucWenStep(Law):
         elif n == 2.0:
             lost = kernels.quadratic_path(A, beta, gamma, last_u, z, u, y)
         else:
-            lost = kernels.power_path(A, beta, gamma, n, last_u, z, u, law.state, y)
+            lost = kernels.power_path(law.parameters, last_u, z, u, law.state, y)
         if lost < 0:
             law.state[:2] = u[-1], y[-1]
             kernels.to_output(law.parameters, 4, u, y)
@@ -115,7 +115,7 @@ class BoucWenStep(Law):
         parameters, memory = cls.pack(tables)
         laws = read_only(np.concatenate([parameters[:, :4], memory[:, 1:]], axis=1), finite=False)
         with np.errstate(all="ignore"):  # a memory that diverges overflows, and uncompiled kernels would warn of it
-            kernels.batch(laws, read_only(parameters[:, 4:], finite=False), u, y, 0, len(y))
+            kernels.batch(laws, read_only(parameters[:, 4:], finite=False), u, y)
 
 
 class BoucWenLaw(BoucWenStep, MemoryLaw):

@@ -56,8 +56,10 @@ def outputs(
     y, taken = np.empty((n_sets, u.shape[1])), list[int]()
 
     def work(start: int, stop: int) -> None:
+        k = slice(start, stop)
+        inputs = u if len(u) == 1 else u[k]
         with np.errstate(all="ignore"):  # a memory that diverges overflows, and uncompiled kernels would warn of it
-            taken.append(kernels.batch(parameters, z0, u, bound, most_steps, y, start, stop))
+            taken.append(kernels.batch(parameters[k], z0[k], inputs, bound, most_steps, y[k]))
 
     in_chunks(work, n_sets, workers=workers, minimum=1 + _SAMPLES_PER_THREAD // max(1, u.shape[1]))
     if feedthrough.any():

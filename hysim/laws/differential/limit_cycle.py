@@ -115,7 +115,7 @@ def _from_rest(A: float, c: float, n: float, lengths: FloatArray) -> FloatArray:
     u = read_only(np.stack([np.zeros(lengths.size), lengths], axis=1))
     z = np.empty(u.shape)
     with np.errstate(all="ignore"):  # a memory that diverges overflows, and uncompiled kernels would warn of it
-        kernels.batch(laws, memory_itself, u, z, 0, len(z))
+        kernels.batch(laws, memory_itself, u, z)
     return z[:, 1]
 
 
