@@ -191,9 +191,10 @@ class Function(NamedTuple):
 
 
 class Library(Protocol):
-    """Collection of functions, tables and helpers."""
+    """Collection of functions, tables, helpers and structs."""
 
     helpers: set[str]
+    structs: set[Several]
 
     def function(self, of: Callable[..., Any], types: tuple[Type, ...]) -> Function:
         """The C function of a kernel for arguments of these types."""

@@ -80,11 +80,17 @@ class Expressions:
         methods: dict[type[ast.expr], Callable[[Any], Value]] = {
             ast.Constant: self._constant, ast.Name: self._name, ast.Attribute: self._attribute, ast.BinOp: self._binary,
             ast.UnaryOp: self._unary, ast.BoolOp: self._junction, ast.Compare: self._comparison,
-            ast.IfExp: self._choice, ast.Subscript: self._subscript, ast.Call: self._call,
+            ast.IfExp: self._choice, ast.Subscript: self._subscript, ast.Call: self._call, ast.Tuple: self._tuple,
         }  # fmt: skip
         if type(node) not in methods:
             raise self.refusal(node, f"{type(node).__name__} is no expression of the subset")
         return methods[type(node)](node)
+
+    def _tuple(self, node: ast.Tuple) -> Value:
+        values = [self.value(each) for each in node.elts]
+        kind = Several(tuple(value.type for value in values))  # type: ignore[misc]
+        self.library.structs.add(kind)
+        return Value(f"({kind.c_type}){{{', '.join(value.text for value in values)}}}", kind)
 
     # ------------------------------------------------------------------------------ names and constants
 
@@ -343,7 +349,7 @@ class Expressions:
     def _given(self, node: ast.expr, parameter: Parameter) -> list[str]:
         """An argument as far as the function uses it, and its length where that is used."""
         if not isinstance(parameter.type, Vector):
-            return [self.value(node).text] if parameter.is_used else []
+            return [self.any(node).text] if parameter.is_used else []
         array = self.vector(node) if parameter.is_used else self.quietly(node)
         for root in array.roots if parameter.is_written else ():
             self.scope.write(root)

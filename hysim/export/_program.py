@@ -41,9 +41,9 @@ class Translation:
 
     functions: dict[Any, Function] = field(default_factory=dict)
     helpers: set[str] = field(default_factory=set)
+    structs: set[Several] = field(default_factory=set)
     _texts: list[str] = field(default_factory=list)
     _tables: dict[int, tuple[str, Any]] = field(default_factory=dict)
-    _structs: set[Several] = field(default_factory=set)
     _names: set[str] = field(default_factory=set)
 
     def function(self, of: Callable[..., Any], types: tuple[Type, ...]) -> Function:
@@ -66,7 +66,7 @@ class Translation:
     def text(self) -> str:
         structs = [
             f"typedef struct {{ {' '.join(f'{m.c_type} at{i};' for i, m in enumerate(each.members))} }} {each.c_type};"
-            for each in sorted(self._structs, key=lambda each: each.c_type)
+            for each in sorted(self.structs, key=lambda each: each.c_type)
         ]
         helpers = [text for name, text in _c.HELPERS.items() if name in self.helpers]
         used = set(re.findall(r"table_\w+", "".join(self._texts)))  # a table may stand in a branch that was left out
@@ -91,7 +91,7 @@ class Translation:
             for each in body.arguments
         )
         if isinstance(body.returns, Several):
-            self._structs.add(body.returns)
+            self.structs.add(body.returns)
         result = "void" if body.returns is None else body.returns.c_type  # type: ignore[union-attr]
         arguments = [text for each in parameters for text in _declared(each, scope.c_name(each.name))]
         summary = (ast.get_docstring(source.tree) or "").partition("\n\n")[0]

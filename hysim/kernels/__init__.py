@@ -11,7 +11,7 @@ that `hysim.export` translates to C one statement after the other:
 4. Indices are not negative, but for a literal -1; slices lie inside their array and have no stride.
 5. No arithmetic of whole arrays, and no `a[:] = b`: a loop copies, and compiles seconds faster.
 6. Room for work is a part of the state, or `np.empty` of a constant size.
-7. Tuples are results and targets only, and hold numbers; a choice between two is one.
+7. Tuples hold numbers, and are results, targets, arguments and names; a choice between two is a target's.
 8. Globals are numbers, vectors of doubles, or kernels.
 9. No recursion, exceptions, keyword arguments, inner functions, or choice between arrays. A step may itself be an
    inner function that has kernels from around it.

@@ -45,6 +45,10 @@ _AHEAD = 2.0**-26
 _SMALLEST = 2.0**-1022
 _SEARCH = float64(STEP, CONSTANTS, VECTOR, float64)
 SEARCH = types.FunctionType(_SEARCH)
+Branch = tuple[float, float, float, float]
+"""Input where a branch begins, direction of the input, side from which outputs are counted, and their level."""
+Ends = tuple[float, float, float, float]
+"""Two lengths on a branch, each with its error."""
 Search = Callable[[Step, FloatArray, FloatArray, float], float]
 
 
@@ -128,23 +132,18 @@ def put_back(law: FloatArray, before: FloatArray, places: FloatArray) -> None:
 
 @inner
 def _rise(
-    step: Step,
-    parameters: FloatArray,
-    law: FloatArray,
-    before: FloatArray,
-    places: FloatArray,
-    u: float,
-    side: float,
-    level: float,
+    step: Step, own: FloatArray, law: FloatArray, before: FloatArray, places: FloatArray, branch: Branch, length: float
 ) -> float:
-    """Output at `u` less `level`, counted positive on one side of it, from the memory `before`."""
+    """Output after `length` on a branch less its level, counted positive on its side, from the memory `before`."""
+    here, direction, side, level = branch
     put_back(law, before, places)
-    return side * (step(parameters, law, u) - level)
+    return side * (step(own, law, here + direction * length) - level)
 
 
 @inlined
-def _apart(here: float, direction: float, low: float, length: float, high: float) -> bool:
+def _apart(branch: Branch, low: float, length: float, high: float) -> bool:
     """Whether the input after `length` is a number between those after `low` and `high`."""
+    here, direction, _, _ = branch
     end = direction * (here + direction * length)
     return direction * (here + direction * low) < end < direction * (here + direction * high)
 
@@ -152,35 +151,33 @@ def _apart(here: float, direction: float, low: float, length: float, high: float
 @inlined
 def _bracket(
     step: Step,
-    parameters: FloatArray,
+    own: FloatArray,
     law: FloatArray,
     before: FloatArray,
     places: FloatArray,
-    here: float,
-    direction: float,
-    side: float,
-    wanted: float,
+    branch: Branch,
     gap: float,
     guess: float,
     limit: float,
     ahead: float,
     noise: float,
-) -> tuple[float, float, float, float]:
+) -> Ends:
     """Two lengths with their errors. The second reaches the output; if no length does, its error is negative.
 
     The output turns before `limit`. Unless `ahead` is zero, it is evaluated this part of a length beyond each end:
     where it falls there, the end is behind the turn. An infinite `noise` is an output that rises in steps of rounding.
     """
+    here, direction, side, wanted = branch
     low, low_error = 0.0, -gap
     high, too_far = min(guess, 0.5 * limit), limit
     high_error = math.nan
     for _ in range(_DOUBLINGS):
-        high_error = _rise(step, parameters, law, before, places, here + direction * high, side, wanted)
+        high_error = _rise(step, own, law, before, places, branch, high)
         if 0.0 <= high_error < math.inf:
             return low, low_error, high, high_error
         rises = -math.inf < high_error < 0.0 and high_error >= low_error - noise
         if rises and ahead > 0.0:
-            next_error = side * (step(parameters, law, here + direction * (high + ahead * high)) - wanted)
+            next_error = side * (step(own, law, here + direction * (high + ahead * high)) - wanted)
             rises = next_error >= high_error - noise
         if rises:
             low, low_error = high, high_error
@@ -194,40 +191,26 @@ def _bracket(
 
 @inlined
 def _closed_in(
-    step: Step,
-    parameters: FloatArray,
-    law: FloatArray,
-    before: FloatArray,
-    places: FloatArray,
-    here: float,
-    direction: float,
-    side: float,
-    wanted: float,
-    low: float,
-    low_error: float,
-    high: float,
-    high_error: float,
+    step: Step, own: FloatArray, law: FloatArray, before: FloatArray, places: FloatArray, branch: Branch, ends: Ends
 ) -> float:
     """The shortest length that reaches the output, by regula falsi (Illinois) where that is faster than halving.
 
     Where the output stands still, saturated, the length is halved while it keeps the output.
     """
+    low, low_error, high, high_error = ends
     last_side = 0
     while high_error == 0.0:
         length = 0.5 * (low + high)
-        if (
-            not _apart(here, direction, low, length, high)
-            or _rise(step, parameters, law, before, places, here + direction * length, side, wanted) != 0.0
-        ):
+        if not _apart(branch, low, length, high) or _rise(step, own, law, before, places, branch, length) != 0.0:
             return high
         high = length
     for i in range(_HALVINGS):
         length = high - (high - low) * (high_error / (high_error - low_error))
-        if i % 3 == 2 or not _apart(here, direction, low, length, high):
+        if i % 3 == 2 or not _apart(branch, low, length, high):
             length = 0.5 * (low + high)
-        if high_error == 0.0 or not _apart(here, direction, low, length, high):
+        if high_error == 0.0 or not _apart(branch, low, length, high):
             break
-        error = _rise(step, parameters, law, before, places, here + direction * length, side, wanted)
+        error = _rise(step, own, law, before, places, branch, length)
         if error < 0.0:
             low, low_error = length, error
             high_error *= 0.5 if last_side < 0 else 1.0
@@ -242,14 +225,11 @@ def _closed_in(
 @inlined
 def _turn(
     step: Step,
-    parameters: FloatArray,
+    own: FloatArray,
     law: FloatArray,
     before: FloatArray,
     places: FloatArray,
-    here: float,
-    direction: float,
-    side: float,
-    reached: float,
+    branch: Branch,
     length: float,
     noise: float,
 ) -> float:
@@ -257,7 +237,7 @@ def _turn(
     last = 0.0
     for i in range(1, _POINTS + 1):
         part = length * i / _POINTS
-        rise = _rise(step, parameters, law, before, places, here + direction * part, side, reached)
+        rise = _rise(step, own, law, before, places, branch, part)
         if not rise > last - noise:
             return part
         last = rise
@@ -267,13 +247,11 @@ def _turn(
 @inlined
 def _falls_back(
     step: Step,
-    parameters: FloatArray,
+    own: FloatArray,
     law: FloatArray,
     before: FloatArray,
     places: FloatArray,
-    here: float,
-    direction: float,
-    side: float,
+    branch: Branch,
     steepness: float,
     largest: float,
 ) -> bool:
@@ -284,11 +262,11 @@ def _falls_back(
     """
     near, noise, known = _NEAR, 0.0, False
     put_back(law, before, places)
-    reached = step(parameters, law, here)  # which differs from what was wanted by the rounding of the input
+    here, direction, side, _ = branch
+    reached = step(own, law, here)  # which differs from what was wanted by the rounding of the input
+    back_from = here, direction, side, reached
     while near > _NEAREST:
-        back = _rise(
-            step, parameters, law, before, places, here - direction * (near * largest / steepness), side, reached
-        )
+        back = _rise(step, own, law, before, places, back_from, -(near * largest / steepness))
         if math.isfinite(back) and (back < -noise or (noise == 0.0 and back <= _ROUNDINGS * largest)):
             return True
         known = known or math.isfinite(back)
@@ -318,12 +296,12 @@ def search(step: Step, parameters: FloatArray, state: FloatArray, y: float) -> f
         state[3] = max(state[3], abs(y), abs(reached), abs(slope * here))
         largest, resolved = state[3], gap > _RESOLVED * state[3]
         noise, guess = _ROUNDINGS * largest, gap / abs(slope)
-        limit, ahead = math.inf, 0.0
+        limit, ahead, from_here = math.inf, 0.0, (here, direction, side, reached)
         for _ in range(_ATTEMPTS):
             allowed = noise if resolved else math.inf
-            low, low_error, high, high_error = _bracket(
-                step, own, law, before, places, here, direction, side, y, gap, guess, limit, ahead, allowed
-            )
+            branch = here, direction, side, y
+            ends = _bracket(step, own, law, before, places, branch, gap, guess, limit, ahead, allowed)
+            low, low_error, high, high_error = ends
             reaches = 0.0 <= high_error < math.inf
             if not reaches and -noise <= low_error < 0.0:  # saturated but for rounding: what is reached is wanted
                 y += side * (low_error - noise / _BELOW)
@@ -333,16 +311,10 @@ def search(step: Step, parameters: FloatArray, state: FloatArray, y: float) -> f
                     break
                 continue
             if reaches:
-                high = _closed_in(
-                    step, own, law, before, places, here, direction, side, y, low, low_error, high, high_error
-                )
+                high = _closed_in(step, own, law, before, places, branch, ends)
             if reaches or ahead > 0.0:
                 end = high if reaches else low
-                turn = (
-                    0.0
-                    if certain
-                    else _turn(step, own, law, before, places, here, direction, side, reached, end, noise)
-                )
+                turn = 0.0 if certain else _turn(step, own, law, before, places, from_here, end, noise)
                 if turn == 0.0 or not resolved:
                     length = high if reaches else math.nan
                     break
@@ -350,7 +322,7 @@ def search(step: Step, parameters: FloatArray, state: FloatArray, y: float) -> f
             ahead = max(_AHEAD, _CLEAR * noise / gap)
         if resolved and length > 0.0:
             steepness = gap / length
-            if certain or _falls_back(step, own, law, before, places, here, direction, side, steepness, largest):
+            if certain or _falls_back(step, own, law, before, places, from_here, steepness, largest):
                 state[2] = rising * steepness
             else:
                 length = math.nan
