@@ -56,6 +56,10 @@ _PLACES, _SHARES = (
 )
 
 
+Weights = tuple[float, float, float]
+"""Weights of x, m and z in the sum that a stroke takes to its target."""
+
+
 @kernel
 def step(parameters: FloatArray, state: FloatArray, u: float) -> float:
     """Output at the next field `u`; `state` is (last u, M_irr, x, rest), and moves along.
@@ -73,9 +77,9 @@ def step(parameters: FloatArray, state: FloatArray, u: float) -> float:
     if u != last:
         delta = 1.0 if u > last else -1.0
         share = parameters[FEEDBACK] * parameters[REVERSIBLE]
-        of_m, of_z = -parameters[COUPLING] * share, -parameters[COUPLING] * (1.0 - share)
+        weights = 1.0, -parameters[COUPLING] * share, -parameters[COUPLING] * (1.0 - share)
         x, rest = delta * state[2], delta * state[3]
-        x, rest, after, _ = advance(x, rest, delta * z, delta * (u / a), 1.0, of_m, of_z, parameters)
+        x, rest, after, _ = advance(x, rest, delta * z, delta * (u / a), weights, parameters)
         if after != delta * z:
             state[1] = delta * Ms * after
         state[0], state[2], state[3] = u, delta * x, delta * rest
@@ -138,9 +142,10 @@ def reversible(low: float, high: float, target: float, of_x: float, of_m: float,
 
 @inner
 def advance(
-    x: float, rest: float, z: float, target: float, of_x: float, of_m: float, of_z: float, parameters: FloatArray
+    x: float, rest: float, z: float, target: float, weights: Weights, parameters: FloatArray
 ) -> tuple[float, float, float, float]:
     """x, its rest, z and m at the first place ahead with of_x x + of_m m + of_z z = `target`; nan without one."""
+    of_x, of_m, of_z = weights
     p, kappa = parameters[ANISOTROPY], parameters[PINNING]
     m, slope = curve(x, p)
     if z > m:
@@ -157,7 +162,7 @@ def advance(
         return math.nan, math.nan, math.nan, math.nan
     steepest = curve(0.0, p)[1] if x < 0.0 else slope
     if is_steady(m - z, steepest, steepest, parameters):
-        return solve(x, z, m, slope, math.inf, target, of_x, of_m, of_z, parameters)
+        return solve(x, z, m, slope, math.inf, target, weights, parameters)
     length = 0.5
     for _ in range(_MAX_PIECES):
         length = steady_length(x, m - z, slope, length, parameters)
@@ -167,7 +172,7 @@ def advance(
         z_end = averaged(x, z, length, parameters)
         m_end, slope_end = curve(end, p)
         if of_x * end + of_m * m_end + of_z * z_end >= target:
-            return solve(x, z, m, slope, end, target, of_x, of_m, of_z, parameters)
+            return solve(x, z, m, slope, end, target, weights, parameters)
         x, z, m, slope = end, z_end, m_end, slope_end
         length = min(2.0 * length, max(1.0, kappa))
     return math.nan, math.nan, math.nan, math.nan
@@ -200,23 +205,15 @@ def steady_length(x: float, gap: float, slope: float, length: float, parameters:
 
 @inner
 def solve(
-    x: float,
-    z: float,
-    m: float,
-    slope: float,
-    end: float,
-    target: float,
-    of_x: float,
-    of_m: float,
-    of_z: float,
-    parameters: FloatArray,
+    x: float, z: float, m: float, slope: float, end: float, target: float, weights: Weights, parameters: FloatArray
 ) -> tuple[float, float, float, float]:
     """As `advance`, for a place up to `end` on a branch along which z follows m, and the sum rises."""
+    of_x, of_m, of_z = weights
     kappa, p = parameters[PINNING], parameters[ANISOTROPY]
     low, z_low, high = x, z, end
     rise = of_x + of_m * slope + of_z * (m - z) / kappa
     error = target - of_x * x - of_m * m - of_z * z
-    trial = predicted(x, (m - z) / kappa, error, rise, slope, of_x, of_m, of_z, parameters)
+    trial = predicted(x, (m - z) / kappa, error, rise, slope, weights, parameters)
     if not error > 0.0 or trial == x:  # the place is within a rounding of x
         left = error / rise if rise > 0.0 else 0.0
         start, rest = landed(x, left)
@@ -260,17 +257,10 @@ def landed(x: float, left: float) -> tuple[float, float]:
 
 @inner
 def predicted(
-    x: float,
-    steepness: float,
-    error: float,
-    rise: float,
-    slope: float,
-    of_x: float,
-    of_m: float,
-    of_z: float,
-    parameters: FloatArray,
+    x: float, steepness: float, error: float, rise: float, slope: float, weights: Weights, parameters: FloatArray
 ) -> float:
     """The place to look first: by the slopes in the middle of a step of Newton's rule from the beginning."""
+    of_x, of_m, of_z = weights
     half = 0.5 * error / rise if rise > 0.0 else math.nan
     if not half < _FORGOTTEN:
         return math.nan

@@ -34,7 +34,7 @@ def step(parameters: FloatArray, state: FloatArray, y: float) -> float:
     of_m, of_z = gain * c - feedthrough * coupling * share, gain * (1.0 - c) - feedthrough * coupling * (1.0 - share)
     target = delta * rising * (y - own[law.OFFSET])
     x, rest = delta * copy[2], delta * copy[3]
-    x, rest, after, m = law.advance(x, rest, delta * z, target, feedthrough, of_m, of_z, own)
+    x, rest, after, m = law.advance(x, rest, delta * z, target, (feedthrough, of_m, of_z), own)
     wanted = delta * a * (x - coupling * (share * m + (1.0 - share) * after))
     if delta * (wanted - u) <= 0.0:
         return float(u)  # the step is below a rounding of the effective field, and might go the wrong way
