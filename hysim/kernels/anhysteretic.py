@@ -16,26 +16,15 @@ the imaginary axis from i pi / 2 on (theorem of Lee and Yang); for p < 0 farther
 """
 
 import math
-from fractions import Fraction
 
 import numpy as np
 
 from hysim._basics.frozen import read_only
 from hysim.kernels._compile import inner
-from hysim.kernels.elementary import N_TERMS, sum16
+from hysim.kernels.elementary import riccati_series, sum16
 
 _DEPTH = 40.0  # of the exponent: what is left out is below e^-40 of the integral
-
-
-def _langevin_series() -> list[float]:
-    """Coefficients of L(x) / x in powers of x^2, from L' = 1 - L^2 - 2 L / x."""
-    c = [Fraction(1, 3)]
-    for k in range(1, N_TERMS):
-        c.append(-sum((c[j] * c[k - 1 - j] for j in range(k)), Fraction(0)) / (2 * k + 3))
-    return [float(value) for value in c]
-
-
-_SERIES = read_only(_langevin_series())
+_SERIES = read_only(riccati_series(3))  # L(x) / x in powers of x^2, from L' = 1 - L^2 - 2 L / x
 _SERIES_REACH = 1.0  # the terms left out are below 3e-17 of the sum here
 _N_ANGLES = 32
 _ANGLES, _WEIGHTS = (read_only(0.5 * values) for values in np.polynomial.legendre.leggauss(_N_ANGLES))

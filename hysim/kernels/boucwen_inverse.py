@@ -33,6 +33,8 @@ _EPSILON = 2.0**-52
 _SMALLEST = 2.0**-1022  # below it numbers lose their bits: an output that near to another is no other
 _ROUNDINGS = 16.0  # of the forward step, which may keep the residual from zero where the bracket has closed
 _FLAT = 1e-12  # of the slope ahead: a slope of zero, rounded, where the input turns back
+Place = tuple[float, float]
+"""Input and memory."""
 _POINTS = 16  # evaluated along a branch that the bound on P'' does not decide
 
 
@@ -107,12 +109,10 @@ def lowest_slope(u: float, z: float, end: float, z_end: float, direction: float,
 
 
 @pasted
-def monotone(
-    u: float, z: float, direction: float, parameters: FloatArray, state: FloatArray, charts: int | None
-) -> bool:
-    """Whether the slope is positive from (u, z) to where the law's state stands; else `state` gets the place."""
+def monotone(place: Place, direction: float, parameters: FloatArray, state: FloatArray, charts: int | None) -> bool:
+    """Whether the slope is positive from a place to where the law's state stands; else `state` gets the place."""
     memory = state[N_OWN:]
-    end, z_end = memory[0], memory[1]
+    u, z, end, z_end = place[0], place[1], memory[0], memory[1]
     lowest = lowest_slope(u, z, end, z_end, direction, parameters)
     if lowest > 0.0:
         return True
@@ -130,20 +130,13 @@ def monotone(
 
 @pasted
 def solve(
-    u: float,
-    z: float,
-    y: float,
-    direction: float,
-    gap: float,
-    parameters: FloatArray,
-    state: FloatArray,
-    charts: int | None,
+    place: Place, y: float, direction: float, gap: float, parameters: FloatArray, state: FloatArray, charts: int | None
 ) -> bool:
-    """Move the law's state in `direction` from (u, z), `gap` short of `y`, to where the output is `y`.
+    """Move the law's state in `direction` from a place (u, z), `gap` short of `y`, to where the output is `y`.
 
     Returns whether it was reached; the last place goes into `state`.
     """
-    memory = state[N_OWN:]
+    memory, u, z = state[N_OWN:], place[0], place[1]
     upward = parameters[0] * direction
     steepness, back = slope(u, z, direction, parameters), slope(u, z, -direction, parameters)
     state[2], state[3] = u, parameters[0] * min(steepness, back)
@@ -198,7 +191,8 @@ def inverse(parameters: FloatArray, state: FloatArray, y: float, charts: int | N
     gap = upward * (y - (own[6] + boucwen.polynomial(u, coefficients, 0) + own[5] * z))
     direction, wanted = own[0] * upward, u
     if not gap <= 0.0:
-        exists = solve(u, z, y, direction, gap, own, state, charts) and monotone(u, z, direction, own, state, charts)
+        place = u, z
+        exists = solve(place, y, direction, gap, own, state, charts) and monotone(place, direction, own, state, charts)
         stays = not exists and gap <= _ROUNDINGS * rounding(y, u, z, own)  # saturated but for rounding
         if stays:
             memory[0], memory[1] = u, z

@@ -54,16 +54,16 @@ def sum8(c: FloatArray, first: int, x: float) -> float:
     return float(a + b * (x2 * x2))
 
 
-def _tangent_series() -> list[float]:
-    """Coefficients of tanh(sqrt(y)) / sqrt(y) in powers of y, from T' = 1 - T^2."""
-    c = [Fraction(1)]
+def riccati_series(m: int) -> list[float]:
+    """Coefficients of T(x) / x in powers of x^2, from T' = 1 - T^2 - (m - 1) T / x."""
+    c = [Fraction(1, m)]
     for k in range(1, N_TERMS):
-        c.append(-sum((c[j] * c[k - 1 - j] for j in range(k)), Fraction(0)) / (2 * k + 1))
+        c.append(-sum((c[j] * c[k - 1 - j] for j in range(k)), Fraction(0)) / (2 * k + m))
     return [float(value) for value in c]
 
 
 _DECAY = read_only([(-1.0) ** k / math.factorial(k + 1) for k in range(N_TERMS)])  # of (1 - exp(-x)) / x
-_TANGENT = read_only(_tangent_series())
+_TANGENT = read_only(riccati_series(1))  # of tanh(sqrt(y)) / sqrt(y)
 DECAY_REACH = 0.75  # the terms left out are below 3e-17 here
 TANGENT_REACH = 0.2  # and below 5e-18 here
 _LARGEST_EXPONENT = 709.0

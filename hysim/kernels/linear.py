@@ -114,7 +114,7 @@ def columns(
             cut = level[before] + (1.0 - part) * rise[before]
             end = level[now] + (1.0 - part) * rise[now]
             if not at_end:
-                _write(x, free, cut if part > 0.0 else level[now], den, powers, first, own, k)
+                _write(x, free, cut if part > 0.0 else level[now], den, powers, first, own[k])
             if part > 0.0:
                 _advance(cut_A, cut_B0, cut_B1, cut, level[before] + rise[before], x, moved)
             _advance(full_A, full_B0, full_B1, level[now], end, x, moved)
@@ -126,7 +126,7 @@ def columns(
             for column in range(n):
                 free[column] = moved[column]
             if at_end:
-                _write(x, free, end, den, powers, first, own, k)
+                _write(x, free, end, den, powers, first, own[k])
 
 
 @kernel
@@ -257,23 +257,16 @@ def step(parameters: FloatArray, state: FloatArray, u: float) -> float:
 
 @inlined
 def _write(
-    x: FloatArray,
-    free: FloatArray,
-    through: float,
-    den: FloatArray,
-    powers: FloatArray,
-    first: int,
-    out: FloatArray,
-    k: int,
+    x: FloatArray, free: FloatArray, through: float, den: FloatArray, powers: FloatArray, first: int, row: FloatArray
 ) -> None:
-    """Sample k: s^j / den(s) u for the powers j from n - `first` down, the free responses, and zero."""
+    """A sample: s^j / den(s) u for the powers j from n - `first` down, the free responses, and zero."""
     n = len(x)
     if first == 0:
         for j in range(n):
             through -= den[j] * x[n - 1 - j]
-        out[k, 0] = through
+        row[0] = through
     for j in range(max(first, 1), n + 1):
-        out[k, j - first] = x[n - j] * powers[j]
+        row[j - first] = x[n - j] * powers[j]
     for j in range(n):
-        out[k, n + 1 - first + j] = free[j] * powers[j]
-    out[k, 2 * n + 1 - first] = 0.0
+        row[n + 1 - first + j] = free[j] * powers[j]
+    row[2 * n + 1 - first] = 0.0

@@ -21,6 +21,7 @@ import numpy as np
 from hysim._basics.frozen import FloatArray
 from hysim.kernels._compile import borrowed, inner, kernel
 from hysim.kernels.inverses import N_LIMITS, N_PLACE, within_limits
+from hysim.kernels.tellinen_table import interval
 
 HEAD = 3
 
@@ -29,23 +30,10 @@ HEAD = 3
 
 
 @inner
-def interval(parameters: FloatArray, u: float) -> int:
-    """Place of the last level but one that is not above `u`, an input between the levels."""
-    low, high = 0, int(parameters[2]) - 1
-    while high - low > 1:
-        middle = (low + high) // 2
-        if u >= parameters[HEAD + middle]:
-            low = middle
-        else:
-            high = middle
-    return low
-
-
-@inner
 def everett(parameters: FloatArray, a: float, b: float) -> float:
     """E(a, b): half of the rise of the output from `b` to `a`, inputs between the levels."""
     n = int(parameters[2])
-    i, j = interval(parameters, a), interval(parameters, b)
+    i, j = interval(parameters, HEAD, n, a), interval(parameters, HEAD, n, b)
     low_a, high_a = parameters[HEAD + i], parameters[HEAD + i + 1]
     low_b, high_b = parameters[HEAD + j], parameters[HEAD + j + 1]
     p, q = (a - low_a) / (high_a - low_a), (b - low_b) / (high_b - low_b)
@@ -104,7 +92,7 @@ def shortened(parameters: FloatArray, x: FloatArray, y: FloatArray, d: int) -> i
 def solved(parameters: FloatArray, start: float, y: float, wanted: float) -> float:
     """Input at which the output, `y` at the extreme `start`, is `wanted`; nan if that is beyond the last level."""
     side = 1 if wanted > y else -1
-    near = interval(parameters, start) + (side + 1) // 2
+    near = interval(parameters, HEAD, int(parameters[2]), start) + (side + 1) // 2
     far = int(parameters[2]) - 1 if side > 0 else 0
     if side * (y + 2.0 * everett(parameters, parameters[HEAD + far], start)) < side * wanted:
         return math.nan

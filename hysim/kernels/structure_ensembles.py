@@ -7,7 +7,7 @@ import numpy as np
 
 from hysim._basics.frozen import FloatArray
 from hysim.kernels._compile import inner, kernel, pasted, uncounted
-from hysim.kernels.structure_flows import N_POWERS, fill_flows
+from hysim.kernels.structure_flows import N_POWERS, fill_flows, put
 from hysim.kernels.structure_layout import Elements, Flows, Motion, Plant, Room, Steps, Tracks
 from hysim.kernels.structure_moments import IntArray
 from hysim.kernels.structure_pointers import follow_at, start_at, step_at
@@ -88,10 +88,8 @@ def fill_slopes(
 def begin_motion(elements: Elements, starts: IntArray, state: FloatArray, x: FloatArray, motion: Motion) -> None:
     """Put a structure at its first sample."""
     n, n_nodes = elements.k0.size, x.size // 2
-    for q in range(x.size):
-        motion.x[q] = x[q]
-    for q in range(state.size):
-        motion.laws[q] = state[q]
+    put(x, motion.x)
+    put(state, motion.laws)
     for q in range(motion.peaks.size):
         motion.peaks[q] = 0.0
     for q in range(motion.work.size):

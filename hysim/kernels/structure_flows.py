@@ -45,15 +45,20 @@ def fill_flows(
 
 
 @uncounted
+def put(values: FloatArray, out: FloatArray) -> None:
+    """Copy a vector."""
+    for q in range(values.size):
+        out[q] = values[q]
+
+
+@uncounted
 def copy_flow(E: FloatArray, P: FloatArray, E_out: FloatArray, P_out: FloatArray) -> None:
     """Copy a flow."""
     for i in range(E.shape[0]):
-        for q in range(E.shape[1]):
-            E_out[i, q] = E[i, q]
+        put(E[i], E_out[i])
     for i in range(P.shape[0]):
         for j in range(N_POWERS):
-            for q in range(P.shape[2]):
-                P_out[i, j, q] = P[i, j, q]
+            put(P[i, j], P_out[i, j])
 
 
 @uncounted
@@ -107,8 +112,7 @@ def double(E: FloatArray, P: FloatArray, square_of: FloatArray, past: FloatArray
     for i in range(m):
         apply(E, E[i], square_of[i])
     for i in range(m):
-        for q in range(m):
-            E[i, q] = square_of[i, q]
+        put(square_of[i], E[i])
 
 
 @uncounted

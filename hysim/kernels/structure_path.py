@@ -15,7 +15,7 @@ import math
 
 from hysim._basics.frozen import FloatArray
 from hysim.kernels._compile import uncounted, uncounted_kernel, unfolded
-from hysim.kernels.structure_flows import add_columns
+from hysim.kernels.structure_flows import add_columns, put
 from hysim.kernels.structure_layout import Elements, Flows, Motion, Plant, Room, Steps, Tracks
 from hysim.kernels.structure_moments import crest, set_clock
 from hysim.kernels.structure_pointers import step_at
@@ -37,8 +37,7 @@ def add_work(flows: Flows, plant: Plant, level: int, h: float, share: float, mot
     for i in range(n_loads):
         inputs[m + 2 * i + 1] *= 2.0
     for k in range(3):
-        for q in range(m):
-            room.now[q] = x[q] if k == 0 else room.point[q] if k == 1 else room.end[q]
+        put(x if k == 0 else room.point if k == 1 else room.end, room.now)
         add_powers(plant, h, share, 0.5 * k, 1.0 - k, room.now, room, work)
 
 
@@ -141,8 +140,7 @@ def take_step(
         peaks[2 * n + q] = max(peaks[2 * n + q], size)
     if plant.directions.shape[0] > 0:
         add_work(flows, plant, level, h, share, motion, room)
-    for q in range(m):
-        x[q] = end[q]
+    put(end, x)
     keep(elements.stretches, motion.laws, room.saved)
 
 
@@ -201,13 +199,6 @@ def write(motion: Motion, k: int, tracks: Tracks) -> None:
     put(motion.work, tracks.work[row])
     if tracks.laws.shape[0] > 0:
         put(motion.laws, tracks.laws[min(k, tracks.laws.shape[0] - 1)])
-
-
-@uncounted
-def put(values: FloatArray, out: FloatArray) -> None:
-    """Copy a vector."""
-    for q in range(values.size):
-        out[q] = values[q]
 
 
 @uncounted_kernel

@@ -44,28 +44,14 @@ FOLLOW = types.FunctionType(
 """Type of `path.follow`."""
 
 
-def step_at(step: Any) -> Step:
-    """Inside a kernel: the step at an address. The caller of the kernel must hold the step's function."""
-    return step  # type: ignore[no-any-return]  # where nothing is compiled, a step is its own address
-
-
-def start_at(start: Any) -> Start:
-    """As `step_at`, for a start."""
-    return start  # type: ignore[no-any-return]
-
-
-def controller_at(controller: Any) -> ControllerStep:
-    """As `step_at`, for the step of a controller."""
-    return controller  # type: ignore[no-any-return]
-
-
-def follow_at(follow: Any) -> Callable[..., int]:
-    """As `step_at`, for `path.follow`."""
-    return follow  # type: ignore[no-any-return]
+_IS_COMPILED = os.environ.get("NUMBA_DISABLE_JIT", "0") in ("", "0")
 
 
 def _function_at(kind: Any) -> Any:
-    """Type and code of a function of a kind at an address."""
+    """Inside a kernel: the function of a kind at an address, which the caller of the kernel must hold.
+
+    Where nothing is compiled, a function is its own address.
+    """
 
     def typed(_: Any, __: Any) -> Any:
         def code(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
@@ -77,7 +63,13 @@ def _function_at(kind: Any) -> Any:
 
         return kind(int64), code
 
-    return typed
+    return intrinsic(typed) if _IS_COMPILED else lambda function: function
+
+
+step_at: Callable[[Any], Step] = _function_at(STEP)
+start_at: Callable[[Any], Start] = _function_at(START)
+controller_at: Callable[[Any], ControllerStep] = _function_at(CONTROLLER)
+follow_at: Callable[[Any], Callable[..., int]] = _function_at(FOLLOW)
 
 
 def addresses(functions: Sequence[Any], kind: Any = STEP) -> Any:
@@ -85,11 +77,3 @@ def addresses(functions: Sequence[Any], kind: Any = STEP) -> Any:
     if not _IS_COMPILED:
         return tuple(functions)
     return np.array([_get_wrapper_address(each, kind.signature) for each in functions], dtype=np.int64)
-
-
-_IS_COMPILED = os.environ.get("NUMBA_DISABLE_JIT", "0") in ("", "0")
-if _IS_COMPILED:
-    step_at = intrinsic(_function_at(STEP))
-    start_at = intrinsic(_function_at(START))
-    controller_at = intrinsic(_function_at(CONTROLLER))
-    follow_at = intrinsic(_function_at(FOLLOW))

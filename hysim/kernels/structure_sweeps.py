@@ -8,7 +8,7 @@ import math
 
 from hysim._basics.frozen import FloatArray
 from hysim.kernels._compile import unfolded
-from hysim.kernels.structure_flows import N_POWERS, add_columns
+from hysim.kernels.structure_flows import N_POWERS, add_columns, put
 from hysim.kernels.structure_layout import Elements, Flows, Motion, Room
 from hysim.kernels.structure_moments import UNSEEN, IntArray, fit_rest, quintic, set_clock
 from hysim.kernels.structure_pointers import step_at
@@ -24,8 +24,7 @@ _TINY = 1.0e-290
 @unfolded
 def combine(columns: FloatArray, weights: FloatArray, base: FloatArray, out: FloatArray) -> None:
     """The columns by their weights, added to `base`."""
-    for q in range(out.size):
-        out[q] = base[q]
+    put(base, out)
     add_columns(columns, weights, out)
 
 
@@ -129,8 +128,7 @@ def try_step(
     n, m, n_loads = elements.k0.size, motion.x.size, motion.loads.size
     carry, rest, half, inputs = motion.carry, room.rest, room.half, room.inputs
     drifts, half_drifts = flows.drifts[level], flows.drifts[level + 1]
-    for q in range(m):
-        inputs[q] = motion.x[q]
+    put(motion.x, inputs)
     for i in range(n_loads):
         inputs[m + 2 * i] = room.loads[1, i]
         inputs[m + 2 * i + 1] = 0.5 * share * room.loads[0, i]
@@ -152,8 +150,7 @@ def try_step(
         halve(rest, half)
         combine(half_drifts, half, room.free_middle, room.middle)
         any_divided = sweep(elements, h, k > 0, motion, room)
-        for e in range(2 * n):
-            room.before[e] = room.drifts[e]
+        put(room.drifts, room.before)
         combine(drifts, rest, room.free_drifts, room.drifts)
         if k == 0 and not is_adaptive:
             continue

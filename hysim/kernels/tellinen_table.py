@@ -23,12 +23,12 @@ _STRAIGHT = 1e-8  # x for which log(1 + x) / x is 1 - x / 2 to rounding
 
 
 @inner
-def interval(parameters: FloatArray, n: int, u: float) -> int:
-    """The piece of the table in which `u` lies; the first or the last one where it lies outside."""
+def interval(parameters: FloatArray, first: int, n: int, u: float) -> int:
+    """The piece of a table of `n` inputs from the place `first` on in which `u` lies; outside, the piece next to it."""
     low, high = 0, n - 1
     while high - low > 1:
         middle = (low + high) // 2
-        if parameters[N_HEAD + middle] <= u:
+        if parameters[first + middle] <= u:
             low = middle
         else:
             high = middle
@@ -72,7 +72,7 @@ def decay(parameters: FloatArray, n: int, k: int, u: float, end: float) -> float
 @inner
 def stroke(parameters: FloatArray, n: int, u1: float, u2: float) -> float:
     """Logarithm of what is left of the distance to the branch along which a stroke goes."""
-    k, last = interval(parameters, n, u1), interval(parameters, n, u2)
+    k, last = interval(parameters, N_HEAD, n, u1), interval(parameters, N_HEAD, n, u2)
     side, total, u = (1 if u2 > u1 else 0), 0.0, u1
     while k != last:
         end = parameters[N_HEAD + k + side]
@@ -91,7 +91,7 @@ def step(parameters: FloatArray, state: FloatArray, u: float) -> float:
         lost = -math.expm1(stroke(parameters, n, state[0], u))
         state[1] = state[1] * (1.0 - lost) - direction * lost
         state[0] = u
-    k = interval(parameters, n, u)
+    k = interval(parameters, N_HEAD, n, u)
     lower = branch(parameters, N_HEAD + n, n, k, u)
     upper = branch(parameters, N_HEAD + 2 * n, n, k, u)
     return float(parameters[0] + parameters[1] * u + 0.5 * ((1.0 + state[1]) * upper + (1.0 - state[1]) * lower))

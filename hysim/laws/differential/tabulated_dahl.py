@@ -88,7 +88,7 @@ class TabulatedDahl(Law):
             state[1] += (math.copysign(1.0, length) - state[1]) * -math.expm1(-parameters[0] * abs(length))
             state[0] = u
         n = (parameters.size - N_HEAD) // 3
-        k = interval(parameters, n, u)
+        k = interval(parameters, N_HEAD, n, u)
         centre = branch(parameters, N_HEAD + n, n, k, u)
         return float(centre + branch(parameters, N_HEAD + 2 * n, n, k, u) * state[1])
 
