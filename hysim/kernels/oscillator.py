@@ -254,14 +254,8 @@ def newmark(state: State, F: float, slope: float, h: float, plant: Plant, curve:
             break
         last = moved if moved < 1.0e-6 else math.inf
     dy = 0.5 * h * (v + v1)
-    return (
-        y + dy,
-        v1,
-        z1,
-        state[3] + 0.5 * (F + end) * dy,
-        state[4] + damping * 0.5 * (v + v1) * dy,
-        state[5] + gain * 0.5 * (z + z1) * dy,
-    )
+    work, damped, taken = 0.5 * (F + end) * dy, damping * 0.5 * (v + v1) * dy, gain * 0.5 * (z + z1) * dy
+    return y + dy, v1, z1, state[3] + work, state[4] + damped, state[5] + taken
 
 
 @inner
@@ -288,14 +282,8 @@ def strang(
     v1 -= kick * (spring(y1, 0.0, offset, curve) + gain * (z1 - A * y1))
     end = F + slope * h
     taken = 0.5 * (z + middle) * (turn - y) + 0.5 * (middle + z1) * (y1 - turn)
-    return (
-        y1,
-        v1,
-        z1,
-        state[3] + 0.5 * h * (F * v + end * v1),
-        state[4] + 0.5 * h * damping * (v * v + v1 * v1),
-        state[5] + gain * taken,
-    )
+    done, damped = 0.5 * h * (F * v + end * v1), 0.5 * h * damping * (v * v + v1 * v1)
+    return y1, v1, z1, state[3] + done, state[4] + damped, state[5] + gain * taken
 
 
 # ---------------------------------------------------------------------------------- paths

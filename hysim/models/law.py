@@ -491,8 +491,7 @@ class Law(Placed, Searched, ABC):
         >>> hs.BoucWen.responses({"beta": [0.3, 0.5, 0.7]}, u, reduce="area").round(3).tolist()
         [0.41, 0.595, 0.746]
         """
-        laws = _batch(cls, cls.__name__, cls.defaults(), parameters, u, check=cls.check)
-        return laws.result(reduce, target, workers)
+        return _batch(cls, parameters, u).result(reduce, target, workers)
 
     def inverse_response(self, y: npt.ArrayLike, u0: float | None = None, state: State | None = None) -> FloatArray:
         """Input that gives the output `y`, monotone between the samples.
@@ -689,7 +688,7 @@ class Law(Placed, Searched, ABC):
 
     def outputs_of(self, parameters: Parameters, u: npt.ArrayLike) -> Batch:
         """As `outputs`, not computed yet; parameters that the constructor would refuse are not refused."""
-        return _batch(self, type(self).__name__, self.arguments, parameters, u, self.u0)
+        return _batch(self, parameters, u)
 
     @classmethod
     def completed(cls, tables: dict[str, FloatArray]) -> dict[str, FloatArray]:
@@ -736,24 +735,20 @@ def _after_first(model: Startable, u0: float) -> CompiledLaw:
     return law
 
 
-def _batch(
-    law: Law | type[Law],
-    family: str,
-    defaults: Mapping[str, Any],
-    parameters: Parameters,
-    u: npt.ArrayLike,
-    u0: float | None = None,
-    *,
-    check: Callable[[Tables], None] | None = None,
-) -> Batch:
-    """Laws by their parameters, those not given by `defaults`, and their inputs; memories hold at `u0` by default."""
+def _batch(law: Law | type[Law], parameters: Parameters, u: npt.ArrayLike) -> Batch:
+    """Laws by their parameters, and their inputs.
+
+    Numbers that are not given are those of the law, at whose input the memories hold, or the defaults of a family,
+    which checks all numbers.
+    """
+    family, defaults, u0 = (law, law.defaults(), None) if isinstance(law, type) else (type(law), law.arguments, law.u0)
     numbers = {name: value for name, value in parameters.items() if name != "u_range"}
     place = {} if numbers.get("u0", u0) is None else {"u0": u0 or 0.0}
-    tables, inputs = tables_of(family, {**defaults, **place}, numbers, u)
+    tables, inputs = tables_of(family.__name__, {**defaults, **place}, numbers, u)
     begin = tables.pop("u0", None)
     tables = law.completed(tables)
-    if check is not None:
-        check(tables)
+    if isinstance(law, type):
+        law.check(tables)
 
     def compute(sets: Sets, u: FloatArray, y: FloatArray) -> None:
         own = {name: table[sets] for name, table in tables.items()}

@@ -29,6 +29,8 @@ from hysim.models.search_space import Freedom, SearchSpace
 from hysim.records import Record, span_of
 
 Numbers = Mapping[str, float]
+Groups = tuple[tuple[str, ...], ...]
+Box = Mapping[str, tuple[float, float]]
 REDUNDANT = (("A", "gain"),)
 _FURTHER = ("b2", "b3", "b4", "b5", "b6")
 _SCALED = {  # parameters with a unit of their own, and their box in it
@@ -54,13 +56,7 @@ _BOX = {
 
 
 def search_space(
-    defaults: Mapping[str, float],
-    columns: tuple[str, ...],
-    record: Record,
-    freedom: Freedom,
-    *,
-    alike: tuple[tuple[str, ...], ...] = (),
-    screened: int | None = None,
+    defaults: Numbers, columns: tuple[str, ...], record: Record, freedom: Freedom, *, alike: Groups = ()
 ) -> SearchSpace:
     """Declare the coordinates, their box and the way back to the user's parameters for one record."""
     at_rest = ("z0",) if freedom.starts_at_rest() else ()
@@ -78,16 +74,16 @@ def search_space(
     extended = not known.issuperset(defaults)  # what is admissible for such a law is not known
     quadrant = {name: (max(low, 0.0) if name in _PAIR else low, high) for name, (low, high) in box.items()}
     regions = {"admissible": sides(quadrant)} if set(_PAIR) <= set(box) and not extended else {}
-    return space_of_memory(chart, box, defaults, columns, held, bounds, freedom, regions=regions, screened=screened)
+    return space_of_memory(chart, box, defaults, columns, held, bounds, freedom, regions=regions)
 
 
 def space_of_memory(
     chart: "Chart",
-    box: Mapping[str, tuple[float, float]],
-    defaults: Mapping[str, float],
+    box: Box,
+    defaults: Numbers,
     columns: tuple[str, ...],
-    held: Mapping[str, float],
-    bounds: Mapping[str, tuple[float, float]],
+    held: Numbers,
+    bounds: Box,
     freedom: Freedom,
     **others: Any,
 ) -> SearchSpace:
@@ -114,7 +110,7 @@ class Chart:
 
     coordinates: tuple[str, ...]
     values: Numbers  # every parameter, where it is not free
-    limits: Mapping[str, tuple[float, float]]  # parameters that are their own coordinates
+    limits: Box  # parameters that are their own coordinates
     span: float
     reach: float  # of |u|, or of its path
     slope: float  # what A is measured in
@@ -123,9 +119,7 @@ class Chart:
     beside_loading: ClassVar[str] = "unloading"
 
     @classmethod
-    def of(
-        cls, defaults: Numbers, held: Numbers, bounds: Mapping[str, tuple[float, float]], record: Record, reach: float
-    ) -> Self:
+    def of(cls, defaults: Numbers, held: Numbers, bounds: Box, record: Record, reach: float) -> Self:
         """The chart of the parameters that are not held; finite `bounds` are limits of own coordinates."""
         values = {**defaults, **held}
         free = [name for name in cls.memory if name in values and name not in held]

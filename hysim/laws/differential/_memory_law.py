@@ -7,7 +7,7 @@ u is the input, z the memory, y the output; time has no part in it.
 """
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any, ClassVar, Self
 
@@ -126,14 +126,9 @@ class MemoryLaw(ShapedLaw):
         return np.asarray(slope(direction, z, *further, u))
 
     def search_space(self, record: Record, freedom: Freedom = ALL_FREE) -> SearchSpace:
-        return _boucwen_search.search_space(
-            self.scalars,
-            self.columns,
-            record,
-            freedom,
-            alike=self.alike(record, freedom),
-            screened=self.screened,
-        )
+        alike = self.alike(record, freedom)
+        space = _boucwen_search.search_space(self.scalars, self.columns, record, freedom, alike=alike)
+        return replace(space, screened=self.screened)
 
     def alike(self, record: Record, freedom: Freedom) -> tuple[tuple[str, ...], ...]:
         """Groups of parameters; one parameter of each group is held on this record."""
