@@ -53,6 +53,9 @@ _TAYLOR_REACH = 0.25  # of a bound of the distance at which the series ends: 31 
 N_WORK = _SPARE + 2 * _N_TAYLOR
 
 
+Moved = tuple[float, float, float]  # the change of w, the length left over, and the end
+
+
 # ---------------------------------------------------------------------------------- constants of an exponent
 
 
@@ -155,9 +158,7 @@ def distance(w: float, n: float) -> float:
 
 
 @inlined
-def in_chart(
-    w: float, forwards: bool, side: int, n: float, length: float, work: FloatArray
-) -> tuple[float, float, float]:
+def in_chart(w: float, forwards: bool, side: int, n: float, length: float, work: FloatArray) -> Moved:
     """From w over `length` in T within one chart, or up to its end: the change of w, the length left over, the end.
 
     `side` is 0 for sigma = 1 and 1 for sigma = -1. The change is inf for a memory that
@@ -177,9 +178,7 @@ def in_chart(
 
 
 @inlined
-def near_zero(
-    w: float, forwards: bool, side: int, n: float, length: float, work: FloatArray
-) -> tuple[float, float, float]:
+def near_zero(w: float, forwards: bool, side: int, n: float, length: float, work: FloatArray) -> Moved:
     """As `in_chart` near zero; the way backwards ends at w = 0."""
     x = w**n if side == 0 else -(w**n)
     beyond = w * x * sum8(work, _ZERO_THERE, x)  # T - w
@@ -195,7 +194,7 @@ def near_zero(
 
 
 @inlined
-def near_saturation(w: float, forwards: bool, n: float, length: float, work: FloatArray) -> tuple[float, float, float]:
+def near_saturation(w: float, forwards: bool, n: float, length: float, work: FloatArray) -> Moved:
     """As `in_chart` near w = 1 at sigma = 1; only the way backwards has an end."""
     scale = max(n, 1.0)
     e = scale * (1.0 - w)
@@ -215,9 +214,7 @@ def near_saturation(w: float, forwards: bool, n: float, length: float, work: Flo
 
 
 @inlined
-def along_cells(
-    w: float, forwards: bool, side: int, last: int, n: float, length: float, work: FloatArray
-) -> tuple[float, float, float]:
+def along_cells(w: float, forwards: bool, side: int, last: int, n: float, length: float, work: FloatArray) -> Moved:
     """As `in_chart` in a line of cells; `last` is the uppermost."""
     i = int(work[_VISITED + side]) & _NOT_NEGATIVE
     edge = _EDGES + side * (_N_CELLS + 1) + i
@@ -325,9 +322,7 @@ def cell_series(x: float, n: float, q: FloatArray, p: FloatArray, slope: FloatAr
 
 
 @inner
-def far_step(
-    w: float, forwards: bool, side: int, n: float, length: float, work: FloatArray
-) -> tuple[float, float, float]:
+def far_step(w: float, forwards: bool, side: int, n: float, length: float, work: FloatArray) -> Moved:
     """As `in_chart`, for a step of the flow about w, as long as its series serves."""
     a = 1.0 if forwards else -1.0
     c = a if side == 0 else -a

@@ -42,6 +42,10 @@ if TYPE_CHECKING:
 
 State = tuple[float, ...]
 """Last input, and what the law remembers."""
+Advanced = tuple[FloatArray, State]
+"""Outputs, and the state after them."""
+Outputs = Callable[[Parameters, FloatArray], FloatArray]
+"""Outputs (n_sets, n_samples) for parameters and an input."""
 
 _AHEAD = 4  # runs through the turning points before the search for a steady memory
 _EXACT = 1e-12  # of the range: what a step along a branch leaves out,
@@ -284,9 +288,7 @@ class Law(Placed, Searched, ABC):
         """
         return self.advance(u)[0]
 
-    def advance(
-        self, u: npt.ArrayLike, state: State | None = None, *, sample_time: float | None = None
-    ) -> tuple[FloatArray, State]:
+    def advance(self, u: npt.ArrayLike, state: State | None = None, *, sample_time: float | None = None) -> Advanced:
         """Output at the samples of `u`, continued from `state`, and the state after the last sample.
 
         Parameters
@@ -593,9 +595,7 @@ class Law(Placed, Searched, ABC):
         """Columns in which the output is affine, and the rest of it, shape (n_sets, n_samples, n_columns + 1)."""
         return self.columns_by(self.outputs, parameters, record.u)
 
-    def columns_by(
-        self, outputs: Callable[[Parameters, FloatArray], FloatArray], parameters: Parameters, u: FloatArray
-    ) -> FloatArray:
+    def columns_by(self, outputs: Outputs, parameters: Parameters, u: FloatArray) -> FloatArray:
         """As `regressors`, by a function from parameters and an input to outputs (n_sets, n_samples)."""
         zero = {**parameters, **dict.fromkeys(self.columns, 0.0)}
         rest = outputs(zero, u)

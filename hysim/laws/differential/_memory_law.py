@@ -6,7 +6,7 @@
 u is the input, z the memory, y the output; time has no part in it.
 """
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any, ClassVar, Self
@@ -17,7 +17,7 @@ import numpy.typing as npt
 from hysim._basics.frozen import FloatArray
 from hysim.kernels.boucwen import polynomial
 from hysim.laws.differential import _boucwen_search, boucwen_inverse
-from hysim.models.law import Law, State, of_sets
+from hysim.models.law import Law, Outputs, State, of_sets
 from hysim.models.protocols import CompiledLaw
 from hysim.models.search_space import ALL_FREE, Freedom, Parameters, SearchSpace
 from hysim.models.steady_cycle import Pass, PassOf
@@ -162,9 +162,7 @@ class MemoryLaw(ShapedLaw):
 
         return of
 
-    def columns_by(
-        self, outputs: Callable[[Parameters, FloatArray], FloatArray], parameters: Parameters, u: FloatArray
-    ) -> FloatArray:
+    def columns_by(self, outputs: Outputs, parameters: Parameters, u: FloatArray) -> FloatArray:
         """Columns u, u^2, ..., z, 1, 0 of the output, shape (n_sets, n_samples, n_columns + 1)."""
         z = outputs({**parameters, **self.memory_only}, u)
         n_powers = len(self.coefficient_names)

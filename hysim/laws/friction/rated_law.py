@@ -19,7 +19,7 @@ from hysim.kernels import stepping
 from hysim.kernels.friction_rates import N_RATED
 from hysim.models.batch import Reduction
 from hysim.models.composable import Placed
-from hysim.models.law import Law, State
+from hysim.models.law import Advanced, Law, State
 from hysim.models.parameters import Parameter, declared_space, rate_spans
 from hysim.models.protocols import CompiledLaw, Startable, Subject, needed_time, positive_time
 from hysim.models.search_space import ALL_FREE, Freedom, Parameters, SearchSpace
@@ -108,9 +108,7 @@ class TimedLaw(Subject, Placed, ABC):
         """
         return self.at_sample_time(sample_time).response(u)
 
-    def advance(
-        self, u: npt.ArrayLike, state: State | None = None, *, sample_time: float | None = None
-    ) -> tuple[FloatArray, State]:
+    def advance(self, u: npt.ArrayLike, state: State | None = None, *, sample_time: float | None = None) -> Advanced:
         """Output continued from `state`, last input and memory, and the state after the last sample.
 
         The bits are those of one uncut input; arguments and errors are those of `response`.

@@ -40,7 +40,7 @@ from hysim.kernels import preisach as kernels
 from hysim.laws.operators._bank_search import TURN, SignedStructure, check_increasing, named, table_of, with_offset
 from hysim.laws.operators._densities import Parts, check_strength, judged_parts, smooth
 from hysim.models.by_structure import ByStructure
-from hysim.models.law import Law, Packed, State
+from hysim.models.law import Advanced, Law, Packed, State
 from hysim.models.parameters import Coordinate, space_of, spans
 from hysim.models.protocols import DirectFit
 from hysim.models.search_space import ALL_FREE, Freedom, Parameters, SearchSpace
@@ -260,9 +260,7 @@ class RelayLaw(ByStructure, Law):
         warn_beyond(self.u_range, np.asarray(u, dtype=float), type(self).__name__, stacklevel=3)
         return y
 
-    def advance(
-        self, u: npt.ArrayLike, state: State | None = None, *, sample_time: float | None = None
-    ) -> tuple[FloatArray, State]:
+    def advance(self, u: npt.ArrayLike, state: State | None = None, *, sample_time: float | None = None) -> Advanced:
         """Output and state as of `Law.advance`: the last input and the dominant extremes, the oldest first."""
         inputs = read_only(u, "u", ndim=1)
         past = self.past if state is None else state[1:]

@@ -26,7 +26,7 @@ from hysim.laws.operators._play_sums import EXAMPLE, PlaysAtSampleTime
 from hysim.laws.operators.prandtl_ishlinskii import PrandtlIshlinskii
 from hysim.models.batch import Reduction
 from hysim.models.composable import Placed
-from hysim.models.law import State
+from hysim.models.law import Advanced, State
 from hysim.models.model import Example, family
 from hysim.models.parameters import Parameter
 from hysim.models.protocols import UNLIMITED, CompiledLaw, Limits, Startable, needed_time
@@ -140,9 +140,7 @@ class RateDependentPrandtlIshlinskii(Plays, Placed):
         law = self.at(sample_time)
         return {"y": law.response(u), "z": law.memory(u)}
 
-    def advance(
-        self, u: npt.ArrayLike, state: State | None = None, *, sample_time: float | None = None
-    ) -> tuple[FloatArray, State]:
+    def advance(self, u: npt.ArrayLike, state: State | None = None, *, sample_time: float | None = None) -> Advanced:
         """Output continued from `state`, input and positions at the last sample so far, and the state at the end.
 
         The bits are those of one uncut input, which moves evenly from the state's input to its first sample; arguments
