@@ -38,6 +38,11 @@ class Parameter:
     physical: tuple[bool, bool] = (False, False)
 
 
+def affine(*names: str, unit: str = "1") -> tuple[Parameter, ...]:
+    """Fields of one unit in which the output is affine."""
+    return tuple(Parameter(name, unit=unit, affine=True) for name in names)
+
+
 _ROUNDING = 1e-14  # of a number by way of its logarithm
 
 

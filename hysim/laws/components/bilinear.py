@@ -7,10 +7,10 @@ from typing import ClassVar, Self
 from hysim._basics.frozen import FloatArray
 from hysim.models.law import Law
 from hysim.models.model import Example, family
-from hysim.models.parameters import Parameter
+from hysim.models.parameters import Parameter, affine
 from hysim.models.stages import Stage
 
-SLOPES = tuple(Parameter(name, unit="y/u", affine=True) for name in ("stiffness", "hardening"))
+SLOPES = affine("stiffness", "hardening", unit="y/u")
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

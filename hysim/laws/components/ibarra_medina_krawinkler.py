@@ -138,9 +138,7 @@ class IbarraMedinaKrawinkler(Law):
         Parameter("hardening_ratio", 0.0, 0.9, physical=(True, True)),
         Parameter("cap_input", 1e-2, 3.0, unit="h", log=True),
         Parameter("capping_ratio", 1e-3, 2.0, log=True),
-        Parameter("residual", 0.0, 1.0, physical=(True, True)),
-        Parameter("pinch_force", 0.0, 1.0, physical=(True, True)),
-        Parameter("pinch_input", 0.0, 1.0, physical=(True, True)),
+        *(Parameter(name, 0.0, 1.0, physical=(True, True)) for name in ("residual", "pinch_force", "pinch_input")),
         *(Parameter(name, 0.1, 1e3, unit="h", log=True) for name in _CAPACITIES),
         Parameter("c", 0.5, 2.0, log=True),
     )

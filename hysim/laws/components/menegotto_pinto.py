@@ -126,8 +126,7 @@ class MenegottoPinto(HardeningLaw):
         Parameter("R0", 1.0, 60.0, log=True),
         Parameter("cR1", 0.0, 0.999, physical=(True, True)),
         Parameter("cR2", 1e-2, 10.0, log=True),
-        Parameter("a1", 0.0, 0.5, physical=(True, False)),
-        Parameter("a3", 0.0, 0.5, physical=(True, False)),
+        *(Parameter(name, 0.0, 0.5, physical=(True, False)) for name in ("a1", "a3")),
         Parameter("offset", unit="y", affine=True),
         Parameter("z0", -1.0, 1.0),
     )

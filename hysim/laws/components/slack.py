@@ -5,7 +5,7 @@ from typing import ClassVar, Self
 from hysim._basics.frozen import FloatArray
 from hysim.models.law import Law
 from hysim.models.model import Example, family
-from hysim.models.parameters import Parameter
+from hysim.models.parameters import Parameter, affine
 
 
 @family
@@ -71,8 +71,7 @@ class Slack(Law):
         group="Devices",
     )
     searched = (
-        Parameter("stiffness", unit="y/u", affine=True),
-        Parameter("opposite_stiffness", unit="y/u", affine=True),
+        *affine("stiffness", "opposite_stiffness", unit="y/u"),
         Parameter("slack", -1.0, 1.0, unit="u"),
         Parameter("yield_input", 1e-3, 3.0, unit="u", log=True),
         Parameter("hardening_ratio", 0.0, 0.99, physical=(True, True)),

@@ -26,7 +26,7 @@ import numpy as np
 from hysim._basics.frozen import FloatArray
 from hysim.models.law import Law, Packed
 from hysim.models.model import Example, family
-from hysim.models.parameters import Parameter
+from hysim.models.parameters import Parameter, affine
 from hysim.models.stages import Stage
 from hysim.models.tables import Tables
 
@@ -119,15 +119,12 @@ class VaianaRosati(Law):
         group="Devices",
     )  # fmt: skip
     searched = (
-        Parameter("k_b", unit="y/u", affine=True),
-        Parameter("f_0", unit="y", affine=True),
+        *affine("k_b", unit="y/u"),
+        *affine("f_0", "beta_1", "gamma_1", "z0", unit="y"),
         Parameter("alpha", 1e-1, 1e3, unit="1/u", log=True),
-        Parameter("beta_1", unit="y", affine=True),
         Parameter("beta_2", -20.0, 20.0, unit="1/u"),
-        Parameter("gamma_1", unit="y", affine=True),
         Parameter("gamma_2", 1e-1, 1e3, unit="1/u", log=True),
         Parameter("gamma_3", -1.0, 1.0, unit="u", from_first=True),
-        Parameter("z0", unit="y", affine=True),
     )
 
     @staticmethod

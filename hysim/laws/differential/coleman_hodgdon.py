@@ -5,7 +5,7 @@ import numpy as np
 from hysim._basics.frozen import FloatArray
 from hysim.laws.differential.boucwen import EquivalentBoucWen
 from hysim.models.model import Example, family
-from hysim.models.parameters import Parameter
+from hysim.models.parameters import Parameter, affine
 from hysim.models.tables import Tables
 
 
@@ -55,8 +55,8 @@ class ColemanHodgdon(EquivalentBoucWen):
     example = Example({}, (-2.0, 2.0), title="Coleman-Hodgdon: magnet")
     searched = (
         Parameter("alpha", 1e-2, 1e3, unit="1/u", log=True),
-        *(Parameter(name, unit="y/u", affine=True) for name in ("c", "B")),
-        *(Parameter(name, unit="y", affine=True) for name in ("offset", "z0")),
+        *affine("c", "B", unit="y/u"),
+        *affine("offset", "z0", unit="y"),
     )
     starts = tuple({"alpha": 1.0 / length} for length in (0.03, 0.1, 0.3, 1.0))
     screened = 64

@@ -10,7 +10,7 @@ from hysim._basics.frozen import FloatArray, check_whole, vectors
 from hysim.kernels.tellinen_table import N_HEAD, branch, interval
 from hysim.models.law import Law, Packed
 from hysim.models.model import Example, family
-from hysim.models.parameters import Parameter
+from hysim.models.parameters import Parameter, affine
 from hysim.models.search_space import Parameters
 from hysim.models.tables import Tables
 from hysim.records import Record, span_of
@@ -74,8 +74,7 @@ class TabulatedDahl(Law):
         title="Dahl's law from a table: cell at rest",
     )
     searched = (
-        Parameter("centre", unit="y", affine=True),
-        Parameter("amplitude", unit="y", affine=True),
+        *affine("centre", "amplitude", unit="y"),
         Parameter("rate", 0.1, 1e3, unit="1/u", log=True),
         Parameter("z0", -1.0, 1.0, physical=(True, True)),
     )

@@ -10,7 +10,7 @@ from hysim._basics.frozen import FloatArray
 from hysim.kernels import lugre as kernels
 from hysim.laws.friction.rated_law import RatedLaw, curve
 from hysim.models.model import Example, family
-from hysim.models.parameters import Parameter
+from hysim.models.parameters import Parameter, affine
 
 
 @family
@@ -93,13 +93,10 @@ class LuGre(RatedLaw):
     rated_step = staticmethod(kernels.rated_step)
     searched = (
         Parameter("sigma0", 1e-2, 1e6, unit="y/u", log=True),
-        Parameter("sigma1", affine=True),
-        Parameter("sigma2", affine=True),
-        Parameter("coulomb", 1e-3, 1e1, unit="y", log=True),
-        Parameter("breakaway", 1e-3, 1e1, unit="y", log=True),
+        *(Parameter(name, 1e-3, 1e1, unit="y", log=True) for name in ("coulomb", "breakaway")),
         Parameter("stribeck_velocity", 1e-4, 1e1, unit="v", log=True),
-        Parameter("offset", affine=True),
         Parameter("z0", -1.0, 1.0, unit="breakaway/sigma0", physical=(True, True)),
+        *affine("sigma1", "sigma2", "offset"),
     )
     starts: ClassVar = tuple(
         {"sigma0": 0.4 / length, "coulomb": 0.4, "breakaway": level, "stribeck_velocity": velocity}

@@ -9,7 +9,7 @@ from hysim._basics.frozen import FloatArray
 from hysim.kernels import maxwell as kernels
 from hysim.laws.friction.rated_law import RatedLaw, curve
 from hysim.models.model import Example, family
-from hysim.models.parameters import Parameter
+from hysim.models.parameters import Parameter, affine
 from hysim.models.tables import Tables
 
 
@@ -95,12 +95,10 @@ class GeneralizedMaxwellSlip(RatedLaw):
     rated_step = staticmethod(kernels.rated_step)
     searched = (
         Parameter("stiffness", 1e-2, 1e6, unit="y/u", log=True),
-        Parameter("coulomb", 1e-3, 1e1, unit="y", log=True),
-        Parameter("breakaway", 1e-3, 1e1, unit="y", log=True),
+        *(Parameter(name, 1e-3, 1e1, unit="y", log=True) for name in ("coulomb", "breakaway")),
         Parameter("stribeck_velocity", 1e-4, 1e1, unit="v", log=True),
         Parameter("attraction", 1e-2, 1e6, unit="r", log=True),
-        Parameter("viscous", affine=True),
-        Parameter("offset", affine=True),
+        *affine("viscous", "offset"),
     )
     starts: ClassVar = tuple(
         {"coulomb": 0.4, "breakaway": level, "stribeck_velocity": velocity, "attraction": 100.0}

@@ -10,7 +10,7 @@ from hysim._basics.frozen import FloatArray
 from hysim.kernels import stribeck as kernels
 from hysim.laws.friction.rated_law import RatedLaw
 from hysim.models.model import Example, family
-from hysim.models.parameters import Parameter
+from hysim.models.parameters import Parameter, affine
 
 
 @family
@@ -72,11 +72,8 @@ class StribeckFriction(RatedLaw):
     rated_step = staticmethod(kernels.rated_step)
     initial: ClassVar[tuple[str, ...]] = ()
     searched = (
-        Parameter("coulomb", affine=True),
-        Parameter("breakaway", affine=True),
         Parameter("breakaway_velocity", 1e-4, 1e1, unit="v", log=True),
-        Parameter("viscous", affine=True),
-        Parameter("offset", affine=True),
+        *affine("coulomb", "breakaway", "viscous", "offset"),
     )
     starts: ClassVar = tuple({"breakaway_velocity": velocity} for velocity in (0.001, 0.01, 0.1))
     memory = None  # type: ignore[assignment]  # it remembers nothing

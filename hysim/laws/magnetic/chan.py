@@ -75,10 +75,6 @@ class Chan(BranchLaw):
     [0.0, 0.29561, 0.09439, -0.29561, -0.09439]
     """
 
-    saturation: float = 1.0
-    coercivity: float = 1.0
-    squareness: float = 0.5
-    feedthrough: float = 0.0
     gap: float = 0.0
     offset: float = 0.0
     z0: float = 0.0

@@ -58,7 +58,7 @@ from hysim.kernels import jiles_atherton_inverse as inverse
 from hysim.models.inverse_search import first_input
 from hysim.models.law import Law, Packed, State
 from hysim.models.model import Example, family
-from hysim.models.parameters import Parameter, sides, space_of_chart, spans
+from hysim.models.parameters import affine, sides, space_of_chart, spans
 from hysim.models.protocols import UNLIMITED, CompiledLaw, Limits
 from hysim.models.search_space import ALL_FREE, Freedom, Parameters, SearchSpace
 from hysim.models.tables import Tables
@@ -306,11 +306,7 @@ class JilesAtherton(Law):
         (-2.0, 2.0),
         title="Magnetic core: Jiles-Atherton",
     )
-    searched = (
-        Parameter("gain", unit="y/u", affine=True),
-        Parameter("feedthrough", unit="y/u", affine=True),
-        Parameter("offset", unit="y", affine=True),
-    )
+    searched = (*affine("gain", "feedthrough", unit="y/u"), *affine("offset", unit="y"))
     step = staticmethod(kernels.step)
     resume = staticmethod(kernels.resume)
     exact_strokes: ClassVar[bool] = True

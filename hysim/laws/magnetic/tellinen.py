@@ -9,7 +9,7 @@ Both branches go from -saturation to saturation; the upper one has the remanence
 import math
 from abc import abstractmethod
 from collections.abc import Mapping
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import ClassVar, Self
 
 import numpy as np
@@ -18,7 +18,7 @@ from hysim._basics.frozen import FloatArray
 from hysim.kernels import tellinen as kernels
 from hysim.models.law import Law, Packed
 from hysim.models.model import Example, family
-from hysim.models.parameters import Parameter
+from hysim.models.parameters import Parameter, affine
 from hysim.models.search_space import ALL_FREE, Freedom, Parameters, SearchSpace
 from hysim.models.tables import Tables
 from hysim.records import Record
@@ -30,13 +30,19 @@ _SHAPES = ((0.03, 0.1), (0.1, 0.5), (0.3, 0.5), (0.3, 0.9))  # coercivity in hal
 _SIDES = {"feedthrough": (0.0, np.inf)}  # of affine parameters: no core falls at saturation
 
 
-class BranchLaw(Law):
-    """A law with the fields saturation, coercivity, squareness, feedthrough, offset and z0."""
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Branches(Law):
+    """A law with the parameters of two branches in front of those of its family."""
 
-    saturation: float
-    coercivity: float
-    squareness: float
-    feedthrough: float
+    saturation: float = 1.0
+    coercivity: float = 1.0
+    squareness: float = 0.5
+    feedthrough: float = 0.0
+
+
+class BranchLaw(Branches):
+    """A law with the fields offset and z0 beside those of its branches."""
+
     offset: float
     z0: float
 
@@ -45,11 +51,10 @@ class BranchLaw(Law):
     units: ClassVar[Mapping[str, str]] = {"squareness": "1", "z0": "1"}
     states: ClassVar[tuple[str, ...]] = ("rest", "periodic", "free")
     searched: ClassVar[tuple[Parameter, ...]] = (
-        Parameter("saturation", unit="y", affine=True),
+        *affine("saturation", "offset", unit="y"),
         Parameter("coercivity", 1e-3, 3.0, unit="h", log=True),
         Parameter("squareness", 1e-3, 0.999, physical=(True, True)),
         Parameter("feedthrough", unit="y/u", affine=True),
-        Parameter("offset", unit="y", affine=True),
         Parameter("z0", -1.0, 1.0, physical=(True, True)),
     )
     starts = tuple(
@@ -154,10 +159,6 @@ class Tellinen(BranchLaw):
     [0.0, 1.7126, 0.8681, -0.0185]
     """
 
-    saturation: float = 1.0
-    coercivity: float = 1.0
-    squareness: float = 0.5
-    feedthrough: float = 0.0
     offset: float = 0.0
     z0: float = 0.0
 

@@ -21,7 +21,7 @@ from hysim.laws.operators._bank_search import conditioned, dominant_extremes, mo
 from hysim.laws.operators._densities import gamma_plays
 from hysim.models.law import Law, Packed
 from hysim.models.model import Example, family
-from hysim.models.parameters import Parameter, declared_space, spans
+from hysim.models.parameters import Parameter, affine, declared_space, spans
 from hysim.models.search_space import ALL_FREE, Freedom, Parameters, SearchSpace
 from hysim.models.tables import Tables
 from hysim.records import Record, few_places
@@ -107,9 +107,8 @@ class ParametricPrandtlIshlinskii(Law):
         Parameter("exponent", -0.95, 4.0, physical=(True, False)),
         Parameter("decay", 3e-3, 1e2, unit="h", log=True),
         Parameter("weight", unit="y/u", affine=True),
-        Parameter("weight_slope", affine=True),
         Parameter("offset", unit="y", affine=True),
-        Parameter("input_coefficients", affine=True),
+        *affine("weight_slope", "input_coefficients"),
         Parameter("z0", -2.0, 2.0, unit="h", from_first=True),
     )
     screened = 64
