@@ -28,7 +28,6 @@ from hysim.kernels.stepping import CONSTANTS, RESUME, STEP, VECTOR, Resume, Step
 
 N_HEAD = 5
 _OUTLIER = 5.0  # standard deviations: one in two million errors of a normal distribution is larger
-_SEARCH = float64(STEP, CONSTANTS, VECTOR, float64)
 
 
 @inner
@@ -129,7 +128,7 @@ _ADAPT = float64(STEP, RESUME, inverses.SEARCH, CONSTANTS, VECTOR, float64, floa
 def adaptive(step: Step, resume: Resume) -> ControllerStep:
     """The controller around the inverse of the law with this step."""
     adapt_by = by_address(adapt, _ADAPT)
-    search_by = by_address(inverses.search, _SEARCH)
+    search_by = by_address(inverses.search, inverses.SEARCH.signature)
     step_by, resume_by = by_address(step, STEP.signature), by_address(resume, RESUME.signature)
 
     @signed_closure(CONTROLLER.signature)

@@ -10,12 +10,10 @@ on u - x exp(-k t / c), which is monotone on either side of its one turn, from t
 
 import math
 
-from numba import float64
-
 from hysim._basics.frozen import FloatArray
 from hysim.kernels._compile import inlined, inner, signed_kernel
 from hysim.kernels.friction_rates import moved_on
-from hysim.kernels.stepping import CONSTANTS, VECTOR
+from hysim.kernels.stepping import STEP
 
 _MOST_PHASES = 8  # of a stroke: contact, gap, contact, gap, contact is the longest course
 _MOST_STEPS = 60  # of Newton's method, which converges quadratically
@@ -102,7 +100,7 @@ def begun(parameters: FloatArray, state: FloatArray, first: int) -> float:
     return float(state[first])
 
 
-@signed_kernel(float64(CONSTANTS, VECTOR, float64))
+@signed_kernel(STEP.signature)
 def step(parameters: FloatArray, state: FloatArray, u: float) -> float:
     """Torque after an even stroke; `state` is (last u, part of the gap, 1 after the first step).
 
@@ -116,7 +114,7 @@ def step(parameters: FloatArray, state: FloatArray, u: float) -> float:
     return float(parameters[5] + torque(u - parameters[4] - after, rise / duration, after, stiffness, damping, gap))
 
 
-@signed_kernel(float64(CONSTANTS, VECTOR, float64))
+@signed_kernel(STEP.signature)
 def rated_step(parameters: FloatArray, state: FloatArray, u: float) -> float:
     """Torque after a stroke of an element, along which the gap's part moves as along an even one; see `rates`."""
     stiffness, damping, gap = parameters[1], parameters[2], parameters[3]

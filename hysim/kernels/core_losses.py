@@ -2,17 +2,15 @@
 
 import math
 
-from numba import float64
-
 from hysim._basics.frozen import FloatArray
 from hysim.kernels._compile import signed_kernel
-from hysim.kernels.stepping import CONSTANTS, VECTOR
+from hysim.kernels.stepping import STEP
 
 N_ALONE, N_POWERS = 6, 3  # weights of the polynomial alone, 1, x, x^3, ..., x^9; of each stop b, 1, x^2, b^2
 _HEAD = 3
 
 
-@signed_kernel(float64(CONSTANTS, VECTOR, float64))
+@signed_kernel(STEP.signature)
 def excess(parameters: FloatArray, state: FloatArray, u: float) -> float:
     """The root of the velocity with its sign, `parameters` (sample time, c) and `state` (last u)."""
     velocity = (u - state[0]) / parameters[0]
@@ -20,7 +18,7 @@ def excess(parameters: FloatArray, state: FloatArray, u: float) -> float:
     return float(parameters[1] * math.copysign(math.sqrt(abs(velocity)), velocity))
 
 
-@signed_kernel(float64(CONSTANTS, VECTOR, float64))
+@signed_kernel(STEP.signature)
 def field(parameters: FloatArray, state: FloatArray, u: float) -> float:
     """Field of a core, see `hysim.CoreField`; `state` is (last u, stops, what u is ahead of its lags).
 

@@ -14,13 +14,13 @@ nothing, so they shrink where they do on a line without ends. In a loop whose re
 the period before, and rings keep the errors of the last N samples and the corrections of the last N + m.
 """
 
-from numba import float64, void
+from numba import void
 
 from hysim._basics.frozen import FloatArray
-from hysim.kernels._compile import borrowed, by_address, kernel, signed_closure, signed_kernel
+from hysim.kernels._compile import borrowed, kernel, signed_kernel
 from hysim.kernels.controllers import CONTROLLER, ControllerStep
 from hysim.kernels.stepping import CONSTANTS, VECTOR
-from hysim.kernels.tracking import push
+from hysim.kernels.tracking import bound, push
 
 N_HEAD = 6
 N_PLACES = 3  # of the state before the ring of references
@@ -98,15 +98,6 @@ def learn(
     return float(u)
 
 
-_LEARNING = float64(CONTROLLER, CONSTANTS, VECTOR, float64, float64)
-
-
 def learning(inner: ControllerStep) -> ControllerStep:
     """The step `learn` around the step of a controller."""
-    learn_by, inner_by = by_address(learn, _LEARNING), by_address(inner, CONTROLLER.signature)
-
-    @signed_closure(CONTROLLER.signature)
-    def step(parameters: FloatArray, state: FloatArray, reference: float, measurement: float) -> float:
-        return learn_by(inner_by, parameters, state, reference, measurement)
-
-    return step
+    return bound(learn, inner, CONTROLLER)

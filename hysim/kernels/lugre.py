@@ -14,12 +14,10 @@ the exponential with that quadratic is exact again, so that stiff bristles need 
 
 import math
 
-from numba import float64
-
 from hysim._basics.frozen import FloatArray
 from hysim.kernels._compile import inlined, signed_kernel
 from hysim.kernels.friction_rates import middle_speed, moved_on, stribeck
-from hysim.kernels.stepping import CONSTANTS, VECTOR
+from hysim.kernels.stepping import STEP
 
 _SERIES = 0.05  # kappa below which the averages of the exponential are series; the terms left out are below 1e-16
 _NEAR = 0.5  # kappa below which the change of z is taken, and not its distance from the end
@@ -62,7 +60,7 @@ def deflection(
     return (along - begin / sigma0) * math.exp(-kappa) - moved + end / sigma0
 
 
-@signed_kernel(float64(CONSTANTS, VECTOR, float64))
+@signed_kernel(STEP.signature)
 def step(parameters: FloatArray, state: FloatArray, u: float) -> float:
     """Force after an even stroke; `state` is (last u, z).
 
@@ -86,7 +84,7 @@ def step(parameters: FloatArray, state: FloatArray, u: float) -> float:
     return float(parameters[9] + direction * (sigma0 * along + (bristles + parameters[3]) * speed))
 
 
-@signed_kernel(float64(CONSTANTS, VECTOR, float64))
+@signed_kernel(STEP.signature)
 def rated_step(parameters: FloatArray, state: FloatArray, u: float) -> float:
     """Force after a stroke of an element, without the dashpot (sigma1 + sigma2) v; see `rates`.
 

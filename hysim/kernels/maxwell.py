@@ -10,12 +10,10 @@ weight_i g. Along a stroke of a structure's element g is taken as linear over th
 
 import math
 
-from numba import float64
-
 from hysim._basics.frozen import FloatArray
 from hysim.kernels._compile import inlined, signed_kernel
 from hysim.kernels.friction_rates import moved_on, stribeck
-from hysim.kernels.stepping import CONSTANTS, VECTOR
+from hysim.kernels.stepping import STEP
 
 _N_OTHERS = 8  # parameters beside those of the elements
 
@@ -81,7 +79,7 @@ def move(
     return force
 
 
-@signed_kernel(float64(CONSTANTS, VECTOR, float64))
+@signed_kernel(STEP.signature)
 def step(parameters: FloatArray, state: FloatArray, u: float) -> float:
     """Force after an even stroke; `state` is (last u, forces, directions of slip).
 
@@ -97,7 +95,7 @@ def step(parameters: FloatArray, state: FloatArray, u: float) -> float:
     return float(parameters[2 * n + 7] + force + parameters[2 * n + 6] * rate)
 
 
-@signed_kernel(float64(CONSTANTS, VECTOR, float64))
+@signed_kernel(STEP.signature)
 def rated_step(parameters: FloatArray, state: FloatArray, u: float) -> float:
     """Force after a stroke of an element without the viscous part; see `rates`."""
     n = (parameters.size - _N_OTHERS) // 2

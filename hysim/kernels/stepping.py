@@ -13,6 +13,7 @@ input from the first one: it is `self_starting`, with one place more at the end 
 
 import math
 from collections.abc import Callable
+from typing import Any
 
 from numba import float64, int64, types, void
 
@@ -46,14 +47,14 @@ def drive(step: Step, parameters: FloatArray, state: FloatArray, u: FloatArray, 
     return -1
 
 
-@signed_kernel(float64(CONSTANTS, VECTOR, float64))
+@signed_kernel(STEP.signature)
 def line(parameters: FloatArray, state: FloatArray, u: float) -> float:
     """The law without memory, `parameters` (offset, slope) and `state` (last u)."""
     state[0] = u
     return float(parameters[0] + parameters[1] * u)
 
 
-@signed_kernel(float64(CONSTANTS, VECTOR, float64))
+@signed_kernel(STEP.signature)
 def dashpot(parameters: FloatArray, state: FloatArray, u: float) -> float:
     """The damper, `parameters` (sample time, c) and `state` (last u)."""
     rise = u - state[0]
@@ -143,11 +144,6 @@ def self_starting(step: Step, start: Start) -> Step:
 # ---------------------------------------------------------------------------------- a user's own step
 
 
-def compile_step(function: Step) -> Step:
-    """Compile a plain function for the type `STEP`; numba's errors pass through."""
-    return signed_kernel(float64(CONSTANTS, VECTOR, float64))(function)
-
-
-def compile_start(function: Start) -> Start:
-    """Compile a plain function as a start; numba's errors pass through."""
-    return signed_kernel(START.signature)(function)
+def compile_as(kind: Any, function: Any) -> Any:
+    """Compile a plain function as a kind, `STEP` or `START`; numba's errors pass through."""
+    return signed_kernel(kind.signature)(function)

@@ -7,12 +7,10 @@ with v_s = sqrt(2) breakaway_velocity and v_c = breakaway_velocity / 10.
 
 import math
 
-from numba import float64
-
 from hysim._basics.frozen import FloatArray
 from hysim.kernels._compile import inlined, signed_kernel
 from hysim.kernels.friction_rates import moved_on
-from hysim.kernels.stepping import CONSTANTS, VECTOR
+from hysim.kernels.stepping import STEP
 
 _PEAK = math.sqrt(2.0 * math.e)
 _STRIBECK = math.sqrt(2.0)
@@ -27,7 +25,7 @@ def dry(rate: float, coulomb: float, breakaway: float, breakaway_velocity: float
     return peak + coulomb * math.tanh(rate / (_COULOMB * breakaway_velocity))
 
 
-@signed_kernel(float64(CONSTANTS, VECTOR, float64))
+@signed_kernel(STEP.signature)
 def step(parameters: FloatArray, state: FloatArray, u: float) -> float:
     """Force after an even stroke; `state` is (last u).
 
@@ -39,7 +37,7 @@ def step(parameters: FloatArray, state: FloatArray, u: float) -> float:
     return float(parameters[5] + force + parameters[4] * rate)
 
 
-@signed_kernel(float64(CONSTANTS, VECTOR, float64))
+@signed_kernel(STEP.signature)
 def rated_step(parameters: FloatArray, state: FloatArray, u: float) -> float:
     """Force at the end of a stroke of an element without the viscous part; see `rates`."""
     moved_on(state, u)

@@ -24,6 +24,7 @@ notch, feed-forward) took 24 % longer a sample than the kernel.
 
 import math
 from collections.abc import Callable
+from typing import Any
 
 from numba import float64
 
@@ -36,8 +37,7 @@ from hysim.kernels.stepping import CONSTANTS, STEP, VECTOR, Step
 N_HEAD = 10
 N_FEEDFORWARD = 4
 
-BoundStep = Callable[[Step, FloatArray, FloatArray, float, float], float]
-_BOUND = float64(STEP, CONSTANTS, VECTOR, float64, float64)
+BoundStep = Callable[[Any, FloatArray, FloatArray, float, float], float]
 _JUST, _TINY = 1e-15, 1e-300  # beyond a limit: the command where no input gives the output
 
 
@@ -152,13 +152,13 @@ def track(inverse: Step, parameters: FloatArray, state: FloatArray, reference: f
     return float(u)
 
 
-def bound(controller: BoundStep, inverse: Step) -> ControllerStep:
-    """The controller of a kernel, `invert` or `track`, with the inverse that it steps."""
-    controller_by = by_address(controller, _BOUND)
-    inverse_by = by_address(inverse, STEP.signature)
+def bound(controller: BoundStep, inner: Any, kind: Any = STEP) -> ControllerStep:
+    """The controller of a kernel, such as `track`, with what it steps: an inverse, or a function of another kind."""
+    signature = float64(kind, CONSTANTS, VECTOR, float64, float64)
+    controller_by, inner_by = by_address(controller, signature), by_address(inner, kind.signature)
 
     @signed_closure(CONTROLLER.signature)
     def step(parameters: FloatArray, state: FloatArray, reference: float, measurement: float) -> float:
-        return controller_by(inverse_by, parameters, state, reference, measurement)
+        return controller_by(inner_by, parameters, state, reference, measurement)
 
     return step

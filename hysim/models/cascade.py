@@ -28,6 +28,7 @@ from hysim.models.parts import (
     compiled_law,
     compiled_pair,
     exchanged,
+    labelled,
     labels,
     own,
     response_of,
@@ -122,7 +123,7 @@ class CascadeStructure(Subject, Composable):
 
     def assumed_states(self, record: Record) -> tuple[str, ...]:
         """The states that the stages from the carrier on leave to the record; a cascade has no cycle ahead of it."""
-        stages = [*zip(labels(self.stages), self.stages, strict=True)][self.carrier :]
+        stages = [*labelled(self.stages).items()][self.carrier :]
         with_state = {label: stage for label, stage in stages if isinstance(stage, Identifiable)}
         states = common_states(with_state, self._record_at(stages[0][0], record))
         return tuple(state for state in states if state != "periodic")
@@ -136,7 +137,7 @@ class CascadeStructure(Subject, Composable):
         """The stages; structures of transfer functions other than the carrier have the gain one."""
         return {
             label: stage.with_unit_gain() if isinstance(stage, LinearStructure) and k != self.carrier else stage
-            for k, (label, stage) in enumerate(zip(labels(self.stages), self.stages, strict=True))
+            for k, (label, stage) in enumerate(labelled(self.stages).items())
         }
 
     @property

@@ -7,7 +7,7 @@ from typing import Any, TypeVar
 
 from numba.core.dispatcher import Dispatcher
 
-from hysim.kernels.stepping import STEP, Start, Step, by_address, compile_start, compile_step
+from hysim.kernels.stepping import START, STEP, Start, Step, by_address, compile_as
 from hysim.models.protocols import Startable, Stepwise
 
 _Kernel = TypeVar("_Kernel", Step, Start)
@@ -22,12 +22,12 @@ def startable(thing: Any, sample_time: float | None = None) -> Startable:
 
 def compiled_step(function: Callable[[Any, Any, float], float]) -> Step:
     """The step of a family, compiled by numba if it is no kernel; TypeError unless it returns one number."""
-    return function if _is_kernel(function) else _compiled(function, compile_step, "step(parameters, state, u) -> y")
+    return function if _is_kernel(function) else _compiled(function, STEP, "step(parameters, state, u) -> y")
 
 
 def compiled_start(function: Callable[[Any, Any, float], None]) -> Start:
     """The start of a family, as `compiled_step`; TypeError if it is no function of (parameters, state, u0)."""
-    return function if _is_kernel(function) else _compiled(function, compile_start, "start(parameters, state, u0)")
+    return function if _is_kernel(function) else _compiled(function, START, "start(parameters, state, u0)")
 
 
 @functools.lru_cache(maxsize=256)
@@ -41,7 +41,7 @@ def _is_kernel(function: Any) -> bool:
 
 
 @functools.lru_cache(maxsize=256)
-def _compiled(function: Any, compiler: Callable[[Any], Any], kind: str) -> Any:
+def _compiled(function: Any, type_: Any, kind: str) -> Any:
     plain, name = (function.py_func if isinstance(function, Dispatcher) else function), kind.partition("(")[0]
     if not inspect.isfunction(plain):
         raise TypeError(f"{name} must be a function {kind}, got {type(function).__name__}")
@@ -49,7 +49,7 @@ def _compiled(function: Any, compiler: Callable[[Any], Any], kind: str) -> Any:
     if len(taken) != 3:
         raise TypeError(f"{name} must take {wanted}, but {plain.__name__} takes ({', '.join(taken)})")
     try:
-        return compiler(plain)
+        return compile_as(type_, plain)
     except Exception as error:  # numba's errors share no class
         reason = " ".join(str(error).split())
         raise TypeError(f"{plain.__name__} does not compile as {kind}: {reason}") from None

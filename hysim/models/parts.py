@@ -20,8 +20,13 @@ def labels(parts: Sequence[Any]) -> tuple[str, ...]:
     return tuple(f"{name}[{names[:k].count(name)}]" if names.count(name) > 1 else name for k, name in enumerate(names))
 
 
+def labelled(parts: Sequence[Any]) -> dict[str, Any]:
+    """The parts by their `labels`."""
+    return dict(zip(labels(parts), parts, strict=True))
+
+
 def exchanged(parts: Sequence[Any], others: Mapping[str, Any]) -> tuple[Any, ...]:
-    return tuple(others.get(label, part) for label, part in zip(labels(parts), parts, strict=True))
+    return tuple(others.get(label, part) for label, part in labelled(parts).items())
 
 
 def _label(part: Any) -> str:

@@ -32,6 +32,7 @@ from hysim.models.parts import (
     compiled_law,
     compiled_pair,
     exchanged,
+    labelled,
     labels,
     own,
     response_of,
@@ -167,10 +168,9 @@ class Composite(ByStructure, Composable):
     @property
     def scalars(self) -> dict[str, float]:
         """Numbers of the members that have names for them, with the label first, as in ``"bouc_wen.beta"``."""
-        named = zip(labels(self.members), self.members, strict=True)
         return {
             f"{label}.{name}": value
-            for label, member in named
+            for label, member in labelled(self.members).items()
             if isinstance(member, Numbered)
             for name, value in member.scalars.items()
         }
@@ -179,7 +179,7 @@ class Composite(ByStructure, Composable):
         """The composite with other numbers, by their names in `scalars`."""
         numbered = {
             label: member.with_scalars(others)
-            for label, member in zip(labels(self.members), self.members, strict=True)
+            for label, member in labelled(self.members).items()
             if isinstance(member, Numbered) and (others := own(scalars, label))
         }
         family: Any = type(self)
@@ -234,9 +234,9 @@ def time_of(part: Any, record: Record) -> float | None:
 
 
 def assembled(members: Sequence[Any], searched: Mapping[str, Any], parameters: Parameters) -> tuple[Any, ...]:
-    parts = zip(labels(members), members, strict=True)
     return tuple(
-        searched[label].assemble(own(parameters, label)) if label in searched else part for label, part in parts
+        searched[label].assemble(own(parameters, label)) if label in searched else part
+        for label, part in labelled(members).items()
     )
 
 
@@ -302,11 +302,7 @@ class SumStructure(Subject, Composable):
 
     @property
     def _identified(self) -> dict[str, Identifiable]:
-        return {
-            label: part
-            for label, part in zip(labels(self.parts), self.parts, strict=True)
-            if isinstance(part, Identifiable)
-        }
+        return {label: part for label, part in labelled(self.parts).items() if isinstance(part, Identifiable)}
 
     def _values(self, columns: Sequence[str]) -> dict[str, float]:
         return {

@@ -29,7 +29,7 @@ from hysim.models.compiled_step import compiled_start, compiled_step
 from hysim.models.joint_space import columns_beside
 from hysim.models.law import Law
 from hysim.models.model import family
-from hysim.models.parts import labels, own, response_of
+from hysim.models.parts import labelled, own, response_of
 from hysim.models.protocols import Identifiable, Sampled, Timed, needed_time
 from hysim.models.search_space import Parameters
 from hysim.models.sum import Sum, SumStructure
@@ -153,7 +153,7 @@ def columns_along(
         known = tuple(part for part in subject.parts if not isinstance(part, Identifiable))
         blocks = [
             columns_along(part, own(parameters, name), own(varying, name), record)
-            for name, part in zip(labels(subject.parts), subject.parts, strict=True)
+            for name, part in labelled(subject.parts).items()
             if isinstance(part, Identifiable)
         ]
         return columns_beside(blocks, replace(subject, parts=known).regressors({}, record) if known else 0.0)
@@ -173,7 +173,7 @@ def response_along(
     if not series:
         return response_of(model, u, sample_time)
     if isinstance(model, Sum):
-        named = zip(labels(model.parts), model.parts, strict=True)
+        named = labelled(model.parts).items()
         parts = [response_along(part, own(series, name), u, sample_time) for name, part in named]
         return np.asarray(np.sum(parts, axis=0))
     law = model.at_sample_time(needed_time(model, sample_time)) if isinstance(model, Timed) else model
@@ -247,7 +247,7 @@ def check_memory_is_its_own(law: Any, names: Iterable[str], record: Record) -> N
     """Raise a ValueError if an affine parameter among these moves the memory of a law, so that it cannot vary."""
     names = tuple(names)
     if isinstance(law, Sum | SumStructure):
-        for name, part in zip(labels(law.parts), law.parts, strict=True):
+        for name, part in labelled(law.parts).items():
             check_memory_is_its_own(part, own(dict.fromkeys(names), name), record)
     elif isinstance(law, Law) and names and law.initial_names:
         changed = law.with_scalars({name: law.scalars[name] + k for k, name in enumerate(names, 1)})

@@ -301,7 +301,7 @@ class Duhem(Law):
 
         The memory is called y where it is the output: without feedthrough, offset and terms with ``|z|``; else z.
         """
-        return {term.named(self._letter): value for term, value in self._coefficients.items()}
+        return {term.named(self._letter): value for term, value in terms_of(self._parts).items()}
 
     @property
     def equation(self) -> str:
@@ -391,10 +391,6 @@ class Duhem(Law):
     @property
     def _parts(self) -> Polynomials:
         return Polynomials(self.p, self.q, self.p_abs, self.q_abs)
-
-    @property
-    def _coefficients(self) -> dict[Term, float]:
-        return terms_of(self._parts)
 
     @property
     def _letter(self) -> str:
