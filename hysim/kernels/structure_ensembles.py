@@ -6,7 +6,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from hysim._basics.frozen import FloatArray
-from hysim.kernels._compile import inner, kernel, pasted, uncounted
+from hysim.kernels._compile import inner, kernel, uncounted
 from hysim.kernels.structure_flows import N_POWERS, fill_flows, put
 from hysim.kernels.structure_layout import Elements, Flows, Motion, Plant, Room, Steps, Tracks
 from hysim.kernels.structure_moments import IntArray
@@ -44,48 +44,41 @@ class Results(NamedTuple):
     errors: FloatArray
 
 
-@inner
-def set_slopes(
-    steps: IntArray, starts: IntArray, parameters: FloatArray, parameter_ends: IntArray, states: FloatArray,
-    state_ends: IntArray, spare: FloatArray, slopes: FloatArray,
-) -> None:  # fmt: skip
-    """Elastic slopes of laws at their start: the limit of secants of shorter and shorter strokes, zero if negative.
-
-    Of all secants that one is taken which differs least, relatively, from the one before.
-    """
-    for e in range(slopes.size):
-        own = parameters[parameter_ends[e] : parameter_ends[e + 1]]
-        begin, end = state_ends[e], state_ends[e + 1]
-        step, start = step_at(steps[e]), start_at(starts[e])
-        before, least = math.nan, math.inf
-        slopes[e] = 0.0
-        for k in range(_PROBES):
-            stroke = 10.0**-k
-            for q in range(begin, end):
-                spare[q] = states[q]
-            start(own, spare[begin:end], 0.0)
-            f0 = step(own, spare[begin:end], 0.0)
-            secant = (step(own, spare[begin:end], stroke) - f0) / stroke
-            size = max(abs(secant), abs(before))
-            change = 0.0 if size == 0.0 else abs(secant - before) / size
-            if change < least:
-                least, slopes[e] = change, max(secant, 0.0)
-            before = secant
-
-
 @kernel
 def fill_slopes(
     steps: IntArray, starts: IntArray, parameters: FloatArray, parameter_ends: IntArray, states: FloatArray,
     state_ends: IntArray, slopes: FloatArray,
 ) -> None:  # fmt: skip
-    """As `set_slopes`, for each row of parameters (n_sets, n_parameters) and states."""
+    """Elastic slopes of laws at their start: the limit of secants of shorter and shorter strokes, zero if negative.
+
+    Of all secants that one is taken which differs least, relatively, from the one before. The laws are those of each
+    row of parameters (n_sets, n_parameters) and states.
+    """
     spare = np.empty(states.shape[1])
     for i in range(slopes.shape[0]):
-        set_slopes(steps, starts, parameters[i], parameter_ends, states[i], state_ends, spare, slopes[i])
+        numbers, memories = parameters[i], states[i]
+        for e in range(slopes.shape[1]):
+            own = numbers[parameter_ends[e] : parameter_ends[e + 1]]
+            begin, end = state_ends[e], state_ends[e + 1]
+            step, start = step_at(steps[e]), start_at(starts[e])
+            before, least = math.nan, math.inf
+            slopes[i, e] = 0.0
+            for k in range(_PROBES):
+                stroke = 10.0**-k
+                for q in range(begin, end):
+                    spare[q] = memories[q]
+                start(own, spare[begin:end], 0.0)
+                f0 = step(own, spare[begin:end], 0.0)
+                secant = (step(own, spare[begin:end], stroke) - f0) / stroke
+                size = max(abs(secant), abs(before))
+                change = 0.0 if size == 0.0 else abs(secant - before) / size
+                if change < least:
+                    least, slopes[i, e] = change, max(secant, 0.0)
+                before = secant
 
 
-@inner
-def begin_motion(elements: Elements, starts: IntArray, state: FloatArray, x: FloatArray, motion: Motion) -> None:
+@kernel
+def start_motion(elements: Elements, starts: IntArray, state: FloatArray, x: FloatArray, motion: Motion) -> None:
     """Put a structure at its first sample."""
     n, n_nodes = elements.k0.size, x.size // 2
     put(x, motion.x)
@@ -114,12 +107,6 @@ def begin_motion(elements: Elements, starts: IntArray, state: FloatArray, x: Flo
         motion.peaks[2 * n + q] = abs(x[q])
 
 
-@kernel
-def start_motion(elements: Elements, starts: IntArray, state: FloatArray, x: FloatArray, motion: Motion) -> None:
-    """As `begin_motion`, from Python."""
-    begin_motion(elements, starts, state, x, motion)
-
-
 @inner
 def same(one: FloatArray, two: FloatArray) -> bool:
     """Whether two matrices are equal."""
@@ -146,8 +133,8 @@ def project(elements: Elements, columns: FloatArray, drifts: FloatArray) -> None
                 drifts[level, i, n + e] = rate
 
 
-@pasted
-def fill(
+@kernel
+def fill_structure(
     elements: Elements, A: FloatArray, loads: FloatArray, rate: float, h: float, E: FloatArray, P: FloatArray,
     flows: Flows,
 ) -> None:  # fmt: skip
@@ -169,15 +156,6 @@ def fill(
                     flows.rests[level, N_POWERS * i + j, q] = P[level, n_loads + i, j, q]
     project(elements, flows.free, flows.free_drifts)
     project(elements, flows.rests, flows.drifts)
-
-
-@kernel
-def fill_structure(
-    elements: Elements, A: FloatArray, loads: FloatArray, rate: float, h: float, E: FloatArray, P: FloatArray,
-    flows: Flows,
-) -> None:  # fmt: skip
-    """As `fill`, from Python."""
-    fill(elements, A, loads, rate, h, E, P, flows)
 
 
 @kernel
@@ -203,11 +181,11 @@ def follow_each(
         if base == 0:
             base = max(1, math.ceil(steps.sample_time * rate / phase))
         if i == 0 or not (same(A, sets.A[i - 1]) and same(sets.loads[i], sets.loads[i - 1])):
-            fill(one, A, sets.loads[i], rate, steps.sample_time / base, E, P, flows)
+            fill_structure(one, A, sets.loads[i], rate, steps.sample_time / base, E, P, flows)
         row = u[min(i, u.shape[0] - 1)]
         for k in range(row.size):
             loads[k, 0] = sets.scales[i] * row[k]
-        begin_motion(one, starts, sets.states[i], x, motion)
+        start_motion(one, starts, sets.states[i], x, motion)
         own = Plant(A, sets.loads[i], plant.damping, plant.directions, plant.pushing)
         divided = Steps(steps.sample_time, rate, base, steps.halvings, steps.tolerance)
         lost = walk(one, flows, own, divided, True, loads, motion, room, tracks)

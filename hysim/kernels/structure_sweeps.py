@@ -58,24 +58,18 @@ def sweep(elements: Elements, h: float, is_fine: bool, motion: Motion, room: Roo
 
 
 @unfolded
-def set_errors(h: float, phase: float, room: Room) -> None:
-    """Errors of the drifts, or of their rates over the step.
+def largest_error(h: float, phase: float, tolerance: float, room: Room) -> float:
+    """The largest error of a drift, or of its rate over the step, in units of the tolerance.
 
-    They are the changes by the last sweep, or what the fits of the rests miss: the response to a load that has no first
-    four moments, at the end of the step, and in the middle, from where it comes back by the path.
+    The errors are the changes by the last sweep, or what the fits of the rests miss: the response to a load that has no
+    first four moments, at the end of the step, and in the middle, from where it comes back by the path.
     """
     n, share = room.scales.size, phase * phase * (_MISSED + phase * phase / 12.0)
+    largest = 0.0
     for e in range(n):
         change = max(abs(room.drifts[e] - room.before[e]), h * abs(room.drifts[n + e] - room.before[n + e]))
         error = max(change, share * room.sums[e, 5] * room.own[e])
         room.errors[e] = error if math.isfinite(error) else math.inf
-
-
-@unfolded
-def largest_error(tolerance: float, room: Room) -> float:
-    """The largest error in units of the tolerance."""
-    largest = 0.0
-    for e in range(room.errors.size):
         if room.errors[e] > 0.0:
             largest = max(largest, room.errors[e] / (tolerance * room.scales[e]))
     return largest
@@ -154,8 +148,7 @@ def try_step(
         combine(drifts, rest, room.free_drifts, room.drifts)
         if k == 0 and not is_adaptive:
             continue
-        set_errors(h, h * rate, room)
-        apart = largest_error(tolerance, room)
+        apart = largest_error(h, h * rate, tolerance, room)
         if k > 0 and not (any_divided and apart > 1.0):
             break
         if apart < _AT_ONCE and is_smooth(elements, h, motion, room):

@@ -29,7 +29,7 @@ from hysim.models.compiled_step import compiled_start, compiled_step, pointer
 from hysim.models.composable import Placed
 from hysim.models.inverse_search import check_reached, inverse_at_rest, inverse_response, not_reached, searched_inverse
 from hysim.models.parameters import Parameter, declared_space
-from hysim.models.protocols import UNLIMITED, CompiledLaw, Limits, Searched, Startable
+from hysim.models.protocols import UNLIMITED, CompiledLaw, Limits, Startable, Subject
 from hysim.models.search_space import ALL_FREE, Freedom, Parameters, SearchSpace
 from hysim.models.slope import HOOKS, states_of, step_of
 from hysim.models.stages import Simpler, Stage, Subset
@@ -73,7 +73,7 @@ class Stepping(NamedTuple):
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Law(Placed, Searched, ABC):
+class Law(Placed, Subject, ABC):
     """A rate-independent law that is defined by its step, or by its slope, from which the step follows.
 
     A family is a subclass under the decorator `hysim.family`: its fields, and the class attributes below. A field is
@@ -577,10 +577,6 @@ class Law(Placed, Searched, ABC):
     def freed_in_turn(self) -> tuple[Stage, ...]:
         """The `stages` of the family."""
         return self.stages
-
-    def notes(self, record: Record, model: Any) -> tuple[str, ...]:
-        """Remarks on the identified model, as phrases."""
-        return ()
 
     def simpler(self) -> Simpler | None:
         """The law that this one `contains`, with the values that both have."""
