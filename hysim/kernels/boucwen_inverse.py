@@ -97,10 +97,7 @@ def lowest_slope(u: float, z: float, end: float, z_end: float, direction: float,
     """A lower bound of `slope` from (u, z) to (end, z_end), the lowest slope itself if P is linear."""
     coefficients = parameters[N_HEAD : N_HEAD + int(parameters[7])]
     rising = parameters[0]
-    memory = min(
-        rising * memory_slope(z, direction, parameters),
-        rising * memory_slope(z_end, direction, parameters),
-    )
+    memory = min(rising * memory_slope(z, direction, parameters), rising * memory_slope(z_end, direction, parameters))
     if z * z_end < 0.0:
         memory = min(memory, rising * memory_slope(0.0, direction, parameters))
     at_ends = rising * (derivative(u, coefficients) + derivative(end, coefficients))

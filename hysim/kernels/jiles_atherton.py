@@ -56,6 +56,7 @@ _PLACES, _SHARES = (
 )
 
 
+Stroke = tuple[float, float, float, float]  # x, its rest, z and m at the end
 Weights = tuple[float, float, float]
 """Weights of x, m and z in the sum that a stroke takes to its target."""
 
@@ -141,9 +142,7 @@ def reversible(low: float, high: float, target: float, of_x: float, of_m: float,
 
 
 @inner
-def advance(
-    x: float, rest: float, z: float, target: float, weights: Weights, parameters: FloatArray
-) -> tuple[float, float, float, float]:
+def advance(x: float, rest: float, z: float, target: float, weights: Weights, parameters: FloatArray) -> Stroke:
     """x, its rest, z and m at the first place ahead with of_x x + of_m m + of_z z = `target`; nan without one."""
     of_x, of_m, of_z = weights
     p, kappa = parameters[ANISOTROPY], parameters[PINNING]
@@ -206,7 +205,7 @@ def steady_length(x: float, gap: float, slope: float, length: float, parameters:
 @inner
 def solve(
     x: float, z: float, m: float, slope: float, end: float, target: float, weights: Weights, parameters: FloatArray
-) -> tuple[float, float, float, float]:
+) -> Stroke:
     """As `advance`, for a place up to `end` on a branch along which z follows m, and the sum rises."""
     of_x, of_m, of_z = weights
     kappa, p = parameters[PINNING], parameters[ANISOTROPY]

@@ -25,13 +25,7 @@ def drive_memory(step: Step, parameters: FloatArray, state: FloatArray, u: Float
 
 @signed_kernel(void(STEP, TABLE, TABLE, int64, CONSTANTS, VECTOR, ROWS))
 def drive_to_end(
-    step: Step,
-    parameters: FloatArray,
-    memory: FloatArray,
-    scratch: int,
-    u: FloatArray,
-    y: FloatArray,
-    out: FloatArray,
+    step: Step, parameters: FloatArray, memory: FloatArray, scratch: int, u: FloatArray, y: FloatArray, out: FloatArray
 ) -> None:
     """The memory of each law after the last sample of `u` into `out`, nan where it diverges.
 

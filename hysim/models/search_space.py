@@ -162,11 +162,7 @@ class Freedom:
         return (self.initial or default) != "free"
 
     def held(
-        self,
-        defaults: Mapping[str, float],
-        *,
-        redundant: tuple[tuple[str, ...], ...] = (),
-        at_rest: Iterable[str] = (),
+        self, defaults: Mapping[str, float], *, redundant: tuple[tuple[str, ...], ...] = (), at_rest: Iterable[str] = ()
     ) -> dict[str, float]:
         """The parameters that are not free, and their values: fixed ones, zeros `at_rest`, one of each redundant group.
 

@@ -62,12 +62,7 @@ _PINCHING = Stage(
     rounds=((32, 8), (8, 25)),
 )
 _SPREAD = Stage(
-    word="lambda_",
-    names=("lambda_",),
-    neutral={"lambda_": 0.5},
-    drawn=8,
-    rounds=((8, 25),),
-    idle={"zeta_s": 0.0},
+    word="lambda_", names=("lambda_",), neutral={"lambda_": 0.5}, drawn=8, rounds=((8, 25),), idle={"zeta_s": 0.0}
 )
 _WEARING = ("delta_a", "delta_nu", "delta_eta", "zeta_s")
 _LARGEST_EXPONENT = 700.0

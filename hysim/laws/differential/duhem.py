@@ -55,11 +55,7 @@ _BOUND = 1e3
 _OUTPUT = ("feedthrough", "offset", "y0")
 
 
-def search_space(
-    defaults: Mapping[str, float],
-    record: Record,
-    freedom: Freedom,
-) -> SearchSpace:
+def search_space(defaults: Mapping[str, float], record: Record, freedom: Freedom) -> SearchSpace:
     """Declare the box for the terms, feedthrough, offset and y0 in `defaults`."""
     span_of(record)  # which raises
     terms = {name: Term.parse(name) for name in defaults if name not in _OUTPUT}

@@ -233,12 +233,7 @@ def law_text(coefficients: Mapping[str, float], letter: str) -> str:
 
 
 def equation(
-    coefficients: Mapping[str, float],
-    letter: str,
-    *,
-    feedthrough: float = 0.0,
-    gain: float = 1.0,
-    offset: float = 0.0,
+    coefficients: Mapping[str, float], letter: str, *, feedthrough: float = 0.0, gain: float = 1.0, offset: float = 0.0
 ) -> str:
     """The law as text; where the memory is called z, with the output."""
     law = law_text(coefficients, letter)

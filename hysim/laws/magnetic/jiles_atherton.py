@@ -85,10 +85,7 @@ _DRAWN = {
     "c": (0.0, 0.8),
     "anisotropy": (-10.0, 10.0),
 }
-_PHYSICAL = {
-    "Ms": (True, False),
-    **dict.fromkeys(("c", "reversible_feedback", "z0"), (True, True)),
-}
+_PHYSICAL = {"Ms": (True, False), **dict.fromkeys(("c", "reversible_feedback", "z0"), (True, True))}
 _LOGS = ("Ms", "a", "k")
 _CALLED = {"a": "width", "alpha": "stability"}
 _HELD = ("anisotropy", "reversible_feedback")

@@ -73,9 +73,7 @@ class GeneralizedPrandtlIshlinskii(Plays, PlaySum):
     units: ClassVar = {"offset": "y"}
     by_input: ClassVar[bool] = False
     example = Example(
-        {**EXAMPLE, "left": (1.2, 1.4, 0.0, 0.0, 0.1)},
-        (-2.0, 2.0),
-        title="Prandtl-Ishlinskii: envelopes",
+        {**EXAMPLE, "left": (1.2, 1.4, 0.0, 0.0, 0.1)}, (-2.0, 2.0), title="Prandtl-Ishlinskii: envelopes"
     )
 
     @classmethod
