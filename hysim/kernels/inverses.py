@@ -25,9 +25,8 @@ from hysim.kernels.stepping import CONSTANTS, STEP, VECTOR, Step
 N_LIMITS = 2  # parameters before those of the inverse itself
 N_PLACE = 2  # places of the state before those of the inverse itself
 N_SEARCH = 4  # places of the state of `searched` before the law's: input, output, slope, largest output so far
-N_SEARCHED = (
-    N_LIMITS + 3
-)  # parameters before the places of the memory: limits, certain, numbers of stretches and places
+# parameters before the places of the memory: limits, certain, numbers of stretches and places
+N_SEARCHED = N_LIMITS + 3
 
 _POINTS = 16  # of a branch at which the output is evaluated
 _DOUBLINGS = 1100  # more than there are between the smallest number and the largest

@@ -35,6 +35,8 @@ from hysim.kernels.elementary import linear_flow, power
 
 State = tuple[float, float, float, float, float, float]
 Plant = tuple[float, float, float, float, float, float, float, float, float, float]
+Rates = tuple[float, float]  # y'' and z'
+Branch = tuple[float, float, float]  # signs of y' and z, and C
 
 _REVERSAL = 1.0e-6  # share of the change of y' in a step by which its end may lie beyond a reversal
 _CROSSING = 1.0e-3  # likewise of z and a crossing
@@ -65,9 +67,7 @@ def tangent(y: float, stiffness: float, curve: FloatArray) -> float:
 
 
 @inner
-def rates(
-    force: float, y: float, v: float, z: float, side: float, C: float, plant: Plant, curve: FloatArray
-) -> tuple[float, float]:
+def rates(force: float, y: float, v: float, z: float, side: float, C: float, plant: Plant, curve: FloatArray) -> Rates:
     """Acceleration and z' on the branch where sign(z) is `side`, and on its continuation."""
     _, damping, stiffness, offset, gain, A, _, _, n, mobility = plant
     acceleration = (force - damping * v - spring(y, stiffness, offset, curve) - gain * z) * mobility
@@ -124,9 +124,7 @@ def dip(v0: float, a0: float, v1: float, a1: float, length: float) -> float:
 
 
 @inner
-def branch(
-    state: State, acceleration: float, slope: float, h: float, A: float, beta: float, gamma: float
-) -> tuple[float, float, float]:
+def branch(state: State, acceleration: float, slope: float, h: float, A: float, beta: float, gamma: float) -> Branch:
     """Signs of y' and z on the branch that begins here, a moment ahead, and C."""
     ahead = state[1] + _REVERSAL * h * acceleration
     forward = math.copysign(1.0, ahead if ahead != 0.0 else slope)

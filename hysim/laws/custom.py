@@ -80,7 +80,7 @@ class CustomLaw(Law):
 
     def __post_init__(self) -> None:
         for what, named in (("parameters", self.parameters), ("state", self.state)):
-            values = {name: _number(value, f"{what}[{name!r}]") for name, value in named.items()}
+            values = {name: float(read_only(value, f"{what}[{name!r}]", ndim=0)) for name, value in named.items()}
             object.__setattr__(self, what, MappingProxyType(values))
         if not self.parameters:
             raise ValueError("parameters must name at least one parameter")
@@ -149,7 +149,3 @@ class CustomLaw(Law):
             parameters={name: scalars.get(name, value) for name, value in self.parameters.items()},
             state={name: scalars.get(name, value) for name, value in self.state.items()},
         )
-
-
-def _number(value: Any, name: str) -> float:
-    return float(read_only(value, name, ndim=0))

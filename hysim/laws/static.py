@@ -71,9 +71,8 @@ def smoothing_spline(u: FloatArray, y: FloatArray, weights: FloatArray) -> Smoot
     coefficients = inverse @ moments[0]
     low, high = float(u.min()), float(u.max())
     knots = np.concatenate([[0.0], x, [1.0]])
-    inputs, remaining = np.unique(
-        np.clip(low + (high - low) * knots, low, high), return_index=True
-    )  # in u, where they round
+    # in u, where they round
+    inputs, remaining = np.unique(np.clip(low + (high - low) * knots, low, high), return_index=True)
     return Smooth(
         u=inputs,
         y=splines.at(knots[remaining]).combined(coefficients),

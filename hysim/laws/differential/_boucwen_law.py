@@ -121,17 +121,14 @@ class BoucWenStep(Law):
 class BoucWenLaw(BoucWenStep, MemoryLaw):
     """A law with the memory of Bouc and Wen, exact at the samples of an input that is linear between them."""
 
+    elementary = (1.0, 2.0)
+
     @property
     def stepping(self) -> Stepping:
         """The kernel for the exponent: a loop compiles no other, and n = 1 and 2 need no charts."""
         if self.n == 1.0:
             return Stepping(kernels.linear_step, stepping.start, 0)
         return Stepping(kernels.quadratic_step, stepping.start, 0) if self.n == 2.0 else super().stepping
-
-    @property
-    def structural(self) -> tuple[str, ...]:
-        """The exponent where it has a kernel of its own."""
-        return ("n",) if self.n in (1.0, 2.0) else ()
 
     @property
     def admissible(self) -> bool:

@@ -44,6 +44,7 @@ class MemoryLaw(ShapedLaw):
     """
 
     polynomial: ClassVar[str] = "input_coefficients"
+    elementary: ClassVar[tuple[float, ...]] = ()  # exponents for which the step is another one
     positive = ("n",)
     units: ClassVar[Mapping[str, str]] = {"n": "1", "offset": "y"}
 
@@ -68,6 +69,11 @@ class MemoryLaw(ShapedLaw):
         """Order that groups laws of equal n, which share their charts (`hysim.kernels.charts`)."""
         n = tables["n"][:, 0]
         return None if (np.diff(n) >= 0.0).all() else np.argsort(n, kind="stable")
+
+    @property
+    def structural(self) -> tuple[str, ...]:
+        """The exponent where it has a step of its own."""
+        return ("n",) if self.n in self.elementary else ()
 
     @property
     def coefficient_names(self) -> tuple[str, ...]:

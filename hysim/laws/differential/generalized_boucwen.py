@@ -66,6 +66,7 @@ class GeneralizedBoucWen(MemoryLaw):
 
     example = Example({"beta": 0.5, "gamma": 0.2, "b2": 0.1, "b4": 0.1}, (-2.0, 2.0), title="Generalised Bouc-Wen")
     contains = bouc_wen_with(*_SECTORS)
+    elementary = (1.0, 2.0)
     step = staticmethod(kernels.step)
     workspace: ClassVar[int] = kernels.N_STATE - 2
 
@@ -84,12 +85,7 @@ class GeneralizedBoucWen(MemoryLaw):
     @property
     def stepping(self) -> Stepping:
         """The kernel for the exponent: n = 1 and 2 need no charts."""
-        return Stepping(kernels.elementary_step, self.start, 0) if self.n in (1.0, 2.0) else super().stepping
-
-    @property
-    def structural(self) -> tuple[str, ...]:
-        """The exponent where it has a step of its own."""
-        return ("n",) if self.n in (1.0, 2.0) else ()
+        return Stepping(kernels.elementary_step, self.start, 0) if self.n in self.elementary else super().stepping
 
     @property
     def known_slopes(self) -> tuple[float, float]:

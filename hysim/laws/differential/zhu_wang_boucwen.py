@@ -59,6 +59,7 @@ class ZhuWangBoucWen(MemoryLaw):
     short = "zhu-wang"
     example = Example({"beta": 0.5, "gamma": 0.2, "delta": 0.15}, (-2.0, 2.0), title="Zhu-Wang: asymmetric")
     samples_a_thread = 2_000
+    elementary = (1.0,)
     screened = 1024  # a step costs twenty times that of the Bouc-Wen law
     contains = bouc_wen_with("delta")
 
@@ -73,8 +74,3 @@ class ZhuWangBoucWen(MemoryLaw):
     @staticmethod
     def flow(p: Any, z: float, last: float, u: float) -> float:
         return float(ramp(p.A, p.beta, p.gamma, p.delta, z, last, u - last))
-
-    @property
-    def structural(self) -> tuple[str, ...]:
-        """The exponent where it has a closed form."""
-        return ("n",) if self.n == 1.0 else ()

@@ -269,9 +269,8 @@ def everett_from_curves(
             above += np.where(grid < end, below - np.interp(end, grid, below), 0.0)
         between = np.flatnonzero((grid > turn) & (grid <= curve.turn))
         reached = (grid[between] - turn) / (curve.turn - turn)
-        share = np.append(
-            np.cumsum(np.abs(np.diff(above - below))[::-1])[::-1], 0.0
-        )  # total variation above each level
+        # total variation above each level
+        share = np.append(np.cumsum(np.abs(np.diff(above - below))[::-1])[::-1], 0.0)
         share = share / (share[0] or 1.0)
         for k, t, r in zip(between, reached, curve.above_line(turn, grid[between], reached), strict=True):
             table[k] = np.where(grid <= turn, (1.0 - t) * below + t * above + r * share, 0.0)
