@@ -143,15 +143,15 @@ def quadratic_path(A: float, beta: float, gamma: float, last_u: float, z: float,
 
 @pasted
 def elementary_path(
-    whole: Move, part: Move, A: float, beta: float, gamma: float, last: float, z: float, u: FloatArray, out: FloatArray
+    flow: Move, part: Move, A: float, beta: float, gamma: float, last: float, z: float, u: FloatArray, out: FloatArray
 ) -> int:
-    """As `linear_path`, by the `whole` flow of an exponent and the `part` of it that runs take."""
+    """As `linear_path`, by the `flow` of an exponent and the `part` of it that runs take."""
     loading, unloading = beta + gamma, beta - gamma
     k = n_alike = 0
     last_du = 0.0
     while k < u.size:
         du = u[k] - last
-        z = z if du == 0.0 else whole(z, du, A, loading, unloading)
+        z = z if du == 0.0 else flow(z, du, A, loading, unloading)
         last = u[k]
         out[k] = z
         if not math.isfinite(z):

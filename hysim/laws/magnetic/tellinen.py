@@ -41,7 +41,7 @@ class Branches(Law):
 
 
 class BranchLaw(Branches):
-    """A law with the fields offset and z0 beside those of its branches."""
+    """A law with the fields offset and z0 after those of its branches."""
 
     offset: float
     z0: float
