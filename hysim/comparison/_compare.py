@@ -25,9 +25,9 @@ from hysim.identification import Identification, identify
 from hysim.identification.sharing import sharing
 from hysim.metrics import LoopMetrics, loop_metrics
 from hysim.models.dependent import on_record
-from hysim.models.model import candidates, candidates_named, is_identifiable
+from hysim.models.model import candidates, candidates_named, is_identifiable, is_searched
 from hysim.models.parts import response_of
-from hysim.models.protocols import Direct, Identifiable, Responding, needs_time
+from hysim.models.protocols import Direct, Responding, needs_time
 from hysim.records import Record, as_record, several
 from hysim.simulation import free_run, models_on, simulate
 
@@ -320,7 +320,7 @@ def _is_family(subject: Any) -> bool:
 
 def _with_initial_state(record: Record, fitted: Identification, seed: int) -> Any:
     model = on_record(fitted.model, record)
-    if not isinstance(model, Identifiable):
+    if not is_searched(model):
         return model
     space = model.search_space(record)
     state = set(space.state) & set(space.names)

@@ -202,7 +202,12 @@ def candidates_named(name: str) -> dict[str, Any]:
 
 def is_identifiable(subject: Any) -> bool:
     """Whether `identify` takes a class, a model or a structure."""
-    return isinstance(subject, Direct | Identifiable)
+    return isinstance(subject, Direct) or is_searched(subject)
+
+
+def is_searched(subject: Any) -> bool:
+    """Whether `identify` searches for the parameters of a class, a model or a structure."""
+    return isinstance(subject, Identifiable)
 
 
 def _of_family(name: str, family: Any) -> dict[str, Any]:
