@@ -23,9 +23,9 @@ class Parameter:
     `lower` and `upper` are the box in units of `unit`: a quotient of the spans of input and output such as ``"y/u"``;
     ``"h"`` is half the span of the input. A quotient of two other parameters stands for their values in the law: the
     box of ``"breakaway/sigma0"`` moves with both. The box of a parameter with `from_first` stands about the first
-    input, and one with `log` is searched on a log scale. The output is affine in an `affine` parameter, which needs no box.
-    `physical` says whether the lower and the upper side of the box is a limit of physics or of the law: the search is
-    not stopped there, as it is at other sides.
+    input, and one with `log` is searched on a log scale. The output is affine in an `affine` parameter, which needs no
+    box. `physical` says whether the lower and the upper side of the box is a limit of physics or of the law: the search
+    is not stopped there, as it is at other sides.
     """
 
     name: str

@@ -406,7 +406,7 @@ class OscillatorStructure(Subject):
         )
 
     def notes(self, record: Record, model: Any) -> tuple[str, ...]:
-        """The error of the steps, where that is not small beside the residual."""
+        """The error of the steps, where that is not small next to the residual."""
         if self.method != "split":
             return ()
         coarse, fine = (self._output(replace(model, substeps=substeps), record) for substeps in (1, 2))
