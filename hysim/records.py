@@ -423,7 +423,7 @@ def several(records: Any, verb: str) -> tuple[Record, ...]:
         raise TypeError(f"{verb} takes a Record or several of them, got {type(records).__name__}: hs.Record(u=u, y=y)")
     if not members:
         raise ValueError(f"{verb} takes a Record or several of them: no record was given")
-    for name in "uy":
+    for name in dict.fromkeys(name for each in members if each is not None for name in each.units):
         if len(units := {each.units.get(name, "") for each in members if each is not None} - {""}) > 1:
             raise ValueError(f"{verb} takes records in the same units, got {name} in {' and '.join(sorted(units))}")
     return tuple(_of_ordinary_size(each, verb) for each in members if each is not None)

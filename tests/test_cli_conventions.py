@@ -363,8 +363,19 @@ def test_control_names_the_quantities_that_drive_and_takes_them_in_the_units_of_
     assert run("plot", path, "--model", tmp_path / "stack.json", "--out", tmp_path / "loop.svg")[0] == 2
 
 
+def test_a_model_takes_times_in_its_own_unit(run, tmp_path):
+    lag, u, t = hs.TransferFunction(num=(1.0,), den=(5.0, 1.0)), np.sin(np.arange(50.0)), np.arange(50.0)
+    hs.save(lag, tmp_path / "ms.json", units={"t": "ms"})
+    hs.save_record(hs.Record(u=u, y=u, t=1e-3 * t, units={"t": "s"}), tmp_path / "s.csv")
+    _, *lines = run("simulate", tmp_path / "ms.json", tmp_path / "s.csv")[1].splitlines()
+    assert np.loadtxt(lines, delimiter=",")[:, 2] == pytest.approx(lag.response(u, 1.0), abs=1e-12)
+    for words in (("control", "--range", "0,1"), ("c", "--out", tmp_path / "m.c"), ("fmu", "--out", tmp_path / "m.fmu")):
+        code, _, err = run(words[0], tmp_path / "ms.json", "--sample-time", "1e-3", *words[1:])
+        assert (code, "ms.json counts time in ms, and the sample time is in s" in err) == (2, True)
+
+
 def test_a_reference_is_a_step_or_a_file_and_the_loop_of_a_linear_plant_is_lag(run, tmp_path):
-    (tmp_path / "way.csv").write_text("t,r\n0,0\n1,1\n2,0.5\n")
+    (tmp_path / "way.csv").write_text("t [ms],r\n0,0\n1000,1\n2000,0.5\n")
     slow = ("--range", "0,1", "--frequency", "0.1", "--duration", "5", "--controller", "integral")
     design = ("control", "lag.json", "--sample-time", "0.02", *slow)
     code, out, _ = run(*design, "--reference", tmp_path / "way.csv")

@@ -338,6 +338,8 @@ def test_a_model_that_is_worse_by_a_third_is_seen_in_four_hundred_samples():
 def test_a_test_in_other_units_is_refused_and_one_in_the_same_is_printed(table1):
     other = hs.Record(u=table1.u, y=1e3 * table1.y, units={"u": "V", "y": "nm"})
     assert_refused("same units, got y in nm and um", hs.compare, {"line": hs.Line}, table1, test=other)
+    times = [hs.Record(u=table1.u, y=table1.y, t=np.arange(52.0), units={"t": unit}) for unit in ("s", "ms")]
+    assert_refused("identify takes records in the same units, got t in ms and s", hs.identify, hs.Line, times)
     assert "test rmse" in str(hs.compare({"line": hs.Line, "play": hs.Play}, table1, test=table1, cross_validate=None))
 
 

@@ -188,6 +188,9 @@ def test_an_open_loop_without_overshoot_has_none_to_take_away():
     found = vibration_reduction(t, 1.0 - np.exp(-t), y(t), decay_rate=0.2)
     assert math.isnan(found.overshoot_reduction_percent)
     assert found.settling_time_reduction_percent < 0.0
+    rising = t[: t.size // 2]  # and has not come to rest: the last value is above the mean of the last tenth
+    found = vibration_reduction(rising, 1.0 - np.exp(-rising), y(rising), decay_rate=0.2)
+    assert math.isnan(found.overshoot_reduction_percent)
     assert reduction_percent(2.0, 3.0) == -50.0
     assert math.isnan(reduction_percent(0.0, 1.0))
     assert math.isnan(reduction_percent(math.nan, 1.0))

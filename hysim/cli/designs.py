@@ -72,7 +72,7 @@ class Design(NamedTuple):
 
 def designed(path: str, options: DesignOptions, exported: Callable[[Any], object]) -> Design:
     """The controller for the model in a file; `exported` is called before the search with a controller of its kind."""
-    model, units = models.read(path)
+    model, units = models.read_in_seconds(path)
     record, within = None, options.limits
     if options.record is not None:
         record = models.in_units(hs.load(options.record, u=options.u, y=options.y), units, options.record)
@@ -164,7 +164,7 @@ def reference(task: Task, rest: float, kind: str, unit: str | None) -> tuple[Flo
     if kind == "triangle":
         values = hs.signals.triangle(task.low, task.high, cycles=2, samples_per_cycle=task.samples_per_cycle)
         return values, task.period, "rms"
-    units = {} if unit is None else {"u": unit}
+    units = {"t": "s"} | ({} if unit is None else {"u": unit})
     return models.in_units(hs.load(kind, t=0, u=1, y=1), units, kind).resample(h).u, 0.0, "rms"
 
 

@@ -330,7 +330,17 @@ def read(path: str) -> tuple[Any, dict[str, str]]:
     return from_json(Path(path).read_bytes(), path)
 
 
-def in_units(record: "hs.Record", units: Mapping[str, str], source: str, signals: str = "uy") -> "hs.Record":
+def read_in_seconds(path: str) -> tuple[Any, dict[str, str]]:
+    """As `read`, for a command with a sample time [s]; ValueError for a model that counts time in another unit."""
+    from hysim.models.protocols import needs_time
+
+    model, units = read(path)
+    if needs_time(model) and (unit := units.get("t", "s")) != "s":
+        raise ValueError(f"{path} counts time in {unit}, and the sample time is in s: identify it from times in s")
+    return model, units
+
+
+def in_units(record: "hs.Record", units: Mapping[str, str], source: str, signals: str = "tuy") -> "hs.Record":
     """The record in these units, where it has others; ValueError if they differ by more than a prefix."""
     known = {name: units[name] for name in signals if name in units}
     other = {name: unit for name, unit in known.items() if record.units.get(name, unit) != unit}

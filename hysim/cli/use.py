@@ -49,7 +49,7 @@ def simulate(
         raise ValueError(f"the model stands before the record: hysim simulate {file} {model}")
     law, units = models.read(model)
     of_the_ground = isinstance(law, _Shaken) and law.excitation == "base"
-    record = models.in_units(records.read_input(settings, file, of_the_ground=of_the_ground), units, file, "u")
+    record = models.in_units(records.read_input(settings, file, of_the_ground=of_the_ground), units, file, "tu")
     units |= (settings.units or {}) | {signal: unit for signal, unit in record.units.items() if signal != "y"}
     simulation = models.simulated(law, record, units)
     columns = simulation.columns
@@ -168,7 +168,7 @@ def c(
     hysim c law.json --out law.c
     hysim c law.json --inverse --out inverse.c
     """
-    law, _ = models.read(model)
+    law, _ = models.read_in_seconds(model)
     stem = str(Path(out).with_suffix(""))
     code = hs.to_c(hs.InverseFeedforward(law=law) if inverse else law, sample_time, name=Path(out).stem, u0=u0)
     files: dict[Any, str | bytes] = {f"{stem}.h": code.header, f"{stem}.c": code.source, f"{stem}_main.c": code.main}
@@ -220,6 +220,6 @@ def fmu(
     hysim fmu law.json --out law.fmu
     hysim fmu actuator.json --sample-time 1e-4 --version 3.0 --out actuator.fmu
     """
-    law, own = models.read(model)
+    law, own = models.read_in_seconds(model)
     labels = {**own, **(units or {})}
     hs.to_fmu(law, out, version, sample_time, name=name, units=labels, platforms=platforms, u0=u0, y0=y0)

@@ -140,7 +140,7 @@ class StepMetrics:
     rise_time : float
         Time from 10 to 90 % [unit of t].
     overshoot : float
-        Largest excess over the final value [% of the step], at least 0.
+        Largest excess over the final value [% of the step], at least 0; 0 for a response that still rises at its end.
     settling_time : float
         Time after which the response stays within 2 %; nan if it does not before the last tenth [unit of t].
     t98 : float
@@ -208,11 +208,12 @@ def step_metrics(t: npt.ArrayLike, y: npt.ArrayLike) -> StepMetrics:
     """
     times, eta, initial, final = _normalised(t, y)
     excess = float(eta.max()) - 1.0 if np.isfinite(eta).all() else math.nan
+    is_rising = bool(eta.argmax() == eta.size - 1)  # to the end: above the mean of the last tenth, and of no return
     return StepMetrics(
         initial=initial,
         final=final,
         rise_time=_first_crossing(times, eta, 0.9) - _first_crossing(times, eta, 0.1),
-        overshoot=0.0 if excess <= ROUNDING else 100.0 * excess,
+        overshoot=0.0 if excess <= ROUNDING or is_rising else 100.0 * excess,
         settling_time=_settling_time(times, eta),
         t98=_first_crossing(times, eta, 1.0 - SETTLED),
     )
