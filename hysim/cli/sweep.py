@@ -210,6 +210,9 @@ class FileTask:
     def __call__(self, *arguments: Any, **named: Any) -> Any:
         return self.function(*arguments, **named)
 
+    def __repr__(self) -> str:
+        return f"{self.path}:{self.name}"
+
     def __reduce__(self) -> tuple[Any, ...]:
         return FileTask, (self.path, self.name)
 

@@ -477,11 +477,13 @@ def doubts(judgement: Judgement) -> tuple[str, ...]:
 
 
 def _no_structure(judgement: Judgement, turning: float, linear: float, curve: float) -> str:
-    alike = min(turning, linear) >= BETTER * curve or (linear >= BETTER * curve and CURVE in judgement.explained_by)
-    if alike or not judgement.rate_spread >= SEVERAL:
+    alike = min(turning, linear) >= BETTER * curve
+    if alike or (linear >= BETTER * curve and CURVE in judgement.explained_by) or not judgement.rate_spread >= SEVERAL:
+        how, then = ("as well as", ":") if alike else ("less well than", ", but")
         return (
-            f"A single-valued curve of the input predicts held-out samples as well as a model with memory (rmse "
-            f"{curve:.3g} against {min(turning, linear):.3g}): the records show no loop that is wider than their noise."
+            f"A single-valued curve of the input predicts held-out samples {how} a model with memory (rmse "
+            f"{curve:.3g} against {min(turning, linear):.3g}){then} the records show no loop that is wider than their "
+            "noise."
         )
     if set(judgement.explained_by) <= {CURVE}:
         return (

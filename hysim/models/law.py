@@ -438,8 +438,8 @@ class Law(Placed, Subject, ABC):
         law = self.remembering(state[0], state[1:])
         if not np.allclose(law.state_at(state[0]), state, rtol=1e-12, atol=0.0):
             raise TypeError(
-                f"the memory of a {type(self).__name__} after an input is more than its {' and '.join(self.initial)}: "
-                "continue with advance(u, state)"
+                f"{type(self).__name__} remembers more of an input than its fields can hold: continue with "
+                "advance(u, state)"
             )
         return law
 

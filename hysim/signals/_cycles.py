@@ -1,7 +1,6 @@
 """Periodic signals, whose cycles have the same bits, and signals with nested loops."""
 
 import math
-import operator
 from collections.abc import Sequence
 
 import numpy as np
@@ -276,6 +275,8 @@ def checked_span(low: float, high: float) -> float:
 
 
 def checked_count(name: str, value: int) -> int:
-    if operator.index(value) < 1:
+    if not isinstance(value, int | np.integer):
+        raise TypeError(f"{name} must be a whole number, got {value!r}")
+    if value < 1:
         raise ValueError(f"{name} must be at least 1, got {value}")
     return value

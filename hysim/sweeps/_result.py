@@ -349,8 +349,9 @@ class Fragility:
         return summary_text([f"Fragility: {self.intensities.size} intensities, {self.level:.0%} intervals"], words)
 
     def probability(self, intensities: npt.ArrayLike) -> FloatArray:
-        """The curve at positive intensities."""
-        return np.asarray(special.ndtr(np.log(np.divide(intensities, self.median)) / self.dispersion))
+        """The curve at intensities, zero at zero."""
+        with np.errstate(divide="ignore"):
+            return np.asarray(special.ndtr(np.log(np.divide(intensities, self.median)) / self.dispersion))
 
     def band(self, intensities: npt.ArrayLike) -> FloatArray:
         """Confidence limits of the curve, shape (2, n), at each of n positive intensities."""
