@@ -369,7 +369,11 @@ def test_a_model_takes_times_in_its_own_unit(run, tmp_path):
     hs.save_record(hs.Record(u=u, y=u, t=1e-3 * t, units={"t": "s"}), tmp_path / "s.csv")
     _, *lines = run("simulate", tmp_path / "ms.json", tmp_path / "s.csv")[1].splitlines()
     assert np.loadtxt(lines, delimiter=",")[:, 2] == pytest.approx(lag.response(u, 1.0), abs=1e-12)
-    for words in (("control", "--range", "0,1"), ("c", "--out", tmp_path / "m.c"), ("fmu", "--out", tmp_path / "m.fmu")):
+    for words in (
+        ("control", "--range", "0,1"),
+        ("c", "--out", tmp_path / "m.c"),
+        ("fmu", "--out", tmp_path / "m.fmu"),
+    ):
         code, _, err = run(words[0], tmp_path / "ms.json", "--sample-time", "1e-3", *words[1:])
         assert (code, "ms.json counts time in ms, and the sample time is in s" in err) == (2, True)
 

@@ -276,7 +276,7 @@ def test_a_limit_cycle_that_linear_theory_does_not_show_is_no_reduction(rate, st
         assert ("limit cycle" in str(found)) == (not stable)
     assert math.isnan(step.reduction.settling_time_reduction_percent) == (not stable)
     assert (wave.reduction is None) == (not stable)
-    assert step.reduction.open.overshoot > 0.0
+    assert (step.reduction.open.overshoot > 0.0) == (rate > 0.05), "the slowest amplifier still rises at the end"
 
 
 def test_a_limit_cycle_on_the_steps_of_the_sensor_is_one():

@@ -214,7 +214,7 @@ test_impossible_signals_are_refused = refused(
     (lambda: hs.signals.triangle(0, 1, cycles=1, samples_per_cycle=3), "must be even"),
     (lambda: hs.signals.sine(0.0, cycles=1, samples_per_cycle=4), "amplitude must be positive"),
     (lambda: hs.signals.sine(1.0, mean=math.nan, cycles=1, samples_per_cycle=4), "finite"),
-    (lambda: hs.signals.sine(1.0, cycles=1.5, samples_per_cycle=4), TypeError, "integer"),
+    (lambda: hs.signals.sine(1.0, cycles=1.5, samples_per_cycle=4), TypeError, "cycles must be a whole number"),
     error=(ValueError, TypeError),
 )
 

@@ -50,6 +50,7 @@ Outputs = Callable[[Parameters, FloatArray], FloatArray]
 _AHEAD = 4  # runs through the turning points before the search for a steady memory
 _EXACT = 1e-12  # of the range: what a step along a branch leaves out,
 _FINEST = 1e-14  # and in differences
+_ROUNDED = 1e-13  # of the largest input, a column that is nothing but rounding
 _FEW = 0.5  # of the samples: more turning points are those of noise
 
 
@@ -598,6 +599,10 @@ class Law(Placed, Subject, ABC):
         size = _sizes(rest, u)
         with np.errstate(invalid="ignore", over="ignore"):
             added = [(outputs({**zero, name: size}, u) - rest) / size[:, np.newaxis] for name in self.columns]
+        slopes = [each.name for each in self.searched if each.affine and each.unit == "y/u"]
+        for name in {*slopes} & {*self.columns}:  # a slope that no sample shows has rounding for its column
+            column, least = added[self.columns.index(name)], _ROUNDED * float(np.abs(u).max())
+            column[np.abs(column).max(axis=1) <= least] = 0.0
         return np.stack([*added, rest], axis=-1)
 
     def steady(self, parameters: Parameters, record: Record) -> dict[str, FloatArray]:

@@ -82,7 +82,8 @@ class RateDependentPrandtlIshlinskii(Plays, Placed):
     example = Example({**EXAMPLE, "beta": 0.005}, title="Prandtl-Ishlinskii: with the rate")
     dynamic: ClassVar[bool] = True
     by_input: ClassVar[bool] = False
-    axes = (Axis(Parameter("beta", 0.0, 1.0, unit="h/v"), (0.0, 0.1, 0.3)),)  # up to half a span at the highest speed
+    # up to half a span at the highest speed
+    axes = (Axis(Parameter("beta", 0.0, 1.0, unit="h/v", physical=(True, False)), (0.0, 0.1, 0.3)),)
     not_negative = ("beta",)
 
     @property
