@@ -125,8 +125,7 @@ MAPPED = {
     "identification/likelihood.py": "search posterior",
     "identification/marquardt.py": "search discovery_refinement identification",
     "identification/sharing.py": "choice comparison",
-    "identification/swapped.py": "warnings",
-    "identification/forms.py": "identification_result warnings",
+    "identification/doubts.py": "warnings identification_result bad_data",
 }
 NOT_MUTATED = {"kernels/_compile.py"}  # how kernels are compiled, not what they compute
 

@@ -13,8 +13,8 @@ import hysim as hs
 from hysim._columns.input_noise import input_noise, quiet_path
 from hysim._columns.repeats import repeated_cycle
 from hysim.cli import main
-from hysim.identification._diagnostics import rate_noise_warning
 from hysim.identification._noise import Gaussian, Quantised, Robust
+from hysim.identification.doubts import rate_noise_warning
 
 # ---------------------------------------------------------------------------------- densities of the noise
 

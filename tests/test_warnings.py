@@ -12,7 +12,7 @@ from hysim.cli import main
 from hysim.identification._admissible import danger, excursion, implausible
 from hysim.identification._diagnostics import whiteness
 from hysim.identification._noise import Quantised
-from hysim.identification.forms import sentences
+from hysim.identification.doubts import sentences
 
 SWAPPED = "the input and the output may be swapped"
 LOOP = hs.signals.triangle(-1.0, 1.0, cycles=2, samples_per_cycle=60)
@@ -136,15 +136,7 @@ def test_correlated_residuals_are_said_where_intervals_are_quoted():
 
 
 def test_a_search_that_did_not_converge_is_said():
-    usual = {
-        "spread": 1.0,
-        "size": 2.0,
-        "rmse": 0.1,
-        "whiteness": 0.5,
-        "stderr": {"a": 0.1},
-        "reasons": (),
-        "success": True,
-    }
+    usual = {"spread": 1.0, "exact": False, "whiteness": 0.5, "stderr": {"a": 0.1}, "reasons": (), "success": True}
     assert sentences(**usual) == ()
     assert sentences(**(usual | {"success": False})) == ("the search did not converge: better parameters may exist",)
     assert sentences(**(usual | {"stderr": {"a": np.nan}})) == ("no standard error for a",)

@@ -13,7 +13,7 @@ from hysim._basics.frozen import FloatArray, check_choice, items
 from hysim._basics.printing import aligned, bic_in_words, csv_text, folded, frozen_result, listed, summary_text
 from hysim._names import among
 from hysim.comparison._verdict import Contrast, contrasts
-from hysim.identification.forms import CONSTANT, SWAPPED
+from hysim.identification.doubts import CONSTANT, SWAPPED
 from hysim.interop import frame, heading
 from hysim.metrics import LoopMetrics
 from hysim.models.model import in_brief

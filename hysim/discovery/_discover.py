@@ -24,7 +24,7 @@ from hysim.discovery._result import Discovery, coefficients, law_from
 from hysim.discovery._search import MOST_WORK, Library, Options, Outcome, or_any_exponent, searched
 from hysim.discovery._slopes import FORMS, check, signs_of
 from hysim.identification import folds
-from hysim.identification.swapped import swapped_columns
+from hysim.identification.doubts import swapped_columns
 from hysim.laws.differential.terms import duhem_terms, memory_terms, named_terms, symmetric
 from hysim.records import Record, several
 

@@ -18,11 +18,11 @@ from hysim._basics.frozen import FloatArray, frozen
 from hysim._basics.printing import frozen_result, summary_text, wrapped
 from hysim.discovery._judgement import Judgement
 from hysim.discovery._refinement import AnyExponent, Candidate, Structure, Terms
-from hysim.identification.forms import Stored
 from hysim.interop import frame
 from hysim.laws.differential.boucwen import BoucWen
 from hysim.laws.differential.duhem import Duhem
 from hysim.laws.differential.terms import bouc_wen_exponent, bouc_wen_terms, equation, latex
+from hysim.models.storage import Stored
 from hysim.plants.transfer_function import TransferFunction
 from hysim.records import Record
 

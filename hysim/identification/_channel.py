@@ -16,11 +16,11 @@ from hysim._basics.results import model_of
 from hysim._columns.channels import value_in
 from hysim.identification._identify import identify
 from hysim.identification._result import Identification
-from hysim.identification.forms import Stored
 from hysim.models.dependent import Dependent
 from hysim.models.parameters import Coordinate, space_of
 from hysim.models.protocols import Subject
 from hysim.models.search_space import ALL_FREE, Freedom, Parameters, SearchSpace
+from hysim.models.storage import Stored
 from hysim.models.varying import ChannelPolynomial, power_coefficients, weights
 from hysim.records import Record
 

@@ -40,7 +40,7 @@ from hysim.identification._diagnostics import fit_measures, left_out, left_out_e
 from hysim.identification._noise import Noise
 from hysim.identification._problem import Problem
 from hysim.identification._result import Choice, Identification, Width
-from hysim.identification.forms import CONSTANT
+from hysim.identification.doubts import CONSTANT
 from hysim.metrics.rows import LoopRows
 from hysim.models.by_structure import searched
 from hysim.models.model import candidates

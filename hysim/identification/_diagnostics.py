@@ -1,42 +1,25 @@
 """Measures of a fit, whiteness of residuals, error of the loop width, cross-validation from the optima of all data."""
 
-import math
 from collections.abc import Sequence
-from typing import Any, TypedDict
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
 from hysim import metrics
 from hysim._basics.frozen import FloatArray
-from hysim._columns.input_noise import noise_level
 from hysim._columns.turning import TOLERANCE
-from hysim.errors import SimulationError
 from hysim.identification._descent import Descent
 from hysim.identification._noise import Gaussian, Noise
 from hysim.identification._problem import Problem
 from hysim.identification._uncertainty import output_slopes
-from hysim.identification.forms import RESTING, ROUNDING
 from hysim.metrics.rows import LoopRows
-from hysim.models.protocols import Rescalable, needs_time
 from hysim.records import Record
 
 _MOST_LAGS = 20
-_ALONE = 0.5  # of the rms residual, in one sample or in the mean; by hand
-_FEW = 20  # samples, too few to say so
-_SHARE_OF_NOISE = 0.3  # of the residuals: below it noise of the input adds less than 5 % to them
 
 
-class FitMeasures(TypedDict):
-    fit_percent: float
-    rmse: float
-    fpe: float
-    aic: float
-    bic: float
-    whiteness: float
-
-
-def fit_measures(y: FloatArray, residual: FloatArray, n_parameters: int) -> FitMeasures:
+def fit_measures(y: FloatArray, residual: FloatArray, n_parameters: int) -> dict[str, Any]:
     """Measures of a fit of `n_parameters` to outputs `y` (n,) with this residual (n,)."""
     return {
         "fit_percent": metrics.fit_percent(y, y - residual),
@@ -64,51 +47,6 @@ def whiteness(residual: FloatArray, n_parameters: int) -> float:
     correlation = np.array([centred[k:] @ centred[:-k] for k in range(1, lags + 1)]) / power
     statistic = n * (n + 2) * np.sum(correlation**2 / (n - np.arange(1, lags + 1)))
     return float(chi2.sf(statistic, lags))
-
-
-def odd_residuals(problem: Problem, residual: FloatArray) -> list[str]:
-    """Sentences on a sample that carries a fit, and on a record or sensor whose residual is mostly its mean."""
-    counted, n = np.where(problem.weights > 0.0, residual, 0.0), np.count_nonzero(problem.weights)
-    rms, k, several = float(np.sqrt(counted @ counted / n)), int(np.argmax(np.abs(counted))), len(problem.parts) > 1
-    if rms <= max(RESTING * float(np.std(problem.y)), ROUNDING * problem.scale):
-        return []
-    told = [f'sample {k} alone makes most of the residual: leave it out by weights=, or take noise="robust"']
-    told = told if n > _FEW and abs(counted[k]) > _ALONE * math.sqrt(n) * rms else []
-    for place, (record, own) in enumerate(problem.pieces):
-        n_sensors = len(record) // record.input.size if isinstance(record, Rescalable) else 1
-        for sensor, part in enumerate(np.split(counted[own], n_sensors)):
-            if part.size > _FEW and abs(part.mean()) > _ALONE * max(float(np.sqrt(np.mean(part**2))), rms):
-                of = f" of sensor {sensor}" * (n_sensors > 1) + f" of record {place}" * several
-                told.append(f"the residual{of} is mostly its mean {part.mean():.3g}: an offset that the model lacks")
-    return told
-
-
-def rate_noise_warning(models: Sequence[Any], records: Sequence[Record]) -> str:
-    """A sentence where noise of the input explains residuals of models that depend on time; else the empty text.
-
-    Noise is added to each input once more: what the output changes by, the input's own noise has done to the residuals.
-    """
-    rng = np.random.default_rng(0)
-    for model, record in zip(models, records, strict=True):
-        noise = noise_level(record.u)
-        if not (noise and needs_time(model) and record.sample_time):
-            continue
-        try:
-            outputs = [
-                np.asarray(model.response(u, record.sample_time))
-                for u in (record.u, record.u + noise * rng.standard_normal(len(record)))
-            ]
-        except SimulationError:
-            continue
-        share = metrics.rmse(*outputs) / max(metrics.rmse(record.y, outputs[0]), float(np.finfo(float).tiny))
-        if share > _SHARE_OF_NOISE:
-            return (
-                f"the input has noise of about {noise:.2g} rms, {100.0 * noise / np.ptp(record.u):.2g} % of its span, "
-                f"and the model depends on its rate: noise of this size changes the output by {100.0 * share:.0f} % of "
-                "the residuals, and biases damping, breakaway and other parameters of the velocity. Smooth the "
-                "input and identify again, such as with scipy.signal.savgol_filter over a small part of a cycle"
-            )
-    return ""
 
 
 def loop_widths(descent: Descent, theta: FloatArray) -> FloatArray:

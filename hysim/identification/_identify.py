@@ -20,7 +20,7 @@ from hysim._basics.results import model_of
 from hysim.identification._admissible import choose, danger, excursion, implausible
 from hysim.identification._assumptions import Treated, decided, in_units_of_noise, quiet_rmse, treated
 from hysim.identification._choice import better, in_one_step, of_any_family, refuse
-from hysim.identification._diagnostics import left_out, left_out_errors, rate_noise_warning, rms_of_known
+from hysim.identification._diagnostics import left_out, left_out_errors, rms_of_known
 from hysim.identification._measured import as_measured, said_of_noise
 from hysim.identification._noise import Quantised, density
 from hysim.identification._problem import Problem, Setting
@@ -28,8 +28,8 @@ from hysim.identification._result import Identification
 from hysim.identification._search import PERFECT, chosen, stages_in_words, widened
 from hysim.identification._searched import Search
 from hysim.identification._starts import begun, begun_by_parts
+from hysim.identification.doubts import rate_noise_warning, swapped_columns, swapped_for
 from hysim.identification.sharing import sharing
-from hysim.identification.swapped import swapped_columns, swapped_for
 from hysim.models.by_structure import searched
 from hysim.models.dependent import Dependent, on_record
 from hysim.models.dependent_structure import DependentStructure

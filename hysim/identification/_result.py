@@ -10,9 +10,9 @@ import numpy as np
 from hysim._basics.frozen import FloatArray, frozen
 from hysim._basics.printing import aligned, bic_in_words, folded, frozen_result, summary_text, wrapped
 from hysim.identification._profile import Profile
-from hysim.identification.forms import Stored
 from hysim.interop import frame
 from hysim.models.cascade import Cascade
+from hysim.models.storage import Stored
 
 
 @frozen

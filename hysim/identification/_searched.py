@@ -10,14 +10,14 @@ from hysim import metrics
 from hysim._basics.frozen import FloatArray
 from hysim.identification._assumptions import Treated
 from hysim.identification._descent import Descent
-from hysim.identification._diagnostics import bootstrap, fit_measures, loop_widths, odd_residuals, width_stderr
+from hysim.identification._diagnostics import bootstrap, fit_measures, loop_widths, width_stderr
 from hysim.identification._noise import Gaussian, Noise, Quantised, Robust
 from hysim.identification._problem import Problem
 from hysim.identification._profile import Profile, profiles, threshold
 from hysim.identification._result import Candidate, Identification, Width
 from hysim.identification._search import PERFECT, Optimum, polish
 from hysim.identification._uncertainty import Uncertainty, by_energy, uncertainty
-from hysim.identification.forms import sentences
+from hysim.identification.doubts import is_exact, odd_residuals, sentences
 from hysim.records import Record
 
 LEVEL = 0.95
@@ -190,6 +190,11 @@ class Search:
         rivals = tuple(self.candidate(each.theta) for each in likely[1:] if 2.0 * (each.loss - best.loss) < limit)
         stderr = dict(zip(names, np.sqrt(np.diag(known.covariance)).tolist(), strict=True))
         draws = self._draws(best, residual) if intervals == "bootstrap" else np.empty((0, best.theta.size))
+        spread, exact = float(np.std(problem.y)), is_exact(problem, chosen.rmse)
+        why, probability = (*known.stopped, *known.reasons), measures["whiteness"]
+        told = sentences(
+            spread=spread, exact=exact, whiteness=probability, stderr=stderr, reasons=why, success=best.converged
+        )
         return Identification(
             model=chosen.model,
             models=tuple(problem.family.assemble(problem.estimates(best.theta, k)) for k in range(len(problem.parts))),
@@ -215,19 +220,7 @@ class Search:
             message="; ".join([*_phrases(best.converged, problem, known, rivals, curves), *self._notes(best, draws)]),
             rivals=rivals,
             seed=self.seed,
-            warnings=(
-                *known.stopped,
-                *sentences(
-                    spread=float(np.std(problem.y)),
-                    size=problem.scale,
-                    rmse=chosen.rmse,
-                    whiteness=measures["whiteness"],
-                    stderr=stderr,
-                    reasons=(*known.stopped, *known.reasons),
-                    success=best.converged,
-                ),
-                *odd_residuals(problem, residual),
-            ),
+            warnings=(*known.stopped, *told, *odd_residuals(problem, residual)),
         )
 
     def _notes(self, best: LocalOptimum, draws: FloatArray) -> list[str]:
