@@ -115,16 +115,14 @@ MAPPED = {
     "identification/_measured.py": "noise",
     "identification/_noise.py": "warnings noise posterior",
     "identification/_problem.py": "identification several_records noise",
-    "identification/_profile.py": "identification_result",
     "identification/_result.py": "identification_result",
-    "identification/_search.py": "identification several_records",
+    "identification/_search.py": "identification several_records choice comparison",
     "identification/_searched.py": "identification warnings identification_result bad_data",
     "identification/_select.py": "choice",
     "identification/_starts.py": "channels whole_actuator",
     "identification/_uncertainty.py": "identification warnings identification_result noise",
     "identification/likelihood.py": "search posterior",
     "identification/marquardt.py": "search discovery_refinement identification",
-    "identification/sharing.py": "choice comparison",
     "identification/doubts.py": "warnings identification_result bad_data",
 }
 NOT_MUTATED = {"kernels/_compile.py"}  # how kernels are compiled, not what they compute

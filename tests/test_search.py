@@ -12,10 +12,9 @@ from hysim.identification._assumptions import decided
 from hysim.identification._descent import Constraint, Descent
 from hysim.identification._noise import Gaussian
 from hysim.identification._problem import Setting, problem, problems
-from hysim.identification._search import optima, polish
+from hysim.identification._search import optima, polish, sharing
 from hysim.identification.likelihood import again
 from hysim.identification.marquardt import bounded_steps
-from hysim.identification.sharing import sharing
 from hysim.models.law import Law
 from hysim.models.model import every_family
 from hysim.models.search_space import Freedom, SearchSpace

@@ -21,8 +21,7 @@ from hysim._columns.excursions import measured_cycles
 from hysim._columns.turning import TOLERANCE
 from hysim.comparison._result import Comparison, ComparisonRow
 from hysim.errors import Interrupted, SimulationError
-from hysim.identification import Identification, identify
-from hysim.identification.sharing import sharing
+from hysim.identification import Identification, identify, sharing
 from hysim.metrics import LoopMetrics, loop_metrics
 from hysim.models.dependent import on_record
 from hysim.models.model import candidates, candidates_named, is_identifiable, is_searched

@@ -25,11 +25,10 @@ from hysim.identification._measured import as_measured, said_of_noise
 from hysim.identification._noise import Quantised, density
 from hysim.identification._problem import Problem, Setting
 from hysim.identification._result import Identification
-from hysim.identification._search import PERFECT, chosen, stages_in_words, widened
+from hysim.identification._search import PERFECT, chosen, sharing, stages_in_words, widened
 from hysim.identification._searched import Search
 from hysim.identification._starts import begun, begun_by_parts
 from hysim.identification.doubts import rate_noise_warning, swapped_columns, swapped_for
-from hysim.identification.sharing import sharing
 from hysim.models.by_structure import searched
 from hysim.models.dependent import Dependent, on_record
 from hysim.models.dependent_structure import DependentStructure

@@ -9,7 +9,6 @@ import numpy as np
 
 from hysim._basics.frozen import FloatArray, frozen
 from hysim._basics.printing import aligned, bic_in_words, folded, frozen_result, summary_text, wrapped
-from hysim.identification._profile import Profile
 from hysim.interop import frame
 from hysim.models.cascade import Cascade
 from hysim.models.storage import Stored
@@ -36,6 +35,22 @@ class Width:
     def bounds(self, words: str) -> str:
         """The interval in some words; the empty text where it is not known."""
         return words.format(self.lower, self.upper) if np.isfinite(self.lower) else ""
+
+
+@frozen
+class Profile:
+    """Likelihood's profile of one parameter.
+
+    `lower` and `upper` are the interval at 95 %, infinite where the profile stays inside the `limit` of the deviance;
+    `at_box` says whether the box ends it. `deviance` (n_points,) is twice the fall of the log-likelihood at `values`.
+    """
+
+    lower: float
+    upper: float
+    at_box: tuple[bool, bool]
+    values: FloatArray
+    deviance: FloatArray
+    limit: float
 
 
 @frozen_result

@@ -1,4 +1,14 @@
-"""One searched problem with its noise: the optima, their intervals, and the result that describes them."""
+"""One searched problem with its noise: the optima, their intervals, and the result that describes them.
+
+**Confidence intervals by the likelihood's profile.**
+
+    D(v) = 2 (min over theta with p(theta) = v of loss - min of loss)
+
+The interval of a parameter p holds the values with D(v) <= N ln(1 + t^2 / (N - d)), t the quantile of Student's
+distribution with N - d degrees of freedom, which is exact for a linear model and normal noise. Its ends are found by
+the secant method on sqrt(D), all ends of all parameters at once; an interval that reaches a search bound ends
+there. Other optima inside the interval count too.
+"""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -9,16 +19,18 @@ import numpy as np
 from hysim import metrics
 from hysim._basics.frozen import FloatArray
 from hysim.identification._assumptions import Treated
-from hysim.identification._descent import Descent
+from hysim.identification._descent import Constraint, Descent
 from hysim.identification._diagnostics import bootstrap, fit_measures, loop_widths, width_stderr
 from hysim.identification._noise import Gaussian, Noise, Quantised, Robust
 from hysim.identification._problem import Problem
-from hysim.identification._profile import Profile, profiles, threshold
-from hysim.identification._result import Candidate, Identification, Width
+from hysim.identification._result import Candidate, Identification, Profile, Width
 from hysim.identification._search import PERFECT, Optimum, polish
 from hysim.identification._uncertainty import Uncertainty, by_energy, uncertainty
 from hysim.identification.doubts import is_exact, odd_residuals, sentences
+from hysim.identification.marquardt import Sets
 from hysim.records import Record
+
+Numbers = Mapping[str, float]
 
 LEVEL = 0.95
 TAILS = (0.025, 0.975)
@@ -169,10 +181,10 @@ class Search:
         n_samples, n_names = self.problem.n_samples, len(self.problem.space.names)
         if n_samples <= n_names:
             return {}, None
-        limit = threshold(n_samples, n_names, LEVEL)
+        limit = float(n_samples * np.log1p(self._quantile(n_samples) ** 2 / (n_samples - n_names)))
         inside = [optimum for optimum in likely if 2.0 * (optimum.loss - likely[0].loss) < limit]
         thetas, losses = np.array([each.theta for each in inside]), np.array([each.loss for each in inside])
-        return profiles(self.descent, thetas, losses, known.covariance, known.with_names, limit)
+        return _profiles(self.descent, thetas, losses, known, limit)
 
     def _described(
         self, likely: list[LocalOptimum], known: Uncertainty, intervals: str, curves: Mapping[str, Profile]
@@ -236,12 +248,7 @@ class Search:
         return bootstrap(self.problem, self.noise, best.theta, residual, best.sigma, draws=N_BOOTSTRAP, seed=self.seed)
 
     def _intervals(
-        self,
-        intervals: str,
-        estimates: Mapping[str, float],
-        stderr: Mapping[str, float],
-        curves: Mapping[str, Profile],
-        draws: FloatArray,
+        self, intervals: str, estimates: Numbers, stderr: Numbers, curves: Mapping[str, Profile], draws: FloatArray
     ) -> dict[str, tuple[float, float]]:
         unknown = dict.fromkeys(stderr, (np.nan, np.nan))
         if intervals == "profile":
@@ -252,13 +259,13 @@ class Search:
             ends = np.quantile(self.problem.named(draws), TAILS, axis=0).T.tolist()
             both = zip(stderr, ends, strict=True)
             return unknown | {name: (low, high) for name, (low, high) in both if np.isfinite(stderr[name])}
-        reach = {name: value * self._quantile() for name, value in stderr.items()}
+        reach = {name: value * self._quantile(self.problem.y.size) for name, value in stderr.items()}
         return {name: (estimates[name] - each, estimates[name] + each) for name, each in reach.items()}
 
-    def _quantile(self) -> float:
+    def _quantile(self, n_samples: int) -> float:
         from scipy.stats import t
 
-        freedom = self.problem.y.size - len(self.problem.space.names)
+        freedom = n_samples - len(self.problem.space.names)
         return float(t.ppf(TAILS[1], freedom)) if freedom > 0 else float("nan")
 
     def _width(self, theta: FloatArray, known: Uncertainty, draws: FloatArray) -> Width | None:
@@ -269,17 +276,15 @@ class Search:
         if len(draws):
             lower, upper = np.quantile(loop_widths(self.descent, draws), TAILS).tolist()
         else:
-            reach = self._quantile() * width_stderr(self.problem, theta, known.of_theta, known.slopes)
+            reach = self._quantile(self.problem.y.size) * width_stderr(
+                self.problem, theta, known.of_theta, known.slopes
+            )
             lower, upper = width - reach, width + reach
         return Width(value=width, lower=lower, upper=upper)
 
 
 def _phrases(
-    converged: bool,
-    problem: Problem,
-    known: Uncertainty,
-    rivals: Sequence[Candidate],
-    curves: Mapping[str, Profile],
+    converged: bool, problem: Problem, known: Uncertainty, rivals: Sequence[Candidate], curves: Mapping[str, Profile]
 ) -> list[str]:
     ended = known.stopped or (("converged",) if converged else ())
     phrases = [*ended, *(() if converged else ("the search did not converge",)), *known.reasons]
@@ -292,3 +297,131 @@ def _phrases(
     if rivals:
         phrases.append(f"{len(rivals)} other {'optimum' if len(rivals) == 1 else 'optima'} within the noise")
     return phrases
+
+
+_ENOUGH = 0.01  # of sqrt(D) at the end of an interval
+_ROUNDS = 30
+_FARTHEST = 4.0  # growth of a step that does not reach the end yet
+_CLOSE = 1e-3  # two values this close, in standard errors, are one
+_FLAT = 1e-4  # of the loss: a descent that gains less rests
+_BETTER = 0.02  # of the deviance: below minus this, an optimum is another
+
+
+class _Ends:
+    """Outermost values inside and innermost ones outside (nan if unknown) of each interval, with sqrt(D) there."""
+
+    def __init__(self, place: Sets, side: FloatArray, values: FloatArray, deviance: FloatArray) -> None:
+        self.place, self.side, self.points = place, side, [(place, values, deviance)]  # parameters; -1 at lower ends
+        self.inside, self.r_inside = values.copy(), np.sqrt(deviance)
+        self.origin, self.r_origin = values.copy(), np.sqrt(deviance)
+        self.outside, self.r_outside = np.full(values.size, np.nan), np.full(values.size, np.inf)
+        self.end = np.full(values.size, np.nan)
+        self.doubtful = np.zeros(values.size, dtype=bool)  # whether the outer value was reached from farther away
+
+    def move_in(self, which: Sets, values: FloatArray, root: FloatArray) -> None:
+        self.inside[which], self.r_inside[which] = values, root
+        self.doubtful[which] = np.isfinite(self.outside[which]) & (self.outside[which] != values)
+        self.outside[which] = np.where(self.doubtful[which], self.outside[which], np.nan)
+
+    def move_out(self, which: Sets, values: FloatArray, root: FloatArray) -> None:
+        self.outside[which], self.r_outside[which], self.doubtful[which] = values, root, False
+
+    def farther(self, won: Sets, step: FloatArray, root: float) -> FloatArray:
+        gone, risen = np.abs(self.inside - self.origin)[won], (self.r_inside - self.r_origin)[won]
+        straight = 1.1 * (root - self.r_inside[won]) * gone / np.where(risen > 0.0, risen, np.inf)
+        return np.where(risen > 0.0, np.clip(straight, 0.1 * step, _FARTHEST * step), _FARTHEST * step)
+
+    def trial(self, active: Sets, step: FloatArray, root: float) -> FloatArray:
+        inside, outside = self.inside[active], self.outside[active]
+        r_in, r_out = self.r_inside[active], self.r_outside[active]
+        share = np.where(np.isfinite(r_out), (root - r_in) / np.where(np.isfinite(r_out), r_out - r_in, 1.0), 0.5)
+        between = inside + np.clip(share, 0.1, 0.9) * (outside - inside)
+        ahead = inside + self.side[active] * step[active]
+        again = self.doubtful[active] & ((outside - ahead) * self.side[active] <= 0.0)
+        return np.where(np.isnan(outside), ahead, np.where(again, outside, between))
+
+    def curves(self, names: tuple[str, ...], limit: float) -> dict[str, Profile]:
+        at_box = np.isnan(self.end) & np.isfinite(self.outside) & ~np.isfinite(self.r_outside)
+        open_ended = np.where(np.isnan(self.outside), self.side * np.inf, self.inside)
+        end = np.where(np.isnan(self.end), open_ended, self.end)
+        places, visited, deviance = (np.concatenate(parts) for parts in zip(*self.points, strict=True))
+        result = {}
+        for k in np.unique(self.place).tolist():
+            low, high = (np.flatnonzero((self.place == k) & (self.side == sign)) for sign in (-1.0, 1.0))
+            lowest, highest = low[np.argmin(end[low])], high[np.argmax(end[high])]
+            mine = np.flatnonzero(places == k)
+            mine = mine[_outline(visited[mine], deviance[mine])]
+            result[names[k]] = Profile(
+                lower=float(end[lowest]),
+                upper=float(end[highest]),
+                at_box=(bool(at_box[lowest]), bool(at_box[highest])),
+                values=visited[mine],
+                deviance=deviance[mine],
+                limit=limit,
+            )
+        return result
+
+
+def _profiles(
+    descent: Descent, optima: FloatArray, losses: FloatArray, known: Uncertainty, limit: float
+) -> tuple[dict[str, Profile], FloatArray | None]:
+    """Profiles of all parameters with a standard error, and a better optimum (n_theta,) if one was met.
+
+    `optima` (n_optima, n_theta) lie within the `limit` of the deviance, best first.
+    """
+    variance, root = np.diag(known.covariance), float(np.sqrt(limit))
+    free = np.flatnonzero(np.isfinite(variance) & (variance > 0.0))
+    if not free.size:
+        return {}, None
+    grid = np.meshgrid(free, [-1.0, 1.0], np.arange(len(optima)), indexing="ij")
+    place, start = grid[0].ravel(), grid[2].ravel()
+    side: FloatArray = grid[1].ravel().astype(float)
+    values, theta = descent.problem.named(optima)[start, place], optima[start]
+    ends = _Ends(place, side, values, 2.0 * np.maximum(losses[start] - losses[0], 0.0))
+    stderr, slope = np.sqrt(variance[place]), (known.with_names[:, place] / variance[place]).T.copy()
+    step = stderr * np.maximum(root - ends.r_inside, 0.2 * root)
+    trial = values + side * step
+    active = np.arange(place.size)
+    better: tuple[float, FloatArray] | None = None
+    for _ in range(_ROUNDS):
+        if not active.size:
+            break
+        at = trial[active]
+        guess = theta[active] + (at - ends.inside[active])[:, np.newaxis] * slope[active]
+        reached = descent.run(guess, constraint=Constraint(place[active], at), tolerance=_FLAT)
+        deviance = 2.0 * (reached.loss - losses[0])
+        lowest = int(np.argmin(deviance))
+        if deviance[lowest] < -_BETTER and (better is None or deviance[lowest] < better[0]):
+            better = float(deviance[lowest]), reached.theta[lowest]
+        finite = np.isfinite(deviance)
+        ends.points.append((place[active][finite], at[finite], deviance[finite]))
+        r = np.sqrt(np.maximum(deviance, 0.0))
+        inner = r <= root
+        won, lost = active[inner], active[~inner]
+        moved = at[inner] - ends.inside[won]
+        far = np.abs(moved) > 0.1 * np.abs(at[inner] - ends.origin[won])  # nearer ones differ by how far they descended
+        slope[won[far]] = (reached.theta[inner] - theta[won])[far] / moved[far, np.newaxis]
+        theta[won] = reached.theta[inner]
+        ends.move_in(won, at[inner], r[inner])
+        ends.move_out(lost, at[~inner], r[~inner])
+        close = np.abs(r - root) <= _ENOUGH * root
+        ends.end[active[close]] = at[close]
+        gap = np.abs(ends.outside[active] - ends.inside[active])
+        step[won] = ends.farther(won, step[won], root)
+        trial[active] = ends.trial(active, step, root)
+        active = active[~close & (ends.doubtful[active] | ~(gap <= _CLOSE * stderr[active]))]
+    return ends.curves(descent.problem.space.names, limit), None if better is None else better[1]
+
+
+def _outline(values: FloatArray, deviance: FloatArray) -> Sets:
+    """Points of the profile in order of their values, without those that a point farther out lies below."""
+    centre = values[np.argmin(deviance)]
+    outline: list[int] = []
+    for sign in (-1.0, 1.0):
+        lowest = np.inf
+        for k in np.lexsort((deviance, -sign * values)).tolist():
+            if sign * (values[k] - centre) >= 0.0 and deviance[k] < lowest:
+                lowest = deviance[k]
+                outline.append(k)
+    chosen = np.unique(outline)
+    return chosen[np.argsort(values[chosen], kind="stable")]

@@ -9,7 +9,7 @@ from hysim._basics.printing import aligned, frozen_result, summary_text
 from hysim._basics.progress import Reports, announced_by, reports
 from hysim.identification._identify import identify
 from hysim.identification._result import Identification
-from hysim.identification.sharing import sharing
+from hysim.identification._search import sharing
 from hysim.interop import frame
 from hysim.records import Record
 

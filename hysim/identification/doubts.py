@@ -57,7 +57,6 @@ def sentences(
 
 
 def is_exact(problem: Problem, rmse: float) -> bool:
-    """Whether a residual is that of a perfect fit."""
     return rmse <= max(_RESTING * float(np.std(problem.y)), _ROUNDING * problem.scale)
 
 

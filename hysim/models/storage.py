@@ -1,7 +1,4 @@
-"""Models to and from JSON: version of hysim, family, parameters (also of a model in a model), and units.
-
-Results of identification and discovery likewise; nan is null, an infinity its name.
-"""
+"""Models and results to and from JSON: version of hysim, family, parameters, units; nan is null, inf its name."""
 
 import importlib
 import json
