@@ -31,7 +31,7 @@ ALLOWED: dict[tuple[str, ...], tuple[str, ...]] = {
     ("control/", "plants/chain.py", "plants/multi_input_actuator.py", "plants/structures/structure.py"): ("Line",),
     ("plants/structures/parts.py",): ("Dashpot", "Line"),
     # The filter of small reversals is what a fit of a noisy input has in front of any law.
-    ("identification/_assumptions.py", "identification/_measured.py"): ("ReversalFilter",),
+    ("identification/_assumptions.py", "identification/_identify.py"): ("ReversalFilter",),
     # The diagram of reversal curves is that of a density of relays.
     ("plot/_sweeps.py",): ("Preisach", "PreisachRelays"),
     # A page computes a curve of knots, which has no step, and plays that widen with the speed, in the browser.

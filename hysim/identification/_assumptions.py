@@ -112,10 +112,8 @@ def treated(family: Any, setting: Setting, how: str) -> Treated:
         return Treated(records)
     front = ReversalFilter(threshold=reach(max(noises)))
     filtered = [replace(record, u=front.response(record.u)) for record in records]
-    quiet = [
-        replace(record, u=quiet_path(record.u, noise)) if noise else record
-        for record, noise in zip(records, noises, strict=True)
-    ]
+    pairs = zip(records, noises, strict=True)
+    quiet = [replace(record, u=quiet_path(record.u, noise)) if noise else record for record, noise in pairs]
     behind = Treated(filtered, front, noises, quiet)
     if how == "filtered" or isinstance(family, PartByPart):
         return behind
@@ -173,9 +171,8 @@ def in_units_of_noise(problem: Problem, seed: int) -> Problem:
         measured = [part.record for part in problem.parts if isinstance(part.record, Rescalable)]
         own = list(zip(measured, np.split(residual, problem.cuts[1:-1]), strict=True))
         noise = np.concatenate([record.noise(rest) for record, rest in own])
-        parts = [
-            replace(part, record=record.rescaled(rest)) for part, (record, rest) in zip(problem.parts, own, strict=True)
-        ]
+        rescaled = (record.rescaled(rest) for record, rest in own)
+        parts = (replace(part, record=record) for part, record in zip(problem.parts, rescaled, strict=True))
         problem = replace(problem, parts=tuple(parts), ends=ends)
         if noise.max() <= _EVEN * noise.min():
             break
@@ -288,9 +285,8 @@ def _starts_beside(space: SearchSpace, before: Sequence[_Trial]) -> FloatArray:
     for each in before:
         if each.names and {*each.names, *coordinates} <= {*space.state}:
             for places in itertools.combinations(range(len(coordinates)), len(each.names)):
-                beside = np.repeat(
-                    space.starts[: None if len(places) < len(coordinates) else 1], len(each.ends), axis=0
-                )
+                own = space.starts if len(places) < len(coordinates) else space.starts[:1]
+                beside = np.repeat(own, len(each.ends), axis=0)
                 beside[:, places] = np.tile(each.ends, (len(beside) // len(each.ends), 1))
                 starts.append(beside)
     every = np.concatenate(starts)
@@ -345,6 +341,6 @@ def _sentence(best: _Trial, others: Sequence[_Trial], records: Sequence[Record])
 def _by(gain: float) -> str:
     if math.isnan(gain):
         return ""
-    return (
-        f" (else the BIC is {gain:.0f} higher)" if gain > _STRONG else " (no other assumption has a clearly lower BIC)"
-    )
+    if gain > _STRONG:
+        return f" (else the BIC is {gain:.0f} higher)"
+    return " (no other assumption has a clearly lower BIC)"

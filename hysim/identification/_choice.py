@@ -28,7 +28,6 @@ from dataclasses import replace
 from typing import Any, NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
 from hysim import metrics
 from hysim._basics.frozen import FloatArray
@@ -36,10 +35,10 @@ from hysim._basics.progress import Progress
 from hysim._columns.turning import TOLERANCE
 from hysim.errors import SimulationError
 from hysim.identification._admissible import excursion
-from hysim.identification._diagnostics import fit_measures, left_out, left_out_errors, rms_of_known
-from hysim.identification._noise import Noise
-from hysim.identification._problem import Problem
+from hysim.identification._diagnostics import Folds, Samples, fit_measures, left_out, left_out_errors, rms_of_known
+from hysim.identification._problem import Weights
 from hysim.identification._result import Choice, Identification, Width
+from hysim.identification._searched import Search
 from hysim.identification.doubts import CONSTANT
 from hysim.metrics.rows import LoopRows
 from hysim.models.by_structure import searched
@@ -67,9 +66,6 @@ _ALL_BEYOND = np.array([1.0, 0.0, 1.5])
 _BEYOND = 0.02  # of the range of a beginning: inputs that leave it by more are beyond
 _ROUNDING = 1e-9  # of the outputs' range
 
-Samples = npt.NDArray[np.intp]
-
-Folds = Sequence[Samples]
 Identify = Callable[..., Identification]
 
 
@@ -85,50 +81,37 @@ def refuse(family: Direct, freedom: Freedom, noise: str, intervals: str) -> None
 
 
 def in_one_step(
-    family: Direct,
-    records: Sequence[Record],
-    weights: Sequence[FloatArray] | None,
-    folds: Folds,
-    seed: int,
-    admissible: bool | None,
+    family: Direct, records: Sequence[Record], weights: Weights, folds: Folds, seed: int, admissible: bool | None
 ) -> Identification:
     """The fit, and its errors at samples that are left out."""
     return _described(family, _fitted(family, records, weights, admissible), records, weights, folds, seed)
 
 
 def better(
-    fit: Identification,
-    search: Problem,
-    noise: Noise,
-    optima: FloatArray,
-    rival: Any,
-    folds: Folds,
-    admissible: bool | None,
+    fit: Identification, search: Search, optima: FloatArray, rival: Any, folds: Folds, admissible: bool | None
 ) -> Identification:
     """The `fit` of a search from its `optima`, or that of the `rival` where it predicts left-out parts better."""
-    records, weights = [part.record for part in search.parts], [part.weights for part in search.parts]
+    parts = search.problem.parts
+    records, weights = [part.record for part in parts], [part.weights for part in parts]
     shares = [each for each in weights if each is not None] or None
     smooth = _fitted(rival, records, shares, admissible)
     if (smoother := smooth.smoother) is None:
         raise TypeError(f"{rival!r} does not say how its fit depends on the outputs")
     samples, residual = smoother.samples, _residual(smooth, records)
-    short = search.at(samples)
+    short = search.problem.at(samples)
     kinds = rival.parts([part.record for part in short.parts])
-    own = np.concatenate([left_out_errors(short, noise, optima, kind) for kind in kinds])
+    own = np.concatenate([left_out_errors(short, search.noise, optima, kind) for kind in kinds])
     others = np.concatenate([smoother.left_out(residual, [samples[each] for each in kind]) for kind in kinds])
     of_search, of_rival = rms_of_known(own), rms_of_known(others)
     told = f"{of_rival:.3g} against {of_search:.3g}"
     if not of_rival < _CLEARLY * of_search:
-        return replace(
-            fit, message=f"{fit.message}; a smooth density predicts parts left out not clearly better, {told}"
-        )
+        message = f"{fit.message}; a smooth density predicts parts left out not clearly better, {told}"
+        return replace(fit, message=message)
     result = _described(rival, smooth, records, shares, folds, fit.seed)
     return replace(result, message=f"{result.message}; it predicts parts left out better than a grid, {told}")
 
 
-def _fitted(
-    family: Direct, records: Sequence[Record], weights: Sequence[FloatArray] | None, admissible: bool | None
-) -> DirectFit:
+def _fitted(family: Direct, records: Sequence[Record], weights: Weights, admissible: bool | None) -> DirectFit:
     """The fit, the next smoother one as long as it is not safe on smaller cycles."""
     shares = None if weights is None else np.concatenate(weights)
     fit = family.fitted(records, shares)
@@ -141,12 +124,7 @@ def _fitted(
 
 
 def _described(
-    family: Direct,
-    fit: DirectFit,
-    records: Sequence[Record],
-    weights: Sequence[FloatArray] | None,
-    folds: Folds,
-    seed: int,
+    family: Direct, fit: DirectFit, records: Sequence[Record], weights: Weights, folds: Folds, seed: int
 ) -> Identification:
     y, residual = np.concatenate([record.y for record in records]), _residual(fit, records)
     kept = np.ones(y.size, dtype=bool) if weights is None else np.concatenate(weights) > 0.0
@@ -184,9 +162,7 @@ def _residual(fit: DirectFit, records: Sequence[Record]) -> FloatArray:
     return np.concatenate([record.y - free_run(model, record).y for model, record in pairs])
 
 
-def _fitted_again(
-    family: Direct, records: Sequence[Record], weights: Sequence[FloatArray] | None, folds: Folds
-) -> FloatArray:
+def _fitted_again(family: Direct, records: Sequence[Record], weights: Weights, folds: Folds) -> FloatArray:
     """Errors at samples that are left out, by fits to the rest; nan elsewhere."""
     shares = np.ones(sum(map(len, records))) if weights is None else np.concatenate(weights)
     errors = np.full(shares.size, np.nan)
@@ -209,9 +185,8 @@ def _width(fit: DirectFit, record: Record, sigma: float) -> Width | None:
         return Width(value=value, lower=bound, upper=bound)
     own = fit.smoother.samples < len(record)
     places, every = fit.smoother.samples[own], np.arange(len(record))
-    slope = rows.max_width_slopes(
-        output, np.array([np.interp(every, places, each) for each in fit.smoother.rows[own].T])
-    )
+    by_outputs = np.array([np.interp(every, places, each) for each in fit.smoother.rows[own].T])
+    slope = rows.max_width_slopes(output, by_outputs)
     reach = _NORMAL * sigma * float(np.sqrt(np.maximum(slope @ fit.smoother.gram @ slope, 0.0)))
     return Width(value=value, lower=value - reach, upper=value + reach)
 
@@ -236,9 +211,8 @@ def of_any_family(
 
     first = errors_of(names, slice(0, 1), 0)
     rounds = _scores(first, size)
-    close = [
-        name for name in sorted(rounds, key=lambda name: rounds[name]) if rounds[name] <= _WORSE * min(rounds.values())
-    ]
+    ranked, worst = sorted(rounds, key=lambda name: rounds[name]), _WORSE * min(rounds.values())
+    close = [name for name in ranked if rounds[name] <= worst]
     second = errors_of(close, slice(None), len(names))
     if len(second) < len(close):  # not all have had all parts: the errors of the first round are of the same ones
         errors, compared = first, [*first]
@@ -342,9 +316,9 @@ class _Sampled(NamedTuple):
 
 
 def _at(record: Record, kept: Samples) -> Record:
-    return (
-        record if kept.size == len(record) else Record(u=record.u[kept], y=record.y[kept], resolution=record.resolution)
-    )
+    if kept.size == len(record):
+        return record
+    return Record(u=record.u[kept], y=record.y[kept], resolution=record.resolution)
 
 
 def _folds(records: Sequence[Record]) -> list[Samples]:

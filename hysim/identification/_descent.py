@@ -60,22 +60,15 @@ class Descent:
     projected: bool = False
 
     def run(
-        self,
-        theta: FloatArray,
-        *,
-        constraint: Constraint | None = None,
-        tolerance: float = 1e-5,
-        steps: int = N_STEPS,
+        self, theta: FloatArray, *, constraint: Constraint | None = None, tolerance: float = 1e-5, steps: int = N_STEPS
     ) -> Reached:
         """Descend from `theta` (n_sets, n_theta) until a step lowers the loss by less than `tolerance`."""
         few = max(1, _MOST_AT_ONCE // self.problem.y.size)
         if len(theta) > few and constraint is None:
-            parts = [
-                replace(self, targets=_some(self.targets, k), weights=_some(self.weights, k)).run(
-                    theta[k], tolerance=tolerance, steps=steps
-                )
-                for k in (slice(first, first + few) for first in range(0, len(theta), few))
-            ]
+            parts = []
+            for k in (slice(first, first + few) for first in range(0, len(theta), few)):
+                own = replace(self, targets=_some(self.targets, k), weights=_some(self.weights, k))
+                parts.append(own.run(theta[k], tolerance=tolerance, steps=steps))
             return Reached(*map(np.concatenate, zip(*parts, strict=True)))
         targets, weights = (np.broadcast_to(each, (len(theta), each.shape[1])) for each in (self.targets, self.weights))
         sets = _Sets(self, targets, weights * self.problem.weights, constraint)

@@ -16,6 +16,9 @@ from hysim.identification._uncertainty import output_slopes
 from hysim.metrics.rows import LoopRows
 from hysim.records import Record
 
+Samples = npt.NDArray[np.intp]
+Folds = Sequence[Samples]
+
 _MOST_LAGS = 20
 
 
@@ -75,7 +78,7 @@ _SAMPLES_AT_ONCE = 1_000_000  # of all sets that descend together, to bound the 
 _TOLERANCE = 1e-9
 
 
-def folds(count: str | int, n: int, *, name: str = "folds") -> list[npt.NDArray[np.intp]]:
+def folds(count: str | int, n: int, *, name: str = "folds") -> list[Samples]:
     """Samples of each fold of `n`: ``"loo"`` is one at a time, an int that many blocks; else a ValueError."""
     number = n if count == "loo" else count
     if not isinstance(number, int) or isinstance(number, bool) or not 2 <= number <= n:
@@ -83,7 +86,7 @@ def folds(count: str | int, n: int, *, name: str = "folds") -> list[npt.NDArray[
     return np.array_split(np.arange(n), number)
 
 
-def left_out(cross_validate: str | int | None, records: Sequence[Record]) -> list[npt.NDArray[np.intp]]:
+def left_out(cross_validate: str | int | None, records: Sequence[Record]) -> list[Samples]:
     """Samples of each fold of records that follow each other, by `cross_validate` of `identify`; else a ValueError."""
     if cross_validate is None:
         return []
@@ -97,7 +100,7 @@ def left_out(cross_validate: str | int | None, records: Sequence[Record]) -> lis
     return folds(cross_validate, cuts[-1], name="cross_validate")
 
 
-def _cycles(records: Sequence[Record], cuts: Sequence[int]) -> list[npt.NDArray[np.intp]]:
+def _cycles(records: Sequence[Record], cuts: Sequence[int]) -> list[Samples]:
     cycles = []
     for record, begin in zip(records, cuts, strict=False):
         turns = record.reversals(TOLERANCE)[1::2]
@@ -107,9 +110,7 @@ def _cycles(records: Sequence[Record], cuts: Sequence[int]) -> list[npt.NDArray[
     return cycles
 
 
-def left_out_errors(
-    problem: Problem, noise: Noise, optima: FloatArray, every_fold: Sequence[npt.NDArray[np.intp]]
-) -> FloatArray:
+def left_out_errors(problem: Problem, noise: Noise, optima: FloatArray, every_fold: Folds) -> FloatArray:
     """Error of each sample, shape (n,), in the fit that leaves it out; inf if it diverged.
 
     It is nan without such a fit, and of samples that have no weight in any.
@@ -133,9 +134,7 @@ def rms_of_known(errors: FloatArray) -> float:
     return float(np.sqrt(np.mean(known**2))) if known.size else float("nan")
 
 
-def _left_out_errors(
-    problem: Problem, noise: Noise, starts: FloatArray, every_fold: Sequence[npt.NDArray[np.intp]]
-) -> FloatArray:
+def _left_out_errors(problem: Problem, noise: Noise, starts: FloatArray, every_fold: Folds) -> FloatArray:
     weights = np.ones((len(every_fold), problem.y.size))
     for fold, samples in enumerate(every_fold):
         weights[fold, samples] = 0.0

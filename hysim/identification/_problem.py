@@ -22,6 +22,7 @@ from hysim._columns.channels import taken
 from hysim._columns.repeats import repeated_cycle
 from hysim._names import meant
 from hysim.identification.marquardt import Settled, least_squares, triangle
+from hysim.metrics.criteria import information
 from hysim.models.by_structure import searched
 from hysim.models.protocols import Identifiable, placed
 from hysim.models.search_space import STATES, STATES_IN_WORDS, Freedom, SearchSpace
@@ -39,10 +40,6 @@ class Budget:
     samples: float
     spent: float = 0.0
     cut: bool = False
-
-    def take(self, n_sets: int, n_samples: int) -> None:
-        """Count sets that are simulated."""
-        self.spent += float(n_sets) * n_samples
 
     def sets(self, wanted: int, n_samples: int) -> int:
         """As many of the `wanted` sets as a stage may simulate."""
@@ -66,6 +63,8 @@ _DIFFERENCE = 1e-6  # step of a central difference in units of the box: truncati
 
 
 Initial = str | Sequence[str] | None
+Weights = Sequence[FloatArray] | None
+Numbers = Mapping[str, float]
 
 
 @dataclass(frozen=True)
@@ -135,6 +134,10 @@ class Problem:
     def pieces(self) -> list[tuple[Record, slice]]:
         """Each record, and its samples among those of all."""
         return [(part.record, slice(a, b)) for part, a, b in zip(self.parts, self.cuts, self.cuts[1:], strict=False)]
+
+    def criterion(self, cost: float) -> float:
+        """Bayesian information criterion of a sum of squares."""
+        return information(cost / self.n_samples, self.n_samples, len(self.space.names))
 
     def work(self, values: FloatArray) -> FloatArray:
         """Integral over the input from the first sample of each record, of values (n_samples, n) in its output."""
@@ -209,7 +212,7 @@ class Problem:
         """This problem with a budget, which it shares with the simpler one."""
         return replace(self, budget=budget, simpler=self.simpler and self.simpler.within(budget))
 
-    def weighted(self, weights: Sequence[FloatArray] | None) -> "Problem":
+    def weighted(self, weights: Weights) -> "Problem":
         """This problem with a weight for each sample of each record."""
         if weights is None:
             return self
@@ -290,7 +293,7 @@ class Problem:
     def split(self, x: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Columns (n_sets, n_samples, n_linear) of the free linear parameters, and the output without them."""
         if self.budget is not None:
-            self.budget.take(len(x), self.y.size)
+            self.budget.spent += float(len(x)) * self.y.size
         n_linear = len(self.space.linear)
         columns = np.zeros((len(x), self.y.size, n_linear))
         fixed_part = np.zeros((len(x), self.y.size))
@@ -396,9 +399,8 @@ class Problem:
         for k in outside:
             size = float(np.linalg.norm(goals[k])) or 1.0  # the tolerance of the solver is an absolute one
             unit = norms[k] / size
-            solutions[k] = (
-                lsq_linear(rows[k], goals[k] / size, bounds=(lower * unit, upper * unit), method="bvls").x / unit
-            )
+            box = lower * unit, upper * unit
+            solutions[k] = lsq_linear(rows[k], goals[k] / size, bounds=box, method="bvls").x / unit
         return solutions
 
     def linear_box(self) -> tuple[FloatArray, FloatArray]:
@@ -463,7 +465,7 @@ class Setting:
     records: Sequence[Record]
     freedom: Freedom
     initial: Initial = None
-    weights: Sequence[FloatArray] | None = None
+    weights: Weights = None
     max_evaluations: float | None = None
     seed: int = 0
     budget: Budget | None = None

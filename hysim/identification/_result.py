@@ -119,11 +119,11 @@ class Choice:
     def to_text(self) -> str:
         """The table for a terminal, the best first."""
         columns = self.left_out, self.continued, self.beyond, self.score
-        rows = [
-            [name, *(f"{each[name]:.3g}" for each in columns), f"{self.bic[name]:.5g}" if name in self.bic else ""]
-            for name in self.score
-        ]
-        header, *lines = aligned([["family", "left out", "continued", "beyond", "over the best", "BIC"], *rows])
+        rows = [["family", "left out", "continued", "beyond", "over the best", "BIC"]]
+        for name in self.score:
+            bic = f"{self.bic[name]:.5g}" if name in self.bic else ""
+            rows.append([name, *(f"{each[name]:.3g}" for each in columns), bic])
+        header, *lines = aligned(rows)
         return "\n".join([header, "-" * len(header), *lines])
 
     def to_frame(self) -> Any:

@@ -17,7 +17,7 @@ from concurrent.futures import Future
 from contextlib import contextmanager
 from contextvars import ContextVar
 from dataclasses import replace
-from typing import Any, NamedTuple, TypeVar
+from typing import NamedTuple
 
 import numpy as np
 
@@ -28,7 +28,6 @@ from hysim._basics.progress import Progress
 from hysim.identification._descent import Descent, Reached
 from hysim.identification._noise import Gaussian
 from hysim.identification._problem import Problem
-from hysim.metrics.criteria import information
 from hysim.models.search_space import SearchSpace
 from hysim.models.stages import Stage
 
@@ -74,6 +73,9 @@ class Optimum(NamedTuple):
     is_simpler: bool = False
 
 
+Known = Sequence[Optimum] | None
+
+
 def chosen(
     problems: Sequence[Problem], *, seed: int, progress: Progress | None = None
 ) -> tuple[Problem, list[Optimum]]:
@@ -90,7 +92,7 @@ def chosen(
             ends = np.array([each.x for each in likely[:N_POLISHED_WHOLE]])
             return problem, _distinct(polish(problem, ends)) if likely else []
     best: tuple[float, Problem, list[Optimum]] = (math.inf, problems[0], [])
-    known: list[Optimum] | None = None
+    known: Known = None
     for problem in problems:
         n_samples, n_names = problem.n_samples, len(problem.space.names)
         if n_names > n_samples and problem is not problems[0]:
@@ -99,8 +101,7 @@ def chosen(
         known = optima(problem, seed=seed, progress=progress, known=known, may_end=may_end)
         if known:
             cost = max(known[0].cost, n_samples * (PERFECT * problem.scale) ** 2)
-            criterion = information(cost / n_samples, n_samples, n_names)
-            best = min(best, (criterion, problem, known), key=lambda each: each[0])
+            best = min(best, (problem.criterion(cost), problem, known), key=lambda each: each[0])
     _, problem, likely = best
     return problem, likely
 
@@ -138,12 +139,7 @@ def stages_in_words(problems: Sequence[Problem], last: Stage | None) -> str:
 
 
 def optima(
-    problem: Problem,
-    *,
-    seed: int,
-    progress: Progress | None = None,
-    known: Sequence[Optimum] | None = None,
-    may_end: bool = False,
+    problem: Problem, *, seed: int, progress: Progress | None = None, known: Known = None, may_end: bool = False
 ) -> list[Optimum]:
     """Distinct local optima, best first; empty if every parameter set diverges.
 
@@ -158,17 +154,14 @@ def optima(
     return once(problem, seed, search) if is_whole else search()
 
 
-def _found(
-    problem: Problem, seed: int, progress: Progress | None, known: Sequence[Optimum] | None, may_end: bool
-) -> list[Optimum]:
+def _found(problem: Problem, seed: int, progress: Progress | None, known: Known, may_end: bool) -> list[Optimum]:
     space = problem.space
     if not space.coordinates:
         return polish(problem, np.empty((1, 0)))
     if problem.ends is not None:
         condensed = problem.condensed()
-        return _distinct(
-            polish(condensed, apart(space, problem.ends, condensed.costs(problem.ends), _SAME, N_POLISHED_WHOLE))
-        )
+        ends = apart(space, problem.ends, condensed.costs(problem.ends), _SAME, N_POLISHED_WHOLE)
+        return _distinct(polish(condensed, ends))
     if problem.y.size > _LONG and (short := problem.thinned(_SHORT) or problem.beginning(_FIRST)) is not None:
         likely = optima(short, seed=seed, progress=progress, known=known, may_end=may_end)[:N_POLISHED_WHOLE]
         if problem.stage is not None and problem.rough() is not problem:  # each costs much to polish
@@ -269,9 +262,8 @@ def _polished(problem: Problem, starts: FloatArray) -> Reached:
 def _optima(problem: Problem, reached: Reached) -> list[Optimum]:
     x = reached.theta[:, : problem.n_x]
     costs = problem.costs(x)
-    return [
-        Optimum(x[k], float(costs[k]), bool(reached.at_rest[k])) for k in np.flatnonzero(np.isfinite(costs)).tolist()
-    ]
+    finite = np.flatnonzero(np.isfinite(costs)).tolist()
+    return [Optimum(x[k], float(costs[k]), bool(reached.at_rest[k])) for k in finite]
 
 
 def _staged(problem: Problem, stage: Stage, begun: FloatArray, seed: int) -> FloatArray:
@@ -354,8 +346,7 @@ def _distinct(optima: list[Optimum]) -> list[Optimum]:
     return distinct
 
 
-T = TypeVar("T")
-_known: ContextVar[dict[Hashable, Future[Any]] | None] = ContextVar("searches that are known", default=None)
+_known: ContextVar[dict[Hashable, Future[list[Optimum]]] | None] = ContextVar("searches that are known", default=None)
 _lock = threading.Lock()
 
 
@@ -369,7 +360,7 @@ def sharing() -> Iterator[None]:
         _known.reset(token)
 
 
-def once(problem: Problem, seed: int, search: Callable[[], T]) -> T:
+def once(problem: Problem, seed: int, search: Callable[[], list[Optimum]]) -> list[Optimum]:
     """The result of `search`, a function of the problem and the seed; one with a budget or a start is not shared."""
     known = _known.get()
     if known is None or problem.budget is not None or problem.ends is not None or problem.stage is not None:
@@ -381,7 +372,7 @@ def once(problem: Problem, seed: int, search: Callable[[], T]) -> T:
         return search()
     with _lock:
         is_first = key not in known
-        result: Future[T] = known.setdefault(key, Future())
+        result: Future[list[Optimum]] = known.setdefault(key, Future())
     if is_first:
         try:
             result.set_result(search())

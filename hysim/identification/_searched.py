@@ -22,15 +22,13 @@ from hysim.identification._assumptions import Treated
 from hysim.identification._descent import Constraint, Descent
 from hysim.identification._diagnostics import bootstrap, fit_measures, loop_widths, width_stderr
 from hysim.identification._noise import Gaussian, Noise, Quantised, Robust
-from hysim.identification._problem import Problem
+from hysim.identification._problem import Numbers, Problem
 from hysim.identification._result import Candidate, Identification, Profile, Width
 from hysim.identification._search import PERFECT, Optimum, polish
 from hysim.identification._uncertainty import Uncertainty, by_energy, uncertainty
 from hysim.identification.doubts import is_exact, odd_residuals, sentences
 from hysim.identification.marquardt import Sets
 from hysim.records import Record
-
-Numbers = Mapping[str, float]
 
 LEVEL = 0.95
 TAILS = (0.025, 0.975)
@@ -160,10 +158,8 @@ class Search:
         rng, treatment = np.random.default_rng(self.seed), self.treatment
 
         def output(inputs: Sequence[FloatArray]) -> FloatArray:
-            parts = [
-                replace(part, record=replace(part.record, u=u))
-                for part, u in zip(self.problem.parts, inputs, strict=True)
-            ]
+            pairs = zip(self.problem.parts, inputs, strict=True)
+            parts = [replace(part, record=replace(part.record, u=u)) for part, u in pairs]
             return np.asarray(replace(self.problem, parts=tuple(parts)).model(theta[np.newaxis])[0])
 
         def measured(record: Record, noise: float) -> FloatArray:
@@ -171,10 +167,8 @@ class Search:
             return u if treatment.front is None else treatment.front.response(u)
 
         quiet = output([record.u for record in treatment.quiet])
-        draws = [
-            output([measured(*each) for each in zip(treatment.quiet, treatment.noises, strict=True)])
-            for _ in range(N_DISTURBED)
-        ]
+        known = [*zip(treatment.quiet, treatment.noises, strict=True)]
+        draws = [output([measured(*each) for each in known]) for _ in range(N_DISTURBED)]
         return np.array(draws) - quiet
 
     def _profiles(self, likely: list[LocalOptimum], known: Uncertainty) -> tuple[dict[str, Profile], FloatArray | None]:
@@ -291,9 +285,8 @@ def _phrases(
     inputs = [part.record.u for part in problem.parts]
     if all((np.diff(u) >= 0.0).all() or (np.diff(u) <= 0.0).all() for u in inputs):
         phrases.append("the input never turns back: the parameters of unloading are not determined")
-    phrases += [
-        f"the interval of {name} ends at its search bound" for name, curve in curves.items() if any(curve.at_box)
-    ]
+    ends = [name for name, curve in curves.items() if any(curve.at_box)]
+    phrases += [f"the interval of {name} ends at its search bound" for name in ends]
     if rivals:
         phrases.append(f"{len(rivals)} other {'optimum' if len(rivals) == 1 else 'optima'} within the noise")
     return phrases

@@ -122,22 +122,15 @@ def select(
     if criterion == "cv_rmse" and cross_validate is None:
         raise ValueError('criterion="cv_rmse" needs a cross-validation: cross_validate="loo", or a number of blocks')
     named, report = _named(candidates), progress or (lambda done, total: None)
+    options: dict[str, Any] = {"initial": initial, "noise": noise, "cross_validate": cross_validate, "seed": seed}
+    options |= {"max_evaluations": max_evaluations, "workers": workers}
     fits: dict[str, Identification] = {}
     announce = announce or announced_by(progress)
     with sharing():
         for name, candidate in named.items():
             if announce is not None:
                 announce(name)
-            fits[name] = identify(
-                candidate,
-                record_or_records,
-                initial=initial,
-                noise=noise,
-                cross_validate=cross_validate,
-                max_evaluations=max_evaluations,
-                seed=seed,
-                workers=workers,
-            )
+            fits[name] = identify(candidate, record_or_records, **options)
             report(len(fits), len(named))
 
     def score(name: str) -> float:

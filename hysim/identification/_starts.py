@@ -32,10 +32,9 @@ from hysim._basics.frozen import FloatArray
 from hysim._columns.channels import steady
 from hysim.errors import SimulationError
 from hysim.identification._assumptions import decided, decides
-from hysim.identification._problem import Problem, Setting
+from hysim.identification._problem import Numbers, Problem, Setting
 from hysim.identification._search import apart, brief_optimum, chosen, descended, spread
 from hysim.identification._uncertainty import uncertainty
-from hysim.metrics.criteria import information
 from hysim.models.dependent_structure import DependentStructure
 from hysim.models.parts import share_of
 from hysim.models.protocols import Identifiable, PartByPart
@@ -56,16 +55,6 @@ _MOST_ROUNDS = 8  # of what is held
 _IN_VAIN = 2  # trials in a row that are no better
 _SHARE = 0.5  # of the evaluations that the user allows
 
-Coordinates = Mapping[str, float]
-
-
-class _Law(NamedTuple):
-    """A law that was searched alone, the parameters of its shape, and whether it explains its record."""
-
-    model: Any
-    shape: Mapping[str, float]
-    is_enough: bool
-
 
 class _End(NamedTuple):
     """A plant, its problem on all records, and the best coordinates (1, n_x) of one search."""
@@ -75,21 +64,15 @@ class _End(NamedTuple):
     ends: FloatArray
 
     def criterion(self) -> float:
-        n = self.problem.n_samples
-        return information(max(float(self.problem.costs(self.ends)[0]), 1e-300) / n, n, len(self.problem.space.names))
+        return _criterion(self.problem, self.ends)
 
 
-class Begun(NamedTuple):
-    """A plant and the records as its search takes them, and coordinates (n_sets, n_x) where it begins."""
+def begun_by_parts(structure: Any, setting: Setting) -> tuple[Any, Sequence[Record], FloatArray, bool]:
+    """The structure where the search part by part ends, with what it holds; ValueError as of `identify`.
 
-    structure: Any
-    records: Sequence[Record]
-    ends: FloatArray
-    cut: bool  # whether the user's number of evaluations has ended a part of the search
-
-
-def begun_by_parts(structure: Any, setting: Setting) -> Begun:
-    """The structure where the search part by part ends, with what it holds; ValueError as of `identify`."""
+    Also the records as its search takes them, coordinates (n_sets, n_x) where it begins, and whether the user's number
+    of evaluations has ended a part of the search.
+    """
     plant, records = structure.over(setting.records, setting.freedom)
     most = setting.max_evaluations
     setting = replace(setting, records=records).allowing(None if most is None else _SHARE * most)
@@ -104,15 +87,15 @@ def begun_by_parts(structure: Any, setting: Setting) -> Begun:
     plant, ends = end.plant, end.ends
     if end.problem.n_x:
         plant, ends = _told_apart(plant, setting, end.problem, _descended(end.problem, ends, exact=True))
-    return Begun(plant, records, ends, setting.budget is not None and setting.budget.cut)
+    return plant, records, ends, setting.budget is not None and setting.budget.cut
 
 
 def _searched(plant: Any, setting: Setting) -> _End:
     """The best end of a search from the law on, and where its record moves, of one from the modes on."""
-    plant, law = _with_law(plant, setting)
-    grown, known = _behind_inputs(plant, law.model, setting)
-    first = _all_at_once(grown, _on_all(grown, setting, law.shape, known), setting)
-    if law.is_enough:
+    plant, law, shape, is_enough = _with_law(plant, setting)
+    grown, known = _behind_inputs(plant, law, setting)
+    first = _all_at_once(grown, _on_all(grown, setting, shape, known), setting)
+    if is_enough:
         return first
     grown, known = _behind_inputs(plant, None, setting)
     second = _all_at_once(grown, known, setting, spread_laws=True)
@@ -124,8 +107,8 @@ def _gone_on(end: _End) -> _End:
     return end._replace(ends=_descended(end.problem, points, exact=False)[:1]) if len(points) > 1 else end
 
 
-def _with_law(plant: Any, setting: Setting) -> tuple[Any, _Law]:
-    """The plant whose law begins where the law alone is best, and that law."""
+def _with_law(plant: Any, setting: Setting) -> tuple[Any, Any, Numbers, bool]:
+    """The plant whose law begins where the law alone is best, that law, its shape, and whether it is enough."""
     k, law, freedom = plant.slowest, plant.law, setting.freedom
     record = plant.static(setting.records[k])
     share = replace(share_of(freedom, "hysteresis"), starts_anew=False)
@@ -145,16 +128,16 @@ def _with_law(plant: Any, setting: Setting) -> tuple[Any, _Law]:
     shape = {f"hysteresis.{name}": estimates[name] for name in searched}
     error = math.sqrt(optima[0].cost / best.n_samples)
     is_enough = error <= _ENOUGH * float(np.ptp(record.y)) + (record.resolution or 0.0)
-    return plant.with_law(start), _Law(model, shape, is_enough)
+    return plant.with_law(start), model, shape, is_enough
 
 
-def _behind_inputs(plant: Any, law: Any, setting: Setting) -> tuple[Any, list[Coordinates]]:
+def _behind_inputs(plant: Any, law: Any, setting: Setting) -> tuple[Any, list[Numbers]]:
     """The plant and coordinates of its parts, after a known law, or directly after several inputs."""
     plant, known = _grown(plant, law, setting)
     return _tried(plant, setting), known
 
 
-def _all_at_once(plant: Any, known: Sequence[Coordinates], setting: Setting, spread_laws: bool = False) -> _End:
+def _all_at_once(plant: Any, known: Sequence[Numbers], setting: Setting, spread_laws: bool = False) -> _End:
     """End of a search for all parts from these coordinates, and if asked from laws all over their box."""
     problem = setting.problem(plant.begun(known))
     if not problem.n_x:
@@ -174,23 +157,26 @@ def _beside_laws(problem: Problem, begun: FloatArray, seed: int) -> FloatArray:
     return apart(space, points, problem.costs(points), _APART_LAWS, _BEST)
 
 
-def _grown(plant: Any, law: Any, setting: Setting) -> tuple[Any, list[Coordinates]]:
+def _grown(plant: Any, law: Any, setting: Setting) -> tuple[Any, list[Numbers]]:
     """The plant with the modes that the fastest record shows, and the best coordinates of its parts there."""
-    known: list[Coordinates] = []
+    known: list[Numbers] = []
     before = math.inf
     for each in plant.growing():
         known_law = each.behind(law)
         attempt = setting.only([plant.fastest]).about(known_law.names).problem(known_law)
         ends = _found(attempt, each, known) if attempt.n_x else np.empty((1, 0))
-        cost = float(attempt.costs(ends[:1])[0])
-        criterion = information(max(cost, 1e-300) / attempt.n_samples, attempt.n_samples, len(attempt.space.names))
+        criterion = _criterion(attempt, ends)
         if not criterion < before - _STRONG and (smaller := _left_out(plant, each, setting.freedom)) is not None:
             return smaller, known
         known, before = _parts_only(attempt, ends), criterion
     return plant, known
 
 
-def _found(attempt: Problem, plant: Any, known: Sequence[Coordinates]) -> FloatArray:
+def _criterion(attempt: Problem, ends: FloatArray) -> float:
+    return attempt.criterion(max(float(attempt.costs(ends[:1])[0]), 1e-300))
+
+
+def _found(attempt: Problem, plant: Any, known: Sequence[Numbers]) -> FloatArray:
     space = attempt.space
     points = plant.points(space, known)
     best = apart(space, points, attempt.costs(points), _APART, _BEST)
@@ -226,9 +212,7 @@ def _tried(plant: Any, setting: Setting) -> Any:
     return best
 
 
-def _on_all(
-    plant: Any, setting: Setting, shape: Mapping[str, float], known: Sequence[Coordinates]
-) -> list[Coordinates]:
+def _on_all(plant: Any, setting: Setting, shape: Numbers, known: Sequence[Numbers]) -> list[Numbers]:
     """The best coordinates of the parts on all records, with the law's shape."""
     attempt = setting.beside(shape).problem(plant.begun(known))
     if not attempt.n_x:
@@ -274,16 +258,14 @@ def _descended(attempt: Problem, points: FloatArray, *, exact: bool) -> FloatArr
     return np.asarray(reached.theta[order, : attempt.n_x])
 
 
-def _parts_only(attempt: Problem, ends: FloatArray) -> list[Coordinates]:
+def _parts_only(attempt: Problem, ends: FloatArray) -> list[Numbers]:
     names, plant = attempt.space.coordinates, attempt.family
-    known: list[Coordinates] = [
-        {name: value for name, value in zip(names, row, strict=True) if not name.startswith("hysteresis.")}
-        for row in ends.tolist()
-    ]
+    own = [(k, name) for k, name in enumerate(names) if not name.startswith("hysteresis.")]
+    known: list[Numbers] = [{name: row[k] for k, name in own} for row in ends.tolist()]
     if not isinstance(plant, PartByPart) or len(plant.inputs) == 1:
         return known
     solved = [plant.solved(attempt.estimates(theta)) for theta in attempt.completed(ends)]
-    return [{**own, **gains} for own, gains in zip(known, solved, strict=True)]
+    return [{**each, **gains} for each, gains in zip(known, solved, strict=True)]
 
 
 _MOST_GROUPS = 12
@@ -330,9 +312,7 @@ def _groups(structure: DependentStructure, records: Sequence[Record]) -> dict[tu
     return groups
 
 
-def _through(
-    structure: DependentStructure, records: Sequence[Record], known: Sequence[Mapping[str, float]]
-) -> dict[str, float]:
+def _through(structure: DependentStructure, records: Sequence[Record], known: Sequence[Numbers]) -> dict[str, float]:
     """Values of polynomials through the `known` parameters of the law on some records, and medians of the others."""
     start = {name: float(np.median([each[name] for each in known])) for name in known[0]}
     for name, at in structure.at.items():

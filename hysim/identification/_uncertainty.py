@@ -90,9 +90,8 @@ def uncertainty(problem: Problem, theta: FloatArray, curvature: FloatArray) -> U
     directions = way_back / norms @ right.T
     covariance = (way_back @ spread) @ (way_back @ spread).T
     size = np.abs(directions).max(axis=1)
-    undetermined = np.flatnonzero(
-        ~is_determined & (np.abs(right[:, ~known]).max(axis=1, initial=0.0) > 0.5 / np.sqrt(known.size))
-    )
+    is_searched = np.abs(right[:, ~known]).max(axis=1, initial=0.0) > 0.5 / np.sqrt(known.size)
+    undetermined = np.flatnonzero(~is_determined & is_searched)
     redundant = tuple(_named(space.names, directions[:, k], size) for k in undetermined)
     redundant = tuple(dict.fromkeys(names for names in redundant if names))
     reasons += [_in_words(names, space.redundant) for names in redundant]
@@ -103,9 +102,8 @@ def uncertainty(problem: Problem, theta: FloatArray, curvature: FloatArray) -> U
     visible = np.where(moves | known, 1.0, 0.0)[:, np.newaxis] * spread
     output = np.concatenate([np.linalg.norm(slopes[k] @ visible, axis=1) for k in every])
     together = spread @ (way_back @ spread).T
-    return Uncertainty(
-        covariance, spread @ spread.T, together, output, condition, redundant, tuple(reasons), stopped, slopes
-    )
+    notes = redundant, tuple(reasons), stopped
+    return Uncertainty(covariance, spread @ spread.T, together, output, condition, *notes, slopes)
 
 
 def by_energy(
@@ -130,9 +128,8 @@ def by_energy(
     covariance = of_names @ of_names.T + by_input @ by_input.T / len(disturbances)
     covariance[np.isnan(known.covariance)] = np.nan
     output = np.linalg.norm(slopes @ spread, axis=1)
-    return replace(
-        known, covariance=covariance, of_theta=spread @ spread.T, with_names=spread @ of_names.T, output=output
-    )
+    of_theta, with_names = spread @ spread.T, spread @ of_names.T
+    return replace(known, covariance=covariance, of_theta=of_theta, with_names=with_names, output=output)
 
 
 def _transposed(u: FloatArray, values: FloatArray) -> FloatArray:
@@ -186,11 +183,8 @@ def _extrapolated(problem: Problem, theta: FloatArray) -> FloatArray | None:
     """dm/dtheta of a law over steps that suit its numbers; None of other models, of long records and of cycles."""
     family, names = problem.family, problem.space.names
     is_short = problem.y.size * len(names) <= _FEW and problem.below is None
-    if (
-        not isinstance(family, Law)
-        or not is_short
-        or any(part.before or part.record.channels for part in problem.parts)
-    ):
+    is_alone = not any(part.before or part.record.channels for part in problem.parts)
+    if not (isinstance(family, Law) and is_short and is_alone):
         return None
     by_names, rows = named_slopes(problem, theta[np.newaxis])[0], []
     for k, part in enumerate(problem.parts):

@@ -8,9 +8,9 @@ import numpy as np
 
 from hysim._basics.frozen import FloatArray
 from hysim.identification._descent import named_slopes
-from hysim.identification._measured import without_filter
+from hysim.identification._identify import without_filter
 from hysim.identification._noise import Noise, density
-from hysim.identification._problem import Problem, problem
+from hysim.identification._problem import Initial, Numbers, Problem, problem
 from hysim.identification._result import Identification
 from hysim.identification._uncertainty import output_slopes
 from hysim.models.protocols import Identifiable
@@ -23,7 +23,6 @@ _SAME = 1e-3  # of the residual's rms: largest difference between the residuals 
 _ROUNDING = 1e-9  # of the output's size
 
 Bounds = Mapping[str, tuple[float, float]]
-Initial = str | Sequence[str] | None
 
 
 def again(fit: Identification, records: Sequence[Record], bounds: Bounds, initial: Initial) -> Problem:
@@ -101,14 +100,7 @@ class Expected:
     way_there: FloatArray
 
     @classmethod
-    def at(
-        cls,
-        family: Any,
-        record: Record,
-        freedom: Freedom,
-        coordinates: Mapping[str, float],
-        values: Mapping[str, float],
-    ) -> Self:
+    def at(cls, family: Any, record: Record, freedom: Freedom, coordinates: Numbers, values: Numbers) -> Self:
         """The model with these `values`, at these coordinates by name; ValueError for a value outside the box."""
         attempt = problem(family, [record], freedom, None)
         x = [coordinates[name] for name in attempt.space.coordinates]
