@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import hysim as hs
-from hysim._columns.repeats import repeated_cycle
+from hysim._columns.input_noise import repeated_cycle
 
 TRIANGLE = hs.signals.triangle(-1.0, 1.0, cycles=5, samples_per_cycle=40)
 LAW = hs.PrandtlIshlinskii(

@@ -10,8 +10,7 @@ from scipy import stats
 from strategies import assert_refused
 
 import hysim as hs
-from hysim._columns.input_noise import input_noise, quiet_path
-from hysim._columns.repeats import repeated_cycle
+from hysim._columns.input_noise import input_noise, quiet_path, repeated_cycle
 from hysim.cli import main
 from hysim.identification._noise import Gaussian, Quantised, Robust
 from hysim.identification.doubts import rate_noise_warning

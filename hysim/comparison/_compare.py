@@ -109,9 +109,8 @@ def compare(
     training = records[-1]
     if cross_validate == "auto":
         cross_validate = "loo" if sum(map(len, records)) <= _SHORT else _BLOCKS
-    protocol = _Protocol(
-        records, _last_loop(training), cross_validate, seed, trial, max_evaluations, announce or announced_by(progress)
-    )
+    options: dict[str, Any] = {"cross_validate": cross_validate, "max_evaluations": max_evaluations, "seed": seed}
+    protocol = _Protocol(records, _last_loop(training), trial, options, announce or announced_by(progress))
     names = list(subjects)
     done: dict[str, ComparisonRow | str] = {}
 
@@ -164,10 +163,8 @@ class _Trial:
 class _Protocol:
     records: tuple[Record, ...]
     measured: LoopMetrics
-    cross_validate: str | int | None
-    seed: int
     trial: _Trial | None
-    max_evaluations: int | None
+    options: Mapping[str, Any]
     announce: Callable[[str], None] | None
 
     def row(self, name: str, subject: Any) -> ComparisonRow | str:
@@ -176,13 +173,7 @@ class _Protocol:
             self.announce(name)
         try:
             if identified_here:
-                subject = identify(
-                    subject,
-                    self.records,
-                    cross_validate=self.cross_validate,
-                    max_evaluations=self.max_evaluations,
-                    seed=self.seed,
-                )
+                subject = identify(subject, self.records, **self.options)
             return self._measured_row(name, subject, identified_here)
         except _FAILURES as error:
             return " ".join(str(error).split())
@@ -238,7 +229,7 @@ class _Protocol:
             return math.nan, math.nan
         drive, test = self.trial.drive, self.trial.record
         if self.trial.own_state and identified_here:
-            model = _with_initial_state(drive, subject, self.seed)
+            model = _with_initial_state(drive, subject, self.options["seed"])
         y = free_run(model, drive).y[self.trial.begin :]
         return metrics.fit_percent(test.y, y), metrics.rmse(test.y, y)
 

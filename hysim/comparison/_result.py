@@ -175,14 +175,9 @@ class Comparison:
         if self.winner is None:
             return ()
         best, *others = self.ranked()
-        return contrasts(
-            {row.name: row.cv_residual for row in others},
-            best.cv_residual,
-            {row.name: row.cv_rmse for row in others},
-            best.cv_rmse,
-            span=float(np.ptp(self._y)),
-            fitted=[row.name for row in others if row.n_parameters],
-        )
+        errors, rmses = {row.name: row.cv_residual for row in others}, {row.name: row.cv_rmse for row in others}
+        span, fitted = float(np.ptp(self._y)), [row.name for row in others if row.n_parameters]
+        return contrasts(errors, best.cv_residual, rmses, best.cv_rmse, span=span, fitted=fitted)
 
     @property
     def probabilities(self) -> dict[str, float]:
@@ -223,9 +218,8 @@ class Comparison:
         notes = [f"not compared: {name}: {reason}" for name, reason in self.failed.items()] + [self.verdict]
         wrapped = [line for note in notes if note for line in folded(note, _WIDE, indent="  ")]
         warnings = [line for each in self.warnings for line in folded(each, _WIDE, "  ", "    ")]
-        return "\n".join(
-            [lines[0], "-" * len(lines[0]), *lines[1:], *wrapped, *(["Warnings"] if warnings else []), *warnings]
-        )
+        lines[1:1] = ["-" * len(lines[0])]
+        return "\n".join([*lines, *wrapped, *(["Warnings"] if warnings else []), *warnings])
 
     def __str__(self) -> str:
         best = [row.name for row in self.ranked()]
@@ -271,12 +265,9 @@ class Comparison:
         spans = rf"\multicolumn{{{len(header) - 1}}}{{l}}"
         lines = [" & ".join(map(_escaped, cells)) for cells in body]
         lines += [rf"{_escaped(name)} & {spans}{{{_escaped(reason)}}}" for name, reason in failed]
-        head = [
-            rf"\begin{{tabular}}{{l{'r' * (len(header) - 1)}}}",
-            r"\hline",
-            " & ".join(map(_escaped, header)) + r" \\",
-        ]
-        return "\n".join([*head, r"\hline", *(rf"{line} \\" for line in lines), r"\hline", r"\end{tabular}"])
+        begin = rf"\begin{{tabular}}{{l{'r' * (len(header) - 1)}}}"
+        head, *body = (rf"{line} \\" for line in (" & ".join(map(_escaped, header)), *lines))
+        return "\n".join([begin, r"\hline", head, r"\hline", *body, r"\hline", r"\end{tabular}"])
 
     def to_csv(self) -> str:
         """Every measure as comma-separated values with all digits, nan as an empty cell."""

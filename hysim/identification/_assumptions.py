@@ -20,8 +20,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from hysim._basics.frozen import FloatArray
-from hysim._columns.input_noise import input_noise, quiet_path, reach
-from hysim._columns.repeats import repeated_cycle
+from hysim._columns.input_noise import input_noise, quiet_path, reach, repeated_cycle
 from hysim.errors import SimulationError
 from hysim.identification._problem import Initial, Problem, Setting, problem
 from hysim.identification._search import brief_optima, brief_optimum, optima

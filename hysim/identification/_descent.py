@@ -20,7 +20,7 @@ import numpy as np
 from hysim._basics.frozen import FloatArray
 from hysim.identification._noise import Noise
 from hysim.identification._problem import Problem
-from hysim.identification.marquardt import Evaluated, Flags, Sets, Trial, bounded_steps, descend
+from hysim.identification.marquardt import Evaluated, Flags, Sets, System, Trial, bounded_steps, descend
 
 N_STEPS = 60
 _MOST_AT_ONCE = 1_000_000  # samples of all sets that descend together, to bound the memory
@@ -169,7 +169,7 @@ class _Sets:
     weights: FloatArray
     constraint: Constraint | None
 
-    def evaluate(self, x: FloatArray, sets: Sets) -> tuple[FloatArray, tuple[FloatArray, ...]]:
+    def evaluate(self, x: FloatArray, sets: Sets) -> tuple[FloatArray, Evaluated]:
         """Minus the log-likelihood; outputs, columns, sigma. If `projected`, the linear part of `x` is solved for."""
         problem, n_x = self.descent.problem, self.descent.problem.n_x
         columns, fixed_part = problem.split(x[:, :n_x])
@@ -187,7 +187,7 @@ class _Sets:
         loss[diverged] = np.inf
         return loss, (outputs, columns, sigma)
 
-    def linearised(self, x: FloatArray, sets: Sets, evaluated: tuple[FloatArray, ...]) -> tuple[FloatArray, FloatArray]:
+    def linearised(self, x: FloatArray, sets: Sets, evaluated: Evaluated) -> System:
         outputs, columns, sigma = evaluated
         jacobian = self.descent.slopes(x, outputs, columns)
         _, slope, curvature = self.descent.noise.terms(self.targets[sets] - outputs, sigma)
@@ -198,10 +198,8 @@ class _Sets:
     def _root(self, sets: Sets, curvature: FloatArray, sigma: FloatArray) -> FloatArray:
         return np.asarray(np.sqrt(self.weights[sets] * np.maximum(curvature, 1e-12 / sigma**2)))
 
-    def stepped(
-        self, x: FloatArray, sets: Sets, jacobian: FloatArray, goal: FloatArray, damping: FloatArray
-    ) -> FloatArray:
-        (lower, upper), n_x = self.descent.box(), self.descent.problem.n_x
+    def stepped(self, x: FloatArray, sets: Sets, system: System, damping: FloatArray) -> FloatArray:
+        (lower, upper), n_x, (jacobian, goal) = self.descent.box(), self.descent.problem.n_x, system
         constraint = self._constraint(sets)
         if constraint is None:
             steps = bounded_steps(jacobian, goal, damping, lower - x, upper - x, n_damped=n_x)

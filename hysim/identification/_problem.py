@@ -19,7 +19,7 @@ import numpy.typing as npt
 
 from hysim._basics.frozen import FloatArray
 from hysim._columns.channels import taken
-from hysim._columns.repeats import repeated_cycle
+from hysim._columns.input_noise import repeated_cycle
 from hysim._names import meant
 from hysim.identification.marquardt import Settled, least_squares, triangle
 from hysim.metrics.criteria import information

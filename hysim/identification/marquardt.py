@@ -111,6 +111,9 @@ class Schedule:
 Evaluated = tuple[FloatArray, ...]
 """Values at points, arrays of n rows."""
 
+System = tuple[FloatArray, FloatArray]
+"""Jacobian and goal of a regression near points, arrays of n rows."""
+
 
 class Trial(NamedTuple):
     """Points that were aimed at (n, n_x), the same as they were evaluated, and what was evaluated there."""
@@ -126,17 +129,13 @@ _BENT = Schedule(success=0.3, failure=3.0)  # of steps that are bent: the dampin
 class Problem(Protocol):
     """A loss to minimise; `sets` (n,) says which set each point belongs to."""
 
-    def evaluate(self, x: FloatArray, sets: Sets) -> tuple[FloatArray, tuple[FloatArray, ...]]:
+    def evaluate(self, x: FloatArray, sets: Sets) -> tuple[FloatArray, Evaluated]:
         """Losses (n,) at points `x` (n, n_x), which it may change in place, and arrays that `linearised` needs."""
         ...
 
-    def linearised(
-        self, x: FloatArray, sets: Sets, evaluated: tuple[FloatArray, ...]
-    ) -> tuple[FloatArray, FloatArray]: ...
+    def linearised(self, x: FloatArray, sets: Sets, evaluated: Evaluated) -> System: ...
 
-    def stepped(
-        self, x: FloatArray, sets: Sets, jacobian: FloatArray, goal: FloatArray, damping: FloatArray
-    ) -> FloatArray: ...
+    def stepped(self, x: FloatArray, sets: Sets, system: System, damping: FloatArray) -> FloatArray: ...
 
 
 class Reached(NamedTuple):
@@ -144,7 +143,7 @@ class Reached(NamedTuple):
 
     x: FloatArray
     loss: FloatArray
-    evaluated: tuple[FloatArray, ...]
+    evaluated: Evaluated
     at_rest: Flags
 
 
@@ -186,7 +185,7 @@ def descend(
         is_stale[fresh] = False
         sets = np.repeat(moving, factors.size)
         dampings = np.outer(damping[moving], factors).ravel()
-        trial = problem.stepped(x[sets], sets, _rows(jacobian, sets), _rows(goal, sets), dampings)
+        trial = problem.stepped(x[sets], sets, (_rows(jacobian, sets), _rows(goal, sets)), dampings)
         aim = trial.copy()
         losses, evaluated_there = problem.evaluate(trial, sets)
         if bend is not None and steps - remaining > _STRAIGHT:
@@ -195,9 +194,8 @@ def descend(
             bent = bend(x[sets], sets, _rows(jacobian, sets), dampings, begin, straight)
             bent_losses, evaluated_bent = problem.evaluate(bent, sets)
             is_lower = bent_losses < losses
-            for values, others in zip(
-                (trial, losses, *evaluated_there), (bent, bent_losses, *evaluated_bent), strict=True
-            ):
+            rivals = bent, bent_losses, *evaluated_bent
+            for values, others in zip((trial, losses, *evaluated_there), rivals, strict=True):
                 values[is_lower] = others[is_lower]
         best = losses.reshape(-1, factors.size).argmin(axis=1) + factors.size * np.arange(moving.size)
         before, gained = loss[moving], loss[moving] - losses[best]
@@ -277,21 +275,20 @@ class SumOfSquares:
     upper: FloatArray | float = np.inf
     sizes: Callable[[FloatArray], FloatArray] | None = None
 
-    def evaluate(self, x: FloatArray, sets: Sets) -> tuple[FloatArray, tuple[FloatArray, ...]]:
+    def evaluate(self, x: FloatArray, sets: Sets) -> tuple[FloatArray, Evaluated]:
         residual = self.residuals(x)
         with np.errstate(over="ignore", invalid="ignore"):
             squares = np.sum(residual**2, axis=1)
         return np.where(np.isfinite(squares), squares, np.inf), (residual,)
 
-    def linearised(self, x: FloatArray, sets: Sets, evaluated: tuple[FloatArray, ...]) -> tuple[FloatArray, FloatArray]:
+    def linearised(self, x: FloatArray, sets: Sets, evaluated: Evaluated) -> System:
         residual = evaluated[0][0]
         jacobian = self.slopes(x[0], residual)
         return (jacobian.T @ jacobian)[np.newaxis], -(jacobian.T @ residual)[np.newaxis]
 
-    def stepped(
-        self, x: FloatArray, sets: Sets, jacobian: FloatArray, goal: FloatArray, damping: FloatArray
-    ) -> FloatArray:
+    def stepped(self, x: FloatArray, sets: Sets, system: System, damping: FloatArray) -> FloatArray:
         """The next points; numbers at a bound against which the gradient pushes stay."""
+        jacobian, goal = system
         sizes = np.sqrt(np.diagonal(jacobian, axis1=1, axis2=2))
         stays = ((x <= self.lower) & (goal < 0.0)) | ((x >= self.upper) & (goal > 0.0)) | (sizes == 0.0)
         if self.sizes is not None:

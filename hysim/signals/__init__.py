@@ -15,21 +15,7 @@ from hysim.signals._cycles import (
     staircase,
     triangle,
 )
-from hysim.signals._ground_motion import ground_motion
-from hysim.signals._spectra import multisine, sample_times, sweep
+from hysim.signals._spectra import ground_motion, multisine, sample_times, sweep
 
-__all__ = [
-    "decaying_sine",
-    "extremes",
-    "ground_motion",
-    "growing_sine",
-    "multisine",
-    "reversal_curves",
-    "sample_times",
-    "sawtooth",
-    "sine",
-    "square",
-    "staircase",
-    "sweep",
-    "triangle",
-]
+__all__ = ["decaying_sine", "extremes", "ground_motion", "growing_sine", "multisine", "reversal_curves"]
+__all__ += ["sample_times", "sawtooth", "sine", "square", "staircase", "sweep", "triangle"]
