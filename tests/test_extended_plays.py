@@ -12,9 +12,9 @@ from strategies import assert_cut_or_stepped_it_has_the_same_bits, assert_refuse
 
 import hysim as hs
 from hysim.identification._descent import Descent
-from hysim.identification._diagnostics import loop_widths, width_stderr
 from hysim.identification._noise import Gaussian
 from hysim.identification._problem import problem
+from hysim.identification._uncertainty import loop_widths, width_stderr
 from hysim.identification.marquardt import least_squares
 from hysim.models.search_space import ALL_FREE, Freedom
 

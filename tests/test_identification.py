@@ -9,10 +9,9 @@ from strategies import assert_refused, refused, with_peak_memory
 
 import hysim as hs
 from hysim.identification import Candidate, _descent, marquardt
-from hysim.identification._diagnostics import left_out
 from hysim.identification._problem import Problem, problem
 from hysim.identification._searched import _phrases
-from hysim.identification._uncertainty import _named, uncertainty
+from hysim.identification._uncertainty import _named, left_out, uncertainty
 from hysim.models.model import candidates
 from hysim.models.search_space import Freedom, SearchSpace
 

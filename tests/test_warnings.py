@@ -10,8 +10,8 @@ from scipy import stats
 import hysim as hs
 from hysim.cli import main
 from hysim.identification._admissible import danger, excursion, implausible
-from hysim.identification._diagnostics import whiteness
 from hysim.identification._noise import Quantised
+from hysim.identification._uncertainty import whiteness
 from hysim.identification.doubts import sentences
 
 SWAPPED = "the input and the output may be swapped"

@@ -266,8 +266,8 @@ class Comparison:
         lines = [" & ".join(map(_escaped, cells)) for cells in body]
         lines += [rf"{_escaped(name)} & {spans}{{{_escaped(reason)}}}" for name, reason in failed]
         begin = rf"\begin{{tabular}}{{l{'r' * (len(header) - 1)}}}"
-        head, *body = (rf"{line} \\" for line in (" & ".join(map(_escaped, header)), *lines))
-        return "\n".join([begin, r"\hline", head, r"\hline", *body, r"\hline", r"\end{tabular}"])
+        first, *others = (rf"{line} \\" for line in (" & ".join(map(_escaped, header)), *lines))
+        return "\n".join([begin, r"\hline", first, r"\hline", *others, r"\hline", r"\end{tabular}"])
 
     def to_csv(self) -> str:
         """Every measure as comma-separated values with all digits, nan as an empty cell."""

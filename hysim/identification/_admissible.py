@@ -75,13 +75,8 @@ class Excursion(NamedTuple):
         return self.beyond <= _UNSAFE * self.span
 
 
-class Choice(NamedTuple):
-    """The search and its optima that are described, best first; candidates that are named; and a remark."""
-
-    search: Search
-    likely: list[LocalOptimum]
-    named: Mapping[str, Candidate]
-    remark: str = ""
+Ends = tuple[Search, list[LocalOptimum]]
+"""A search and its optima, best first."""
 
 
 def excursion(models: Sequence[Any], records: Sequence[Record]) -> Excursion | None:
@@ -136,19 +131,24 @@ def implausible(off: Excursion | None) -> str:
     )
 
 
-def choose(search: Search, likely: list[LocalOptimum], admissible: bool | None) -> Choice:
-    """The optimum, or the best admissible law in its place; `admissible` is that of `hysim.identify`."""
+def choose(
+    search: Search, likely: list[LocalOptimum], admissible: bool | None
+) -> tuple[Ends, Mapping[str, Candidate], str]:
+    """The optimum, or the best admissible law in its place; `admissible` is that of `hysim.identify`.
+
+    Also candidates that are named, and a remark.
+    """
     best = likely[0]
     named = {name: each.candidate(inside[0].theta) for name, (each, inside) in _by_region(search, best).items()}
     is_safe = _is_safe(search, best.theta)
     if admissible is False or (is_safe and not (admissible and named)) or _is_cut(search):
-        return Choice(search, likely, named)
+        return (search, likely), named, ""
     other = _safest(search, likely)
     if other is None:
-        return Choice(search, likely, {name: each for name, each in named.items() if name != "admissible"})
+        return (search, likely), {name: each for name, each in named.items() if name != "admissible"}, ""
     safe, inside = other
     if admissible is None and not _is_as_good(search, best.theta, inside[0].theta):
-        return Choice(search, likely, {**named, "admissible": safe.candidate(inside[0].theta)})
+        return (search, likely), {**named, "admissible": safe.candidate(inside[0].theta)}, ""
     unrestricted = search.candidate(best.theta)
     kind = "is not admissible" if is_safe else "is unsafe on smaller cycles"
     loss = "" if admissible else ", and fits no better within noise and creep"
@@ -156,14 +156,14 @@ def choose(search: Search, likely: list[LocalOptimum], admissible: bool | None) 
         f"the best admissible law, in place of one of fit {unrestricted.fit_percent:.2f} % that {kind}{loss}: "
         "admissible=False returns that one"
     )
-    return Choice(safe, inside, {"unrestricted": unrestricted}, remark)
+    return other, {"unrestricted": unrestricted}, remark
 
 
 def _is_cut(search: Search) -> bool:
     return search.problem.budget is not None and search.problem.budget.cut
 
 
-def _by_region(search: Search, best: LocalOptimum) -> dict[str, tuple[Search, list[LocalOptimum]]]:
+def _by_region(search: Search, best: LocalOptimum) -> dict[str, Ends]:
     """The optima inside each named region that the best one is not in."""
     known, x = {}, best.theta[: search.problem.n_x]
     for name, (lower, upper) in search.problem.space.regions.items():
@@ -226,7 +226,7 @@ def effective_samples(residual: FloatArray) -> float:
     return n / (1.0 + 2.0 * float(pairs[:first].sum()))
 
 
-def _safest(search: Search, likely: list[LocalOptimum] | None) -> tuple[Search, list[LocalOptimum]] | None:
+def _safest(search: Search, likely: list[LocalOptimum] | None) -> Ends | None:
     """The best admissible optimum that was met, in its own box, followed by others of this box."""
     regions = search.problem.space.regions
     if regions:
@@ -255,7 +255,7 @@ def _safe_points(search: Search, likely: Sequence[LocalOptimum]) -> FloatArray:
     return np.reshape(points, (len(points), problem.n_x))
 
 
-def _approached(search: Search, x: FloatArray) -> tuple[Search, list[LocalOptimum]] | None:
+def _approached(search: Search, x: FloatArray) -> Ends | None:
     """The safe optimum that is reached from safe coordinates (n_x,), box by box; on few samples first."""
     problem, half = search.problem, _LARGEST_BOX
     short = problem.thinned(_SHORT) if problem.y.size > _LONG else None

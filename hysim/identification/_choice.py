@@ -35,10 +35,10 @@ from hysim._basics.progress import Progress
 from hysim._columns.turning import TOLERANCE
 from hysim.errors import SimulationError
 from hysim.identification._admissible import excursion
-from hysim.identification._diagnostics import Folds, Samples, fit_measures, left_out, left_out_errors, rms_of_known
 from hysim.identification._problem import Weights
 from hysim.identification._result import Choice, Identification, Width
 from hysim.identification._searched import Search
+from hysim.identification._uncertainty import Folds, Samples, fit_measures, left_out, left_out_errors, rms_of_known
 from hysim.identification.doubts import CONSTANT
 from hysim.metrics.rows import LoopRows
 from hysim.models.by_structure import searched

@@ -24,13 +24,13 @@ from hysim.errors import SimulationError
 from hysim.identification._admissible import choose, danger, excursion, implausible
 from hysim.identification._assumptions import Treated, decided, in_units_of_noise, quiet_rmse, treated
 from hysim.identification._choice import better, in_one_step, of_any_family, refuse
-from hysim.identification._diagnostics import Folds, left_out, left_out_errors, rms_of_known
 from hysim.identification._noise import Quantised, density
 from hysim.identification._problem import Problem, Setting, Weights
 from hysim.identification._result import Candidate, Identification
 from hysim.identification._search import PERFECT, chosen, sharing, stages_in_words, widened
 from hysim.identification._searched import Search
 from hysim.identification._starts import begun, begun_by_parts
+from hysim.identification._uncertainty import Folds, left_out, left_out_errors, rms_of_known
 from hysim.identification.doubts import rate_noise_warning, swapped_columns, swapped_for
 from hysim.laws.operators.reversal_filter import ReversalFilter
 from hysim.models.by_structure import searched
@@ -297,7 +297,7 @@ def _searched(
     if isinstance(noise_model, Quantised):
         noise_model = noise_model.at_least(squares[0].cost, n_samples - len(problem.space.names))
     best = Search(problem, noise_model, seed, treatment)
-    search, likely, named, remark = choose(best, best.likely(squares), admissible)
+    (search, likely), named, remark = choose(best, best.likely(squares), admissible)
     plain = squares[0].x if search is best else likely[0].theta[: problem.n_x]
     if energy:
         search, likely = search.on_energy(likely[0])

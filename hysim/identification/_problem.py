@@ -419,13 +419,8 @@ def _beginning(part: Part, samples: int) -> Part:
 def _at(part: Part, chosen: npt.NDArray[np.intp]) -> Part:
     """The chosen samples, without the times."""
     record = part.record
-    short = Record(
-        u=record.u[chosen],
-        y=record.y[chosen],
-        units=record.units,
-        resolution=record.resolution,
-        channels=taken(record.channels, chosen),
-    )
+    shared: dict[str, Any] = {"units": record.units, "resolution": record.resolution}
+    short = Record(u=record.u[chosen], y=record.y[chosen], channels=taken(record.channels, chosen), **shared)
     return replace(part, record=short, weights=None if part.weights is None else part.weights[chosen])
 
 

@@ -195,16 +195,6 @@ def _found(problem: Problem, seed: int, progress: Progress | None, known: Known,
     return _distinct(polished)
 
 
-def brief_cost(problem: Problem) -> float:
-    """Sum of squares that a short search reaches; inf if every parameter set diverges.
-
-    A search in stages ends before the first of them.
-    """
-    while problem.stage is not None and problem.simpler is not None:
-        problem = problem.simpler
-    return brief_optimum(problem)[1]
-
-
 def brief_optimum(problem: Problem) -> tuple[FloatArray, float]:
     """Coordinates (n_x,) at which a short search ends, and the sum of squares there; inf if every set diverges."""
     ends, costs = brief_optima(problem)

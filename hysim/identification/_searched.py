@@ -20,12 +20,19 @@ from hysim import metrics
 from hysim._basics.frozen import FloatArray
 from hysim.identification._assumptions import Treated
 from hysim.identification._descent import Constraint, Descent
-from hysim.identification._diagnostics import bootstrap, fit_measures, loop_widths, width_stderr
 from hysim.identification._noise import Gaussian, Noise, Quantised, Robust
 from hysim.identification._problem import Numbers, Problem
 from hysim.identification._result import Candidate, Identification, Profile, Width
 from hysim.identification._search import PERFECT, Optimum, polish
-from hysim.identification._uncertainty import Uncertainty, by_energy, uncertainty
+from hysim.identification._uncertainty import (
+    Uncertainty,
+    bootstrap,
+    by_energy,
+    fit_measures,
+    loop_widths,
+    uncertainty,
+    width_stderr,
+)
 from hysim.identification.doubts import is_exact, odd_residuals, sentences
 from hysim.identification.marquardt import Sets
 from hysim.records import Record
@@ -195,7 +202,8 @@ class Search:
         limit = float(chi2.ppf(LEVEL, len(names))) if names else 0.0
         rivals = tuple(self.candidate(each.theta) for each in likely[1:] if 2.0 * (each.loss - best.loss) < limit)
         stderr = dict(zip(names, np.sqrt(np.diag(known.covariance)).tolist(), strict=True))
-        draws = self._draws(best, residual) if intervals == "bootstrap" else np.empty((0, best.theta.size))
+        n_draws = N_BOOTSTRAP if intervals == "bootstrap" and residual.size > len(names) else 0
+        draws = bootstrap(problem, self.noise, best.theta, residual, best.sigma, draws=n_draws, seed=self.seed)
         spread, exact = float(np.std(problem.y)), is_exact(problem, chosen.rmse)
         why, probability = (*known.stopped, *known.reasons), measures["whiteness"]
         told = sentences(
@@ -235,11 +243,6 @@ class Search:
         if len(draws) and isinstance(self.noise, Quantised) and best.sigma < _FAINT * self.noise.quantum:
             notes.append('with noise this far below the quantum bootstrap intervals are too short: use "profile"')
         return [*notes, *family.notes(record, family.assemble(self.problem.estimates(best.theta)))]
-
-    def _draws(self, best: LocalOptimum, residual: FloatArray) -> FloatArray:
-        if residual.size <= len(self.problem.space.names):
-            return np.empty((0, best.theta.size))
-        return bootstrap(self.problem, self.noise, best.theta, residual, best.sigma, draws=N_BOOTSTRAP, seed=self.seed)
 
     def _intervals(
         self, intervals: str, estimates: Numbers, stderr: Numbers, curves: Mapping[str, Profile], draws: FloatArray
@@ -391,9 +394,9 @@ def _profiles(
         r = np.sqrt(np.maximum(deviance, 0.0))
         inner = r <= root
         won, lost = active[inner], active[~inner]
-        moved = at[inner] - ends.inside[won]
-        far = np.abs(moved) > 0.1 * np.abs(at[inner] - ends.origin[won])  # nearer ones differ by how far they descended
-        slope[won[far]] = (reached.theta[inner] - theta[won])[far] / moved[far, np.newaxis]
+        change = at[inner] - ends.inside[won]
+        far = np.abs(change) > 0.1 * np.abs(at[inner] - ends.origin[won])  # others differ by how far they descended
+        slope[won[far]] = (reached.theta[inner] - theta[won])[far] / change[far, np.newaxis]
         theta[won] = reached.theta[inner]
         ends.move_in(won, at[inner], r[inner])
         ends.move_out(lost, at[~inner], r[~inner])

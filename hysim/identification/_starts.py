@@ -63,9 +63,6 @@ class _End(NamedTuple):
     problem: Problem
     ends: FloatArray
 
-    def criterion(self) -> float:
-        return _criterion(self.problem, self.ends)
-
 
 def begun_by_parts(structure: Any, setting: Setting) -> tuple[Any, Sequence[Record], FloatArray, bool]:
     """The structure where the search part by part ends, with what it holds; ValueError as of `identify`.
@@ -99,7 +96,7 @@ def _searched(plant: Any, setting: Setting) -> _End:
         return first
     grown, known = _behind_inputs(plant, None, setting)
     second = _all_at_once(grown, known, setting, spread_laws=True)
-    return min(map(_gone_on, (first, second)), key=_End.criterion)
+    return min(map(_gone_on, (first, second)), key=lambda end: _criterion(end.problem, end.ends))
 
 
 def _gone_on(end: _End) -> _End:

@@ -19,7 +19,7 @@ from hysim._basics.frozen import FloatArray
 from hysim._columns.input_noise import noise_level
 from hysim.errors import SimulationError
 from hysim.identification._problem import Problem, Setting, problems
-from hysim.identification._search import brief_cost
+from hysim.identification._search import brief_optimum
 from hysim.models.protocols import Identifiable, Rescalable, needs_time
 from hysim.records import Record
 
@@ -88,10 +88,8 @@ def rate_noise_warning(models: Sequence[Any], records: Sequence[Record]) -> str:
         if not (noise and needs_time(model) and record.sample_time):
             continue
         try:
-            outputs = [
-                np.asarray(model.response(u, record.sample_time))
-                for u in (record.u, record.u + noise * rng.standard_normal(len(record)))
-            ]
+            inputs = record.u, record.u + noise * rng.standard_normal(len(record))
+            outputs = [np.asarray(model.response(u, record.sample_time)) for u in inputs]
         except SimulationError:
             continue
         share = metrics.rmse(*outputs) / max(metrics.rmse(record.y, outputs[0]), float(np.finfo(float).tiny))
@@ -139,10 +137,12 @@ def swapped_for(family: Identifiable, setting: Setting, error: float) -> str:
         return ""
     reverse = replace(record, u=record.y, y=record.u, resolution=None, units={})[:: -(-len(record) // _MOST_SAMPLES)]
     try:
-        reversed_problem = problems(family, [reverse], setting.freedom, setting.initial)[0]
-        if len(reversed_problem.space.names) >= len(reverse):
+        attempt = problems(family, [reverse], setting.freedom, setting.initial)[0]
+        if len(attempt.space.names) >= len(reverse):
             return ""
-        cost = brief_cost(reversed_problem)
+        while attempt.stage is not None and attempt.simpler is not None:
+            attempt = attempt.simpler
+        cost = brief_optimum(attempt)[1]
     except (ValueError, TypeError, ArithmeticError, SimulationError):
         return ""  # what cannot be fitted in reverse was not swapped
     other = float(np.sqrt(cost / len(reverse)) / np.std(reverse.y))

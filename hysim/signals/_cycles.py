@@ -103,10 +103,8 @@ def square(low: float, high: float, *, cycles: int, samples_per_half: int) -> Fl
     [18.0, 18.0, 50.0, 50.0, 18.0, 18.0, 50.0, 50.0]
     """
     checked_span(low, high)
-    return np.tile(
-        np.repeat([float(low), float(high)], checked_count("samples_per_half", samples_per_half)),
-        checked_count("cycles", cycles),
-    )
+    cycle = np.repeat([float(low), float(high)], checked_count("samples_per_half", samples_per_half))
+    return np.tile(cycle, checked_count("cycles", cycles))
 
 
 _MOST_SAMPLES = 100_000_000  # of lines between extremes: 0.8 GB

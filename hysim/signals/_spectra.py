@@ -134,14 +134,12 @@ def sweep(
     [0.0, 1.618034, 1.618034, -1.175571, -1.175571]
     """
     n = checked_count("n_samples", n_samples)
-    if not 0.0 < sample_time < math.inf:
-        raise ValueError(f"sample_time must be positive and finite, got {sample_time}")
+    t, duration = sample_times(n, sample_time), n * sample_time
     if not (0.0 < amplitude < math.inf and math.isfinite(mean)):
         raise ValueError(f"amplitude must be positive, and it and the mean finite, got {amplitude} and {mean}")
     for name, frequency in (("start", start), ("stop", stop)):
         if not 0.0 <= frequency < 0.5 / sample_time:
             raise ValueError(f"{name} must be from 0 to below half the sampling rate, got {frequency}")
-    t, duration = sample_times(n, sample_time), n * sample_time
     if spacing == "linear":
         turns = start * t + (stop - start) / (2.0 * duration) * t**2
     elif spacing == "logarithmic":
@@ -341,9 +339,8 @@ def _high_passed(motion: FloatArray, sample_time: float, frequency: float, dampi
     """A motion filtered by s^2 / (s^2 + 2 zeta w s + w^2), from rest, by the bilinear transform."""
     from scipy.signal import bilinear, lfilter
 
-    numerator, denominator = bilinear(
-        [1.0, 0.0, 0.0], [1.0, 2.0 * damping * frequency, frequency**2], fs=1.0 / sample_time
-    )
+    poles = [1.0, 2.0 * damping * frequency, frequency**2]
+    numerator, denominator = bilinear([1.0, 0.0, 0.0], poles, fs=1.0 / sample_time)
     return np.asarray(lfilter(numerator, denominator, motion))
 
 
