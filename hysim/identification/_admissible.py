@@ -180,15 +180,8 @@ def _inside(search: Search, lower: FloatArray, upper: FloatArray) -> Search:
 
 def _part(space: SearchSpace, lower: FloatArray, upper: FloatArray) -> SearchSpace:
     drawn = space.drawn and (np.clip(space.drawn[0], lower, upper), np.clip(space.drawn[1], lower, upper))
-    return replace(
-        space,
-        lower=lower,
-        upper=upper,
-        starts=np.clip(space.starts, lower, upper),
-        drawn=drawn,
-        regions={},
-        outer=space.outer or (space.lower, space.upper),
-    )
+    starts, outer = np.clip(space.starts, lower, upper), space.outer or (space.lower, space.upper)
+    return replace(space, lower=lower, upper=upper, starts=starts, drawn=drawn, regions={}, outer=outer)
 
 
 def _reached(search: Search) -> list[LocalOptimum]:

@@ -489,14 +489,10 @@ class Setting:
 
     def about(self, names: Container[str]) -> "Setting":
         """With the part of the user's freedom that is about these parameters."""
-        fixed, free, bounds = self.freedom.fixed, self.freedom.free, self.freedom.bounds
-        freedom = replace(
-            self.freedom,
-            fixed={name: value for name, value in fixed.items() if name in names},
-            free=tuple(name for name in free if name in names),
-            bounds={name: pair for name, pair in bounds.items() if name in names},
-        )
-        return replace(self, freedom=freedom)
+        fixed = {name: value for name, value in self.freedom.fixed.items() if name in names}
+        free = tuple(name for name in self.freedom.free if name in names)
+        bounds = {name: pair for name, pair in self.freedom.bounds.items() if name in names}
+        return replace(self, freedom=replace(self.freedom, fixed=fixed, free=free, bounds=bounds))
 
     def beside(self, values: Mapping[str, float]) -> "Setting":
         """With further parameters that are fixed, unless the user has fixed them."""

@@ -102,8 +102,7 @@ def chosen(
         if known:
             cost = max(known[0].cost, n_samples * (PERFECT * problem.scale) ** 2)
             best = min(best, (problem.criterion(cost), problem, known), key=lambda each: each[0])
-    _, problem, likely = best
-    return problem, likely
+    return best[1:]
 
 
 def widened(problem: Problem, optima: Sequence[Optimum]) -> tuple[Problem, list[Optimum]]:

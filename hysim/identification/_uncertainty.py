@@ -216,15 +216,9 @@ def _extrapolated(problem: Problem, theta: FloatArray) -> FloatArray | None:
 
 def _unknown(problem: Problem, theta: FloatArray, reason: str) -> Uncertainty:
     n_names, n_theta = len(problem.space.names), theta.size
-    return Uncertainty(
-        covariance=np.full((n_names, n_names), np.nan),
-        of_theta=np.zeros((n_theta, n_theta)),
-        with_names=np.zeros((n_theta, n_names)),
-        output=np.full(problem.y.size, np.nan),
-        condition=np.nan,
-        redundant=(),
-        reasons=(reason,),
-    )
+    covariance, of_theta = np.full((n_names, n_names), np.nan), np.zeros((n_theta, n_theta))
+    output = np.full(problem.y.size, np.nan)
+    return Uncertainty(covariance, of_theta, np.zeros((n_theta, n_names)), output, np.nan, (), (reason,))
 
 
 def _named(names: tuple[str, ...], direction: FloatArray, size: FloatArray) -> tuple[str, ...]:

@@ -274,17 +274,15 @@ def ground_motion(
     """
     from scipy.signal import freqs  # loading it takes longer than all other signals together
 
-    n = _n_samples(duration, sample_time)
+    n, highest = _n_samples(duration, sample_time), math.pi / sample_time
     check_positive(peak=peak, ground_frequency=ground_frequency, ground_damping=ground_damping)
     check_positive(corner_frequency=corner_frequency, corner_damping=corner_damping)
     for name, value in {"peak": peak, "ground_damping": ground_damping, "corner_damping": corner_damping}.items():
         if math.isinf(value):
             raise ValueError(f"{name} must be finite, got {value}")
     for name, value in {"ground_frequency": ground_frequency, "corner_frequency": corner_frequency}.items():
-        if not value < math.pi / sample_time:
-            raise ValueError(
-                f"{name} must be below half the sampling rate, {math.pi / sample_time:g} rad/s, got {value}"
-            )
+        if not value < highest:
+            raise ValueError(f"{name} must be below half the sampling rate, {highest:g} rad/s, got {value}")
     shape = _envelope(envelope, np.arange(float(n)) * (sample_time / duration), rise, plateau, end)
     n_noise = 1 << (2 * n - 1).bit_length()  # twice the motion, so that its end does not know its begin
     noise = np.random.default_rng(seed).standard_normal(n_noise)
