@@ -69,7 +69,7 @@ SHORT = tuple(
     for shape in SHAPES
     for noise in (0.0, 0.02, 0.05, 0.10)
 )
-SMOKE = (Condition("noise 1%", rate=200, duration=2.0), SHORT[1])
+SMOKE = (Condition("noise 1%", rate=100, duration=2.0), SHORT[1])
 PER_RATE, FASTER, PEAK = 240, 5.0, 2.0
 
 

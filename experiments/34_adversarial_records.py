@@ -289,7 +289,7 @@ def main(smoke: bool = False) -> list[Row]:
     A smoke run is of a few records, whose verdicts must be right.
     """
     chosen = [case for case in cases() if not smoke or case.seed in SMOKE]
-    jobs = [(case, each) for each in ([replace(SETS[0], samples_per_cycle=20)] if smoke else SETS) for case in chosen]
+    jobs = [(case, each) for each in ([replace(SETS[0], samples_per_cycle=12)] if smoke else SETS) for case in chosen]
     if smoke:
         rows = [row(*job, degree=1) for job in jobs]
     else:

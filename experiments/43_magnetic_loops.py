@@ -200,7 +200,7 @@ def predicted(law: str, records: Records) -> tuple[Array, float]:
 def main(smoke: bool = False, folder: Path | None = None, seconds: float = SECONDS) -> list[Row]:
     """Fit, predict, print, and unless it is a smoke run write table, figure and JSON."""
     if smoke or folder is None:
-        sets, laws, seconds, most = stand_in(), (OWN,), 0.1, 300
+        sets, laws, seconds, most = stand_in(), (OWN,), 0.1, 60
     else:
         sets, laws, most = measured(folder), tuple(LAWS), None
         restored()

@@ -259,7 +259,7 @@ def of_folder(folder: Path) -> tuple[list[Row], dict[str, Any]]:
 def main(smoke: bool = False, folder: Path | None = None) -> list[Row]:
     """Measure, and unless it is a smoke run write table, figure and JSON."""
     if smoke:
-        return along(range(1), 60)
+        return along(range(1), 36)
     rows, numbers, first = simulated(range(N_SEEDS), tuple(s for s in SUPPLIES if s != LEFT_OUT))
     rows += along(range(N_SEEDS), 360)
     numbers = {"simulated": numbers}

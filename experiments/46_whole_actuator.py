@@ -188,7 +188,7 @@ def main(smoke: bool = False) -> list[Row]:
     if smoke:
         truth, structure, records, _ = stage(1)
         subject = hs.Actuator.structure(structure, creep=False, sensor=hs.Sensor(quantum=truth.sensor.quantum))
-        fit = hs.identify(subject, [records[0][:1500:3], records[1][:800]], noise="gaussian")
+        fit = hs.identify(subject, [records[0][:900:3], records[1][:400]], noise="gaussian")
         return [{"model": WHOLE, "fit_percent": fit.fit_percent}]
     cases = computed()
     rows = [summary(cases, model) for model in (WHOLE, CASCADE, ALONE)]

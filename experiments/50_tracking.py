@@ -210,10 +210,10 @@ def controlled(
 
 def main(smoke: bool = False) -> list[Row]:
     """Measure, and unless it is a smoke run write table, figure and JSON."""
-    seeds, cycles = (range(1), 4) if smoke else (range(N_SEEDS), CYCLES)
+    seeds, cycles = (range(1), 1) if smoke else (range(N_SEEDS), CYCLES)
     results = [followed(cycles, seed) for seed in seeds]
     rows = [row for found, _ in results for row in found]
-    walking = [walked(2 if smoke else WALK_CYCLES, seed) for seed in range(1 if smoke else N_WALKS)]
+    walking = [walked(1 if smoke else WALK_CYCLES, seed) for seed in range(1 if smoke else N_WALKS)]
     loops = [row for seed in seeds for jumps in (False, True) for row in in_loop(cycles, seed, jumps)]
     columns = dict.fromkeys([*rows[0], *loops[0]])
     rows = [{**columns, **row} for row in (*rows, *walking, *loops)]

@@ -116,7 +116,7 @@ def row(name: str, record: hs.Record, is_true: bool = False) -> Row:
 def main(smoke: bool = False, folder: Path | None = None) -> list[Row]:
     """All records; unless it is a smoke run, write table, figure and result."""
     if smoke:
-        return [row("simulated", simulated(1e-3, 20), is_true=True)]
+        return [row("simulated", simulated(1e-3, 12), is_true=True)]
     rows = [row(f"simulated, noise {100.0 * noise:g} %", simulated(noise, CURVES), is_true=True) for noise in NOISES]
     files = [] if folder is None else sorted((folder / "forc").glob("*.forc"))
     measured = {file.stem: hs.load(file) for file in files}

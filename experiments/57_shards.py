@@ -66,12 +66,12 @@ def killed(folder: Path, k: int, n: int, delay: float | None) -> bool:
     return child.returncode < 0
 
 
-def shard(folder: Path, n: int, k: int) -> Row:
+def shard(folder: Path, n: int, most_kills: int, k: int) -> Row:
     """One shard, killed and begun again until it ends."""
     rng, kills = np.random.default_rng(k), 0
-    while kills < KILLS and killed(folder, k, n, rng.uniform(0.0, LATEST)):
+    while kills < most_kills and killed(folder, k, n, rng.uniform(0.0, LATEST)):
         kills += 1
-    if kills == KILLS:
+    if kills == most_kills:
         killed(folder, k, n, None)
     computed = (folder / f"{k}.notes").read_text().split()
     return {"shard": k, "kills": kills, "tasks": len({*computed}), "computed_twice": len(computed) - len({*computed})}
@@ -108,11 +108,11 @@ def shared(task: Callable[..., Any], n_tasks: int, repeats: int) -> Row:
 
 def main(smoke: bool = False) -> list[Row]:
     """Kill, go on, merge and compare, and unless it is a smoke run write table, figure and JSON."""
-    n = 300 if smoke else N_SHARDS
+    n, most_kills = (300, 1) if smoke else (N_SHARDS, KILLS)
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         with ThreadPoolExecutor(2) as pool:
-            rows = list(pool.map(partial(shard, folder, n), range(1 if smoke else n)))
+            rows = list(pool.map(partial(shard, folder, n, most_kills), range(1 if smoke else n)))
         if smoke:
             return [*rows, shared(scaling_tasks.product, 20, 1)]
         words = ["sweep", str(STUDY), "--out", str(folder / "walks.sqlite"), "--merge"]

@@ -32,6 +32,7 @@ def triangle(period: float, cycles: int) -> tuple[np.ndarray, int]:
 
 
 @cache
+@cache
 def reference_plant() -> hs.Actuator:
     """The actuator as the controllers know it."""
     structure = hs.PolynomialBoucWen(input_coefficients=(1.0, 0.1))
