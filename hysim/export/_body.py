@@ -17,11 +17,11 @@ class Body:
     def __init__(self, library: Library, source: Routine, arguments: dict[str, Type]) -> None:
         self.source, self.arguments, self.scope = source, list(arguments), Scope(source, arguments)
         self.of, self.refusal = Expressions(library, self.scope), source.refusal
-        self._homes, self._counts = _c.homes(source.tree.body, arguments), stored(source.tree.body)
+        self._homes, self._counts = _c.homes(source.tree), stored(source.tree.body)
         self._declared: set[str] = set()  # names that the statement at hand declares
         self.returns: Type | None = None
         self._results = 0
-        for loop in _c.counters_used_elsewhere(source.tree.body):
+        for loop in _c.counters_used_elsewhere(source.tree):
             raise source.refusal(loop, f"{ast.unparse(loop.target)} counts a loop and has another use: rename one")
 
     def settled(self) -> str:

@@ -250,15 +250,14 @@ class Scope:
         return f"{plain_name}_" if plain_name in RESERVED | HELPERS.keys() | MATHEMATICS | TESTS else plain_name
 
 
-def homes(body: list[ast.stmt], arguments: Iterable[str]) -> Mapping[Place, list[str]]:
-    """Names that are declared at each statement, in the order in which they appear."""
-    _mentioned.cache_clear()
-    local = stored(body).keys() - set(arguments)
-    names = {name: None for statement in body for name in _mentioned(statement) if name in local}
+@lru_cache(maxsize=1024)
+def homes(tree: ast.FunctionDef) -> Mapping[Place, list[str]]:
+    """Names that are declared at each statement of a function, in the order in which they appear."""
+    local = stored(tree.body).keys() - {each.arg for each in tree.args.args}
+    names = {name: None for statement in tree.body for name in _mentioned(statement) if name in local}
     placed: dict[Place, list[str]] = {}
     for name in names:
-        placed.setdefault(_home(body, name), []).append(name)
-    _mentioned.cache_clear()
+        placed.setdefault(_home(tree.body, name), []).append(name)
     return placed
 
 
@@ -268,11 +267,12 @@ def stored(nodes: Iterable[ast.AST]) -> Counter[str]:
     return Counter(node.id for node in each if isinstance(node.ctx, ast.Store))
 
 
-def counters_used_elsewhere(body: list[ast.stmt]) -> list[ast.For]:
-    """Loops whose counting name is assigned within them, or has another use outside such loops."""
-    loops = [node for statement in body for node in ast.walk(statement) if isinstance(node, ast.For)]
+@lru_cache(maxsize=1024)
+def counters_used_elsewhere(tree: ast.FunctionDef) -> list[ast.For]:
+    """Loops of a function whose counting name is assigned within them, or has another use outside such loops."""
+    loops = [node for statement in tree.body for node in ast.walk(statement) if isinstance(node, ast.For)]
+    outside = {name for statement in tree.body for name in _mentioned(statement)}
     _mentioned.cache_clear()
-    outside = {name for statement in body for name in _mentioned(statement)}
     return [
         loop
         for loop in loops
