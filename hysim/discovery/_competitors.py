@@ -31,7 +31,7 @@ from scipy.linalg import block_diag
 
 from hysim import metrics
 from hysim._basics.frozen import FloatArray, checked
-from hysim._columns.turning import TOLERANCE
+from hysim._columns.turning import TOLERANCE, turns
 from hysim.errors import SimulationError
 from hysim.identification import identify
 from hysim.laws.operators.prandtl_ishlinskii import PrandtlIshlinskii
@@ -137,7 +137,7 @@ def means(u: FloatArray, y: FloatArray, weights: FloatArray) -> FloatArray:
 
 def trend(record: Record) -> FloatArray:
     """Columns (n_samples, 1 + degree) of a slow drift of the record: the polynomials of time up to a degree."""
-    degree = min(_BENDS, len(record.branches(TOLERANCE)) // _BRANCHES)
+    degree = min(_BENDS, len(turns(record.u, TOLERANCE).branches) // _BRANCHES)
     return np.asarray(legendre.legvander(np.linspace(-1.0, 1.0, len(record)), degree))
 
 

@@ -138,11 +138,12 @@ def _greedy_path(features: FloatArray, slope: FloatArray, optimizer: str) -> lis
 @contextlib.contextmanager
 def _quiet() -> Iterator[None]:
     """An empty law is the end of a path, and the last iterate of an unfinished one is still a structure."""
-    from sklearn.exceptions import ConvergenceWarning
+    import sklearn.exceptions
 
-    with warnings.catch_warnings():
+    # the options of each of thousands of small regressions are the same
+    with warnings.catch_warnings(), sklearn.config_context(skip_parameter_validation=True):
         warnings.filterwarnings("ignore", message="Sparsity parameter is too big")
-        warnings.filterwarnings("ignore", category=ConvergenceWarning)
+        warnings.filterwarnings("ignore", category=sklearn.exceptions.ConvergenceWarning)
         yield
 
 
