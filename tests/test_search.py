@@ -240,7 +240,7 @@ def test_a_larger_family_never_fits_worse(of):
     """Though its search has one random point beside the start that the simpler family gives."""
     with sharing():  # both families contain the same one
         for family in (hs.GeneralizedBoucWen, hs.PolynomialBoucWen):
-            *_, larger = problems(family(), [RECORDS[of][::2]], Freedom(), None)
+            *_, larger = problems(family(), [RECORDS[of][::3]], Freedom(), None)
             alone = replace(larger.space, starts=larger.space.starts[:0], screened=1)
             known = optima(larger.simpler, seed=0)
             floor = (1e-9 * larger.scale) ** 2 * larger.y.size  # both fits are exact, to the rounding of the memory
@@ -277,7 +277,7 @@ def test_the_criterion_chooses_the_stages_and_the_user_may_ask_for_one():
 
 
 def test_the_spread_of_the_pinching_is_freed_where_the_record_shows_it():
-    u = hs.signals.growing_sine(1.0, cycles=5, samples_per_cycle=60)
+    u = hs.signals.growing_sine(1.0, cycles=4, samples_per_cycle=40)
     pinched = {"delta_nu": 0.02, "delta_eta": 0.02, "zeta_s": 0.9, "q": 0.2, "p": 0.8, "psi": 0.15}
     law = hs.BoucWenBaberNoori(beta=1.5, gamma=0.8, n=1.2, lambda_=0.2, input_coefficients=(0.1,), **pinched)
     fit = hs.identify(hs.BoucWenBaberNoori, hs.Record(u=u, y=law.response(u)))
