@@ -300,7 +300,7 @@ def test_a_record_is_not_thinned_for_a_model_that_depends_on_time_or_where_it_wo
 
 
 RNG = np.random.default_rng(0)
-SHARE = np.linspace(0.0, 1.0, 100)
+SHARE = np.linspace(0.0, 1.0, 60)
 U = np.sin(6.0 * np.pi * SHARE) * (1.0 - 0.5 * SHARE)
 TRUTH = hs.BoucWen(beta=1.2, gamma=0.5, gain=2.0, feedthrough=0.5, offset=0.3)
 Y = TRUTH.response(U) + 0.01 * RNG.standard_normal(U.size)
@@ -323,7 +323,7 @@ SUBJECTS = {
 
 def fitted(name: str, u_factor: float, y_factor: float) -> hs.Identification:
     record = hs.Record(u=u_factor * U, y=y_factor * Y, t=0.01 * np.arange(U.size))
-    return hs.identify(SUBJECTS[name], record, max_evaluations=100)
+    return hs.identify(SUBJECTS[name], record, max_evaluations=40)
 
 
 @pytest.mark.parametrize("name", SUBJECTS)
