@@ -116,7 +116,7 @@ def test_a_steady_loop_between_opposite_fields_takes_energy():
     rng, n_steady = np.random.default_rng(3), 0
     for _ in range(3 if SLOW else 30):
         law = replace(any_law(rng), reversible_feedback=1.0)
-        u = 10.0 ** rng.uniform(-1.0, 1.0) * hs.signals.triangle(-1.0, 1.0, cycles=30, samples_per_cycle=200)
+        u = 10.0 ** rng.uniform(-1.0, 1.0) * hs.signals.triangle(-1.0, 1.0, cycles=30, samples_per_cycle=60)
         loop = hs.loop_metrics(u, law.response(u))
         if loop.closure_gap > 1e-9 * loop.stroke:  # a wide memory takes more cycles
             continue
