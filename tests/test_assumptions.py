@@ -196,7 +196,7 @@ def test_a_sum_leaves_to_the_record_what_its_plays_leave(u0):
 
 
 def test_a_cascade_leaves_to_the_record_what_its_carrier_leaves():
-    t = np.linspace(0.0, 1.0, 400)
+    t = np.linspace(0.0, 1.0, 200)
     u = np.cos(2.0 * np.pi * 4.0 * t) * np.linspace(1.0, 0.6, t.size)
     law = hs.PrandtlIshlinskii(thresholds=(0.0, 0.2, 0.5), weights=(1.0, 0.7, -0.4), z0=(0.0, 0.0, 0.0))
     plant = hs.TransferFunction(num=(400.0,), den=(1.0, 28.0, 400.0))
