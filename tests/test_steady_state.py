@@ -54,7 +54,7 @@ def plain(plant: hs.BoucWenOscillator, n_periods: int) -> np.ndarray:
     ("zeta", "most", "n_periods"),
     [
         (5e-4, MOST, 4000),  # a deviation keeps exp(-0.006) of its size in a period: 4e-11 after 4000
-        (0.01, 60, 10_000),  # 1e-10 in a period, and 12 % of it fades
+        (0.01, 60, 400),  # of which a period takes 11 %: 1e-21 after 400
     ],
     ids=["lightly damped", "moderately damped"],
 )
