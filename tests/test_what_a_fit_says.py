@@ -40,7 +40,7 @@ FAMILIES = [
 @pytest.mark.parametrize("family", FAMILIES, ids=lambda each: each.__name__)
 def test_families_of_actuators_with_a_noisy_input(family):
     rec = record(1.0, begin=30)
-    check(hs.identify(family, rec, max_evaluations=300), [rec])
+    check(hs.identify(family, rec, max_evaluations=60), [rec])
 
 
 @pytest.mark.parametrize("family", [each for each in hs.families().values() if each is not hs.ReversalFilter])
@@ -91,7 +91,7 @@ def test_thresholds_do_not_shrink_with_the_speed():
 def test_every_option(family, options, noise):
     rec = record(noise, quantum=0.1 if options.get("noise") == "quantised" else 0.0)
     fixed = {"n": 1.0} if family is hs.BoucWen else {}
-    check(hs.identify(family, rec, fixed=fixed, max_evaluations=300, **options), [rec])
+    check(hs.identify(family, rec, fixed=fixed, max_evaluations=60, **options), [rec])
 
 
 def test_several_records():
