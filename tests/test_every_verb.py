@@ -45,13 +45,13 @@ def check(fit, rec, own_shell=None):
 
 @pytest.mark.parametrize("name", SUBJECTS)
 def test_all_verbs_agree_on_a_fit(name):
-    check(hs.identify(SUBJECTS[name], REC, max_evaluations=2000), REC)
+    check(hs.identify(SUBJECTS[name], REC, max_evaluations=200), REC)
 
 
 @pytest.mark.parametrize("option", OPTIONS)
 def test_all_verbs_agree_whatever_the_options(option):
     rec = hs.Record(u=U, y=np.round(REC.y / 0.05) * 0.05, t=T, resolution=0.05)
-    fit = hs.identify(hs.BoucWen, rec, fixed={"n": 1.0}, max_evaluations=2000, **OPTIONS[option])
+    fit = hs.identify(hs.BoucWen, rec, fixed={"n": 1.0}, max_evaluations=200, **OPTIONS[option])
     numbers = check(fit, rec)
     assert numbers["identify, fit_percent"] < 99.9  # rounding of the output leaves a residual
 
