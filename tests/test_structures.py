@@ -15,7 +15,7 @@ from hysim.models.model import every_family
 from hysim.models.protocols import Stepwise, needs_time
 
 H = 0.02
-T = H * np.arange(401 if COMPILED else 41)
+T = H * np.arange(241 if COMPILED else 41)
 QUAKE = hs.signals.ground_motion(6.0, duration=8.0, sample_time=H, seed=3)[: T.size]
 NAMES = list(LAWS) if COMPILED else ["BoucWen", "Dahl", "Stop", "MaxwellSlip", "SquareDahl", "CustomLaw"]
 MIXED = ["BoucWen of n = 2", "BoucWenBaberNoori", "MaxwellSlip"]
