@@ -31,15 +31,8 @@ from hysim.plants.oscillator_structure import decimated, interpolated
 from hysim.records import Record
 from hysim.signals import multisine
 
-__all__ = [
-    "LINES",
-    "PERIOD",
-    "SAMPLE_RATE",
-    "SWEEP_LENGTH",
-    "noel_schoukens",
-    "noel_schoukens_plant",
-    "simulate_official",
-]
+__all__ = ["LINES", "PERIOD", "SAMPLE_RATE", "SWEEP_LENGTH"]
+__all__ += ["noel_schoukens", "noel_schoukens_plant", "simulate_official"]
 
 
 def __dir__() -> list[str]:
@@ -146,14 +139,8 @@ def noel_schoukens(
         length = PERIOD if y.size % (_OVERSAMPLING * PERIOD) == 0 else y.size // _OVERSAMPLING
         blocks = disturbances.standard_normal((y.size // (_OVERSAMPLING * length), length))
         y += noise * np.concatenate([interpolated(block, _OVERSAMPLING) for block in blocks])
-    part = slice(lead, lead + n_samples)
-    return Record(
-        u=force[::_OVERSAMPLING][part],
-        y=decimated(y, _STAGES[kind])[part],
-        t=np.arange(n_samples) / SAMPLE_RATE,
-        units=_UNITS,
-        name=f"Noel-Schoukens {kind}",
-    )
+    u, y = (each[lead : lead + n_samples] for each in (force[::_OVERSAMPLING], decimated(y, _STAGES[kind])))
+    return Record(u=u, y=y, t=np.arange(n_samples) / SAMPLE_RATE, units=_UNITS, name=f"Noel-Schoukens {kind}")
 
 
 def simulate_official(
@@ -194,10 +181,8 @@ def simulate_official(
         force = _LEVELS["sweep"] * _unit_sweep(inputs.size)
         deviation = np.abs(force[::_OVERSAMPLING] - inputs)
         if inputs.size < 2 or deviation.max() > 1e-6:
-            raise ValueError(
-                "u must hold the published sweep, 40 sin(2 pi (18 t + t^2/12)) at 750 Hz"
-                + (f", got {inputs[deviation.argmax()]} at sample {deviation.argmax()}" if inputs.size else "")
-            )
+            place = f", got {inputs[deviation.argmax()]} at sample {deviation.argmax()}" if inputs.size else ""
+            raise ValueError(f"u must hold the published sweep, 40 sin(2 pi (18 t + t^2/12)) at 750 Hz{place}")
         begin = 0
     else:
         if inputs.size < 32 or inputs.size % 2:

@@ -43,7 +43,7 @@ def table1(dwell: float = 1.0) -> Record:
     if not (math.isfinite(dwell) and dwell > 0):
         raise ValueError(f"dwell must be positive and finite, got {dwell}")
     _, _, voltage, displacement = _columns("table1.csv")
-    return _record(voltage, displacement, sample_time=dwell, resolution=PIXEL, name="Table 1")
+    return _record("Table 1", voltage, displacement, dwell, PIXEL)
 
 
 def table2() -> Record:
@@ -62,8 +62,7 @@ def table2() -> Record:
     (10, 0.246, 1.021)
     """
     _, _, displacement, voltage = _columns("table2.csv")
-    sample_time = 1 / (4 * SQUARE_WAVE_FREQUENCY)
-    return _record(voltage, displacement, sample_time=sample_time, resolution=None, name="Table 2")
+    return _record("Table 2", voltage, displacement, sample_time=1 / (4 * SQUARE_WAVE_FREQUENCY))
 
 
 def _columns(file: str) -> FloatArray:
@@ -72,14 +71,6 @@ def _columns(file: str) -> FloatArray:
     return np.loadtxt(rows, delimiter=",").T
 
 
-def _record(
-    voltage: FloatArray, displacement: FloatArray, *, sample_time: float, resolution: float | None, name: str
-) -> Record:
-    return Record(
-        u=voltage,
-        y=displacement,
-        t=sample_time * np.arange(float(voltage.size)),
-        units={"t": "s", "u": "V", "y": "um"},
-        resolution=resolution,
-        name=name,
-    )
+def _record(name: str, u: FloatArray, y: FloatArray, sample_time: float, resolution: float | None = None) -> Record:
+    t, units = sample_time * np.arange(float(u.size)), {"t": "s", "u": "V", "y": "um"}
+    return Record(u=u, y=y, t=t, units=units, resolution=resolution, name=name)

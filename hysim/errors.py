@@ -23,12 +23,9 @@ def warn_beyond(u_range: tuple[float, ...] | None, u: Any, name: str, *, stackle
     low, high = u_range
     lowest, highest = float(u.min()), float(u.max())
     if max(low - lowest, highest - high) > _BEYOND * (high - low):
-        warnings.warn(
-            f"the input goes from {lowest:.4g} to {highest:.4g}, but the {name} was identified from {low:.4g} to "
-            f"{high:.4g}: what it says beyond is extrapolated",
-            HysimWarning,
-            stacklevel=stacklevel,
-        )
+        ranges = f"from {lowest:.4g} to {highest:.4g}, but the {name} was identified from {low:.4g} to {high:.4g}"
+        words = f"the input goes {ranges}: what it says beyond is extrapolated"
+        warnings.warn(words, HysimWarning, stacklevel=stacklevel)
 
 
 @runtime_checkable
@@ -48,12 +45,8 @@ def warn_unsafe(thing: Any) -> None:
 def warn_limited(limited: int, samples: int) -> None:
     """Warn if a command stands at a limit for more than 5 % of its samples."""
     if limited > _LIMITED * samples:
-        warnings.warn(
-            f"the command is at a limit of the controller or the amplifier in {limited} of {samples} samples: the "
-            "reference is out of reach there",
-            HysimWarning,
-            stacklevel=_CLOSED,
-        )
+        at_limit = f"the command is at a limit of the controller or the amplifier in {limited} of {samples} samples"
+        warnings.warn(f"{at_limit}: the reference is out of reach there", HysimWarning, stacklevel=_CLOSED)
 
 
 class Interrupted(KeyboardInterrupt):

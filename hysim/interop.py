@@ -12,7 +12,7 @@ import importlib
 import math
 import numbers
 import re
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any, Protocol, runtime_checkable
 
@@ -179,10 +179,8 @@ def told_by(u: Any, y: Any, t: Any, units: Mapping[str, str]) -> tuple[Any, dict
     if times:
         t, unit = times[0]
         if not np.array_equal(t, times[-1][0]):
-            raise ValueError(
-                "u and y must have the same times, got two indexes that differ: align them first, as by "
-                'pandas.concat({"u": u, "y": y}, axis=1).dropna()'
-            )
+            advice = 'align them first, as by pandas.concat({"u": u, "y": y}, axis=1).dropna()'
+            raise ValueError(f"u and y must have the same times, got two indexes that differ: {advice}")
         stated |= {"t": unit} if unit else {}
     return t, {**stated, **units}
 
@@ -285,21 +283,9 @@ def frame(
     return made
 
 
-def dataset(
-    signals: Mapping[str, tuple[Sequence[str], npt.NDArray[Any]]],
-    coordinates: Mapping[str, Any],
-    *,
-    units: Mapping[str, str],
-    notes: Mapping[str, Any] | None = None,
-) -> Any:
-    """An `xarray.Dataset` of signals by axes, units in ``attrs["units"]`` for its plots; ImportError without xarray."""
-    xarray = optional("xarray", "to_xarray", "tables")
-    made = xarray.Dataset(
-        {name: (tuple(axes), values) for name, (axes, values) in signals.items()},
-        coords=dict(coordinates),
-        attrs=dict(notes or {}),
-    )
-    for name in made.variables:
-        if name in units:
-            made[name].attrs["units"] = units[name]
+def dataset(signals: Mapping[str, Any], coordinates: Mapping[str, Any], units: Mapping[str, str]) -> Any:
+    """An `xarray.Dataset` of signals, each its axes and values, with ``attrs["units"]``; ImportError without xarray."""
+    made = optional("xarray", "to_xarray", "tables").Dataset(dict(signals), dict(coordinates))
+    for name in made.variables.keys() & units.keys():
+        made[name].attrs["units"] = units[name]
     return made

@@ -109,19 +109,13 @@ class Record:
         turns = int(self.reversals().size)
         resolution = "" if self.resolution is None else f", resolution {quantity(self.resolution, y)}"
         time = "" if self.t is None else f"{extent(self.t, t)}, {self._step_in_words(t)}"
-        return summary_text(
-            [f"Record {self.name}".rstrip() + f": {self.u.size} samples" + (", no time" if self.t is None else "")],
-            {
-                "t": time,
-                "u": f"{extent(self.u, u)}, {turns} reversal{'' if turns == 1 else 's'}",
-                "y": extent(self.y, y) + resolution,
-                **{name: self._channel_in_words(name) for name in self.channels},
-            },
-        )
-
-    def _channel_in_words(self, name: str) -> str:
-        value, unit = self.channel(name), self.units.get(name, "")
-        return extent(value, unit) if isinstance(value, np.ndarray) else quantity(value, unit)
+        title = f"Record {self.name}".rstrip() + f": {self.u.size} samples{', no time' * (self.t is None)}"
+        signals = {
+            "u": f"{extent(self.u, u)}, {turns} reversal{'s' * (turns != 1)}",
+            "y": extent(self.y, y) + resolution,
+        }
+        channels = {name: extent(value, self.units.get(name, "")) for name, value in self.channels.items()}
+        return summary_text([title], {"t": time, **signals, **channels})
 
     def _step_in_words(self, unit: str) -> str:
         try:
@@ -350,16 +344,10 @@ class Record:
         ``attrs``, from which `hysim.load` makes an equal record.
         """
         varying = along(self.channels)
-        return frame(
-            {"u": self.u, "y": self.y, **varying},
-            index=None if self.t is None else ("t", self.t),
-            units=self.units,
-            notes={
-                "name": self.name,
-                "resolution": self.resolution,
-                "channels": {name: name if name in varying else value for name, value in self.channels.items()},
-            },
-        )
+        channels = {name: name if name in varying else value for name, value in self.channels.items()}
+        notes = {"name": self.name, "resolution": self.resolution, "channels": channels}
+        index = None if self.t is None else ("t", self.t)
+        return frame({"u": self.u, "y": self.y, **varying}, index=index, units=self.units, notes=notes)
 
     def _sample_at(self, place: float) -> int:
         if isinstance(place, (int, np.integer)) and not isinstance(place, bool):
@@ -455,13 +443,10 @@ def as_record(value: Any, verb: str) -> Record | None:
     signals = {name: table.read(table.labels.index(name)) for name in ("u", "y", "t") if name in table.labels}
     channels = channels_of(table)
     units = dict(table.units) | {name: unit for name, (_, unit) in signals.items() if unit}
-    return Record(
-        **{name: values for name, (values, _) in signals.items()},
-        units={name: unit for name, unit in units.items() if name in ("t", "u", "y", *channels)},
-        resolution=table.notes.get("resolution"),
-        name=table.notes.get("name", ""),
-        channels=channels,
-    )
+    units = {name: unit for name, unit in units.items() if name in ("t", "u", "y", *channels)}
+    arrays: dict[str, Any] = {name: values for name, (values, _) in signals.items()}
+    notes = {note: table.notes[note] for note in ("resolution", "name") if note in table.notes}
+    return Record(**arrays, **notes, units=units, channels=channels)
 
 
 def span_of(*records: Record) -> float:

@@ -60,11 +60,9 @@ class Simulation:
 
     def __str__(self) -> str:
         arrays = {"t": self.t, "u": self.u, "y": self.y, "z": self.z, **self.signals}
-        rows = {
-            name: self._in_words(name, values)
-            for name, values in arrays.items()
-            if values is not None and not (name.startswith(_PEAK) and name.removeprefix(_PEAK) in arrays)
-        }
+        told = {f"{_PEAK}{name}" for name in arrays}  # beside the signal that they are the peaks of
+        known = {name: values for name, values in arrays.items() if values is not None and name not in told}
+        rows = {name: self._in_words(name, values) for name, values in known.items()}
         return summary_text([f"Simulation: {self.u.size} samples"], rows)
 
     def _in_words(self, name: str, values: FloatArray) -> str:
@@ -121,7 +119,7 @@ def dataset_of_signals(signals: Mapping[str, FloatArray], units: Mapping[str, st
             coordinates["node"] = np.arange(1, values.shape[1] + 1)
         if name != "t":
             variables[name] = (axes, values)
-    return dataset(variables, coordinates, units=units)
+    return dataset(variables, coordinates, units)
 
 
 def _second_axis(name: str) -> str:
@@ -210,14 +208,8 @@ def simulate(
         signals = _signals(plant, inputs, times)
         memory = plant.memory(inputs) if "z" not in signals and isinstance(plant, Remembering) else signals.get("z")
     every = {"t": times, "u": inputs, "z": memory, **signals}
-    return Simulation(
-        u=inputs,
-        y=signals["y"],
-        t=times,
-        z=memory,
-        signals={name: values for name, values in every.items() if values is not None},
-        units=units or {},
-    )
+    known = {name: values for name, values in every.items() if values is not None}
+    return Simulation(u=inputs, y=signals["y"], t=times, z=memory, signals=known, units=units or {})
 
 
 @runtime_checkable

@@ -119,18 +119,18 @@ class Sweep:
             name: ((*dims, *(f"{name}_{k}" for k in range(values.ndim - 1))), self._along_axes(values))
             for name, values in {**self.outputs, **self.arrays, **own}.items()
         }
-        return dataset(variables, coordinates, units={})
+        return dataset(variables, coordinates, {})
 
     @property
     def ranges(self) -> dict[str, dict[str, float]]:
         """Lowest, median and highest value of each output, and not_finite, the number of values that are left out."""
-        finite = {name: values[np.isfinite(values)] for name, values in self.outputs.items()}
-        return {
-            name: dict(zip(("lowest", "median", "highest"), np.quantile(values, [0.0, 0.5, 1.0]).tolist(), strict=True))
-            | {"not_finite": len(self) - values.size}
-            for name, values in finite.items()
-            if values.size
-        }
+        ranges = {}
+        for name, values in self.outputs.items():
+            if (finite := values[np.isfinite(values)]).size:
+                lowest, median, highest = np.quantile(finite, [0.0, 0.5, 1.0]).tolist()
+                extremes = {"lowest": lowest, "median": median, "highest": highest}
+                ranges[name] = {**extremes, "not_finite": len(self) - finite.size}
+        return ranges
 
     def summary(self) -> str:
         """Numbers of tasks that are done and that failed, the commonest errors, and the range of every output."""
@@ -341,11 +341,8 @@ class Fragility:
     covariance: FloatArray
 
     def __str__(self) -> str:
-        rows = {
-            "median": (self.median, *self.median_interval),
-            "dispersion": (self.dispersion, *self.dispersion_interval),
-        }
-        words = {name: f"{value:.3g} ({low:.3g} to {high:.3g})" for name, (value, low, high) in rows.items()}
+        numbers = {name: (vars(self)[name], *vars(self)[f"{name}_interval"]) for name in ("median", "dispersion")}
+        words = {name: f"{value:.3g} ({low:.3g} to {high:.3g})" for name, (value, low, high) in numbers.items()}
         return summary_text([f"Fragility: {self.intensities.size} intensities, {self.level:.0%} intervals"], words)
 
     def probability(self, intensities: npt.ArrayLike) -> FloatArray:
@@ -418,17 +415,9 @@ def fragility(
     numbers = np.array([np.exp(np.log(x).mean() - line[0] * dispersion), dispersion])
     factors = np.exp(special.ndtri(0.5 + 0.5 * level) * np.sqrt(np.diag(covariance)))
     low_high = np.transpose([numbers / factors, numbers * factors])
-    return Fragility(
-        median=numbers[0],
-        dispersion=dispersion,
-        median_interval=low_high[0],
-        dispersion_interval=low_high[1],
-        level=level,
-        covariance=covariance,
-        intensities=x,
-        n_exceeding=z,
-        n_records=n,
-    )
+    intervals = {"median_interval": low_high[0], "dispersion_interval": low_high[1]}
+    curve = {"median": numbers[0], "dispersion": dispersion, "covariance": covariance, **intervals}
+    return Fragility(**curve, level=level, intensities=x, n_exceeding=z, n_records=n)
 
 
 def _score(eta: FloatArray) -> FloatArray:
