@@ -12,13 +12,11 @@ from typing import IO, Any
 _SIGNALS = ("SIGINT", "SIGTERM", "SIGHUP")
 
 
-def write_text(path: str | Path, text: str) -> None:
-    """Write a text to a new file, then rename it to `path`; a failure leaves the old file."""
-    write_all({path: text})
+def write_all(contents: Mapping[Any, str | bytes]) -> None:
+    """Write texts and bytes to new files, then rename them to their paths; a failure leaves the old files.
 
-
-def write_all(contents: Mapping[str | Path, str | bytes]) -> None:
-    """Write texts and bytes as `write_text` does: all are written before one is renamed, and signals wait meanwhile."""
+    All are written before one is renamed, and signals wait meanwhile.
+    """
     with ExitStack() as last, ExitStack() as files:
         for path, content in contents.items():
             data = content.encode() if isinstance(content, str) else content

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from hysim._basics.atomic import write_text
+from hysim._basics.atomic import write_all
 from hysim._basics.frozen import FloatArray
 from hysim._basics.printing import frozen_result, summary_text
 from hysim._basics.results import model_of
@@ -63,8 +63,7 @@ class CSource:
         """Write name.h, name.c and name_main.c into a folder, which is made."""
         place = Path(folder).resolve()
         place.mkdir(parents=True, exist_ok=True)
-        for name, text in self._files.items():
-            write_text(place / name, text)
+        write_all({place / name: text for name, text in self._files.items()})
 
 
 def to_c(
@@ -137,31 +136,23 @@ def _texts(program: Program, name: str, kind: str, u0: float, y0: float) -> dict
     upper, is_model, is_timed = name.upper(), program.inputs == ("u",), math.isfinite(program.sample_time)
     defines = [f"#define {upper}_SAMPLE_TIME {program.sample_time!r} /* s */\n"] * is_timed
     defines += [f"#define {upper}_AHEAD {program.ahead} /* samples of the reference */\n"] * (not is_model)
-    texts = {
-        "name": name,
-        "NAME": upper,
-        "kind": kind,
-        "u0": f"{u0:g}",
-        "y0": f"{y0:g}",
-        "version": __version__,
+    n_state, has_start = program.state.size, bool(program.start)
+    texts = {"name": name, "NAME": upper, "kind": kind, "u0": f"{u0:g}", "y0": f"{y0:g}", "version": __version__}
+    texts |= {"n_state": str(n_state), "last": str(n_state - 1), "count": str(len(program.inputs))}
+    texts |= {"first": ", double u0" * has_start, "begin": ", u" * has_start, "output": f"the {program.output}"}
+    texts |= {
         "when": f"every {upper}_SAMPLE_TIME seconds" if is_timed else "for each sample of the input",
-        "n_state": str(program.state.size),
-        "last": str(program.state.size - 1),
         "defines": "".join(defines),
-        "first": ", double u0" if program.start else "",
-        "begin": ", u" if program.start else "",
         "arguments": ", ".join(f"double {each}" for each in program.inputs),
         "inputs": ", ".join(program.inputs),
-        "output": f"the {program.output}",
         "functions": program.source,
         "table": _c.table("parameters", program.parameters.tolist()),
-        "init": _init(program.state, bool(program.start)),
+        "init": _init(program.state, has_start),
         "formats": " ".join(["%lf"] * len(program.inputs)),
         "places": ", ".join(f"&{each}" for each in program.inputs),
-        "count": str(len(program.inputs)),
     }
     words = tomllib.loads((_FOLDER / "texts.toml").read_text(encoding="utf-8"))["model" if is_model else "controller"]
-    words |= {"begun": "The first sample will be `u0`."} if program.start else {}
+    words |= {"begun": "The first sample will be `u0`."} if has_start else {}
     return texts | {name: Template(text).substitute(texts) for name, text in words.items()}
 
 

@@ -19,7 +19,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 import hysim as hs
-from hysim._basics.atomic import write_text
+from hysim._basics.atomic import write_all
 from hysim._basics.frozen import FloatArray, items
 from hysim._basics.prefixes import label, printed
 from hysim._basics.results import model_of
@@ -115,7 +115,7 @@ def to_page(
     if size > LARGEST:
         samples = "" if record is None else f": give a record of fewer than {len(record)} samples, such as record[::2]"
         raise ValueError(f"the page would have {size} bytes, more than {LARGEST}{samples}")
-    write_text(page, text)
+    write_all({page: text})
     return page
 
 
@@ -164,23 +164,13 @@ def _model(name: str, shown: Shown, parts: Parts, record: Record | None) -> dict
     if shown.stack:
         parts.controls[:], node["stack"] = _stack(parts.controls, thing), True
     summary, equation = about(thing)
-    return {
-        "name": name,
-        "group": shown.group,
-        "about": summary,
-        "equation": equation,
-        "node": node,
-        "values": parts.values,
-        "controls": parts.controls,
-        "inputs": _inputs(amplitude, middle, parts.timed),
-        "kind": shown.kind,
-        "timed": parts.timed,
-        "labels": {
-            **{signal: label(units, signal) for signal in ("u", "y")},
-            "unit": {signal: printed(units.get(signal, "")) for signal in ("u", "y")},
-        },
-        "plane": plane_of(node),
-    }
+    words = {"name": name, "group": shown.group, "about": summary, "equation": equation}
+    model: dict[str, Any] = {**words, "node": node, "values": parts.values, "controls": parts.controls}
+    inputs = _inputs(amplitude, middle, parts.timed)
+    units_in_words = {signal: printed(units.get(signal, "")) for signal in "uy"}
+    labels = {**{signal: label(units, signal) for signal in "uy"}, "unit": units_in_words}
+    model |= {"inputs": inputs, "kind": shown.kind, "timed": parts.timed, "labels": labels}
+    return model | {"plane": plane_of(node)}
 
 
 def _inputs(amplitude: float, middle: float, timed: bool) -> list[dict[str, Any]]:
@@ -231,14 +221,9 @@ def _record(record: Record) -> dict[str, Any]:
         cuts = [] if loops.places is None else [place for place in loops.places.tolist() if place % 1.0]
         ranges = {"loading": _ranges(last.loading), "unloading": _ranges(last.unloading)}
         cycle = {"cuts": cuts, **ranges, "path": [last.path.start, last.path.stop]}
-    return {
-        "name": record.name or "record",
-        "python": 'hs.load("measured.csv")',
-        "u": _packed(record.u),
-        "y": _packed(record.y),
-        "cycle": cycle,
-        "sampleTime": None if record.t is None else float(np.mean(np.diff(record.t))),
-    }
+    names = {"name": record.name or "record", "python": 'hs.load("measured.csv")'}
+    step = None if record.t is None else float(np.mean(np.diff(record.t)))
+    return {**names, "u": _packed(record.u), "y": _packed(record.y), "cycle": cycle, "sampleTime": step}
 
 
 def _ranges(samples: Samples) -> list[list[int]]:
@@ -279,7 +264,7 @@ def presets() -> dict[str, Shown]:
 def explorer(path: str | Path) -> Path:
     """Write the page with a choice of families to an ``.html`` file, and return its path; else a ValueError."""
     page = checked_path(path)
-    write_text(page, _text())
+    write_all({page: _text()})
     return page
 
 
@@ -300,13 +285,8 @@ def _sums_and_materials() -> dict[str, Shown]:
     damper = hs.BoucWen(A=10.0, beta=2.0, gamma=2.0, feedthrough=0.2) + hs.Dashpot(c=0.02)
     steel = hs.JilesAtherton(Ms=1.6e6, a=1100.0, alpha=1.6e-3, k=400.0, c=0.2)
     static = hs.MaxwellSlip(stiffness=(200.0, 100.0, 50.0), slips=(0.2, 0.5, 1.0))
-    core = Shown(
-        static + hs.Dashpot(c=4.0) + hs.ExcessLoss(c=10.0),
-        (-1.0, 1.0),
-        {"u": "T", "y": "A/m"},
-        group=_GROUPS["magnetic"],
-        kind="sine",
-    )
+    field, units = static + hs.Dashpot(c=4.0) + hs.ExcessLoss(c=10.0), {"u": "T", "y": "A/m"}
+    core = Shown(field, (-1.0, 1.0), units, group=_GROUPS["magnetic"], kind="sine")
     benchmark = noel_schoukens_plant().law
     return {
         "Magnetic core: static, eddy current and excess field": core,

@@ -13,7 +13,7 @@ from typing import Any, ClassVar, Protocol, Self, runtime_checkable
 
 import numpy as np
 
-from hysim._basics.atomic import write_text
+from hysim._basics.atomic import write_all
 from hysim._basics.frozen import given_items, last_names
 from hysim._basics.results import model_of
 from hysim._names import MODULE_OF
@@ -51,7 +51,7 @@ def save(model: Any, path: str | Path, *, units: Mapping[str, str] | None = None
     ...     hs.load_model(f"{folder}/line.json")
     Line(offset=0.0, slope=0.1)
     """
-    write_text(path, to_json(model, units=units))
+    write_all({path: to_json(model, units=units)})
 
 
 def to_json(model: Any, *, units: Mapping[str, str] | None = None) -> str:

@@ -22,7 +22,7 @@ from matplotlib.colors import LinearSegmentedColormap, ListedColormap
 from matplotlib.figure import Figure
 from matplotlib.textpath import TextPath
 
-from hysim._basics.atomic import write_text
+from hysim._basics.atomic import write_all
 from hysim._basics.frozen import check_choice
 
 AxesArray = npt.NDArray[np.object_]
@@ -211,7 +211,7 @@ def to_svg(figure: Figure, *, name: str = "figure") -> str:
 def save_svg(figure: Figure, path: str | Path, *, name: str | None = None) -> None:
     """Write `to_svg` of a figure to a file; `name` is by default the name of the file."""
     path = Path(path)
-    write_text(path, to_svg(figure, name=path.stem if name is None else name))
+    write_all({path: to_svg(figure, name=path.stem if name is None else name)})
 
 
 def to_bytes(figure: Figure, form: str, *, name: str = "figure") -> bytes:
