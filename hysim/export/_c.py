@@ -273,12 +273,8 @@ def counters_used_elsewhere(tree: ast.FunctionDef) -> list[ast.For]:
     loops = [node for statement in tree.body for node in ast.walk(statement) if isinstance(node, ast.For)]
     outside = {name for statement in tree.body for name in _mentioned(statement)}
     _mentioned.cache_clear()
-    return [
-        loop
-        for loop in loops
-        if isinstance(loop.target, ast.Name)
-        and (loop.target.id in stored(loop.body) or loop.target.id in outside - {"_"})
-    ]
+    counters = [(loop, loop.target.id) for loop in loops if isinstance(loop.target, ast.Name)]
+    return [loop for loop, name in counters if name in outside - {"_"} or name in stored(loop.body)]
 
 
 def reads(node: ast.AST) -> set[str]:

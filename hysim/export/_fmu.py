@@ -178,22 +178,17 @@ def _source(program: Program, variables: Sequence["Variable"], version: str, tok
     if fields:
         tables |= {"FIELD_MINIMA": [each.lower for each in fields], "FIELD_MAXIMA": [each.upper for each in fields]}
     digest, sampled = hashlib.sha256(token.encode()).digest(), math.isfinite(program.sample_time)
+    names = {"output": program.output, "hysim": __version__, "step": program.step, "token": token}
+    sizes = {"n_inputs": n_inputs, "n_fields": n_fields, "n_parameters": program.parameters.size}
+    sizes |= {"n_state": program.state.size, "memory": program.memory}
     return _template("source.c").substitute(
+        {**names, **sizes},
         inputs=", ".join(program.inputs),
-        output=program.output,
-        hysim=__version__,
         functions=program.source.strip(),
-        n_inputs=n_inputs,
-        n_fields=n_fields,
-        n_parameters=program.parameters.size,
-        n_state=program.state.size,
-        memory=program.memory,
         is_tunable=int(bool(program.fields and program.memory)),
-        step=program.step,
         values=", ".join(f"(x)[{k}]" for k in range(n_inputs)),
         pack=f"{program.pack}((f), (p), (s))" if program.pack else "((void)0)",
         begin=f"{program.start}((p), (s), (u0))" if program.start else "((void)0)",
-        token=token,
         numbers=", ".join(number(float(int.from_bytes(digest[k : k + 6], "big"))) for k in (0, 6)),
         start=number(inputs[0].start or 0.0),
         more="#define FMU_HAS_START 1\n" * bool(program.start)
@@ -272,6 +267,9 @@ def base_unit(unit: str) -> dict[str, str] | None:
     return {name: str(exponent) for name, exponent in exponents.items() if exponent} | factor
 
 
+_ATTRIBUTES = ("name", "valueReference", "causality", "variability", "initial", "description")
+
+
 class Variable(NamedTuple):
     """A real variable: its name and value reference, its role in FMI, and its unit, start value and limits."""
 
@@ -288,15 +286,8 @@ class Variable(NamedTuple):
 
     def attributes(self) -> dict[str, str]:
         """Attributes that the XML of both versions contains."""
-        named = {
-            "name": self.name,
-            "valueReference": str(self.reference),
-            "causality": self.causality,
-            "variability": self.variability,
-            "initial": self.initial,
-            "description": self.description,
-        }
-        return {name: value for name, value in named.items() if value}
+        values = {**self._asdict(), "valueReference": str(self.reference)}
+        return {name: values[name] for name in _ATTRIBUTES if values[name]}
 
     def numbers(self) -> dict[str, str]:
         limits = {"min": self.lower, "max": self.upper}
@@ -332,30 +323,18 @@ def variables_of(program: Program, units: Mapping[str, str], u0: float) -> list[
 
 
 def _description(program: Program, variables: Sequence[Variable], name: str, version: str, token: str) -> str:
-    is_2, step, experiment, words = version == "2.0", "", "", _DELAY
+    step, experiment, words = "", "", _DELAY
     if math.isfinite(program.sample_time):
         step = f' fixedInternalStepSize="{program.sample_time!r}"'
         experiment = f'  <DefaultExperiment startTime="0.0" stepSize="{program.sample_time!r}" />\n'
         ahead = f" The reference is that of {program.ahead} samples later." if program.ahead else ""
         words = _SAMPLED + ahead
-    elements = (
-        f"    <ScalarVariable{_written(each.attributes())}>\n      <Real{_written(each.numbers())} />\n"
-        "    </ScalarVariable>\n"
-        if is_2
-        else f"    <Float64{_written(each.attributes() | each.numbers())} />\n"
-        for each in variables
-    )
-    return _template(f"fmi{version[0]}.xml").substitute(
-        name=name,
-        token=token,
-        description=words,
-        hysim=__version__,
-        step=step,
-        units=_units(variables),
-        experiment=experiment,
-        variables="".join(elements),
-        output=1 + len(program.inputs),
-    )
+    in_2, in_3 = "    <ScalarVariable{}>\n      <Real{} />\n    </ScalarVariable>\n", "    <Float64{}{} />\n"
+    form = in_2 if version == "2.0" else in_3
+    elements = "".join(form.format(_written(each.attributes()), _written(each.numbers())) for each in variables)
+    texts = {"name": name, "token": token, "description": words, "hysim": __version__, "step": step}
+    texts |= {"units": _units(variables), "experiment": experiment, "variables": elements}
+    return _template(f"fmi{version[0]}.xml").substitute(texts, output=1 + len(program.inputs))
 
 
 def _units(variables: Iterable[Variable]) -> str:

@@ -171,9 +171,8 @@ class Tape:
             template = OPERATIONS[operation].text
             written[place] = template.format(*map(text, operands))
             if uses[place] > 1 or any(template.count(f"{{{k}}}") > 1 for k in range(len(operands))):
-                declarations.append(
-                    f"    const {OPERATIONS[operation].c_type} t{place} = {_without_outer_parentheses(written[place])};"
-                )
+                c_type, value = OPERATIONS[operation].c_type, _without_outer_parentheses(written[place])
+                declarations.append(f"    const {c_type} t{place} = {value};")
                 written[place] = f"t{place}"
         return declarations, [text(number) for number in numbers]
 
@@ -248,9 +247,8 @@ def packing(law: Law, free: Iterable[str] | None = None) -> Packing:
         return Packing(fields, _row(parameters), _row(memory), tape)
     except UntraceableError as error:
         which = ", ".join(error.names)
-        raise ValueError(
-            f"the parameters of this {family} are no expressions of {which}: leave {which} out of free"
-        ) from None
+        words = f"the parameters of this {family} are no expressions of {which}: leave {which} out of free"
+        raise ValueError(words) from None
 
 
 def _row(table: FloatArray) -> tuple[Number, ...]:

@@ -153,12 +153,6 @@ class Parts:
     timed: bool = False
     sample_time: float = 1.0
 
-    def show(self, sliders: Sequence[Mapping[str, Any]], first: int, prefix: str) -> None:
-        """Add sliders for numbers from the place `first` on."""
-        for each in sliders:
-            places = [first + place for place in each["places"]]
-            self.controls.append({**each, "name": prefix + each["name"], "places": places})
-
 
 def node_of(thing: Any, u: FloatArray, parts: Parts, prefix: str = "") -> dict[str, Any]:
     """A model as the page takes it, its contents put into `parts`; TypeError if it consists of other than laws."""
@@ -171,7 +165,9 @@ def node_of(thing: Any, u: FloatArray, parts: Parts, prefix: str = "") -> dict[s
         return {"knots": [thing.u.tolist(), thing.y.tolist()], "name": "hs.SingleValued", "fields": []}
     first = len(parts.values)
     node, sliders = _law(thing, u, parts)
-    parts.show(sliders, first, prefix)
+    for each in sliders:
+        places = [first + place for place in each["places"]]
+        parts.controls.append({**each, "name": prefix + each["name"], "places": places})
     return node
 
 
@@ -180,10 +176,9 @@ def _law(thing: Any, u: FloatArray, parts: Parts) -> tuple[dict[str, Any], list[
     coarse = u[:: max(1, len(u) // FEW)]
     law = _at(thing, parts.sample_time * (len(u) - 1) / (len(coarse) - 1))
     if not isinstance(law, Law):
-        raise TypeError(
-            f"a page takes a law, or a sum or cascade of laws, got {type(thing).__name__}: plants and controllers "
-            "are exported by hysim.to_c and hysim.to_fmu; a law with channels is shown as .at(T=...)"
-        )
+        others = "plants and controllers are exported by hysim.to_c and hysim.to_fmu"
+        advice = f"{others}; a law with channels is shown as .at(T=...)"
+        raise TypeError(f"a page takes a law, or a sum or cascade of laws, got {type(thing).__name__}: {advice}")
     node, names = _node(law, type(thing), parts), list(law.scalars)
     free = [names[place] for place in node["free"] if names[place] != _CLOCK]
     parts.timed |= law is not thing
@@ -213,20 +208,13 @@ def _node(law: Law, family: type, parts: Parts) -> dict[str, Any]:
         parts.modules[kernels.name] = module_of(kernels)
     parts.packs.append(packed.to_js(f"pack{len(parts.packs)}"))
     parts.values += [float(value) for value in law.scalars.values()]
-    return {
-        "kind": family.__name__,
-        "name": _name(family),
-        "module": kernels.name,
-        "pack": len(parts.packs) - 1,
-        "sizes": [len(packed.parameters), len(packed.memory)],
-        "work": general.startable().state.size - len(packed.memory),
-        "first": first,
-        "free": [names.index(name) for name in packed.fields],
-        "output": output_of(family),
-        **({} if law.u0 is None else {"u0": law.u0}),
-        **_plays(law, kernels.step),
-        **_printed(law, first),
-    }
+    n_memory = len(packed.memory)
+    names_of = {"kind": family.__name__, "name": _name(family), "module": kernels.name}
+    node: dict[str, Any] = {**names_of, "pack": len(parts.packs) - 1, "sizes": [len(packed.parameters), n_memory]}
+    node |= {"work": general.startable().state.size - n_memory, "first": first}
+    node |= {"free": [names.index(name) for name in packed.fields], "output": output_of(family)}
+    node |= {} if law.u0 is None else {"u0": law.u0}
+    return node | _plays(law, kernels.step) | _printed(law, first)
 
 
 def _plays(law: Law, step: Callable[..., float]) -> dict[str, Any]:

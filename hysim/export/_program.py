@@ -116,9 +116,8 @@ def _arguments(source: Routine, count: int) -> list[ast.arg]:
     if arguments.vararg or arguments.kwarg or arguments.kwonlyargs or arguments.defaults or arguments.posonlyargs:
         raise source.refusal(source.tree, "a function takes positional arguments without defaults")
     if len(arguments.args) != count:
-        raise source.refusal(
-            source.tree, f"{source.function.__name__} takes {len(arguments.args)} arguments, not {count}"
-        )
+        numbers = f"{len(arguments.args)} arguments, not {count}"
+        raise source.refusal(source.tree, f"{source.function.__name__} takes {numbers}")
     return arguments.args
 
 
@@ -221,13 +220,9 @@ def program_of(
             return _of_model(thing.startable(sample_time), timed)
         # placed: its state is completed where the program runs, from its numbers there
         program = _of_model(law.placed(None).startable(sample_time), timed)
-        return replace(
-            program,
-            source=program.source + "\n" + free.to_c("pack"),
-            fields=tuple(Field(name, law.scalars[name], unit=field_unit(law, name)) for name in free.fields),
-            pack="pack",
-            memory=len(free.memory),
-        )
+        source = f"{program.source}\n{free.to_c('pack')}"
+        fields = tuple(Field(name, law.scalars[name], unit=field_unit(law, name)) for name in free.fields)
+        return replace(program, source=source, fields=fields, pack="pack", memory=len(free.memory))
     if isinstance(thing, Controller):
         if isinstance(thing, InverseFeedforward) and not thing.dynamic:
             begin = start_of(thing, math.inf, u0, y0)
@@ -266,16 +261,10 @@ def start_of(thing: Any, sample_time: float, u0: float | None, y0: float | None)
 def _of_model(model: Startable, sample_time: float | None) -> Program:
     sizes = model.parameters.size, model.state.size
     source, has_start = entries(model.step, model.start, sizes)
-    return Program(
-        source=source,
-        inputs=_LAW,
-        output="y",
-        parameters=model.parameters,
-        state=model.state,
-        start="start" if has_start else "",
-        memory=model.state.size,
-        sample_time=math.nan if sample_time is None else sample_time,
-    )
+    numbers: dict[str, Any] = {"parameters": model.parameters, "state": model.state, "memory": model.state.size}
+    step = math.nan if sample_time is None else sample_time
+    start = "start" if has_start else ""
+    return Program(source=source, inputs=_LAW, output="y", start=start, sample_time=step, **numbers)
 
 
 def _of_controller(controller: Controller, sample_time: float, u0: float, y0: float) -> Program:
@@ -284,16 +273,10 @@ def _of_controller(controller: Controller, sample_time: float, u0: float, y0: fl
     function = translation.function(guarded, (Known(plain(step)), *_VECTORS, Scalar.DOUBLE, Scalar.DOUBLE))
     function = function._replace(parameters=function.parameters[1:])
     inputs = _FEEDFORWARD if isinstance(controller, InverseFeedforward) else _CONTROLLER
-    return Program(
-        source=translation.text() + "\n" + _entry("step", function, inputs, (parameters.size, state.size), _CONTROLLER),
-        inputs=inputs,
-        output="command",
-        parameters=parameters,
-        state=state,
-        memory=state.size,
-        sample_time=sample_time,
-        ahead=preview(controller, sample_time),
-    )
+    entry = _entry("step", function, inputs, (parameters.size, state.size), _CONTROLLER)
+    numbers: dict[str, Any] = {"parameters": parameters, "state": state, "memory": state.size}
+    times: dict[str, Any] = {"sample_time": sample_time, "ahead": preview(controller, sample_time)}
+    return Program(source=f"{translation.text()}\n{entry}", inputs=inputs, output="command", **numbers, **times)
 
 
 def entries(step: Step, start: Start, sizes: tuple[int, int] | None = None) -> tuple[str, bool]:
