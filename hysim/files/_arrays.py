@@ -210,18 +210,10 @@ def micromag(file: BinaryIO) -> Arrays:
     values = np.array(rows, dtype=float)
     system = next((line for line in lines if line.startswith("Units of measure")), "").split()
     units = next((each for name, each in _MICROMAG_UNITS.items() if name in map(str.lower, system)), (None, None))
+    unit_of = dict(zip(_MEASURED, units * 2, strict=True))
     names = (*_MEASURED[:2], "temperature") if values.shape[1] == 3 else _MEASURED
-    arrays = [
-        Array(
-            name,
-            (len(values),),
-            NUMBERS,
-            8,
-            partial(values[:, k].copy),
-            units[k % 2] if name != "temperature" else None,
-        )
-        for k, name in enumerate(names[: values.shape[1]])
-    ]
+    columns = zip(names, values.T, strict=False)
+    arrays = [Array(name, (len(each),), NUMBERS, 8, each.copy, unit_of.get(name)) for name, each in columns]
     return with_notes(arrays, "a MicroMag file")
 
 
@@ -251,10 +243,8 @@ def _entry(archive: zipfile.ZipFile, entry: zipfile.ZipInfo) -> Array:
     is_plain = is_plain and not entry.flag_bits & 1
     require(is_plain, f"array {shown(label)} is encrypted or packed in another way than NumPy does: save it anew")
     array, length, rest = _array(label, partial(archive.open, entry), entry.file_size)
-    require(
-        array.kind != NUMBERS or length == rest,
-        f"array {shown(label)} is damaged: its header says {length:,} bytes of numbers, the archive {rest:,}",
-    )
+    sizes = f"its header says {length:,} bytes of numbers, the archive {rest:,}"
+    require(array.kind != NUMBERS or length == rest, f"array {shown(label)} is damaged: {sizes}")
     return array
 
 

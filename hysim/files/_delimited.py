@@ -311,12 +311,9 @@ def delimited(text: Text, delimiter: str | None, decimal: str | None, thousands:
     require(head < n_lines, "there is a header, but no sample")
     above = list(itertools.islice(itertools.chain.from_iterable(each.texts for each in text.lines()), first - 1))
     names = signs.names(lines[0]) if has_header else _commented(above, width, signs)
-    is_named = len(names) == width
-    require(
-        is_named,
-        f"line {first} names {len(names)} columns, most lines below have {width} cells; if it is part of a header "
-        "above the names, pass its number of lines as skip=",
-    )
+    advice = "if it is part of a header above the names, pass its number of lines as skip="
+    sizes = f"names {len(names)} columns, most lines below have {width} cells"
+    require(len(names) == width, f"line {first} {sizes}; {advice}")
     columns = [Column(place, *heading(label)) for place, label in enumerate(names)]
     if has_units:
         columns = [c._replace(unit=c.unit or _unit(cell)) for c, cell in zip(columns, rows[1], strict=True)]
@@ -362,16 +359,13 @@ def _heads(rows: list[list[str]], below: list[list[str]], line: int, signs: Sign
     if not numeric:  # nothing below to compare with
         kinds_above = [signs.kind(cell) for cell in rows[0]]
         return "text" in kinds_above or "number" not in kinds_above, False
-    kinds_of = [
-        {place: signs.kind(cell) for place, cell in enumerate(row) if len(row) != width or place in numeric}
-        for row in rows
-    ]
+    looked_at = [{*range(len(row))} if len(row) != width else numeric for row in rows]
+    kinds_of = [{k: signs.kind(row[k]) for k in sorted(places)} for row, places in zip(rows, looked_at, strict=True)]
     texts, counts = ([place for place, kind in kinds_of[0].items() if kind == one] for one in ("text", "number"))
     if texts and counts:
-        raise ValueError(
-            f"line {line} is half a header: column {counts[0]} holds the number {rows[0][counts[0]]!r}, column "
-            f"{texts[0]} the text {rows[0][texts[0]]!r}; name every column, or begin the line with #"
-        )
+        number, text = (f"{rows[0][place]!r}" for place in (counts[0], texts[0]))
+        cells = f"column {counts[0]} holds the number {number}, column {texts[0]} the text {text}"
+        raise ValueError(f"line {line} is half a header: {cells}; name every column, or begin the line with #")
     has_units = bool(texts) and len(rows[1]) == width and set(kinds_of[1].values()) == {"text"}
     return bool(texts), has_units
 

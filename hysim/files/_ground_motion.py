@@ -111,11 +111,10 @@ class NumberList(NamedTuple):
         """Raise a ValueError unless every line but the last has as many numbers as the first."""
         first = self.widths[0]
         for width, line in zip(self.widths, self.lines, strict=True):
-            require(
-                width == first or (width < first and line == self.lines[-1]),
-                f"line {line}: expected {first} numbers as in line {self.lines[0]}, got {width}; if the lines "
-                f"above belong to the header, pass skip={line - 1}",
-            )
+            is_sound = width == first or (width < first and line == self.lines[-1])
+            numbers = f"expected {first} numbers as in line {self.lines[0]}, got {width}"
+            advice = f"if the lines above belong to the header, pass skip={line - 1}"
+            require(is_sound, f"line {line}: {numbers}; {advice}")
 
 
 class _Choice(NamedTuple):
@@ -202,9 +201,8 @@ def load_ground_motion(
     is_step = sample_time is None or 0.0 < sample_time < np.inf
     require(is_step, f"sample_time must be positive and finite, got {sample_time}")
     require(sample_time is None or t is None, "give either sample_time or the column t, not both")
-    options_of_a_text(delimiter, decimal, None, skip, None)
+    for_text = options_of_a_text(delimiter, decimal, None, skip, encoding)
     choice = _Choice(t, acceleration, sample_time, units)
-    for_text = {"delimiter": delimiter, "decimal": decimal, "encoding": encoding}
     with opened(path) as source:
         if source.format == "text":
             lines = Text(source.content, source.name, source.encoding or encoding).whole()
@@ -243,11 +241,8 @@ def _of_text(lines: list[str], choice: _Choice, skip: int, delimiter: str | None
     if not by_column and (blocks := cosmos_blocks(lines, skip)):
         block, line = blocks[0], blocks[0].line
         numbers = ", ".join(str(each.line) for each in blocks)
-        require(
-            len(blocks) == 1,
-            f"the file holds {len(blocks)} accelerations, in lines {numbers}: save each to a file, or pass the number "
-            "of lines above the last one as skip=",
-        )
+        advice = "save each to a file, or pass the number of lines above the last one as skip="
+        require(len(blocks) == 1, f"the file holds {len(blocks)} accelerations, in lines {numbers}: {advice}")
         unit = choice.units or stated_unit(lines[line - 1])
         require(unit is not None, f"line {line} states no unit of its accelerations: pass units=")
         below = lines[:line] + list(takewhile(_NUMBERS_ONLY.fullmatch, lines[line:]))
@@ -264,9 +259,8 @@ def _of_text(lines: list[str], choice: _Choice, skip: int, delimiter: str | None
         require(by_column or len(table.labels) > 1, "there is no column of times beside the accelerations")
     except ValueError as error:
         if not by_column and (count := _count_in_list(lines, decimal, skip)):
-            raise UnreadableError(
-                f"{error}; if these are {count} accelerations in reading order, pass their sample_time="
-            ) from None
+            advice = f"if these are {count} accelerations in reading order, pass their sample_time="
+            raise UnreadableError(f"{error}; {advice}") from None
         raise
     return _of_table(table, choice)
 
@@ -310,10 +304,8 @@ def _of_stated(
 def _in_stated_unit(numbers: NumberList, choice: _Choice, unit: str) -> FloatArray:
     words = {word.upper() for word in re.findall(r"[A-Za-z]+", numbers.header)}
     other = next((word for word in ("VELOCITY", "DISPLACEMENT") if word in words), None)
-    require(
-        other is None or any(word.startswith("ACC") for word in words),
-        f"the header says {other}: load the file of the acceleration, which PEER calls .AT2",
-    )
+    is_acceleration = other is None or any(word.startswith("ACC") for word in words)
+    require(is_acceleration, f"the header says {other}: load the file of the acceleration, which PEER calls .AT2")
     return in_si(numbers.values, choice.units or stated_unit(numbers.header) or unit)
 
 
@@ -323,12 +315,9 @@ def _check_no_times(numbers: NumberList) -> None:
     if width == 1 or numbers.widths[-1] != width or n_lines < _FEW_LINES:
         return
     first = numbers.values[::width]
-    increases = bool((np.diff(first) > 0.0).all())
-    require(
-        not (increases and (n_lines >= _MANY_LINES or step_if_even(first))),
-        f"the first of {width} columns increases from line to line, as times do: leave out sample_time, or name the "
-        "column of the acceleration",
-    )
+    is_time = bool((np.diff(first) > 0.0).all()) and (n_lines >= _MANY_LINES or step_if_even(first))
+    advice = "leave out sample_time, or name the column of the acceleration"
+    require(not is_time, f"the first of {width} columns increases from line to line, as times do: {advice}")
 
 
 def _of_table(table: Table, choice: _Choice) -> _Motion:
@@ -387,18 +376,16 @@ def _in_seconds(times: FloatArray, unit: str) -> FloatArray:
 
 def _even(table: Table, times: FloatArray) -> tuple[float, float]:
     """First time and step of evenly spaced times; a ValueError names the place where they are not."""
-    advice = "sort the samples and remove repeated ones, or name the column of the acceleration and pass sample_time="
-    check_increasing(table, times, np.arange(times.size), advice)
+    given = "name the column of the acceleration and pass sample_time="
+    check_increasing(table, times, np.arange(times.size), f"sort the samples and remove repeated ones, or {given}")
     step = step_if_even(times)
     if step is None:
         steps = np.diff(times)
         usual = float(np.median(steps))
         k = int(np.argmax(np.abs(steps - usual))) + 1
-        raise ValueError(
-            f"{table.place(k)}: the time must be evenly spaced, got a step of {steps[k - 1]:.6g} s where most are "
-            f"{usual:.6g} s; interpolate it by hs.load(...).resample({usual:.4g}), or if only the times are wrong, "
-            "name the column of the acceleration and pass sample_time="
-        )
+        sizes = f"got a step of {steps[k - 1]:.6g} s where most are {usual:.6g} s"
+        advice = f"interpolate it by hs.load(...).resample({usual:.4g}), or if only the times are wrong, {given}"
+        raise ValueError(f"{table.place(k)}: the time must be evenly spaced, {sizes}; {advice}")
     decimal = float(f"{step:.6g}")
     return float(times[0]), decimal if abs(decimal - step) <= _SAME_DECIMAL * step else step
 
@@ -492,11 +479,9 @@ def _from_numbers_on(lines: list[str], samples: list[int]) -> list[int]:
             continue
         cells = [cell for cell in _BETWEEN.split(above) if cell]
         n_plain = sum(_NUMBER.fullmatch(cell) is not None for cell in cells)
-        require(
-            width == 1 or len(cells) != width or 2 * n_plain <= width,
-            f"line {place}: expected {width} numbers or a header, got {shown(above, _LONGEST)}; correct the number, "
-            "or begin the line with #",
-        )
+        is_header = width == 1 or len(cells) != width or 2 * n_plain <= width
+        got = f"expected {width} numbers or a header, got {shown(above, _LONGEST)}"
+        require(is_header, f"line {place}: {got}; correct the number, or begin the line with #")
         return samples[at:]
     return []
 
@@ -526,18 +511,14 @@ def _numbers(line: str, number: int) -> list[float]:
         match = _NUMBER.match(text, place)
         values.append(math.nan if match is None else _value(match))
         if match is None or not math.isfinite(values[-1]):
-            raise ValueError(
-                f"line {number}: expected finite numbers, got {shown(text, _LONGEST)}; correct the line, or if it "
-                f"belongs to the header, pass skip={number}"
-            )
+            advice = f"correct the line, or if it belongs to the header, pass skip={number}"
+            raise ValueError(f"line {number}: expected finite numbers, got {shown(text, _LONGEST)}; {advice}")
         between = _BETWEEN.match(text, match.end())
         place = between.end() if between else match.end()
         is_joined = between is None and text[place : place + 1] in (*_BEGIN,)
         is_clear = not match["whole"] and (match["exponent"] or match["bare"] or text[place : place + 1] in ("+", "-"))
-        require(
-            is_clear or not is_joined,
-            f"line {number}: it is not clear where the numbers end in {shown(text, _LONGEST)}: put blanks between them",
-        )
+        where = f"line {number}: it is not clear where the numbers end in {shown(text, _LONGEST)}"
+        require(is_clear or not is_joined, f"{where}: put blanks between them")
     return values
 
 

@@ -183,17 +183,12 @@ def load(
         if name is None:
             unstated = "" if source.format == "frame" else Path(source.name).stem
             name = unstated if table.notes.name is None else table.notes.name
-        records = tuple(
-            Record(
-                **{signal: chosen[signal] for signal in signals},
-                channels={label: chosen[label] if label in chosen else constants[label] for label in keys},
-                units=labels,
-                resolution=resolution,
-                name=name,
-            )
-            for chosen in (dict(zip(columns, values[:, part], strict=True)) for part in parts)
-        )
-    return records if on_missing == "split" else records[0]
+        records = list[Record]()
+        for part in parts:
+            chosen: dict[str, Any] = {**constants, **dict(zip(columns, values[:, part], strict=True))}
+            arrays, own = {name: chosen[name] for name in signals}, {label: chosen[label] for label in keys}
+            records.append(Record(**arrays, channels=own, units=labels, resolution=resolution, name=name))
+    return tuple(records) if on_missing == "split" else records[0]
 
 
 def options_of_a_text(
@@ -203,10 +198,9 @@ def options_of_a_text(
     require(delimiter is None or len(delimiter) == 1, f"delimiter must be one character, got {delimiter!r}")
     require(decimal in (None, *DECIMALS), f'decimal must be "." or ",", got {decimal!r}')
     require(skip >= 0, f"skip must be a number of lines, got {skip}")
-    require(
-        thousands is None or (thousands in (*THOUSANDS,) and thousands != decimal),
-        f"thousands must be a point, a comma, an apostrophe or a space that is not the decimal sign, got {thousands!r}",
-    )
+    is_sign = thousands is None or (thousands in (*THOUSANDS,) and thousands != decimal)
+    signs = "a point, a comma, an apostrophe or a space that is not the decimal sign"
+    require(is_sign, f"thousands must be {signs}, got {thousands!r}")
     return {
         "delimiter": delimiter, "decimal": decimal, "thousands": thousands, "skip": skip or None, "encoding": encoding,
     }  # fmt: skip
@@ -272,11 +266,9 @@ def _opened(name: str, file: BinaryIO, path: Path | None, encoding: str | None) 
     form = format_of(file.read(_HEAD))
     form = "text" if encoding and form != "model" else form
     size = file.seek(0, 2)
-    require(
-        size <= MOST_TEXT or (path is not None and form not in ("text", "micromag")),
-        f"{name} is too large: a text or a stream may have {MOST_TEXT:,} bytes, got {size}; cut it, or save its "
-        "columns as NPZ, MAT or HDF5 and pass the path",
-    )
+    is_small = size <= MOST_TEXT or (path is not None and form not in ("text", "micromag"))
+    advice = "cut it, or save its columns as NPZ, MAT or HDF5 and pass the path"
+    require(is_small, f"{name} is too large: a text or a stream may have {MOST_TEXT:,} bytes, got {size}; {advice}")
     file.seek(0)
     return Opened(name, form, file, path, encoding)
 

@@ -76,9 +76,8 @@ def save_record(record: Record, path: str | Path) -> None:
     form = _VARIABLE if Path(path).suffix.lower() == ".mat" else _PLAIN_NAME
     for name in varying:  # of which the file has no place for some, or would read them in another way
         if not form.fullmatch(name) or name in NOTES or name.endswith(UNITS):
-            raise ValueError(
-                f"{Path(path).name}: a column cannot be called {name!r}; rename the channel, with letters, digits and _"
-            )
+            advice = "rename the channel, with letters, digits and _"
+            raise ValueError(f"{Path(path).name}: a column cannot be called {name!r}; {advice}")
     channels = {name: name if name in varying else value for name, value in record.channels.items()}
     write_all({path: packed(columns, path, Notes(record.units, record.resolution, record.name, channels))})
 
@@ -202,14 +201,11 @@ def join_records(u: Record, y: Record) -> Record:
     if u.t is not None and y.t is not None and not np.array_equal(u.t, y.t):
         first, last = int(np.searchsorted(y.t, u.t[0])), int(np.searchsorted(y.t, u.t[-1], side="right"))
         if last - first < 2:
-            raise ValueError(
-                f"the output's times, {y.t[0]:g} to {y.t[-1]:g}, are not within the input's, {u.t[0]:g} to {u.t[-1]:g}"
-            )
+            output, input_ = (f"{each[0]:g} to {each[-1]:g}" for each in (y.t, u.t))
+            raise ValueError(f"the output's times, {output}, are not within the input's, {input_}")
         t = y.t[first:last]
         return replace(y[first:last], u=np.interp(t, u.t, u.u), t=t, units=units)
     if len(u) != len(y):
-        raise ValueError(
-            f"the input has {len(u)} samples and the output {len(y)}: without a time in both files the numbers must "
-            "agree"
-        )
+        sizes = f"the input has {len(u)} samples and the output {len(y)}"
+        raise ValueError(f"{sizes}: without a time in both files the numbers must agree")
     return replace(y, u=u.u, t=y.t if u.t is None else u.t, units=units)
