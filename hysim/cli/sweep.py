@@ -104,18 +104,8 @@ def sweep(
         task, space, seed, files = read(study)
         outputs.keep(files, [out, csv, plot])
         with _executor(dask, processes) as executor:
-            result = hs.sweep(
-                task,
-                space,
-                executor=executor,
-                workers=workers,
-                store=out,
-                shard=share,
-                merge=stores,
-                time_limit=time_limit,
-                seed=seed,
-                on_change=on_change,
-            )
+            run = functools.partial(hs.sweep, task, space, executor=executor, workers=workers, seed=seed)
+            result = run(store=out, shard=share, merge=stores, time_limit=time_limit, on_change=on_change)
     missing = [] if show else result.missing.tolist()
     contents: options.Files = {csv: result.to_csv, plot: lambda: _picture(result, of)}
     reached = show is not None or not result.errors

@@ -151,10 +151,8 @@ def _quantiles(name: str, distribution: Any) -> Any:
         return distribution.ppf
     with suppress(AttributeError):
         return distribution.icdf
-    raise TypeError(
-        f"the distribution of {name} must be a pair (low, high) or one of scipy.stats with its arguments, "
-        f"got {distribution!r}"
-    )
+    kinds = "a pair (low, high) or one of scipy.stats with its arguments"
+    raise TypeError(f"the distribution of {name} must be {kinds}, got {distribution!r}")
 
 
 def _column(name: str, values: Any) -> Column:

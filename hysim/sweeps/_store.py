@@ -33,7 +33,7 @@ from typing import Any, Literal, NamedTuple, TypeVar
 
 import numpy as np
 
-from hysim.sweeps._chunks import Column, Layout, Rows, Space, Table
+from hysim.sweeps._chunks import OWN_NAMES, Column, Layout, Rows, Space, Table
 
 T = TypeVar("T")
 
@@ -121,7 +121,6 @@ ON_CHANGE = ("error", "keep", "restart")
 # Seconds to wait for another's lock, chosen by hand: a second writer is refused at once; a reader waits for a commit; a
 # writer waits for readers, since rows that are finished would be lost.
 _FOR_A_WRITER, _FOR_A_COMMIT, _FOR_READERS = 0.25, 10.0, 60.0
-_OWN_COLUMNS = ("task", "seed", "seconds", "error")
 _LOCKED = errno.EAGAIN, "the store is locked: another process is writing to it"
 _TROUBLE = {
     sqlite3.SQLITE_BUSY: _LOCKED,
@@ -242,7 +241,7 @@ class Store:
             facts = study_of(dict(self._database.execute("SELECT name, value FROM study")))
             columns = {name for _, name, *_ in self._database.execute("PRAGMA table_info(results)")}
             outputs = [output.column for output in facts.layout if not (output.shape and facts.shards)]
-            if missing := {*_OWN_COLUMNS, *facts.parameters.values(), *outputs} - columns:  # SQLite takes it for text
+            if missing := {*OWN_NAMES, *facts.parameters.values(), *outputs} - columns:  # SQLite takes it for text
                 raise ValueError(f"it has no column {', '.join(map(repr, sorted(missing)))}")
         self._facts = facts
         return facts
@@ -259,26 +258,22 @@ class Store:
         if not changes or on_change == "restart":
             return not changes
         keep = "" if {"space", "seed"} & changes.keys() else 'on_change="keep" to keep the finished rows and go on, or '
-        raise ValueError(
-            f"{self.path} holds another study: {'; '.join(changes.values())}. Pass another store, or {keep}"
-            'on_change="restart" to begin again'
-        )
+        advice = f'Pass another store, or {keep}on_change="restart" to begin again'
+        raise ValueError(f"{self.path} holds another study: {'; '.join(changes.values())}. {advice}")
 
     def _create(self, identity: Mapping[str, str], space: Space, before: Study | None) -> None:
         for table in ("results", "study") if before is not None else ():
             self._database.execute(f"DROP TABLE {table}")
-        parameters = _distinct(space.columns, _OWN_COLUMNS)
+        parameters = _distinct(space.columns, OWN_NAMES)
+        own = "task INTEGER PRIMARY KEY, seed INTEGER, seconds, error TEXT"
         self._database.execute("CREATE TABLE study (name TEXT PRIMARY KEY, value TEXT)")
-        self._database.execute(
-            "CREATE TABLE results (task INTEGER PRIMARY KEY, seed INTEGER, seconds, error TEXT, "
-            f"{_quoted(parameters.values())})"
-        )
+        self._database.execute(f"CREATE TABLE results ({own}, {_quoted(parameters.values())})")
         kinds = {name: column.dtype.kind for name, column in space.columns.items()}
         axes = [(name, values.tolist()) for name, values in (space.axes or {}).items()] or None
         self._remember(Study(identity, space.n_tasks, parameters, kinds, axes))
 
     def _add_outputs(self, layout: Layout) -> None:
-        columns = _distinct(layout, (*_OWN_COLUMNS, *self.study.parameters.values()))
+        columns = _distinct(layout, (*OWN_NAMES, *self.study.parameters.values()))
         self._remember(self.study._replace(layout=[Output(name, layout[name], columns[name]) for name in layout]))
         for column in columns.values():
             self._database.execute(f"ALTER TABLE results ADD COLUMN {_quoted([column])}")

@@ -32,7 +32,7 @@ from hysim._basics.libraries import is_installed
 from hysim._basics.parallel import GLANCE, cores, processes, threads
 from hysim._basics.progress import Line, Progress, Reports, reports
 from hysim._release import __version__
-from hysim.sweeps._chunks import Chunk, Column, Rows, Space, Table, Task, computed, seeds, shown, space_of
+from hysim.sweeps._chunks import Chunk, Rows, Space, Table, Task, computed, seeds, shown, space_of
 from hysim.sweeps._result import Sweep, result_of
 from hysim.sweeps._store import ON_CHANGE, OnChange, Store, opened
 
@@ -106,12 +106,9 @@ def _computed_here(chunk: Chunk) -> list[Rows]:
 
 def identity(task: Callable[..., Any], space: Space, seed: int) -> dict[str, str]:
     """The facts that must not change between two calls that share a store, as short texts."""
-    return {
-        "task": _digest(_content(inspect.unwrap(task), ())),
-        "space": f"{space.n_tasks} tasks of {', '.join(space.columns)} ({_digest(dict(space.columns))})",
-        "seed": str(seed),
-        "hysim": __version__,
-    }
+    content = _digest(_content(inspect.unwrap(task), ()))
+    tasks = f"{space.n_tasks} tasks of {', '.join(space.columns)} ({_digest(dict(space.columns))})"
+    return {"task": content, "space": tasks, "seed": str(seed), "hysim": __version__}
 
 
 def _digest(value: Any) -> str:
@@ -234,7 +231,8 @@ def sweep(
             if rows and opened_store is not None:
                 opened_store.commit(rows, table.layout)
         with workers_of(executor, workers, task) as pool:
-            _Run(columns, own, table, opened_store, pool, progress or None, time_limit).run()
+            report = progress or (lambda done, total: None)
+            _Run(Chunk(own, columns), table, opened_store, pool, report, time_limit).run()
     return result_of(table, tasks, task_seeds, own)
 
 
@@ -287,18 +285,10 @@ class _Run:
     """One run of a study or share: tasks that remain, chunks that are being computed, and rows that are done."""
 
     def __init__(
-        self,
-        columns: Mapping[str, Column],
-        own: npt.NDArray[np.int64],
-        table: Table,
-        store: Store | None,
-        workers: Workers,
-        progress: Progress | None,
-        limit: float | None,
+        self, own: Chunk, table: Table, store: Store | None, workers: Workers, progress: Progress, limit: float | None
     ) -> None:
-        self.columns, self.table, self.store, self.workers = columns, table, store, workers
-        self.places, self.total = own[~table.done[own]], own.size
-        self.progress = progress or (lambda done, total: None)
+        self.columns, self.table, self.store, self.workers = own.columns, table, store, workers
+        self.places, self.total, self.progress = own.places[~table.done[own.places]], own.places.size, progress
         self.running: dict[Future[list[Rows]], int] = {}  # numbers of tasks
         self.sent, self.largest, self.seconds_a_task = 0, 0, 0.0
         self.done, self.n_chunks = self.total - self.places.size, 0
@@ -381,7 +371,5 @@ class _Run:
             self.progress(self.done, self.total)
         if lost is not None:
             error = CancelledError("it was cancelled") if lost.cancelled() else lost.exception()
-            raise OSError(
-                f"the executor lost a chunk of {self.running[lost]} tasks: {type(error).__name__}: {error}. "
-                f"{self.done} of {self.total} tasks are done"
-            ) from error
+            reason = f"{type(error).__name__}: {error}. {self.done} of {self.total} tasks are done"
+            raise OSError(f"the executor lost a chunk of {self.running[lost]} tasks: {reason}") from error
