@@ -23,12 +23,9 @@ def show_versions() -> None:
     >>> hs.show_versions()  # doctest: +ELLIPSIS
     hysim ...
     """
-    versions = {
-        "hysim": __version__,
-        "Python": f"{platform.python_version()} ({platform.python_implementation()}, {sys.byteorder} endian)",
-        "platform": platform.platform(),
-        **{name: _version(name) for name in DEPENDENCIES + EXTRAS},
-    }
+    python = f"{platform.python_version()} ({platform.python_implementation()}, {sys.byteorder} endian)"
+    versions = {"hysim": __version__, "Python": python, "platform": platform.platform()}
+    versions |= {name: _version(name) for name in DEPENDENCIES + EXTRAS}
     width = max(map(len, versions))
     print("\n".join(f"{name:<{width}}  {version}" for name, version in versions.items()))
 

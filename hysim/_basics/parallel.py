@@ -29,6 +29,8 @@ from hysim._basics.frozen import check_count
 from hysim._basics.progress import Progress, followed, silence
 
 T = TypeVar("T")
+Work = Callable[[int, int], None]
+"""A function that computes the items from a first one on, up to another one without it."""
 
 _LONGEST = 2_000_000  # samples to begin with, which take some tenths of a second
 _PIECE, _GROWTH = 0.2, 16.0  # seconds of a call of a kernel, and largest ratio of a call to the one before
@@ -45,14 +47,7 @@ def cores() -> int:
     return len(os.sched_getaffinity(0)) if sys.platform == "linux" else os.cpu_count() or 1
 
 
-def in_chunks(
-    work: Callable[[int, int], None],
-    n_items: int,
-    *,
-    workers: int | None = None,
-    minimum: int = 64,
-    n_samples: int = 1,
-) -> None:
+def in_chunks(work: Work, n_items: int, *, workers: int | None = None, minimum: int = 64, n_samples: int = 1) -> None:
     """Call `work(start, stop)` on several threads so that the calls cover `range(n_items)` once.
 
     A call computes the items from `start` to `stop - 1`. The number of threads is `workers`, by default one for each
@@ -87,7 +82,7 @@ def in_pieces(work: Callable[[slice], int], n_samples: int) -> int:
     return -1
 
 
-def _piece_by_piece(work: Callable[[int, int], None], start: int, stop: int, size: int) -> None:
+def _piece_by_piece(work: Work, start: int, stop: int, size: int) -> None:
     """Call `work` for pieces of `size` items, then of about `_PIECE` seconds, so that interrupts come between them."""
     while start < stop:
         begin, end = time.perf_counter(), min(start + size, stop)

@@ -92,10 +92,8 @@ def describing_function(
     """
     law = model_of(law)
     if not isinstance(law, _Stepped) or (isinstance(law, _Dynamic) and law.dynamic):
-        raise TypeError(
-            f"a describing function of the amplitude alone needs a law without time, got {type(law).__name__}; "
-            "for a transfer function see hysim.to_control"
-        )
+        needed = f"a describing function of the amplitude alone needs a law without time, got {type(law).__name__}"
+        raise TypeError(f"{needed}; for a transfer function see hysim.to_control")
     swings = read_only(amplitudes, "amplitudes", ndim=1)
     if not (swings > 0.0).all() or not math.isfinite(mean):
         raise ValueError(f"amplitudes must be positive, and the mean finite, got {swings.tolist()} and {mean}")
@@ -155,6 +153,9 @@ class StepMetrics:
     t98: float
 
 
+_REDUCED = ("overshoot", "residual_rms", "settling_time")
+
+
 @frozen_result
 class VibrationReduction:
     """The reduction of the vibration after a step by a loop, always three figures together.
@@ -174,21 +175,15 @@ class VibrationReduction:
     closed: StepMetrics
 
     def __str__(self) -> str:
-        figures = {
-            "overshoot": self.overshoot_reduction_percent,
-            "residual rms": self.residual_rms_reduction_percent,
-            "settling time": self.settling_time_reduction_percent,
-        }
+        figures = {name.replace("_", " "): vars(self)[f"{name}_reduction_percent"] for name in _REDUCED}
         words = (f"{name} {'undefined' if math.isnan(each) else f'{each:.2f} %'}" for name, each in figures.items())
         rows = {"open loop": _in_words(self.open), "closed loop": _in_words(self.closed)}
         return summary_text([f"VibrationReduction: {', '.join(words)}"], rows)
 
 
 def _in_words(response: StepMetrics) -> str:
-    return (
-        f"overshoot {response.overshoot:.2f} %, settled after {response.settling_time:.4g}, 98 % after "
-        f"{response.t98:.4g}"
-    )
+    times = f"settled after {response.settling_time:.4g}, 98 % after {response.t98:.4g}"
+    return f"overshoot {response.overshoot:.2f} %, {times}"
 
 
 def step_metrics(t: npt.ArrayLike, y: npt.ArrayLike) -> StepMetrics:
@@ -240,13 +235,11 @@ def vibration_reduction(
     opened, closed = step_metrics(t, y_open), step_metrics(t, y_closed)
     duration = 2.0 * math.log(1.0 / SETTLED) / decay_rate if decay_rate > 0.0 else math.nan
     residual_open, residual_closed = (_residual(t, y, opened.t98, duration) for y in (y_open, y_closed))
-    return VibrationReduction(
-        overshoot_reduction_percent=reduction_percent(opened.overshoot, closed.overshoot),
-        residual_rms_reduction_percent=reduction_percent(residual_open, residual_closed),
-        settling_time_reduction_percent=reduction_percent(opened.settling_time, closed.settling_time),
-        open=opened,
-        closed=closed,
-    )
+    times = opened.settling_time, closed.settling_time
+    pairs = (opened.overshoot, closed.overshoot), (residual_open, residual_closed), times
+    reductions = zip(_REDUCED, (reduction_percent(*pair) for pair in pairs), strict=True)
+    figures = {f"{name}_reduction_percent": percent for name, percent in reductions}
+    return VibrationReduction(**figures, open=opened, closed=closed)
 
 
 def reduction_percent(before: float, after: float) -> float:
