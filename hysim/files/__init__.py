@@ -1,13 +1,9 @@
 """Records from files and into files."""
 
-from hysim.files._ground_motion import column_names as column_names
-from hysim.files._ground_motion import is_at2 as is_at2
-from hysim.files._ground_motion import load_ground_motion as load_ground_motion
-from hysim.files._load import FileColumn as FileColumn
-from hysim.files._load import list_columns as list_columns
-from hysim.files._load import load as load
-from hysim.files._save import ending as ending
-from hysim.files._save import join_records as join_records
-from hysim.files._save import packed as packed
-from hysim.files._save import save_record as save_record
-from hysim.files._table import Notes as Notes
+from hysim.files._ground_motion import column_names, is_at2, load_ground_motion
+from hysim.files._load import FileColumn, list_columns, load
+from hysim.files._save import ending, join_records, packed, save_record
+from hysim.files._table import Notes
+
+__all__ = ["FileColumn", "Notes", "list_columns", "load", "load_ground_motion"]
+__all__ += ["column_names", "ending", "is_at2", "join_records", "packed", "save_record"]

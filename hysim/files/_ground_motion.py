@@ -30,17 +30,7 @@ from hysim._basics.frozen import FloatArray
 from hysim._basics.prefixes import power_of_ten
 from hysim.files._delimited import Text, delimited
 from hysim.files._load import Source, opened, options_of_a_text, table_of
-from hysim.files._table import (
-    COMMENTS,
-    Column,
-    Table,
-    UnreadableError,
-    check_complete,
-    check_increasing,
-    listed,
-    require,
-    shown,
-)
+from hysim.files._table import COMMENTS, Column, Table, check_complete, check_increasing, listed, require, shown
 from hysim.records import step_if_even
 from hysim.signals import sample_times
 
@@ -260,7 +250,7 @@ def _of_text(lines: list[str], choice: _Choice, skip: int, delimiter: str | None
     except ValueError as error:
         if not by_column and (count := _count_in_list(lines, decimal, skip)):
             advice = f"if these are {count} accelerations in reading order, pass their sample_time="
-            raise UnreadableError(f"{error}; {advice}") from None
+            raise ValueError(f"{error}; {advice}") from None
         raise
     return _of_table(table, choice)
 
@@ -376,15 +366,16 @@ def _in_seconds(times: FloatArray, unit: str) -> FloatArray:
 
 def _even(table: Table, times: FloatArray) -> tuple[float, float]:
     """First time and step of evenly spaced times; a ValueError names the place where they are not."""
-    given = "name the column of the acceleration and pass sample_time="
-    check_increasing(table, times, np.arange(times.size), f"sort the samples and remove repeated ones, or {given}")
+    by_step = "name the column of the acceleration and pass sample_time="
+    advice = f"sort the samples and remove repeated ones, or {by_step}"
+    check_increasing(table, times, np.arange(times.size), advice)
     step = step_if_even(times)
     if step is None:
         steps = np.diff(times)
         usual = float(np.median(steps))
         k = int(np.argmax(np.abs(steps - usual))) + 1
         sizes = f"got a step of {steps[k - 1]:.6g} s where most are {usual:.6g} s"
-        advice = f"interpolate it by hs.load(...).resample({usual:.4g}), or if only the times are wrong, {given}"
+        advice = f"interpolate it by hs.load(...).resample({usual:.4g}), or if only the times are wrong, {by_step}"
         raise ValueError(f"{table.place(k)}: the time must be evenly spaced, {sizes}; {advice}")
     decimal = float(f"{step:.6g}")
     return float(times[0]), decimal if abs(decimal - step) <= _SAME_DECIMAL * step else step

@@ -124,9 +124,8 @@ def check_increasing(table: Table, times: FloatArray, samples: npt.NDArray[np.in
     """Refuse times of some samples that do not increase, by the place of the first."""
     for k in np.flatnonzero(np.diff(times[samples]) <= 0.0)[:1]:
         before, after = samples[k : k + 2]
-        raise ValueError(
-            f"{table.place(after)}: time must increase, got {times[after]} after {times[before]}; {advice}"
-        )
+        order = f"time must increase, got {times[after]} after {times[before]}"
+        raise ValueError(f"{table.place(after)}: {order}; {advice}")
 
 
 def number_of(key: str, kind: str, *names: Sequence[str]) -> int | None:
