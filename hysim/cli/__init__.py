@@ -22,6 +22,7 @@ import click
 from click.shell_completion import shell_complete
 
 from hysim import __version__
+from hysim._basics.atomic import ENDING
 from hysim._basics.progress import silent
 from hysim._names import nearest
 from hysim.cli import options, outputs
@@ -232,8 +233,6 @@ def one_line(text: str) -> str:
 PATIENCE = 1.3
 """Seconds in which a command can end in order."""
 
-_NAMES = ("SIGINT", "SIGTERM", "SIGHUP")
-
 
 class Ended(BaseException):
     """A signal asks the process to end: unfinished files are removed on the way out, as after Ctrl-C."""
@@ -253,8 +252,7 @@ def _signals_handled() -> Iterator[None]:
     if threading.current_thread() is not threading.main_thread():
         yield
         return
-    names = [name for name in _NAMES if name in signal.Signals.__members__]
-    handlers = {signal.Signals[name]: signal.getsignal(signal.Signals[name]) for name in names}
+    handlers = {number: signal.getsignal(number) for number in ENDING}
     unhandled = [number for number, handler in handlers.items() if handler is signal.SIG_DFL]
     watched = [*unhandled, *(number for number, handler in handlers.items() if handler is signal.default_int_handler)]
     for number in unhandled:
