@@ -48,8 +48,8 @@ static double dahl_step(const double *parameters, double *state, double u)
 }
 """
 FIELDS = (
-    Field("stiffness", 2.0, 1e-4, 1e5, log=True, unit="y/u"),
-    Field("coulomb", 0.5, 1e-2, 1e2, log=True, unit="y"),
+    Field("stiffness", 2.0, 1e-4, 1e5, unit="y/u"),
+    Field("coulomb", 0.5, 1e-2, 1e2, unit="y"),
     Field("offset", 0.1, -math.inf, math.inf, unit="y"),
     Field("z0", 0.2, -1.0, 1.0, unit="y"),
 )

@@ -134,12 +134,10 @@ def page_text(models: Mapping[str, Shown], record: Record | None = None, *, titl
     time = 0.5 * _PERIOD * _BRANCHES / _SAMPLES
     described = [_model(name, shown, Parts(modules, packs, sample_time=time), record) for name, shown in models.items()]
     codes = {name: gzip.decompress(module) for name, module in modules.items()}  # smaller if compressed together
-    data = {
-        "models": described,
-        "modules": {name: len(code) for name, code in codes.items()},
-        "code": base64.b64encode(compressed(b"".join(codes.values()))).decode(),
-        "record": None if record is None else _record(record),
-    }
+    sizes = {name: len(code) for name, code in codes.items()}
+    joined = base64.b64encode(compressed(b"".join(codes.values()))).decode()
+    measured = None if record is None else _record(record)
+    data = {"models": described, "modules": sizes, "code": joined, "record": measured}
     folder = files("hysim.export").joinpath("page")
     lines = (line for name in _PARTS for line in folder.joinpath(f"{name}.js").read_text(encoding="utf-8").splitlines())
     return Template(folder.joinpath("page.html").read_text(encoding="utf-8")).substitute(

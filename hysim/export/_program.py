@@ -129,13 +129,12 @@ def _as_annotated(argument: ast.arg, type_: Type) -> Type:
 
 
 class Field(NamedTuple):
-    """A number that may be changed where the program runs; `lower` to `upper` is its box, `log` its scale."""
+    """A number that may be changed where the program runs, from `lower` to `upper`."""
 
     name: str
     value: float
     lower: float = -math.inf
     upper: float = math.inf
-    log: bool = False
     unit: str = ""
 
 

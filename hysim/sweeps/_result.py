@@ -189,17 +189,15 @@ def result_of(table: Table, space: Space, task_seeds: Column, asked: npt.NDArray
     for column in table.values.values():
         column[[*table.errors]] = np.nan
     values = {name: done(column) for name, column in table.values.items()}
+    study: dict[str, Any] = {"n_tasks": table.done.size, "missing": asked[~table.done[asked]], "axes": space.axes}
+    rows: dict[str, Any] = {"task": places, "seed": done(task_seeds), "seconds": done(table.seconds)}
     return Sweep(
         parameters={name: done(column) for name, column in space.columns.items()},
         outputs={name: column for name, column in values.items() if column.ndim == 1},
         arrays={name: column for name, column in values.items() if column.ndim > 1},
-        task=places,
-        seed=done(task_seeds),
-        seconds=done(table.seconds),
         errors=dict(sorted(table.errors.items())),
-        n_tasks=table.done.size,
-        missing=asked[~table.done[asked]],
-        axes=space.axes,
+        **rows,
+        **study,
     )
 
 
