@@ -106,14 +106,12 @@ class Record:
 
     def __str__(self) -> str:
         t, u, y = (self.units.get(signal, "") for signal in ("t", "u", "y"))
-        turns = int(self.reversals().size)
+        n = self.reversals().size
+        turned = f"{n} reversal{'' if n == 1 else 's'}"
         resolution = "" if self.resolution is None else f", resolution {quantity(self.resolution, y)}"
         time = "" if self.t is None else f"{extent(self.t, t)}, {self._step_in_words(t)}"
         title = f"Record {self.name}".rstrip() + f": {self.u.size} samples{', no time' * (self.t is None)}"
-        signals = {
-            "u": f"{extent(self.u, u)}, {turns} reversal{'s' * (turns != 1)}",
-            "y": extent(self.y, y) + resolution,
-        }
+        signals = {"u": f"{extent(self.u, u)}, {turned}", "y": extent(self.y, y) + resolution}
         channels = {name: extent(value, self.units.get(name, "")) for name, value in self.channels.items()}
         return summary_text([title], {"t": time, **signals, **channels})
 
@@ -266,9 +264,8 @@ class Record:
             raise ValueError(f"order must be at least 1, got {order}")
         cycles = complete_cycles(self.u, tolerance)
         if len(cycles) <= order:
-            raise ValueError(
-                f"a drift of order {order} needs {order + 1} complete cycles, the record has {len(cycles)}"
-            )
+            needed = f"a drift of order {order} needs {order + 1} complete cycles"
+            raise ValueError(f"{needed}, the record has {len(cycles)}")
         times = np.arange(float(len(self))) if self.t is None else self.t
         return dataclasses.replace(self, y=self.y - drift(cycles, self.u, self.y, times, order))
 
@@ -421,10 +418,8 @@ def _of_ordinary_size(record: Record, verb: str) -> Record:
     for name, values in (("input u", record.u), ("output y", record.y)):
         size = float(np.abs(values).max())
         if size and not 1.0 / _LARGEST <= size <= _LARGEST:
-            raise ValueError(
-                f"{verb} takes records between {1.0 / _LARGEST:g} and {_LARGEST:g} in size, got an {name} of "
-                f"{size:.3g}: convert it to another unit"
-            )
+            limits = f"between {1.0 / _LARGEST:g} and {_LARGEST:g} in size"
+            raise ValueError(f"{verb} takes records {limits}, got an {name} of {size:.3g}: convert it to another unit")
     return record
 
 
@@ -436,10 +431,9 @@ def as_record(value: Any, verb: str) -> Record | None:
     if table is None:
         return None
     if missing := [name for name in ("u", "y") if name not in table.labels]:
-        raise ValueError(
-            f"{verb} takes a table with the columns u and y, got a {table.kind} without {listed(missing)}, with "
-            f"{listed(table.labels)}: name the columns by hs.load(table, u=..., y=...)"
-        )
+        got = f"got a {table.kind} without {listed(missing)}, with {listed(table.labels)}"
+        advice = "name the columns by hs.load(table, u=..., y=...)"
+        raise ValueError(f"{verb} takes a table with the columns u and y, {got}: {advice}")
     signals = {name: table.read(table.labels.index(name)) for name in ("u", "y", "t") if name in table.labels}
     channels = channels_of(table)
     units = dict(table.units) | {name: unit for name, (_, unit) in signals.items() if unit}
@@ -477,11 +471,9 @@ def even_step(t: FloatArray) -> float:
         return step
     steps = np.diff(t)
     usual = f"{float(np.median(steps)):.4g}"
-    raise ValueError(
-        f"the time must be evenly spaced, got steps from {steps.min()} to {steps.max()}: pass "
-        f"record.resample({usual}), or t = {usual} * np.arange(n) if only the time stamps are wrong; on the command "
-        f"line --sample-time {usual}"
-    )
+    mend = f"pass record.resample({usual}), or t = {usual} * np.arange(n) if only the time stamps are wrong"
+    got = f"got steps from {steps.min()} to {steps.max()}"
+    raise ValueError(f"the time must be evenly spaced, {got}: {mend}; on the command line --sample-time {usual}")
 
 
 def step_if_even(t: FloatArray) -> float | None:

@@ -68,9 +68,8 @@ def read_only(
     """
     array = _as_float_array(values, name)
     if ndim is not None and array.ndim != ndim:
-        raise ValueError(
-            wrong_axes(name, array) if ndim == 1 else f"{name} must have {ndim} axes, got shape {array.shape}"
-        )
+        words = f"{name} must have {ndim} axes, got shape {array.shape}"
+        raise ValueError(wrong_axes(name, array) if ndim == 1 else words)
     if finite and np.count_nonzero(np.isfinite(array)) != array.size:  # all() of a short array takes twice as long
         place = tuple(int(i) for i in np.argwhere(~np.isfinite(array))[0])
         index = place[0] if len(place) == 1 else place
@@ -308,9 +307,8 @@ def check_whole(value: Any, name: str, *, least: int = 1) -> None:
 def whole_substeps(count: float) -> int:
     """Sub-steps of a sample, at least one; ValueError for more than a computer takes in a reasonable time."""
     if not count < _MOST_SUBSTEPS:
-        raise ValueError(
-            f"a sample would take {count:.3g} sub-steps: it is too long for the stiffness and damping over the mass"
-        )
+        reason = "it is too long for the stiffness and damping over the mass"
+        raise ValueError(f"a sample would take {count:.3g} sub-steps: {reason}")
     return max(1, math.ceil(count))
 
 

@@ -260,7 +260,7 @@ def processes(number: int, begin: Callable[..., None], *arguments: Any) -> Itera
     pool = ProcessPoolExecutor(min(number, most), context, _begin, (begin, arguments))
     try:
         with _one_blas_thread_if_loaded(), _without_signals():
-            pool.submit(_do_nothing)  # which starts the processes, where they are forked
+            pool.submit(os.getpid)  # which starts the processes, where they are forked
         yield pool
     except BaseException:
         pool.shutdown(wait=False, cancel_futures=True)
@@ -268,10 +268,6 @@ def processes(number: int, begin: Callable[..., None], *arguments: Any) -> Itera
             process.terminate()
         raise
     pool.shutdown()
-
-
-def _do_nothing() -> None:
-    pass
 
 
 @contextmanager

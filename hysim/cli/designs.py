@@ -132,10 +132,9 @@ def task(actuator: hs.Actuator, options: DesignOptions, within: Pair | None) -> 
     duration = options.duration or float(max([_SAMPLES * h, *decays]))
     longest = max(_CYCLES * period, duration) / h
     if longest > _CYCLES * _MOST_SAMPLES:
-        raise ValueError(
-            f"the loop would take {longest:.2g} samples: the plant is too slow for the sample time; give --frequency "
-            "and --duration, or a longer --sample-time"
-        )
+        advice = "give --frequency and --duration, or a longer --sample-time"
+        reason = "the plant is too slow for the sample time"
+        raise ValueError(f"the loop would take {longest:.2g} samples: {reason}; {advice}")
     step = 0.5 * (high - low) if options.step is None else options.step
     if not step or not math.isfinite(step):
         raise ValueError(f"--step must be a number that is not zero, got {step}")
@@ -202,9 +201,8 @@ def _reach(actuator: hs.Actuator, within: Pair | None) -> Pair:
     """The range that is reached at rest within the limits, less the margins."""
     span = within or (actuator.amplifier.limits if actuator.amplifier else None)
     if span is None or not np.isfinite(span).all():
-        raise ValueError(
-            "the range of the loop is unknown: give --range LOW,HIGH, or --limits LOW,HIGH, or --record FILE"
-        )
+        advice = "give --range LOW,HIGH, or --limits LOW,HIGH, or --record FILE"
+        raise ValueError(f"the range of the loop is unknown: {advice}")
     u = hs.signals.triangle(float(span[0]), float(span[1]), cycles=2, samples_per_cycle=2 * _SAMPLES)
     y = replace(actuator, amplifier=None).dc_gain * actuator.level(u)[-2 * _SAMPLES :]
     margin = _MARGIN * float(np.ptp(y))

@@ -431,17 +431,16 @@ class MagneticMetrics:
         is_si, initial, largest = (u, y) == ("A/m", "T"), self.initial_permeability, self.maximum_permeability
         density = "J/m^3" if is_si else f"{y} {u}"
         lines = [f"MagneticMetrics: {self.energy:.4g} {density} a cycle at {self.peak_induction:.4g} {y}"]
+        permeability = f"amplitude {self.amplitude_permeability:.4g}, largest {self.largest_permeability:.4g}"
+        ends = f"{self.end_width:.2g} {y} wide near the ends, gap {self.closure_gap:.2g} {y}"
         rows = {
             "coercivity": f"{self.coercivity:.4g} {u}",
             "remanence": f"{self.remanence:.4g} {y}",
             "peak": f"{self.peak_field:.4g} {u}",
-            "permeability": f"amplitude {self.amplitude_permeability:.4g}, largest {self.largest_permeability:.4g}"
-            if is_si
-            else "",
+            "permeability": permeability if is_si else "",
             "initial curve": f"from {initial:.4g}, at most {largest:.4g}" if is_si and not math.isnan(initial) else "",
             "slope": f"{self.saturated_slope:.4g} {y}/{f'({u})' if '/' in u else u} near the ends",
-            "closure": f"{self.closure}: {self.end_width:.2g} {y} wide near the ends, gap {self.closure_gap:.2g} "
-            f"{y}, noise {self.noise:.2g} {y}",
+            "closure": f"{self.closure}: {ends}, noise {self.noise:.2g} {y}",
         }
         return summary_text(lines, rows)
 
