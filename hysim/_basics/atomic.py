@@ -15,10 +15,7 @@ ENDING = tuple(signal.Signals[name] for name in _NAMES if name in signal.Signals
 
 
 def write_all(contents: Mapping[Any, str | bytes]) -> None:
-    """Write texts and bytes to new files, then rename them to their paths; a failure leaves the old files.
-
-    All are written before one is renamed, and signals wait meanwhile.
-    """
+    """Write new files, all before one is renamed to its path; a failure leaves the old ones, and signals wait."""
     with ExitStack() as last, ExitStack() as files:
         for path, content in contents.items():
             data = content.encode() if isinstance(content, str) else content
