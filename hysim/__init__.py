@@ -3,8 +3,8 @@
 import importlib
 from typing import Any
 
-from hysim._names import MODULE_OF, meant
-from hysim._release import __version__ as __version__
+from hysim._basics.names import MODULE_OF, meant
+from hysim._basics.release import __version__ as __version__
 
 __all__ = ["__version__", *MODULE_OF]
 

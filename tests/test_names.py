@@ -13,7 +13,7 @@ from strategies import refused
 
 import hysim
 import hysim as hs
-from hysim._names import MODULE_OF, meant, nearest
+from hysim._basics.names import MODULE_OF, meant, nearest
 from hysim.models.model import candidates, candidates_named, every_family, family_named
 
 RECORD = hs.datasets.table1()
@@ -122,7 +122,8 @@ def test_the_bare_import_loads_the_standard_library_only():
     foreign = {name.split(".")[0] for name in loaded} - sys.stdlib_module_names - {"hysim", "__main__"}
     site = {name for name in foreign if not name.startswith(("_", "sitecustomize", "usercustomize"))}
     assert site == set()
-    assert [name for name in loaded if name.startswith("hysim")] == ["hysim", "hysim._names", "hysim._release"]
+    own = [name for name in loaded if name.startswith("hysim.")]
+    assert own == ["hysim._basics", "hysim._basics.names", "hysim._basics.release"]
 
 
 @pytest.mark.parametrize("name", [name for name in hysim.__all__ if not name.startswith("__")])

@@ -14,8 +14,8 @@ from typing import Any, TypeVar, dataclass_transform
 import numpy as np
 import numpy.typing as npt
 
+from hysim._basics.names import among, meant
 from hysim._basics.results import model_of
-from hysim._names import among, meant
 
 FloatArray = npt.NDArray[np.float64]
 Positive = typing.Annotated[float, "positive"]

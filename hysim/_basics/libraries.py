@@ -5,7 +5,7 @@ import platform
 import sys
 from typing import Any
 
-from hysim._release import __version__
+from hysim._basics.release import __version__
 
 DEPENDENCIES = ("numpy", "scipy", "numba", "matplotlib", "pysindy", "control", "threadpoolctl", "click", "joblib")
 EXTRAS = (

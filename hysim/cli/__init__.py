@@ -23,8 +23,8 @@ from click.shell_completion import shell_complete
 
 from hysim import __version__
 from hysim._basics.atomic import ENDING
+from hysim._basics.names import nearest
 from hysim._basics.progress import silent
-from hysim._names import nearest
 from hysim.cli import options, outputs
 from hysim.cli.options import flag, suggestion
 from hysim.cli.outputs import in_shell_words

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Annotated, Any, Literal, Protocol, runtime_checkable
 
 import hysim as hs
-from hysim._names import MODULE_OF
+from hysim._basics.names import MODULE_OF
 from hysim.cli import options
 
 _PLANTS = ("oscillator", "actuator")

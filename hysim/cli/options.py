@@ -31,7 +31,7 @@ from typing import Annotated, Any, Literal, NamedTuple, TypeVar
 import click
 from click.shell_completion import CompletionItem
 
-from hysim._names import nearest
+from hysim._basics.names import nearest
 
 T = TypeVar("T")
 Files = Mapping[str | None, Callable[[], Any]]

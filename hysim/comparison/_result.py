@@ -10,8 +10,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from hysim._basics.frozen import FloatArray, check_choice, items
+from hysim._basics.names import among
 from hysim._basics.printing import aligned, bic_in_words, csv_text, folded, frozen_result, listed, summary_text
-from hysim._names import among
 from hysim.comparison._verdict import Contrast, contrasts
 from hysim.identification.doubts import CONSTANT, SWAPPED
 from hysim.interop import frame, heading

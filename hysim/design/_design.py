@@ -10,9 +10,9 @@ import numpy as np
 import numpy.typing as npt
 
 from hysim._basics.frozen import FloatArray, check_positive, read_only
+from hysim._basics.names import among
 from hysim._basics.printing import frozen_result, summary_text
 from hysim._basics.results import model_of
-from hysim._names import among
 from hysim.design import _inputs as shapes
 from hysim.design._inputs import InputLimits
 from hysim.identification.likelihood import Expected, density

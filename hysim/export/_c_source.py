@@ -12,8 +12,8 @@ import numpy as np
 from hysim._basics.atomic import write_all
 from hysim._basics.frozen import FloatArray
 from hysim._basics.printing import frozen_result, summary_text
+from hysim._basics.release import __version__
 from hysim._basics.results import model_of
-from hysim._release import __version__
 from hysim.errors import warn_unsafe
 from hysim.export import _c
 from hysim.export._program import Program, program_of, start_of

@@ -16,8 +16,8 @@ from xml.sax.saxutils import quoteattr
 from hysim._basics.atomic import write_all
 from hysim._basics.frozen import check_choice
 from hysim._basics.prefixes import prefixed
+from hysim._basics.release import __version__
 from hysim._basics.results import model_of
-from hysim._release import __version__
 from hysim.errors import warn_unsafe
 from hysim.export._c import number, table
 from hysim.export._compilers import TARGETS, Target, compiler, shared_library, universal

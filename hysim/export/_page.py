@@ -22,10 +22,10 @@ import hysim as hs
 from hysim._basics.atomic import write_all
 from hysim._basics.frozen import FloatArray, items
 from hysim._basics.prefixes import label, printed
+from hysim._basics.release import __version__
 from hysim._basics.results import model_of
 from hysim._columns.excursions import measured_cycles
 from hysim._columns.turning import TOLERANCE, Samples
-from hysim._release import __version__
 from hysim.benchmarks import noel_schoukens_plant
 from hysim.export._compilers import compressed
 from hysim.export._page_model import Parts, about, heading, node_of, plane_of, rounded, slider

@@ -12,7 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from hysim._basics.frozen import FloatArray
-from hysim._names import meant
+from hysim._basics.names import meant
 from hysim.interop import ForeignTable
 
 _LONGEST_REASON = 200  # letters

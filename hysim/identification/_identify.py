@@ -7,7 +7,7 @@ The model that is returned has the filter of its input, the start of its record,
 """
 
 import inspect
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import MISSING, fields, replace
 from typing import Any, Literal, Protocol, runtime_checkable
 
@@ -39,6 +39,7 @@ from hysim.models.dependent import Dependent, on_record
 from hysim.models.dependent_structure import DependentStructure
 from hysim.models.model import family_named, is_identifiable
 from hysim.models.protocols import (
+    Containing,
     Direct,
     Identifiable,
     Offering,
@@ -48,10 +49,9 @@ from hysim.models.protocols import (
     Rescalable,
     needs_time,
     placed,
+    with_law,
 )
 from hysim.models.search_space import Freedom
-from hysim.plants.actuator import Actuator
-from hysim.plants.multi_input_actuator import MultiInputActuator
 from hysim.records import Record, several
 from hysim.simulation import free_run
 
@@ -460,13 +460,13 @@ def _behind(front: ReversalFilter | None, model: Any) -> Any:
     """A model after a filter of its input; in an actuator the filter of the voltage stands in front of the law."""
     if front is None:
         return model
-    if isinstance(model, Actuator) and model.amplifier is not None:
-        front = ReversalFilter(threshold=abs(model.amplifier.gain) * front.threshold)
-    return _with_law(model, lambda law: front >> law)
+    if isinstance(model, Containing):
+        front = ReversalFilter(threshold=abs(model.input_gain) * front.threshold)
+    return with_law(model, lambda law: front >> law)
 
 
 def _alone(model: Any) -> Any:
-    return _with_law(model, lambda law: law.behind_filter)
+    return with_law(model, lambda law: law.behind_filter)
 
 
 def without_filter(model: Any, records: Sequence[Record]) -> tuple[Any, Sequence[Record]]:
@@ -475,13 +475,3 @@ def without_filter(model: Any, records: Sequence[Record]) -> tuple[Any, Sequence
         return placed(model, None), records
     front = placed(model.stages[0], None)
     return placed(model.behind_filter, None), [replace(record, u=front.response(record.u)) for record in records]
-
-
-def _with_law(model: Any, changed: Callable[[Any], Any]) -> Any:
-    """A law changed; of an actuator its own, of several that of the input ``"u"``."""
-    if isinstance(model, MultiInputActuator):
-        pairs = zip(model.inputs, model.actuators, strict=True)
-        return replace(
-            model, actuators=tuple(_with_law(each, changed) if name == "u" else each for name, each in pairs)
-        )
-    return replace(model, hysteresis=changed(model.hysteresis)) if isinstance(model, Actuator) else changed(model)

@@ -18,9 +18,9 @@ import numpy as np
 import numpy.typing as npt
 
 from hysim._basics.frozen import FloatArray
+from hysim._basics.names import meant
 from hysim._columns.channels import taken
 from hysim._columns.input_noise import repeated_cycle
-from hysim._names import meant
 from hysim.identification.marquardt import Settled, least_squares, triangle
 from hysim.metrics.criteria import information
 from hysim.models.by_structure import searched

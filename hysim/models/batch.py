@@ -15,8 +15,8 @@ import numpy as np
 import numpy.typing as npt
 
 from hysim._basics.frozen import FloatArray, read_only
+from hysim._basics.names import meant
 from hysim._basics.parallel import in_chunks
-from hysim._names import meant
 from hysim.metrics.rows import LoopRows
 
 Reduction = Literal["sse", "max_width", "area", "final"]

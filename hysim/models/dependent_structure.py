@@ -19,8 +19,8 @@ import numpy as np
 import numpy.typing as npt
 
 from hysim._basics.frozen import FloatArray, checked
+from hysim._basics.names import among
 from hysim._columns.channels import value_in
-from hysim._names import among
 from hysim.models.protocols import Identifiable, Numbered, PartByPart, Recorded, Subject, Variant
 from hysim.models.search_space import ALL_FREE, Freedom, Parameters, SearchSpace
 from hysim.models.stages import Simpler, Stage

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from hysim._basics.frozen import FloatArray
-from hysim._names import among
+from hysim._basics.names import among
 from hysim.models.by_structure import searched
 from hysim.models.parts import share_of
 from hysim.models.protocols import Variant

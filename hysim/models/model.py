@@ -19,8 +19,8 @@ from typing import Any, NamedTuple, Protocol, TypeVar, dataclass_transform, runt
 import numpy as np
 
 from hysim._basics.frozen import checked, items
+from hysim._basics.names import MODULE_OF, meant, plain
 from hysim._basics.printing import shown, summary_text, value_in_words, wrapped
-from hysim._names import MODULE_OF, meant, plain
 from hysim.models.protocols import Direct, Identifiable, Offering
 
 T = TypeVar("T")

@@ -140,7 +140,6 @@ def declared_space(
 
 
 def _as_shares(parameters: Mapping[str, float], shares: Mapping[str, Sequence[str]]) -> dict[str, float]:
-    """These parameters in units of a quotient of two others."""
     return {name: parameters[name] * parameters[below] / parameters[above] for name, (above, below) in shares.items()}
 
 

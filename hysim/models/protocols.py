@@ -178,6 +178,19 @@ class Placeable(Protocol):
 
 
 @runtime_checkable
+class Containing(Protocol):
+    """A plant around a law, of several that of the input ``"u"``, for which it multiplies this by `input_gain`."""
+
+    @property
+    def input_gain(self) -> float: ...
+    def with_law(self, changed: Callable[[Any], Any]) -> Any: ...
+
+
+def with_law(model: Any, changed: Callable[[Any], Any]) -> Any:
+    return model.with_law(changed) if isinstance(model, Containing) else changed(model)
+
+
+@runtime_checkable
 class Standing(Protocol):
     """A model, or a controller around one, that begins at a command of its own."""
 

@@ -13,7 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 from hysim._basics.frozen import FloatArray, frozen
-from hysim._names import among, meant
+from hysim._basics.names import among, meant
 
 Parameters = Mapping[str, Any]
 """User's names to floats or to arrays of shape (n_sets,)."""

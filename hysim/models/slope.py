@@ -14,7 +14,7 @@ from types import CodeType, FunctionType
 from typing import Any
 
 from hysim._basics.frozen import FloatArray, last_names
-from hysim._names import meant
+from hysim._basics.names import meant
 from hysim.kernels.stepping import sources, unstored
 
 _TEXT = """\

@@ -15,9 +15,9 @@ import numpy as np
 
 from hysim._basics.atomic import write_all
 from hysim._basics.frozen import given_items, last_names
+from hysim._basics.names import MODULE_OF
+from hysim._basics.release import __version__
 from hysim._basics.results import model_of
-from hysim._names import MODULE_OF
-from hysim._release import __version__
 from hysim.models.model import FAMILIES, every_family, is_model
 
 _DEEPEST = 100  # lists and mappings in each other: a chain of chains takes three for a model

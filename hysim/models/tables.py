@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from hysim._basics.frozen import FloatArray, read_only
-from hysim._names import among
+from hysim._basics.names import among
 from hysim.models.search_space import Parameters
 
 Tables = Mapping[str, FloatArray]

@@ -1,6 +1,7 @@
 """The actuator as a chain of stages:  u -> amplifier -> hysteresis -> creep -> vibration -> y -> sensor."""
 
 import math
+from collections.abc import Callable
 from dataclasses import replace
 from typing import Any, Protocol, runtime_checkable
 
@@ -108,7 +109,16 @@ class Actuator:
         if self.amplifier is not None:
             u0 = None if u0 is None else float(self.amplifier.voltage(u0))
             u_range = None if u_range is None else tuple(sorted(self.amplifier.voltage(u_range).tolist()))
-        return replace(self, hysteresis=placed(self.hysteresis, u0, u_range))
+        return self.with_law(lambda law: placed(law, u0, u_range))
+
+    @property
+    def input_gain(self) -> float:
+        """Gain of the amplifier, from the command to the voltage of the law."""
+        return 1.0 if self.amplifier is None else self.amplifier.gain
+
+    def with_law(self, changed: Callable[[Any], Any]) -> "Actuator":
+        """The actuator with its law changed by a function."""
+        return replace(self, hysteresis=changed(self.hysteresis))
 
     @classmethod
     def of(cls, fit: Any, record: Record | None = None) -> "Actuator":

@@ -10,7 +10,7 @@ is, with a gain in each mode, which are solved for. No record with a resonance s
 and little beside it. Of one input `Scaled` does, a law that is known but for its gain and offset.
 """
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -25,7 +25,7 @@ from hysim.models.dependent import AlongRecord
 from hysim.models.joint_space import columns_beside, declared, together, without_repetition
 from hysim.models.model import family
 from hysim.models.parts import check_parts, own, response_of
-from hysim.models.protocols import Identifiable, Placeable, Subject, law_at, needs_time, placed
+from hysim.models.protocols import Containing, Identifiable, Placeable, Subject, law_at, needs_time, placed, with_law
 from hysim.models.search_space import ALL_FREE, Freedom, Parameters, SearchSpace
 from hysim.records import Record
 
@@ -79,20 +79,35 @@ class MultiInputActuator:
     @property
     def u0(self) -> float | None:
         """Input ``"u"`` at which the memory of its law holds; None for the first sample."""
-        main = self.actuators[self.inputs.index(MAIN)]
+        main = self._main
         return main.u0 if isinstance(main, Placeable) else None
 
     @property
     def u_range(self) -> tuple[float, ...] | None:
         """Lowest and highest input ``"u"`` of the identified record; None if unknown."""
-        main = self.actuators[self.inputs.index(MAIN)]
+        main = self._main
         return main.u_range if isinstance(main, Placeable) else None
 
     def placed(self, u0: float | None, u_range: tuple[float, ...] | None = None) -> "MultiInputActuator":
         """This model with the memory of the law of ``"u"`` at the input `u0`."""
+        return self._with_main(placed(self._main, u0, u_range))
+
+    @property
+    def input_gain(self) -> float:
+        """That of the actuator of ``"u"``."""
+        return self._main.input_gain if isinstance(self._main, Containing) else 1.0
+
+    def with_law(self, changed: Callable[[Any], Any]) -> "MultiInputActuator":
+        """This model with the law of ``"u"`` changed by a function."""
+        return self._with_main(with_law(self._main, changed))
+
+    @property
+    def _main(self) -> Any:
+        return self.actuators[self.inputs.index(MAIN)]
+
+    def _with_main(self, actuator: Any) -> "MultiInputActuator":
         pairs = zip(self.inputs, self.actuators, strict=True)
-        actuators = [placed(each, u0, u_range) if name == MAIN else each for name, each in pairs]
-        return replace(self, actuators=tuple(actuators))
+        return replace(self, actuators=tuple(actuator if name == MAIN else each for name, each in pairs))
 
     @property
     def dynamic(self) -> bool:

@@ -415,7 +415,6 @@ class OscillatorStructure(Subject):
         return (text,) if error > _COARSE * rmse and error > _NOISE_FREE * float(np.ptp(record.y)) else ()
 
     def _output(self, plant: Any, record: Record) -> FloatArray:
-        """Output (n_samples,) at the samples of the record; inf where it diverges or takes too many steps."""
         force, step = self.fine_input(record.u), record.sample_time / self.oversampling
         run = plant.response if self.period is None else plant.periodic_response
         try:

@@ -29,8 +29,8 @@ import numpy.typing as npt
 from scipy import optimize, special
 
 from hysim._basics.frozen import FloatArray, vectors
+from hysim._basics.names import among
 from hysim._basics.printing import csv_text, frozen_result, summary_text
-from hysim._names import among
 from hysim.interop import dataset, frame
 from hysim.sweeps._chunks import Column, Space, Table, saltelli, seeds
 from hysim.sweeps._store import opened

@@ -31,7 +31,7 @@ from hysim._basics.frozen import check_choice, check_count, check_not_negative, 
 from hysim._basics.libraries import is_installed
 from hysim._basics.parallel import GLANCE, cores, processes, threads
 from hysim._basics.progress import Line, Progress, Reports, reports
-from hysim._release import __version__
+from hysim._basics.release import __version__
 from hysim.sweeps._chunks import Chunk, Rows, Space, Table, Task, computed, seeds, shown, space_of
 from hysim.sweeps._result import Sweep, result_of
 from hysim.sweeps._store import ON_CHANGE, OnChange, Store, opened

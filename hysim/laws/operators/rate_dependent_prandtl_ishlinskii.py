@@ -19,7 +19,7 @@ import numpy as np
 import numpy.typing as npt
 
 from hysim._basics.frozen import FloatArray, check_positive, items, read_only
-from hysim._names import among
+from hysim._basics.names import among
 from hysim.laws.operators._bank import Plays
 from hysim.laws.operators._bank_search import Axis, table_of
 from hysim.laws.operators._play_sums import EXAMPLE, PlaysAtSampleTime

@@ -3,7 +3,7 @@
 from collections.abc import Iterable
 from pathlib import Path
 
-_LINES = Path(__file__).with_name("__init__.pyi").read_text(encoding="utf-8").splitlines()
+_LINES = Path(__file__).parents[1].joinpath("__init__.pyi").read_text(encoding="utf-8").splitlines()
 _WORDS = [line.split() for line in _LINES]  # "from hysim.records import Record as Record"
 
 MODULE_OF = {words[3]: words[1] for words in _WORDS if words[:1] == ["from"]}
