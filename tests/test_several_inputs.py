@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 import hysim as hs
+from hysim.identification._identify import _behind
 
 STEP, PERIOD, AHEAD = 1.0 / 1000.0, 160, 60
 FREQUENCIES, DAMPINGS, DELAY = (2.0 * np.pi * 90.0, 2.0 * np.pi * 260.0), (0.04, 0.03), 0.6e-3
@@ -163,3 +164,12 @@ def test_a_start_that_is_no_actuator_is_refused(start):
 def test_a_law_that_is_none_is_refused():
     with pytest.raises(TypeError, match=r"hysteresis\['right'\] must be a law that can be identified, got int"):
         hs.Actuator.structure({"u": hs.Line, "right": 3})
+
+
+def test_a_filter_before_the_law_is_in_the_unit_after_its_amplifier():
+    stage = hs.Actuator(amplifier=hs.Amplifier(gain=-15.0), hysteresis=hs.Play(threshold=1.0))
+    both = hs.MultiInputActuator(inputs=("u", "load"), actuators=(stage, hs.Actuator(hysteresis=hs.Line())))
+    for alone in (stage, both):
+        model = _behind(hs.ReversalFilter(threshold=0.1), alone)
+        law = (model.actuators[0] if alone is both else model).hysteresis
+        assert law.stages == (hs.ReversalFilter(threshold=1.5), stage.hysteresis)

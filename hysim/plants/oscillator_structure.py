@@ -43,9 +43,6 @@ from hysim.models.protocols import Subject
 from hysim.models.search_space import ALL_FREE, Freedom, Parameters, SearchSpace
 from hysim.records import Record, span_of
 
-_MOST_STEPS = 1000  # between two samples: a mass with less inertia than asks for more cannot be told from none
-_COARSE = 0.1  # of the residual, an error of the steps that is said
-_NOISE_FREE = 1e-6  # of the range of the output, an error that matters even to a record without noise
 Excitation = Literal["force", "base"]
 Method = Literal["split", "runge-kutta", "newmark", "strang"]
 METHODS: tuple[Method, ...] = get_args(Method)
@@ -200,6 +197,9 @@ def _stage(y: FloatArray, factor: int, periodic: bool) -> FloatArray:
     return np.asarray(filtered[first : first - (-y.size // factor)])
 
 
+_MOST_STEPS = 1000  # between two samples: a mass with less inertia than asks for more cannot be told from none
+_COARSE = 0.1  # of the residual, an error of the steps that is said
+_NOISE_FREE = 1e-6  # of the range of the output, an error that matters even to a record without noise
 _FREQUENCIES = 8  # tried where no linear plant is near
 _SCREENED = 256
 _IMPROVED = 3  # of the screened points
