@@ -62,6 +62,10 @@ hypothesis.settings.register_profile("hysim", deadline=None, derandomize=True, m
 hypothesis.settings.load_profile("hysim")
 
 
+def pytest_configure(config):
+    config.option.maxworkerrestart = "0"  # pytest-xdist would wait for ever when one has crashed among divided files
+
+
 @pytest.hookimpl(optionalhook=True)
 def pytest_xdist_make_scheduler(config, log):
     """Divide the tests among the workers, whatever ``--dist`` says: pytest 9.2 does not see the groups of loadgroup.

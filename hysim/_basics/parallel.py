@@ -3,8 +3,8 @@
 Kernels release the interpreter lock, so that a pool of threads keeps all cores busy. The division of the work does not
 change a result: every item is computed by itself. Searches in Python hold the lock; they run in a second process.
 
-An interrupt ends all of it: a kernel is called for a fraction of a second at a time, an exception is raised in threads
-that still work, and processes are terminated. A process also ends with its parent, in whatever way that ends.
+An interrupt ends all of it: a kernel is called for a fraction of a second at a time, after which a thread of a stopped
+pool ends, and processes are terminated. A process also ends with its parent, in whatever way that ends.
 """
 
 import contextlib
@@ -18,7 +18,6 @@ import signal
 import sys
 import threading
 import time
-import traceback
 from collections.abc import Callable, Iterator
 from concurrent.futures import Executor, Future, ProcessPoolExecutor
 from contextlib import contextmanager
@@ -38,7 +37,6 @@ _STRETCH = 100_000  # samples of one path: some hundredths of a second
 GLANCE = 0.1  # longest wait without a check for signals [s]
 _SIGNAL_OF_PARENTS_DEATH = 1  # PR_SET_PDEATHSIG of Linux
 _PATIENCE = 0.3  # seconds to wait for threads that are being stopped
-_COMPILING = 60.0  # seconds to wait for one that compiles: an exception there would leave the compiler locked for ever
 
 _most: ContextVar[int | None] = ContextVar("most threads", default=None)
 
@@ -75,6 +73,7 @@ def in_pieces(work: Callable[[slice], int], n_samples: int) -> int:
     between stretches. The result is -1, or the first sample that failed, counted from the first of all.
     """
     for start in range(0, n_samples, _STRETCH):
+        _go_on()
         failed = work(slice(start, min(start + _STRETCH, n_samples)))
         if failed >= 0:
             return start + failed
@@ -85,6 +84,7 @@ def in_pieces(work: Callable[[slice], int], n_samples: int) -> int:
 def _piece_by_piece(work: Work, start: int, stop: int, size: int) -> None:
     """Call `work` for pieces of `size` items, then of about `_PIECE` seconds, so that interrupts come between them."""
     while start < stop:
+        _go_on()
         begin, end = time.perf_counter(), min(start + size, stop)
         work(start, end)
         share = _PIECE / max(time.perf_counter() - begin, 1e-9)
@@ -113,11 +113,6 @@ def map_on_threads(
     return results
 
 
-def _is_compiling(ident: int) -> bool:
-    stack = traceback.walk_stack(sys._current_frames().get(ident))
-    return any(str(frame.f_globals.get("__name__")).startswith(("numba.", "llvmlite.")) for frame, _ in stack)
-
-
 @contextmanager
 def at_most(workers: int | None) -> Iterator[None]:
     """Set the default number of threads of `in_chunks` in this thread; None for all cores."""
@@ -137,6 +132,7 @@ def _check(workers: int | None) -> None:
 def awaited(future: Future[T]) -> T:
     """The result of a future; the wait is cut into pieces of `GLANCE`, since an endless one can miss an interrupt."""
     while not future.done():
+        _go_on()
         with contextlib.suppress(TimeoutError):
             future.exception(timeout=GLANCE)
     return future.result()
@@ -155,12 +151,19 @@ def threads(number: int) -> Iterator[Executor]:
 
 
 class _Stopped(BaseException):
-    """Raised in a thread to stop it."""
+    """Raised in a thread of a pool that has been stopped."""
 
 
-# Until a thread runs, CPython up to 3.11 knows it by the identity of the thread that starts it, so an exception that is
-# raised in the one could reach the other.
-_starting = threading.Lock()
+class _Served(threading.local):
+    pool: "_Threads | None" = None  # of this thread
+
+
+_served = _Served()
+
+
+def _go_on() -> None:
+    if _served.pool is not None and _served.pool.is_stopped:
+        raise _Stopped
 
 
 class _Threads(Executor):
@@ -168,12 +171,10 @@ class _Threads(Executor):
 
     def __init__(self, number: int) -> None:
         self._work: queue.SimpleQueue[tuple[Future[Any], Callable[[], Any]] | None] = queue.SimpleQueue()
-        self._is_shut = False
-        self._serving: set[int] = set()  # threads in which an exception is caught, by their identity
+        self._is_shut = self.is_stopped = False
         self._threads = [threading.Thread(target=self._serve, daemon=True) for _ in range(number)]
-        with _starting:
-            for thread in self._threads:
-                thread.start()
+        for thread in self._threads:
+            thread.start()
 
     def submit(self, function: Callable[..., Any], /, *args: Any, **options: Any) -> Future[Any]:
         if self._is_shut:
@@ -199,31 +200,19 @@ class _Threads(Executor):
                     waiting[0].cancel()
 
     def stop(self, patience: float) -> None:
-        """Cancel work that has not begun, raise an exception in every thread, and wait so many seconds for them."""
+        """Cancel work that has not begun, and wait so many seconds until all threads have seen that they shall end."""
+        self.is_stopped = True
         self._cancel()
-        # Wakes those without work: under a tracer CPython 3.11 calls no function while an exception waits for a thread.
         self.shutdown(wait=False)
-        serving, self._serving = self._serving, set()
-        with _starting:
-            for ident in serving:
-                end = time.monotonic() + _COMPILING
-                while _is_compiling(ident) and time.monotonic() < end:
-                    time.sleep(0.1 * GLANCE)
-                ctypes.pythonapi.PyThreadState_SetAsyncExc(ctypes.c_ulong(ident), ctypes.py_object(_Stopped))
         deadline = time.monotonic() + patience
         for thread in self._threads:
             thread.join(max(0.0, deadline - time.monotonic()))
 
     def _serve(self) -> None:
-        with contextlib.suppress(_Stopped):
-            self._serving.add(threading.get_ident())
-            while (item := self._work.get()) is not None:
-                self._compute(*item)
-                del item  # an idle thread would keep the last result
-            self._end()  # a call of Python's: an exception that is waiting for this thread is raised there, not later
-
-    def _end(self) -> None:
-        self._serving.discard(threading.get_ident())
+        _served.pool = self
+        while (item := self._work.get()) is not None:
+            self._compute(*item)
+            del item  # an idle thread would keep the last result
 
     @staticmethod
     def _compute(future: Future[Any], work: Callable[[], Any]) -> None:
