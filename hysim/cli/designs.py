@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
-from scipy.optimize import brentq
+import scipy
 
 import hysim as hs
 from hysim._basics.frozen import FloatArray
@@ -221,7 +221,7 @@ def _resting_voltage(actuator: hs.Actuator, displacement: float, within: Pair | 
 
     for low, high in [within] if within else ((-(2.0**k), 2.0**k) for k in range(_DOUBLINGS)):
         if excess(low) * excess(high) <= 0.0:
-            return float(brentq(excess, low, high))
+            return float(scipy.optimize.brentq(excess, low, high))
     return 0.0
 
 

@@ -18,7 +18,6 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
-from scipy.signal import firwin, kaiser_beta, kaiserord
 
 from hysim._basics.frozen import FloatArray, Interval, NotNegative, Positive, check_whole, checked, vectors
 from hysim._basics.printing import frozen_result, quantity, summary_text
@@ -398,6 +397,8 @@ def _with_cutoff(
     cutoff: float, inverse: Spectrum, plants: Spectrum, late: int, sample_time: float, slopes: tuple[float, float]
 ) -> _Filters:
     """Taps of a low pass, and of it times the inverse, and what they leave of the error."""
+    from scipy.signal import firwin, kaiser_beta, kaiserord
+
     corner = cutoff * sample_time / math.pi
     half = kaiserord(_RIPPLE, min(_TRANSITION * corner, 1.0 - corner))[0] // 2 if 0.0 < corner < 1.0 else _LENGTH
     reach = half + max(half // 2, 16) + late

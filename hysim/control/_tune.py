@@ -30,9 +30,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
+import scipy
 from scipy.linalg import schur
-from scipy.optimize import minimize
-from scipy.signal import cont2discrete
 
 from hysim._basics.frozen import FloatArray, Interval, check_choice, check_positive, frozen, read_only
 from hysim._basics.printing import frozen_result, summary_text
@@ -339,7 +338,7 @@ def tune(
     )
     for start in sorted(search.starts(), key=search.cost)[:_STARTS]:
         options = {**_SEARCHED, "initial_simplex": search.template.simplex(start)}
-        minimize(search.cost, start, method="Nelder-Mead", options=options)
+        scipy.optimize.minimize(search.cost, start, method="Nelder-Mead", options=options)
     return search.result()
 
 
@@ -515,7 +514,7 @@ class LinearController(SampledController):
     def _discrete(self, sample_time: float) -> tuple[FloatArray, FloatArray, FloatArray, float]:
         system = self.system
         parts = system.A, system.B[:, np.newaxis], system.C[np.newaxis], [[system.D]]
-        A, B, C, D, _ = cont2discrete(parts, positive_time(sample_time), method="bilinear")
+        A, B, C, D, _ = scipy.signal.cont2discrete(parts, positive_time(sample_time), method="bilinear")
         return A, B[:, 0], C[0], float(D[0, 0])
 
     def compiled(self, sample_time: float, u0: float = 0.0, y0: float = 0.0) -> CompiledController:

@@ -25,8 +25,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 import numpy.typing as npt
+import scipy
 from numpy.polynomial import legendre
-from scipy.interpolate import BSpline
 from scipy.linalg import block_diag
 
 from hysim import metrics
@@ -174,7 +174,7 @@ def _spline(records: Sequence[Record]) -> FloatArray:
     n = min(_SPLINES, max(int(np.count_nonzero(_steps(u))) // 2, _CUBIC + 1))
     inner = np.linspace(u.min(), u.max(), n - _CUBIC + 1)
     knots = np.concatenate([np.full(_CUBIC, inner[0]), inner, np.full(_CUBIC, inner[-1])])
-    return np.asarray(BSpline.design_matrix(u, knots, _CUBIC).toarray())
+    return np.asarray(scipy.interpolate.BSpline.design_matrix(u, knots, _CUBIC).toarray())
 
 
 def _steps(u: FloatArray) -> npt.NDArray[np.bool_]:

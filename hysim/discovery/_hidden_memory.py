@@ -28,7 +28,7 @@ from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
-from scipy.interpolate import CubicSpline
+import scipy
 
 from hysim._basics.frozen import FloatArray
 from hysim._basics.parallel import in_chunks
@@ -343,7 +343,7 @@ def _along(motion: Motion, linear: Linear) -> _Along:
         steps = np.diff(np.tile(fine, 2), append=fine[0])
         return _Along(filtering(motion, linear), steps, h, slice(fine.size, -1, _FINER))
     places = np.arange((motion.y.size - 1) * _FINER + 1) / _FINER
-    fine = CubicSpline(np.arange(motion.y.size), motion.y)(places)
+    fine = scipy.interpolate.CubicSpline(np.arange(motion.y.size), motion.y)(places)
     return _Along(filtering(motion, linear), np.diff(fine), h, slice(None, None, _FINER))
 
 

@@ -31,7 +31,7 @@ from dataclasses import replace
 from typing import Any, Literal, NamedTuple, get_args
 
 import numpy as np
-from scipy.signal import cont2discrete, firwin, lfilter, upfirdn
+import scipy
 
 from hysim._basics.frozen import Count, FloatArray, check_whole, checked, read_only
 from hysim._basics.parallel import in_chunks
@@ -122,10 +122,10 @@ def filtering(motion: Motion, plant: Linear) -> Filter:
 
         return by_spectrum
 
-    numerators, poles, _ = cont2discrete((np.eye(3)[::-1], denominator), motion.sample_time, "foh")
+    numerators, poles, _ = scipy.signal.cont2discrete((np.eye(3)[::-1], denominator), motion.sample_time, "foh")
 
     def in_time(signals: FloatArray, power: int) -> FloatArray:
-        return np.asarray(lfilter(numerators[power], poles, signals, axis=-1))
+        return np.asarray(scipy.signal.lfilter(numerators[power], poles, signals, axis=-1))
 
     return in_time
 
@@ -185,14 +185,14 @@ def decimated(y: FloatArray, stages: Sequence[int], *, periodic: bool = False) -
 
 
 def _stage(y: FloatArray, factor: int, periodic: bool) -> FloatArray:
-    taps = firwin(2 * HALF_FILTER + 1, 1.0 / factor)
+    taps = scipy.signal.firwin(2 * HALF_FILTER + 1, 1.0 / factor)
     if periodic:
         before, after = y[-HALF_FILTER:], y[:HALF_FILTER]
     else:
         before, after = 2.0 * y[0] - y[HALF_FILTER:0:-1], 2.0 * y[-1] - y[-2 : -2 - HALF_FILTER : -1]
     # the first of the filtered outputs is number 2 * HALF_FILTER of the convolution: zeros move it onto the grid
     lead = np.zeros(-2 * HALF_FILTER % factor)
-    filtered = upfirdn(taps, np.concatenate([lead, before, y, after]), down=factor)
+    filtered = scipy.signal.upfirdn(taps, np.concatenate([lead, before, y, after]), down=factor)
     first = (lead.size + 2 * HALF_FILTER) // factor
     return np.asarray(filtered[first : first - (-y.size // factor)])
 

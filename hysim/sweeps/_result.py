@@ -26,7 +26,8 @@ from typing import Any
 
 import numpy as np
 import numpy.typing as npt
-from scipy import optimize, special
+import scipy
+from scipy import special
 
 from hysim._basics.frozen import FloatArray, vectors
 from hysim._basics.names import among
@@ -405,7 +406,7 @@ def fragility(
         slopes = _score(line @ rows) * (n * np.exp(below) - z)
         return -float(z @ below + (n - z) @ above) / n.sum(), rows @ slopes / n.sum()
 
-    line = optimize.minimize(loss, [0.0, 1.0], jac=True, method="BFGS", options={"gtol": 1e-10}).x
+    line = scipy.optimize.minimize(loss, [0.0, 1.0], jac=True, method="BFGS", options={"gtol": 1e-10}).x
     if line[1] <= _FLAT:
         raise ValueError("the share above the limit does not rise with the intensity: are the counts in its order?")
     dispersion = logs.std() / line[1]

@@ -23,7 +23,7 @@ import functools
 import math
 
 import numpy as np
-from scipy.optimize import brentq
+import scipy
 
 from hysim._basics.frozen import FloatArray, frozen, read_only
 from hysim.errors import SimulationError
@@ -105,7 +105,7 @@ def _half_difference(A: float, c: float, e: float, n: float, amplitude: float) -
 
     if mismatch(0.0) >= 0.0:
         return 0.0
-    return float(brentq(mismatch, 0.0, amplitude, xtol=1e-16 * amplitude, rtol=1e-15, maxiter=2000))
+    return float(scipy.optimize.brentq(mismatch, 0.0, amplitude, xtol=1e-16 * amplitude, rtol=1e-15, maxiter=2000))
 
 
 def _from_rest(A: float, c: float, n: float, lengths: FloatArray) -> FloatArray:
