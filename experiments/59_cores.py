@@ -147,8 +147,8 @@ def main(smoke: bool = False) -> list[Row]:
     """Simulate, fit and predict, and unless it is a smoke run write table, figure and JSON."""
     rng, rows = np.random.default_rng(59), []
     for differ in DIFFER[1:2] if smoke else DIFFER:
-        records = [sequence(rng, differ) for _ in range(7 if smoke else FITTED + PREDICTED)]
-        split = 5 if smoke else FITTED
+        records = [sequence(rng, differ) for _ in range(3 if smoke else FITTED + PREDICTED)]
+        split = 2 if smoke else FITTED
         found = predicted(records[:split], records[split:])
         rows += [{"differ_percent": 100.0 * differ, **row} for row in found]
     cells = [cell(rng) for _ in range(1 if smoke else CELLS)]
