@@ -32,6 +32,7 @@ import numpy as np
 import numpy.typing as npt
 import scipy
 from scipy.linalg import schur
+from threadpoolctl import threadpool_limits
 
 from hysim._basics.frozen import FloatArray, Interval, check_choice, check_positive, frozen, read_only
 from hysim._basics.printing import frozen_result, summary_text
@@ -596,7 +597,8 @@ def loop_shaping(
     weighted = error / max_sensitivity + (b - b * _SLOW / max_sensitivity) * np.eye(1, n + 1, n)[0]
     outputs = np.stack([weighted, np.zeros(n + 1), error])
     direct = np.stack([through / max_sensitivity, [0.0, 0.0, effort], through])
-    K, _, norm, _ = control.hinfsyn(control.ss(states, inputs, outputs, direct), 1, 1)
+    with threadpool_limits(limits=1, user_api="blas"):  # of slycot's own BLAS, too: fifteen times as fast on two cores
+        K, _, norm, _ = control.hinfsyn(control.ss(states, inputs, outputs, direct), 1, 1)
     controller = LinearController(system=_without_fast_states(K, 1.0 / gain, _FAST / sample_time), limits=limits)
     worst = max(loop.max_sensitivity(controller, each) for loop, each in product(loops, along))
     return LoopShaping(controller, float(norm), worst)
