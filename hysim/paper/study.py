@@ -145,9 +145,8 @@ def study(
         "single-valued": lambda: level_means(record, leave_one_out=not quick),
     }
     results: dict[str, Any] = dict.fromkeys(subjects)
-    for done, name in enumerate(
-        sorted(subjects, key=lambda name: name.startswith("bouc-wen"))
-    ):  # these may take longest
+    in_order = sorted(subjects, key=lambda name: name.startswith("bouc-wen"))  # these may take longest
+    for done, name in enumerate(in_order):
         progress(done, len(subjects), name)
         results[name] = subjects[name]()
     progress(len(subjects), len(subjects), "comparison")

@@ -9,7 +9,7 @@ import io
 import math
 import re
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -18,6 +18,7 @@ import matplotlib.style
 import numpy as np
 import numpy.typing as npt
 from matplotlib.axes import Axes
+from matplotlib.backends.backend_svg import FigureCanvasSVG
 from matplotlib.colors import LinearSegmentedColormap, ListedColormap
 from matplotlib.figure import Figure
 from matplotlib.textpath import TextPath
@@ -70,13 +71,11 @@ _LINES = (
     ("#E69F00", (0, (1, 2.5))),
 )
 
-_STYLE = Path(__file__).with_name("house.mplstyle")
-
 
 @contextmanager
 def house_style() -> Iterator[None]:
     """Context, or decorator, in which figures and Axes have the house style whatever the user's settings."""
-    with matplotlib.style.context(_STYLE, after_reset=True):
+    with matplotlib.style.context(Path(__file__).with_name("house.mplstyle"), after_reset=True):
         yield
 
 
@@ -200,8 +199,10 @@ def to_svg(figure: Figure, *, name: str = "figure") -> str:
             if place is not None and ax.get_in_layout():
                 ax.set_subplotspec(place)
     buffer = io.StringIO()
-    with house_style(), matplotlib.rc_context({"svg.hashsalt": name}):
-        figure.savefig(buffer, format="svg", metadata=_METADATA["svg"])
+    with house_style(), matplotlib.rc_context({"svg.hashsalt": name}), ExitStack() as after:
+        after.callback(figure.set, canvas=figure.canvas, dpi=figure.dpi)
+        # `savefig` would draw twice, the first time for the layout alone.
+        FigureCanvasSVG(figure).print_svg(buffer, metadata=_METADATA["svg"])
     document = buffer.getvalue()
     element = document[document.index("<svg") :]
     own = _TAG.sub(lambda tag: _REFERENCE.sub(rf"\1{name}-", tag[0]), element)
