@@ -168,12 +168,13 @@ def _learned(
 ) -> dict[str, Any]:
     """Figures of the last repetition of a reference that is learned from the paper's camera, at a sample time."""
     (quantum, shake), figures = SENSORS[-1], []
+    sensor = Sensor(quantum=quantum * PIXEL, noise=shake * PIXEL, delay=h)
+    read, stroke = replace(plant, sensor=sensor), (float(reference.min()), float(reference.max()))
+    learner = IterativeLearning(
+        controller=controller, model=read, stroke=stroke, cutoff=cutoff, gain=_GAIN, uncertainty=0.0
+    )
     for seed in range(_SEED, _SEED + _FEW):
-        read = replace(plant, sensor=Sensor(quantum=quantum * PIXEL, noise=shake * PIXEL, delay=h, seed=seed))
-        stroke = float(reference.min()), float(reference.max())
-        learner = IterativeLearning(
-            controller=controller, model=read, stroke=stroke, cutoff=cutoff, gain=_GAIN, uncertainty=0.0
-        )
+        read = replace(plant, sensor=replace(sensor, seed=seed))
         trials = learner.learn(read, h * np.arange(reference.size), reference, trials=TRIALS)
         run = close_loop(plant, controller, trials.t, trials.reference + trials.corrections[-1])
         lead = (run.t.size - reference.size) // 3
