@@ -44,8 +44,8 @@ def affine_columns(
         late = np.minimum(np.broadcast_to(delay, n_sets) / sample_time, float(u.size))
         (A, B0, B1, lags, parts), rate, scaled = _stepped(monic, late, sample_time)
         back = rate ** -np.arange(n + 1.0)
-    level = np.append(0.0, u)
-    rise = np.append(0.0, np.diff(u, append=u[-1:])) if hold == "foh" else np.zeros_like(level)
+    level, rise = np.append(0.0, u), np.zeros(u.size + 1)
+    rise[1:-1] = np.diff(u) if hold == "foh" else 0.0
 
     def work(start: int, stop: int) -> None:
         each = slice(start, stop)
