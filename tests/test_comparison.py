@@ -127,7 +127,7 @@ def quick(table1) -> hs.Comparison:
 @pytest.fixture
 def few(monkeypatch):
     """A registry of the families that are quick to identify."""
-    monkeypatch.setattr(registry, "every_family", lambda: {name: FAMILIES[name] for name in QUICK})
+    monkeypatch.setattr(registry, "every_family", lambda: {name: FAMILIES[name] for name in QUICK[:3]})
 
 
 def test_every_family_of_the_registry_is_a_candidate_in_the_public_order():
@@ -157,8 +157,8 @@ def test_a_family_says_itself_what_is_tried(monkeypatch, few):
 @pytest.mark.parametrize("models", [None, "all"])
 def test_without_models_all_families_are_compared(table1, quick, few, models):
     table = hs.compare(models, table1)
-    assert {row.name for row in table.rows} == set(QUICK)
-    assert all(table[name] == quick[name] for name in QUICK)
+    assert {row.name for row in table.rows} == set(QUICK[:3])
+    assert all(table[name] == quick[name] for name in QUICK[:3])
 
 
 def test_the_number_of_threads_does_not_change_a_bit(table1, quick):
