@@ -1,6 +1,7 @@
 """`judge`: hysteresis, a lag that looks like it, or nothing that these records could tell."""
 
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 import pytest
@@ -79,11 +80,14 @@ def as_line(records, weights):
     return [hs.Duhem.from_terms({"u'": slope}, y0=level + slope * r.u[0]) for r in records]
 
 
+tried = cache(lambda *records: competitors(records))  # the models that need no law, once for all tests of a record
+
+
 def judged(records, refit):
     if not COMPILED and sum(map(len, records)) > 200:
         pytest.skip("identifies on hundreds of samples, which takes minutes uncompiled")
     laws = refit(records, [np.ones(len(record)) for record in records])
-    return judge(records, laws, refit)
+    return judge(records, laws, refit, tried(*records))
 
 
 def test_a_lag_under_sines_of_two_rates_is_a_linear_lag_whose_widths_are_those_of_its_closed_form():
@@ -287,9 +291,9 @@ def test_linear_creep_is_a_lag():
 def test_only_a_law_that_could_change_the_verdict_is_worth_a_search():
     curve = competitors(sines(lambda u, _: MAPS["tanh"](u)))
     assert curve.enough == pytest.approx(BETTER * curve.errors["curve"], rel=1e-3)  # and the floor of the errors
-    slow = competitors(sines(lag().response))
+    slow = tried(*sines(lag().response))
     assert slow.enough == pytest.approx(slow.errors["rival"] / BETTER, rel=1e-3)
-    assert competitors(sines(lambda u, _: LAW.response(u))).enough == np.inf
+    assert tried(*sines(lambda u, _: LAW.response(u))).enough == np.inf
     assert competitors([hs.Record(u=TRIANGLE, y=LAW.response(TRIANGLE))]).enough == np.inf
 
 
@@ -329,7 +333,7 @@ def test_a_fold_that_cannot_be_fitted_counts_as_a_miss():
     def refit(records, weights):
         raise ValueError("the law diverges on this record")
 
-    found = judge(records, laws, refit)
+    found = judge(records, laws, refit, tried(*records))
     assert found.held_out["law"] == np.inf
     assert found.verdict == "linear lag"
 
