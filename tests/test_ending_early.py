@@ -194,7 +194,6 @@ def test_a_pool_takes_no_work_after_its_end_and_finishes_what_it_has():
 def test_an_interrupt_of_a_comparison_stops_its_threads():
     """The thread that waits is interrupted, as the main thread is by Ctrl-C; a search never ends by itself."""
     begun, ended_at = [], []
-    search = endless(begun, ended_at)
 
     def interrupted(done, total):
         until(lambda: begun)
@@ -202,7 +201,7 @@ def test_an_interrupt_of_a_comparison_stops_its_threads():
 
     begin = time.monotonic()
     with pytest.raises(KeyboardInterrupt):
-        map_on_threads(lambda k: search(k) if k else None, 2, workers=2, progress=interrupted)
+        map_on_threads(lambda k: endless(begun, ended_at)(k) if k else None, 2, workers=2, progress=interrupted)
     until(lambda: ended_at, BUSY)
     assert time.monotonic() - begin < PROMISED + BUSY
 
