@@ -203,14 +203,15 @@ def test_what_candidates_have_in_common_is_searched_once_and_is_what_each_finds_
     u = hs.signals.triangle(-1.0, 1.0, cycles=2, samples_per_cycle=16)
     noise = 0.01 * np.random.default_rng(0).standard_normal(u.size)
     record = hs.Record(u=u, y=u - 0.5 * hs.BoucWen(beta=2.0, gamma=0.5, n=1.5).memory(u) + noise)
-    families = {"plain": hs.BoucWen, "polynomial": hs.PolynomialBoucWen}
+    families = {"plain": hs.BoucWen, "polynomial": hs.PolynomialBoucWen, "generalised": hs.GeneralizedBoucWen}
     together = hs.select(families, record).fits
     assert searched.count((hs.BoucWen, u.size)) == 1
     for name, family in families.items():
         assert hs.identify(family, record).estimates == together[name].estimates
-    assert searched.count((hs.BoucWen, u.size)) == 3
+    assert searched.count((hs.BoucWen, u.size)) == 4
+    del families["generalised"]
     tables = [hs.compare(families, record, workers=workers, cross_validate=None) for workers in (1, 2)]
-    assert searched.count((hs.BoucWen, u.size)) == 5
+    assert searched.count((hs.BoucWen, u.size)) == 6
     assert tables[0].rows == tables[1].rows
     searched.clear()
     fit = hs.identify(hs.BoucWen, hs.datasets.table1(), fixed={"n": 1.0}, admissible=True)
