@@ -220,7 +220,7 @@ def test_pysindy_is_what_the_adapter_expects():
 
 
 def test_importing_discovery_does_not_import_pysindy():
-    """Nor `scipy.signal`, which takes as long as all of `hysim.discovery`; control and plots leave it out, too."""
+    """Nor `scipy.signal`, which would take much of the time; control and plots leave it out, too."""
     code = "import sys, hysim.discovery, hysim.control, hysim.plot; sys.exit(not {*sys.argv}.isdisjoint(sys.modules))"
     assert subprocess.run([sys.executable, "-c", code, "pysindy", "scipy.signal"], check=False).returncode == 0
 

@@ -597,7 +597,7 @@ def loop_shaping(
     weighted = error / max_sensitivity + (b - b * _SLOW / max_sensitivity) * np.eye(1, n + 1, n)[0]
     outputs = np.stack([weighted, np.zeros(n + 1), error])
     direct = np.stack([through / max_sensitivity, [0.0, 0.0, effort], through])
-    with threadpool_limits(limits=1, user_api="blas"):  # of slycot's own BLAS, too: fifteen times as fast on two cores
+    with threadpool_limits(limits=1, user_api="blas"):  # of slycot's own BLAS, too: several wait for each other
         K, _, norm, _ = control.hinfsyn(control.ss(states, inputs, outputs, direct), 1, 1)
     controller = LinearController(system=_without_fast_states(K, 1.0 / gain, _FAST / sample_time), limits=limits)
     worst = max(loop.max_sensitivity(controller, each) for loop, each in product(loops, along))
