@@ -172,6 +172,14 @@ def test_the_size_has_limits_which_nothing_raises():
         assert len(sizes["excess"](one_more)) == 1, name
 
 
+def test_every_room_of_mutants_names_the_tests_of_its_modules():
+    script = runpy.run_path(str(PACKAGE.parent / ".ci" / "mutants.py"), run_name="mutants")
+    modules = {
+        path.relative_to(PACKAGE).as_posix() for room in script["SHARES"] for path in (PACKAGE / room).glob("*.py")
+    }
+    assert {name for name in modules if "__init__" not in name} == {*script["MAPPED"], *script["NOT_MUTATED"]}
+
+
 def test_no_module_imports_itself_by_way_of_others():
     """The front door, which loads names when they are first used, imports nothing that it names."""
     graph = {
