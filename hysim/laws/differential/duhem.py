@@ -20,7 +20,7 @@ A law that has neither |z| nor a feedthrough or an offset is not given one: its 
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from typing import Any, ClassVar, Self
 
 import numpy as np
@@ -43,6 +43,7 @@ from hysim.laws.differential.terms import (
 from hysim.models.composable import Composable
 from hysim.models.law import Law, Packed, State
 from hysim.models.model import Example, family
+from hysim.models.parameters import Coordinate, space_of
 from hysim.models.protocols import CompiledLaw, Identifiable, Subject
 from hysim.models.search_space import ALL_FREE, Freedom, Parameters, SearchSpace
 from hysim.models.tables import Tables
@@ -55,8 +56,14 @@ _BOUND = 1e3
 _OUTPUT = ("feedthrough", "offset", "y0")
 
 
-def search_space(defaults: Mapping[str, float], record: Record, freedom: Freedom) -> SearchSpace:
-    """Declare the box for the terms, feedthrough, offset and y0 in `defaults`."""
+def search_space(
+    defaults: Mapping[str, float],
+    record: Record,
+    freedom: Freedom,
+    points: Sequence[Mapping[str, float]] = ({},),
+    screened: int | None = None,
+) -> SearchSpace:
+    """Declare the box for the terms, feedthrough, offset and y0 in `defaults`, with starts at `points`."""
     span_of(record)  # which raises
     terms = {name: Term.parse(name) for name in defaults if name not in _OUTPUT}
     has_own_memory = any(defaults[name] for name in _OUTPUT[:2]) or any(term.absolute for term in terms.values())
@@ -65,25 +72,12 @@ def search_space(defaults: Mapping[str, float], record: Record, freedom: Freedom
         redundant=() if has_own_memory else (("feedthrough",), ("offset",)),
         at_rest=("y0",) if freedom.starts_at_rest() else (),
     )
+    units, box = _units(terms, defaults, record), []
+    for name, value in defaults.items():
+        reach = (_REACH_LEVEL if name in ("offset", "y0") else _REACH) * units[name]
+        box.append(Coordinate(name, value - reach, value + reach, units[name]))
     limits = freedom.limits(defaults, held)
-    names = tuple(name for name in defaults if name not in held)
-    unit = _units(terms, defaults, record)
-    scale = np.array([unit[name] for name in names])
-    start = np.array([defaults[name] for name in names]) / scale
-    reach = np.array([_REACH_LEVEL if name in ("offset", "y0") else _REACH for name in names])
-    lower, upper = start - reach, start + reach
-    for k, name in enumerate(names):
-        if name in limits:
-            lower[k], upper[k] = np.array(limits[name]) / scale[k]
-
-    def parameters(x: FloatArray) -> dict[str, FloatArray]:
-        sets = np.atleast_2d(x) * scale
-        constants = {name: np.full(len(sets), value) for name, value in held.items()}
-        return constants | dict(zip(names, sets.T, strict=True))
-
-    starts = np.clip(start, lower, upper)[np.newaxis]
-    box = {"coordinates": names, "lower": lower, "upper": upper, "starts": starts}
-    return SearchSpace.of(names, (), held, **box, parameters=parameters, state=("y0",))
+    return space_of(box, (), defaults, held, limits, points, state=("y0",), screened=screened)
 
 
 def _units(terms: Mapping[str, Term], defaults: Mapping[str, float], record: Record) -> dict[str, float]:
@@ -112,10 +106,7 @@ class DuhemStructure(Subject, Composable):
         level = {"feedthrough": 0.0, "offset": 0.0, "y0": float(record.y[0]) if len(record) else 0.0}
         candidates = [{**dict.fromkeys(names, 0.0), **self._regression(record, degree), **level} for degree in degrees]
         candidates.sort(key=lambda values: self._distance(values, record))
-        space = search_space(candidates[0], record, freedom)
-        unit = {name: values[0] for name, values in space.parameters(np.ones(space.lower.size)).items()}
-        starts = np.array([[values[name] / unit[name] for name in space.coordinates] for values in candidates])
-        return replace(space, starts=np.clip(starts, space.lower, space.upper), screened=0)
+        return search_space(candidates[0], record, freedom, candidates, screened=0)
 
     def regressors(self, parameters: Parameters, record: Record) -> FloatArray:
         return self.family.regressors(parameters, record)
