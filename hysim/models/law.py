@@ -115,6 +115,9 @@ class Law(Placed, Subject, ABC):
     samples_a_thread : int, optional
         Fewest samples for which many laws at once begin another thread; by default those of 64 sets. It is for steps
         that take much longer than those of most laws.
+    powers : mapping, optional
+        Fields of an output that is a polynomial of the input beside one number times the memory: the power of the input
+        that each multiplies, and None for the memory. One run then gives all columns of a search.
     contains : Subset, optional
         A simpler family that this one contains, whose optimum starts the search.
     stages : tuple of Stage
@@ -144,6 +147,7 @@ class Law(Placed, Subject, ABC):
     starts: ClassVar[tuple[Mapping[str, float], ...]] = ()
     screened: ClassVar[int | None] = None
     samples_a_thread: ClassVar[int | None] = None
+    powers: ClassVar[Mapping[str, int | None]] = {}
     contains: ClassVar[Subset | None] = None
     stages: ClassVar[tuple[Stage, ...]] = ()
     workspace: ClassVar[int] = 0
@@ -268,6 +272,11 @@ class Law(Placed, Subject, ABC):
         """Names in which the output is affine."""
         affine = {parameter.name for parameter in self.searched if parameter.affine}
         return tuple(name for name in self.scalars if name.partition("[")[0] in affine)
+
+    @property
+    def memory_only(self) -> dict[str, float]:
+        """Parameters for which the output of a law with `powers` is the memory itself."""
+        return {name: float(power is None) for name, power in self.powers.items()}
 
     def response(self, u: npt.ArrayLike) -> FloatArray:
         """Output y at the samples of an input that is monotone between them.
@@ -594,6 +603,16 @@ class Law(Placed, Subject, ABC):
 
     def columns_by(self, outputs: Outputs, parameters: Parameters, u: FloatArray) -> FloatArray:
         """As `regressors`, by a function from parameters and an input to outputs (n_sets, n_samples)."""
+        if self.powers and self.columns:
+            z, own = outputs({**parameters, **self.memory_only}, u), {**self.scalars, **parameters}
+            columns = np.zeros((*z.shape, len(self.columns) + 1))
+            for name, power in self.powers.items():
+                column = z if power is None else u**power
+                if name in self.columns:
+                    columns[..., self.columns.index(name)] = column
+                else:
+                    columns[..., -1] += np.reshape(own[name], (-1, 1)) * column
+            return columns
         zero = {**parameters, **dict.fromkeys(self.columns, 0.0)}
         rest = outputs(zero, u)
         size = _sizes(rest, u)
@@ -635,6 +654,8 @@ class Law(Placed, Subject, ABC):
 
     def _check_memory_is_its_own(self, parameters: Parameters, u: FloatArray) -> None:
         """Raise a ValueError if an affine parameter moves the memory along the input `u`."""
+        if self.powers:
+            return
         others = [name for name in self.columns if name not in self.initial_names]
         affine = {name: self.scalars[name] + k for k, name in enumerate(others, 1)}
         before = np.zeros((1, len(self.initial_names)))

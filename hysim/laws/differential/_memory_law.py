@@ -8,8 +8,7 @@ u is the input, z the memory, y the output; time has no part in it.
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from functools import cached_property
-from typing import Any, ClassVar, Self
+from typing import Any, ClassVar
 
 import numpy as np
 import numpy.typing as npt
@@ -17,7 +16,7 @@ import numpy.typing as npt
 from hysim._basics.frozen import FloatArray
 from hysim.kernels.boucwen import polynomial
 from hysim.laws.differential import _boucwen_search, boucwen_inverse
-from hysim.models.law import Law, Outputs, State, of_sets
+from hysim.models.law import Law, State, of_sets
 from hysim.models.protocols import CompiledLaw
 from hysim.models.search_space import ALL_FREE, Freedom, Parameters, SearchSpace
 from hysim.models.steady_cycle import Pass, PassOf
@@ -92,21 +91,13 @@ class MemoryLaw(ShapedLaw):
         return np.asarray(c * np.arange(1.0, c.size + 1.0))
 
     @property
-    def columns(self) -> tuple[str, ...]:
-        return (*self.coefficient_names, "gain", "offset")
+    def powers(self) -> Mapping[str, int | None]:  # type: ignore[override]
+        coefficients = {name: k for k, name in enumerate(self.coefficient_names, 1)}
+        return {**coefficients, "gain": None, "offset": 0}
 
     @property
-    def memory_only(self) -> dict[str, float]:
-        """Parameters for which the output is the memory itself."""
-        return {**dict.fromkeys(self.coefficient_names, 0.0), "gain": 1.0, "offset": 0.0}
-
-    def memory(self, u: npt.ArrayLike) -> FloatArray:
-        """Memory z at the samples of `u`, shape (n_samples,); parameters and errors as in `response`."""
-        return self._memory_as_output.response(u)
-
-    @cached_property
-    def _memory_as_output(self) -> Self:
-        return self.assemble(self.memory_only)
+    def columns(self) -> tuple[str, ...]:
+        return tuple(self.powers)
 
     def tangent(
         self, direction: npt.ArrayLike, z: npt.ArrayLike, u: npt.ArrayLike = 0.0, *others: npt.ArrayLike
@@ -152,9 +143,6 @@ class MemoryLaw(ShapedLaw):
             terms += self.tolerance / np.finfo(float).eps * float(np.abs(y).max())
         return self.search_inverse(state, terms=terms)
 
-    def _check_memory_is_its_own(self, parameters: Parameters, u: FloatArray) -> None:
-        """It is: the polynomial and the gain act after the memory."""
-
     def _passes(self, parameters: Parameters, u: FloatArray) -> PassOf:
         def of(sets: npt.NDArray[np.intp]) -> Pass:
             own = {**of_sets(parameters, sets), **self.memory_only}
@@ -167,13 +155,3 @@ class MemoryLaw(ShapedLaw):
             return passed
 
         return of
-
-    def columns_by(self, outputs: Outputs, parameters: Parameters, u: FloatArray) -> FloatArray:
-        """Columns u, u^2, ..., z, 1, 0 of the output, shape (n_sets, n_samples, n_columns + 1)."""
-        z = outputs({**parameters, **self.memory_only}, u)
-        n_powers = len(self.coefficient_names)
-        columns = np.zeros((*z.shape, n_powers + 3))
-        for k in range(n_powers):
-            columns[..., k] = u ** (k + 1)
-        columns[..., n_powers], columns[..., n_powers + 1] = z, 1.0
-        return columns

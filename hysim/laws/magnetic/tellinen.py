@@ -14,12 +14,11 @@ from typing import ClassVar, Self
 
 import numpy as np
 
-from hysim._basics.frozen import FloatArray
 from hysim.kernels import tellinen as kernels
 from hysim.models.law import Law, Packed
 from hysim.models.model import Example, family
 from hysim.models.parameters import Parameter, affine
-from hysim.models.search_space import ALL_FREE, Freedom, Parameters, SearchSpace
+from hysim.models.search_space import ALL_FREE, Freedom, SearchSpace
 from hysim.models.tables import Tables
 from hysim.records import Record
 
@@ -50,6 +49,7 @@ class BranchLaw(Branches):
     within: ClassVar = {"z0": ("of a size of at most", 1.0)}
     units: ClassVar[Mapping[str, str]] = {"squareness": "1", "z0": "1"}
     states: ClassVar[tuple[str, ...]] = ("rest", "periodic", "free")
+    powers: ClassVar = {"saturation": None, "feedthrough": 1, "offset": 0}
     searched: ClassVar[tuple[Parameter, ...]] = (
         *affine("saturation", "offset", unit="y"),
         Parameter("coercivity", 1e-3, 3.0, unit="h", log=True),
@@ -100,15 +100,6 @@ class BranchLaw(Branches):
         space = super().search_space(record, freedom)
         sides = {name: side for name, side in _SIDES.items() if name in space.linear}
         return replace(space, bounds={**sides, **space.bounds})
-
-    def regressors(self, parameters: Parameters, record: Record) -> FloatArray:
-        """As `Law.regressors`, by one run of the law in place of one for each column."""
-        if not self.columns:
-            return super().regressors(parameters, record)
-        m = self.outputs({**parameters, "saturation": 1.0, "feedthrough": 0.0, "offset": 0.0}, record.u)
-        known = {"saturation": m, "feedthrough": np.broadcast_to(record.u, m.shape), "offset": np.ones_like(m)}
-        fixed = 0.0 if "offset" in self.columns else np.reshape(parameters.get("offset", self.offset), (-1, 1))
-        return np.stack([*(known[name] for name in self.columns), fixed * known["offset"]], axis=-1)
 
     def assumed_states(self, record: Record) -> tuple[str, ...]:
         """Demagnetised, in the steady cycle, or anywhere between the branches: the record decides."""
