@@ -4,9 +4,11 @@ A parameter is searched in units of the record's spans, so that one box fits a r
 affine in it, and it is solved for; or it is neither, and held.
 """
 
+from abc import ABC, abstractmethod
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any, NamedTuple, Protocol
+from functools import cached_property
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -14,6 +16,9 @@ from hysim._basics.frozen import FloatArray
 from hysim.models.search_space import Freedom, SearchSpace
 from hysim.models.tables import scalars_of
 from hysim.records import Record, span_of
+
+Numbers = Mapping[str, float]
+Box = Mapping[str, tuple[float, float]]
 
 
 @dataclass(frozen=True)
@@ -44,6 +49,7 @@ def affine(*names: str, unit: str = "1") -> tuple[Parameter, ...]:
 
 
 _ROUNDING = 1e-14  # of a number by way of its logarithm
+_LEAST = 1e-300  # number that a chart takes the logarithm of
 
 
 class Coordinate(NamedTuple):
@@ -205,71 +211,151 @@ def space_of(
     )
 
 
-class Chart(Protocol):
-    """Coordinates of parameters: their names, the values at the start, and the ways there and back."""
+class Scale(NamedTuple):
+    """Coordinate of a chart: a number, its logarithm (`kind` "log") or its inverse hyperbolic sine ("asinh").
+
+    `lower` and `upper` are its box, and `drawn` the part from which random points are drawn: of the coordinate, or of
+    the number that a logarithm is of. `physical` is that of a `Parameter`.
+    """
+
+    lower: float = -np.inf
+    upper: float = np.inf
+    kind: str = "plain"
+    drawn: tuple[float, float] | None = None
+    physical: tuple[bool, bool] = (False, False)
+
+    def within(self, lower: float, upper: float) -> "Scale":
+        """The coordinate in the user's bounds; between finite ones it measures the parameter itself."""
+        if np.isfinite([lower, upper]).all():
+            return Scale(lower, upper, self.kind if self.kind == "log" else "plain")
+        return self._replace(lower=max(self.lower, lower), upper=min(self.upper, upper))
+
+    def box(self, is_drawn: bool = False) -> tuple[float, float]:
+        """Lower and upper side of the coordinate's box, or of the part of it that is drawn from."""
+        low, high = (is_drawn and self.drawn) or (self.lower, self.upper)
+        return (float(np.log(low)), float(np.log(high))) if self.kind == "log" else (low, high)
+
+    def number(self, x: FloatArray) -> FloatArray:
+        if self.kind == "log":
+            return np.exp(x)
+        return np.sinh(x) if self.kind == "asinh" else x
+
+    def coordinate(self, number: FloatArray) -> float:
+        if self.kind == "log":
+            return float(np.log(np.maximum(number, _LEAST)))
+        return float(np.arcsinh(number) if self.kind == "asinh" else number)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Chart(ABC):
+    """Coordinates of the free parameters of a law in scales of its own, and the ways there and back.
+
+    Its `rows` are the coordinates in their order, by the names of parameters and of what stands in their place; a
+    parameter that the user bounds by finite numbers is its own coordinate.
+    """
+
+    rows: Mapping[str, Scale]
+    defaults: Numbers
+    held: Numbers
+    bounds: Box  # of the user
 
     @property
-    def coordinates(self) -> tuple[str, ...]:
-        """Names of the coordinates."""
+    @abstractmethod
+    def called(self) -> Mapping[str, str]:
+        """Names of coordinates by those of the parameters in whose places they stand."""
 
-    @property
-    def values(self) -> Mapping[str, float]:
-        """Parameters by name, as the search begins."""
+    @abstractmethod
+    def measured(self, known: dict[str, FloatArray], raw: dict[str, FloatArray]) -> dict[str, FloatArray]:
+        """All parameters: those `known`, and the others by the numbers `raw` of their coordinates."""
 
-    def encode(self, parameters: Mapping[str, float]) -> FloatArray:
-        """Coordinates (n_x,) of the parameters."""
+    @abstractmethod
+    def located(self, known: dict[str, FloatArray]) -> dict[str, Any]:
+        """Numbers of the coordinates that differ from their parameters, by all parameters."""
+
+    @cached_property
+    def values(self) -> Numbers:
+        return {**self.defaults, **self.held}
+
+    @cached_property
+    def free(self) -> tuple[str, ...]:
+        return tuple(name for name in self.rows if name in self.values and name not in self.held)
+
+    @cached_property
+    def limits(self) -> Box:
+        """Bounds of the parameters that are their own coordinates."""
+        return {name: pair for name, pair in self.bounds.items() if name in self.free and np.isfinite(pair).all()}
+
+    @cached_property
+    def axes(self) -> Mapping[str, Scale]:
+        """The coordinates in the user's bounds."""
+        axes = {name: self.rows[name] for name in (self.called.get(name, name) for name in self.free)}
+        return axes | {name: axes[name].within(*self.bounds[name]) for name in axes if name in self.bounds}
+
+    def box(self, is_drawn: bool = False) -> Box:
+        """The box of the coordinates, or the part of it that random points are drawn from."""
+        return {name: each.box(is_drawn) for name, each in self.axes.items()}
+
+    def check_finite(self) -> None:
+        """Raise a ValueError for bounds that are not finite, or not positive of a parameter on a log scale."""
+        for name in self.bounds.keys() & self.rows.keys():
+            pair, is_log = self.bounds[name], self.rows[name].kind == "log"
+            if not np.isfinite(pair).all() or (is_log and pair[0] <= 0.0):
+                raise ValueError(f"bounds of {name!r} must be {'positive and ' * is_log}finite, got {pair}")
 
     def decode(self, x: FloatArray) -> dict[str, FloatArray]:
         """Parameters (n_sets,) by name at the coordinates (n_sets, n_x)."""
+        sets = np.atleast_2d(x)
+        raw = {name: each.number(column) for (name, each), column in zip(self.axes.items(), sets.T, strict=True)}
+        known = {name: np.full(len(sets), self.values[name]) for name in self.rows if name in self.values}
+        return self.measured(known | {name: raw.pop(name) for name in self.limits}, raw)
+
+    def encode(self, parameters: Numbers) -> FloatArray:
+        """Coordinates (n_x,) of the parameters."""
+        known = {name: np.array(float(parameters[name])) for name in self.rows if name in parameters}
+        raw = known | self.located(known) | {name: known[name] for name in self.limits}
+        return np.array([each.coordinate(raw[name]) for name, each in self.axes.items()])
 
 
 def space_of_chart(
-    chart: Chart,
-    box: Mapping[str, tuple[float, float]],
-    start: FloatArray,
-    columns: tuple[str, ...],
-    held: Mapping[str, float],
-    bounds: Mapping[str, tuple[float, float]],
-    freedom: Freedom,
-    *,
-    physical: Mapping[str, tuple[bool, bool]],
-    **others: Any,
+    chart: Chart, start: FloatArray, columns: tuple[str, ...], freedom: Freedom, **others: Any
 ) -> SearchSpace:
-    """The search in the coordinates of a chart between the sides of its `box` by name, from `start` (n_x,).
+    """The search in the box of a chart from `start` (n_x,).
 
     A search that begins at a law of the user's has a box that holds it, but for the user's `bounds`.
     """
-    lower, upper = sides(box)
+    lower, upper = sides(chart.box())
     if not freedom.starts_anew:
         own = chart.encode(chart.values)
-        free = np.array([name not in bounds for name in chart.coordinates], dtype=bool)
+        free = np.array([name not in chart.bounds for name in chart.axes], dtype=bool)
         lower, upper = np.where(free, np.minimum(lower, own), lower), np.where(free, np.maximum(upper, own), upper)
 
     def decoded(x: FloatArray) -> dict[str, FloatArray]:
         known = chart.decode(x)
-        others = (name for name in held if name not in known and name not in columns)
-        return {name: np.full(len(np.atleast_2d(x)), held[name]) for name in others} | known
+        others = (name for name in chart.held if name not in known and name not in columns)
+        return {name: np.full(len(np.atleast_2d(x)), chart.held[name]) for name in others} | known
 
-    def encoded(parameters: Mapping[str, float]) -> FloatArray:
+    def encoded(parameters: Numbers) -> FloatArray:
         return np.asarray(np.clip(chart.encode({**chart.values, **parameters}), lower, upper))
 
     return SearchSpace.of(
         chart.values,
         columns,
-        held,
-        coordinates=chart.coordinates,
+        chart.held,
+        coordinates=tuple(chart.axes),
         lower=lower,
         upper=upper,
         starts=np.clip(start, lower, upper)[np.newaxis],
         parameters=decoded,
-        bounds={name: pair for name, pair in bounds.items() if name in columns},
-        physical={name: physical[name] for name in chart.coordinates if name in physical and name not in bounds},
+        bounds={name: pair for name, pair in chart.bounds.items() if name in columns},
+        physical={name: each.physical for name, each in chart.axes.items() if name not in chart.bounds},
         encoded=encoded,
+        state=("z0",),
+        drawn=sides(chart.box(is_drawn=True)) if any(each.drawn for each in chart.rows.values()) else None,
         **others,
     )
 
 
-def sides(box: Mapping[str, tuple[float, float]]) -> tuple[FloatArray, FloatArray]:
+def sides(box: Box) -> tuple[FloatArray, FloatArray]:
     """Lower and upper sides of a box, (n_x,) each."""
     return np.array([low for low, _ in box.values()]), np.array([high for _, high in box.values()])
 

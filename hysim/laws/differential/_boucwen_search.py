@@ -19,39 +19,33 @@ its own coordinate, between these bounds; bounds from or to zero and infinity cu
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import Any, ClassVar, Self
+from typing import Any, Self
 
 import numpy as np
 
 from hysim._basics.frozen import FloatArray
-from hysim.models.parameters import sides, space_of_chart
+from hysim.models import parameters
+from hysim.models.parameters import Box, Numbers, Scale, sides, space_of_chart
 from hysim.models.search_space import Freedom, SearchSpace
 from hysim.records import Record, span_of
 
-Numbers = Mapping[str, float]
 Groups = tuple[tuple[str, ...], ...]
-Box = Mapping[str, tuple[float, float]]
 REDUNDANT = (("A", "gain"),)
 _FURTHER = ("b2", "b3", "b4", "b5", "b6")
-_SCALED = {  # parameters with a unit of their own, and their box in it
-    "delta": (-5.0, 5.0),
-    "z0": (-1.0, 1.0),
-}
 _PAIR = ("loading", "unloading")
 _SHAPES = (*_PAIR, "beta", "gamma", *_FURTHER)
 _LEAST_UNIT, _LARGEST_UNIT = 1e-290, 1e290  # times 1e17, the largest coefficient, still a number
 _BY_DEFAULT = {"A": 1.0, "beta": 0.5, "gamma": 0.5, "n": 1.0, "z0": 0.0}
 KNEE = float(np.arcsinh(40.0))
-PHYSICAL = {"n": (False, True)}  # a larger exponent is a corner as sharp as that of two straight lines
-_BOX = {
-    "A": (-10.0, 10.0),
-    "loading": (-KNEE, KNEE),
-    "unloading": (-KNEE, KNEE),
-    "beta": (-KNEE, KNEE),
-    "gamma": (-KNEE, KNEE),
-    "n": (0.5, 10.0),
-    **dict.fromkeys(_FURTHER, (-KNEE, KNEE)),
-    **_SCALED,
+_SHAPE = Scale(-KNEE, KNEE)
+ROWS = {
+    "A": Scale(-10.0, 10.0),
+    **dict.fromkeys(("loading", "unloading", "beta", "gamma"), _SHAPE),
+    # a larger exponent is a corner as sharp as that of two straight lines
+    "n": Scale(0.5, 10.0, "log", physical=(False, True)),
+    **dict.fromkeys(_FURTHER, _SHAPE),
+    "delta": Scale(-5.0, 5.0),
+    "z0": Scale(-1.0, 1.0),
 }
 
 
@@ -66,81 +60,56 @@ def search_space(
         raise ValueError(f"n must be positive, got {held['n']}")
     if "n" in bounds and not (bounds["n"][0] >= 0.0 and (bounds["n"][0] > 0.0 or np.isinf(bounds["n"][1]))):
         raise ValueError(f"bounds of 'n' must be positive, got {bounds['n']}")
-    chart = Chart.of(defaults, held, bounds, record, float(np.abs(record.u).max()))
-    limits = chart.limits
-    box = {name: limits[name] if name in limits else _cut(name, bounds.get(name)) for name in chart.coordinates}
-    box |= {"n": (float(np.log(box["n"][0])), float(np.log(box["n"][1])))} if "n" in box else {}
+    for name, pair in bounds.items():
+        if name in ROWS and not np.isfinite(pair).all() and 0.0 not in pair and pair != (-np.inf, np.inf):
+            raise ValueError(f"bounds of {name!r} must be finite, or reach from zero to infinity, got {pair}")
+    chart = Chart.over(record, float(np.abs(record.u).max()), ROWS, defaults, held, bounds)
     known = {*columns, *("A", "beta", "gamma", "n", "z0")}
     extended = not known.issuperset(defaults)  # what is admissible for such a law is not known
+    box = chart.box()
     quadrant = {name: (max(low, 0.0) if name in _PAIR else low, high) for name, (low, high) in box.items()}
     regions = {"admissible": sides(quadrant)} if set(_PAIR) <= set(box) and not extended else {}
-    return space_of_memory(chart, box, defaults, columns, held, bounds, freedom, regions=regions)
+    return space_of_memory(chart, columns, freedom, regions=regions)
 
 
-def space_of_memory(
-    chart: "Chart",
-    box: Box,
-    defaults: Numbers,
-    columns: tuple[str, ...],
-    held: Numbers,
-    bounds: Box,
-    freedom: Freedom,
-    **others: Any,
-) -> SearchSpace:
+def space_of_memory(chart: "Chart", columns: tuple[str, ...], freedom: Freedom, **others: Any) -> SearchSpace:
     """The search of a memory in the coordinates of a chart, which begins in the units of the record by default."""
-    is_default = freedom.starts_anew and _BY_DEFAULT.items() <= defaults.items()
+    is_default = freedom.starts_anew and _BY_DEFAULT.items() <= chart.defaults.items()
     start = (chart.in_own_units() if is_default else chart).encode(chart.values)
-    others = {"redundant": REDUNDANT, "physical": PHYSICAL, **others}
-    return space_of_chart(chart, box, start, columns, held, bounds, freedom, state=("z0",), **others)
+    return space_of_chart(chart, start, columns, freedom, redundant=REDUNDANT, **others)
 
 
-def _cut(name: str, sign: tuple[float, float] | None) -> tuple[float, float]:
-    """The default box, cut at zero where the user asks for a sign."""
-    lower, upper = _BOX[name]
-    if sign is None:
-        return lower, upper
-    if 0.0 not in sign and sign != (-np.inf, np.inf):
-        raise ValueError(f"bounds of {name!r} must be finite, or reach from zero to infinity, got {sign}")
-    return max(lower, sign[0]), min(upper, sign[1])
-
-
-@dataclass(frozen=True)
-class Chart:
-    """Coordinates of the memory's free parameters, and the way there and back."""
-
-    coordinates: tuple[str, ...]
-    values: Numbers  # every parameter, where it is not free
-    limits: Box  # parameters that are their own coordinates
+@dataclass(frozen=True, kw_only=True)
+class Chart(parameters.Chart):
     span: float
     reach: float  # of |u|, or of its path
     slope: float  # what A is measured in
 
-    memory: ClassVar[tuple[str, ...]] = ("A", "beta", "gamma", "n", *_FURTHER, *_SCALED)
-    beside_loading: ClassVar[str] = "unloading"
+    @property
+    def called(self) -> Mapping[str, str]:
+        paired = {"beta", "gamma"} <= {*self.free} - {*self.bounds}
+        return {"beta": "loading", "gamma": "ratio" if "ratio" in self.rows else "unloading"} if paired else {}
 
     @classmethod
-    def of(cls, defaults: Numbers, held: Numbers, bounds: Box, record: Record, reach: float) -> Self:
-        """The chart of the parameters that are not held; finite `bounds` are limits of own coordinates."""
-        values = {**defaults, **held}
-        free = [name for name in cls.memory if name in values and name not in held]
-        paired = {"beta", "gamma"} <= {*free} and not {"beta", "gamma"} & {*bounds}
-        combined = {"beta": "loading", "gamma": cls.beside_loading} if paired else {}
-        names = tuple(combined.get(name, name) for name in free)
-        limits = {name: pair for name, pair in bounds.items() if name in free and np.isfinite(pair).all()}
-        return cls(names, values, limits, span_of(record), reach, slope_of(record, values))
+    def over(
+        cls,
+        record: Record,
+        reach: float,
+        rows: Mapping[str, Scale],
+        defaults: Numbers,
+        held: Numbers,
+        bounds: Box,
+    ) -> Self:
+        """The chart in the scales of a record; A is measured in the output's span over the gain and the input's."""
+        span, gain = span_of(record), abs({**defaults, **held}["gain"]) or 1.0
+        slope = float(np.ptp(record.y)) / gain / span or 1.0
+        return cls(rows=rows, defaults=defaults, held=held, bounds=bounds, span=span, reach=reach, slope=slope)
 
     def in_own_units(self) -> Self:
         return replace(self, span=1.0, reach=self.reach / self.span, slope=1.0)
 
-    def decode(self, x: FloatArray) -> dict[str, FloatArray]:
-        """Parameters of the memory, each (n_sets,), from coordinates (n_sets, n_x)."""
-        sets = np.atleast_2d(x)
-        raw = dict(zip(self.coordinates, sets.T, strict=True))
-        known = {name: np.full(len(sets), self.values[name]) for name in self.memory if name in self.values}
-        known |= {name: raw[name] for name in self.limits}
-        raw = {name: values for name, values in raw.items() if name == "n" or name not in self.limits}
-        known |= {"A": raw["A"] * self.slope} if "A" in raw else {}
-        known |= {"n": np.exp(raw["n"])} if "n" in raw else {}
+    def measured(self, known: dict[str, FloatArray], raw: dict[str, FloatArray]) -> dict[str, FloatArray]:
+        known |= {name: raw[name] * size for name, size in {"A": self.slope, "n": 1.0}.items() if name in raw}
         unit = shape_unit(known["A"], known["n"], self.span)
         shapes = {name: shape(raw[name], known["n"]) * unit for name in _SHAPES if name in raw}
         if "loading" in shapes:
@@ -148,38 +117,21 @@ class Chart:
             unloading = shapes.pop("unloading") if "unloading" in shapes else raw["ratio"] * np.abs(loading)
             known |= {"beta": 0.5 * (loading + unloading), "gamma": 0.5 * (loading - unloading)}
         known |= shapes
-        return known | {
-            name: self.sized(name, raw[name]) * size for name, size in self.sizes(known).items() if name in raw
-        }
+        return known | {name: raw[name] * size for name, size in self.sizes(known).items() if name in raw}
 
-    def encode(self, parameters: Mapping[str, float]) -> FloatArray:
-        """Coordinates (n_x,) of one set of parameters."""
-        known = {name: np.array(parameters[name]) for name in self.memory if name in parameters}
+    def located(self, known: dict[str, FloatArray]) -> dict[str, Any]:
         unit = shape_unit(known["A"], known["n"], self.span)
         loading, unloading = known["beta"] + known["gamma"], known["beta"] - known["gamma"]
         shapes = {**known, "loading": loading, "unloading": unloading}
-        raw: dict[str, Any] = {
-            name: knee(shapes[name] / unit, known["n"]) for name in _SHAPES if name in self.coordinates
-        }
-        raw |= {"A": known["A"] / self.slope, "ratio": unloading / np.abs(loading) if loading != 0.0 else 0.0}
-        raw |= {
-            name: self.unsized(name, known[name] / size) for name, size in self.sizes(known).items() if name in known
-        }
-        raw |= {name: known[name] for name in self.limits} | {"n": np.log(known["n"])}
-        return np.array([float(raw[name]) for name in self.coordinates])
+        raw = {name: knee(shapes[name] / unit, known["n"]) for name in _SHAPES if name in self.axes}
+        ratio = unloading / np.abs(loading) if loading != 0.0 else 0.0
+        sized = {name: known[name] / size for name, size in self.sizes(known).items() if name in known}
+        return {**raw, "A": known["A"] / self.slope, "ratio": ratio, **sized}
 
     def sizes(self, known: Mapping[str, FloatArray]) -> dict[str, FloatArray]:
         """Units of the parameters that have one, by A, beta, gamma and n."""
         slope = steepness(known["A"])
         return {"delta": slope / self.reach, "z0": slope * self.span}
-
-    def sized(self, name: str, x: FloatArray) -> FloatArray:
-        """A parameter in its unit, by its coordinate."""
-        return x
-
-    def unsized(self, name: str, value: FloatArray) -> FloatArray:
-        """The coordinate of a parameter in its unit."""
-        return value
 
 
 def shape_unit(A: FloatArray, n: FloatArray, span: float) -> FloatArray:
@@ -209,8 +161,3 @@ def knee(coefficient: FloatArray, n: FloatArray) -> float:
         middle = 0.5 * (low + high)
         low, high = (middle, high) if shape(np.array(middle), n) < abs(coefficient) else (low, middle)
     return float(np.copysign(high, coefficient)) if coefficient else 0.0
-
-
-def slope_of(record: Record, values: Mapping[str, float]) -> float:
-    """The unit of A: the output's span over the gain and the input's."""
-    return float(np.ptp(record.y)) / (abs(values["gain"]) or 1.0) / span_of(record) or 1.0

@@ -34,12 +34,13 @@ from hysim._basics.frozen import FloatArray
 from hysim.kernels.elementary import power
 from hysim.kernels.stepping import inlined_kernel
 from hysim.laws.differential import _boucwen_search
+from hysim.laws.differential._boucwen_search import KNEE, ROWS
 from hysim.laws.differential._memory_law import MemoryLaw
 from hysim.laws.differential.boucwen import bouc_wen_with
 from hysim.laws.differential.polynomial_boucwen import PolynomialBoucWen
 from hysim.models.by_structure import Holding
 from hysim.models.model import Example, family
-from hysim.models.parameters import sides
+from hysim.models.parameters import Scale
 from hysim.models.search_space import ALL_FREE, Freedom, Parameters, SearchSpace
 from hysim.models.stages import Stage
 from hysim.models.tables import Tables
@@ -69,45 +70,30 @@ _LARGEST_EXPONENT = 700.0
 _WIDTHS, _BESIDE = 0.7, 4.0  # of the bell: the most that a step goes within it, and where it begins
 _LARGEST = 600.0  # knee of the loading branch; smaller yield memories are below what a record resolves
 _SAME_SIGN = 0.02  # smallest knee of a law that pinches, whose loading coefficient is positive
-_BOX = {
-    "A": (-10.0, 10.0),
-    "loading": (-_boucwen_search.KNEE, float(np.arcsinh(_LARGEST))),
-    "ratio": (-10.0, 10.0),
-    "beta": (-_boucwen_search.KNEE, _boucwen_search.KNEE),
-    "gamma": (-_boucwen_search.KNEE, _boucwen_search.KNEE),
-    "n": (float(np.log(0.5)), float(np.log(10.0))),
-    "delta_a": (0.0, 4.0),
-    "delta_nu": (0.0, 4.0),
-    "delta_eta": (0.0, 4.0),
-    "zeta_s": (0.0, 0.999),
-    "q": (-1.0, 1.0),
-    "p": (float(np.log(0.05)), float(np.log(300.0))),
-    "psi": (float(np.log(0.02)), float(np.log(5.0))),
-    "delta_psi": (0.0, 4.0),
-    "lambda_": (float(np.log(0.02)), float(np.log(10.0))),
-    "z0": (-3.0, 3.0),
+_LOADING = Scale(-KNEE, float(np.arcsinh(_LARGEST)), drawn=(float(np.arcsinh(1.0 / 3.0)), float(np.arcsinh(500.0))))
+_RATE = Scale(0.0, 4.0, "asinh", physical=(True, False))  # damage does not heal
+_ROWS = {
+    "A": ROWS["A"],
+    "loading": _LOADING,
+    "ratio": Scale(-10.0, 10.0, drawn=(-1.0, 3.0)),
+    "beta": ROWS["beta"],
+    "gamma": ROWS["gamma"],
+    "n": ROWS["n"],
+    **dict.fromkeys(("delta_a", "delta_nu", "delta_eta"), _RATE),
+    "zeta_s": Scale(0.0, 0.999, physical=(True, True)),  # a slope along a branch does not change its sign
+    "q": Scale(-1.0, 1.0),
+    "p": Scale(0.05, 300.0, "log"),
+    "psi": Scale(0.02, 5.0, "log"),
+    "delta_psi": _RATE._replace(drawn=(0.0, 2.0)),
+    "lambda_": Scale(0.02, 10.0, "log"),
+    "z0": Scale(-3.0, 3.0, drawn=(-1.0, 1.0)),
 }
-_DRAWN = {
-    "loading": (float(np.arcsinh(1.0 / 3.0)), float(np.arcsinh(500.0))),
-    "ratio": (-1.0, 3.0),
-    "delta_psi": (0.0, 2.0),
-    "z0": (-1.0, 1.0),
-}
-_RATES = ("delta_a", "delta_nu", "delta_eta", "delta_psi")
-_PHYSICAL = {  # damage does not heal, and a slope along a branch does not change its sign
-    **_boucwen_search.PHYSICAL,
-    **dict.fromkeys(_RATES, (True, False)),
-    "zeta_s": (True, True),
-}
-_LOGS = ("p", "psi", "lambda_")
+_PINCHED = {**_ROWS, "loading": _LOADING._replace(lower=float(np.arcsinh(_SAME_SIGN)), physical=(True, False))}
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class _Chart(_boucwen_search.Chart):
     """Coordinates of the free parameters of the memory, with the length of the input's path as the reach."""
-
-    memory = tuple(name for name in _BOX if name not in ("loading", "ratio"))
-    beside_loading = "ratio"
 
     def sizes(self, known: Mapping[str, FloatArray]) -> dict[str, FloatArray]:
         slope = _boucwen_search.steepness(known["A"])
@@ -122,14 +108,6 @@ class _Chart(_boucwen_search.Chart):
             **dict.fromkeys(("lambda_", "zeta_s", "q"), one),
             "z0": yielding,
         }
-
-    def sized(self, name: str, x: FloatArray) -> FloatArray:
-        return np.asarray(np.sinh(x) if name in _RATES else np.exp(x) if name in _LOGS else x)
-
-    def unsized(self, name: str, value: FloatArray) -> FloatArray:
-        if name in _LOGS:
-            return np.log(np.maximum(value, 1e-300))
-        return np.asarray(np.arcsinh(value) if name in _RATES else value)
 
 
 @inlined_kernel
@@ -386,21 +364,10 @@ class BoucWenBaberNoori(MemoryLaw):
             every = replace(freedom, fixed={**held, **freedom.fixed})
             return _boucwen_search.search_space(self.scalars, self.columns, record, every)
         bounds = freedom.limits(self.scalars, held)
-        for name, pair in bounds.items():
-            if name in _Chart.memory and not np.isfinite(pair).all():
-                raise ValueError(f"bounds of {name!r} must be finite, got {pair}")
-            if name in ("n", *_LOGS) and pair[0] <= 0.0:
-                raise ValueError(f"bounds of {name!r} must be positive, got {pair}")
-        chart = _Chart.of(self.scalars, held, bounds, record, float(np.abs(np.diff(record.u)).sum()))
-        limits, pinches = chart.limits, held.get("zeta_s", 1.0) != 0.0
-        box = {name: limits.get(name, _BOX[name]) for name in chart.coordinates}
-        box |= {"n": (float(np.log(limits["n"][0])), float(np.log(limits["n"][1])))} if "n" in limits else {}
-        box |= {"loading": (float(np.arcsinh(_SAME_SIGN)), _BOX["loading"][1])} if pinches and "loading" in box else {}
-        drawn = sides({name: pair if name in limits else _DRAWN.get(name, pair) for name, pair in box.items()})
-        physical = _PHYSICAL | ({"loading": (True, False)} if pinches else {})
-        return _boucwen_search.space_of_memory(
-            chart, box, self.scalars, self.columns, held, bounds, freedom, physical=physical, drawn=drawn
-        )
+        rows, path = _ROWS if held.get("zeta_s", 1.0) == 0.0 else _PINCHED, float(np.abs(np.diff(record.u)).sum())
+        chart = _Chart.over(record, path, rows, self.scalars, held, bounds)
+        chart.check_finite()
+        return _boucwen_search.space_of_memory(chart, self.columns, freedom)
 
     def steady(self, parameters: Parameters, record: Record) -> dict[str, FloatArray]:
         """Initial memory of a steady cycle; ValueError for a law that degrades or pinches: it has no steady cycle."""

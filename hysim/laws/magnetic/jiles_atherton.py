@@ -46,7 +46,7 @@ import math
 import warnings
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import ClassVar, Self
+from typing import Any, ClassVar, Self
 
 import numpy as np
 import numpy.typing as npt
@@ -58,36 +58,28 @@ from hysim.kernels import jiles_atherton_inverse as inverse
 from hysim.models.inverse_search import first_input
 from hysim.models.law import Law, Packed, State
 from hysim.models.model import Example, family
-from hysim.models.parameters import affine, sides, space_of_chart, spans
+from hysim.models.parameters import Chart, Scale, affine, sides, space_of_chart, spans
 from hysim.models.protocols import UNLIMITED, CompiledLaw, Limits
-from hysim.models.search_space import ALL_FREE, Freedom, Parameters, SearchSpace
+from hysim.models.search_space import ALL_FREE, Freedom, SearchSpace
 from hysim.models.tables import Tables
 from hysim.records import Record
 
 MU0 = 4e-7 * math.pi
 """Magnetic constant [T m / A], to its nine digits."""
 
-_BOX = {
-    "Ms": (np.log(0.9), np.log(30.0)),
-    "a": (np.log(1e-4), np.log(30.0)),
-    "alpha": (-6.0, 13.0),
-    "k": (np.log(1e-3), np.log(30.0)),
-    "c": (0.0, 0.99),
-    "anisotropy": (-30.0, 30.0),
-    "reversible_feedback": (0.0, 1.0),
-    "z0": (-1.0, 1.0),
+_SHARE = Scale(0.0, 1.0, physical=(True, True))
+_ROWS = {
+    "Ms": Scale(0.9, 30.0, "log", drawn=(1.0, 4.0), physical=(True, False)),
+    "a": Scale(kind="log"),
+    "width": Scale(1e-4, 30.0, "log", drawn=(0.01, 3.0)),
+    "alpha": Scale(),
+    "stability": Scale(-6.0, 13.0, drawn=(0.0, 4.0)),
+    "k": Scale(1e-3, 30.0, "log", drawn=(0.01, 3.0)),
+    "c": _SHARE._replace(upper=0.99, drawn=(0.0, 0.8)),
+    "anisotropy": Scale(-30.0, 30.0, drawn=(-10.0, 10.0)),
+    "reversible_feedback": _SHARE,
+    "z0": _SHARE._replace(lower=-1.0),
 }
-_DRAWN = {
-    "Ms": (np.log(1.0), np.log(4.0)),
-    "a": (np.log(0.01), np.log(3.0)),
-    "alpha": (0.0, 4.0),
-    "k": (np.log(0.01), np.log(3.0)),
-    "c": (0.0, 0.8),
-    "anisotropy": (-10.0, 10.0),
-}
-_PHYSICAL = {"Ms": (True, False), **dict.fromkeys(("c", "reversible_feedback", "z0"), (True, True))}
-_LOGS = ("Ms", "a", "k")
-_CALLED = {"a": "width", "alpha": "stability"}
 _HELD = ("anisotropy", "reversible_feedback")
 _COLUMNS = ("gain", "feedthrough")
 _SI = ("A/m", "T")
@@ -117,77 +109,46 @@ def _check_feedback(law: "JilesAtherton", whose: str) -> None:
         raise ValueError(f"{whose} begins demagnetised, got z0 = {law.z0:g}")
 
 
-@dataclass(frozen=True)
-class _Chart:
-    """Coordinates of the free parameters, and the way there and back."""
-
-    names: tuple[str, ...]
-    values: Mapping[str, float]  # every parameter, where it is not free
-    limits: Mapping[str, tuple[float, float]]  # parameters that are their own coordinates
+@dataclass(frozen=True, kw_only=True)
+class _Chart(Chart):
     field: float
     magnetisation: float
 
-    def side(self, name: str) -> tuple[float, float]:
-        """The box of a coordinate."""
-        if name not in self.limits:
-            return _BOX[name]
-        low, high = self.limits[name]
-        return (float(np.log(low)), float(np.log(high))) if name in _LOGS else (low, high)
+    @property
+    def called(self) -> Mapping[str, str]:
+        return {name: called for name, called in (("a", "width"), ("alpha", "stability")) if name not in self.limits}
 
     @property
-    def coordinates(self) -> tuple[str, ...]:
-        """Names of the coordinates."""
-        return tuple(name if name in self.limits else _CALLED.get(name, name) for name in self.names)
+    def units(self) -> Mapping[str, float]:
+        own = dict.fromkeys(("c", "anisotropy", "reversible_feedback"), 1.0)
+        return {"Ms": self.magnetisation, "k": self.field, **own}
 
-    def has_stability(self) -> bool:
-        """Whether the coupling is searched by its stability."""
-        return "alpha" in self.names and "alpha" not in self.limits
-
-    def decode(self, x: FloatArray) -> dict[str, FloatArray]:
-        """Parameters that are not linear, each (n_sets,), from coordinates (n_sets, n_x)."""
-        sets = np.atleast_2d(x)
-        raw = dict(zip(self.names, sets.T, strict=True))
-        known = {name: np.full(len(sets), self.values[name]) for name in _BOX} | raw
-        known |= {name: np.exp(raw[name]) for name in _LOGS if name in raw}
-        for name, unit in (("Ms", self.magnetisation), ("k", self.field)):
-            if name in raw and name not in self.limits:
-                known[name] = known[name] * unit
-        stable = raw["alpha"] if self.has_stability() else None
-        share = initial_slope(known["anisotropy"]) * known["Ms"]
-        apart = 1.0
-        if stable is not None:
-            below, above = np.exp(-stable), np.exp(stable - _TURN)
-            apart = below + above
-        if "a" in raw and "a" not in self.limits:
-            width = known["a"] * self.field
-            coupled = width + known["alpha"] * share if stable is None else width / apart
+    def measured(self, known: dict[str, FloatArray], raw: dict[str, FloatArray]) -> dict[str, FloatArray]:
+        known |= {name: raw[name] * unit for name, unit in self.units.items() if name in raw}
+        below, above = (
+            (np.exp(-raw["stability"]), np.exp(raw["stability"] - _TURN)) if "stability" in raw else (1.0, 0.0)
+        )
+        if "width" in raw:
+            width = raw["width"] * self.field
+            share = initial_slope(known["anisotropy"]) * known["Ms"]
+            coupled = width / (below + above) if "stability" in raw else width + known["alpha"] * share
             known["a"] = np.maximum(coupled, _SMALLEST * width)
-        if stable is not None:
+        if "stability" in raw:
             known["alpha"] = (1.0 - below + above) * known["a"] / (known["Ms"] * steepest(known))
-        if "z0" in raw and "z0" not in self.limits:
+        if "z0" in raw:
             known["z0"] = raw["z0"] * known["Ms"]
         return known
 
-    def encode(self, parameters: Mapping[str, float]) -> FloatArray:
-        """Coordinates (n_x,) of one set of parameters."""
-        raw = {name: float(parameters[name]) for name in _BOX}
-        one = {name: np.array([value]) for name, value in raw.items()}
-        if self.has_stability():
-            beyond = raw["alpha"] * raw["Ms"] * float(steepest(one)[0]) / raw["a"] - 1.0
-            apart = float(np.hypot(beyond, 2.0 * np.exp(-0.5 * _TURN)))
-            stable = -np.log(0.5 * (apart - beyond))
+    def located(self, known: dict[str, FloatArray]) -> dict[str, Any]:
+        own = {name: known[name] / unit for name, unit in self.units.items()}
+        coupling = known["alpha"] * known["Ms"]
+        if "stability" in self.axes:
+            beyond = coupling * steepest(known) / known["a"] - 1.0
+            apart = np.hypot(beyond, 2.0 * np.exp(-0.5 * _TURN))
+            own["stability"] = -np.log(0.5 * (apart - beyond))
         else:
-            share = float(initial_slope(one["anisotropy"])[0]) * raw["Ms"]
-            apart, stable = max(1.0 - raw["alpha"] * share / raw["a"], _LEAST), 0.0
-        own = {
-            "Ms": raw["Ms"] / self.magnetisation,
-            "a": raw["a"] * apart / self.field,
-            "alpha": stable,
-            "k": raw["k"] / self.field,
-            "z0": raw["z0"] / raw["Ms"],
-        }
-        raw |= {name: value for name, value in own.items() if name not in self.limits}
-        return np.array([np.log(raw[name]) if name in _LOGS else raw[name] for name in self.names])
+            apart = max(1.0 - coupling * initial_slope(known["anisotropy"]) / known["a"], _LEAST)
+        return {**own, "width": known["a"] * apart / self.field, "z0": known["z0"] / known["Ms"]}
 
 
 def initial_slope(anisotropy: FloatArray) -> FloatArray:
@@ -304,6 +265,7 @@ class JilesAtherton(Law):
         title="Magnetic core: Jiles-Atherton",
     )
     searched = (*affine("gain", "feedthrough", unit="y/u"), *affine("offset", unit="y"))
+    powers: ClassVar = {"gain": None, "feedthrough": 1, "offset": 0}
     step = staticmethod(kernels.step)
     resume = staticmethod(kernels.resume)
     exact_strokes: ClassVar[bool] = True
@@ -492,7 +454,7 @@ class JilesAtherton(Law):
 
     def magnetisation(self, u: npt.ArrayLike) -> FloatArray:
         """Magnetisation M at the samples of the field `u`, shape (n_samples,) [A/m]; errors as of `response`."""
-        return self.with_scalars({"gain": 1.0, "feedthrough": 0.0, "offset": 0.0}).response(u)
+        return self.with_scalars(self.memory_only).response(u)
 
     def divergence(self, sample: int, u: float, y: float) -> str:
         """Message with the coupling."""
@@ -548,27 +510,10 @@ class JilesAtherton(Law):
         bounds = freedom.limits(scalars, held)
         if "feedthrough" not in held and "gain" in held and held["gain"] > 0.0:  # no core falls at saturation
             bounds = {"feedthrough": (0.0, np.inf), **bounds}
-        limits = {name: pair for name, pair in bounds.items() if name in _BOX}
-        for name, pair in limits.items():
-            if not np.isfinite(pair).all() or (name in _LOGS and pair[0] <= 0.0):
-                raise ValueError(f"bounds of {name!r} must be {'positive and ' * (name in _LOGS)}finite, got {pair}")
-        values = {**scalars, **held}
-        names = tuple(name for name in _BOX if name not in held)
-        chart = _Chart(names, values, limits, unit["h"], 0.5 * unit["y"] / (abs(values["gain"]) or 1.0))
-        box = {each: chart.side(name) for each, name in zip(chart.coordinates, names, strict=True)}
-        drawn = sides({name: chart.side(name) if name in limits else _DRAWN.get(name, _BOX[name]) for name in names})
+        size = 0.5 * unit["y"] / (abs(held.get("gain", self.gain)) or 1.0)
+        chart = _Chart(rows=_ROWS, defaults=scalars, held=held, bounds=bounds, field=unit["h"], magnetisation=size)
+        chart.check_finite()
         is_by_default = freedom.starts_anew and self.arguments == self.defaults()
-        start = 0.5 * (drawn[0] + drawn[1]) if is_by_default else chart.encode(values)
-        return space_of_chart(
-            chart, box, start, self.columns, held, bounds, freedom,
-            state=("z0",), physical=_PHYSICAL, screened=_SCREENED, drawn=drawn,
-        )  # fmt: skip
-
-    def regressors(self, parameters: Parameters, record: Record) -> FloatArray:
-        """Columns M, H, 1 and 0, shape (n_sets, n_samples, 4)."""
-        magnetisation = self.outputs({**parameters, "gain": 1.0, "feedthrough": 0.0, "offset": 0.0}, record.u)
-        field = np.broadcast_to(record.u, magnetisation.shape)
-        return np.stack([magnetisation, field, np.ones_like(field), np.zeros_like(field)], axis=-1)
-
-    def _check_memory_is_its_own(self, parameters: Parameters, u: FloatArray) -> None:
-        """It is: gain, feedthrough and offset act after the memory."""
+        low, high = sides(chart.box(is_drawn=True))
+        start = 0.5 * (low + high) if is_by_default else chart.encode(chart.values)
+        return space_of_chart(chart, start, self.columns, freedom, screened=_SCREENED)
