@@ -42,17 +42,6 @@ def saturation(A: float, beta: float, gamma: float, n: float) -> float:
     return _power(abs(A) / c, 1.0 / n) if c > 0.0 else math.inf
 
 
-def memory_bound(A: float, beta: float, gamma: float, n: float, z0: float, stability_class: str) -> float:
-    """Bound of |z| for every input that begins with z0; inf if |z| is not bounded."""
-    if stability_class == "none":
-        return math.inf
-    if stability_class in ("II", "IV"):
-        unstable = abs(A) / (abs(gamma) - beta)
-        if abs(z0) > _power(unstable, 1.0 / n):
-            return math.inf
-    return max(abs(z0), saturation(A, beta, gamma, n))
-
-
 def memory_slopes(A: float, beta: float, gamma: float, n: float, bound: float) -> tuple[float, float]:
     """Lowest and highest slope dz/du for |z| <= `bound`."""
     ends = [A]
@@ -70,7 +59,9 @@ def polynomial_range(coefficients: FloatArray, low: float, high: float) -> tuple
     turns = np.polynomial.polynomial.polyroots(np.polynomial.polynomial.polyder(trimmed))
     real = turns[np.abs(turns.imag) <= 1e-8 * np.abs(turns)].real
     inside = [turn for turn in real.tolist() if low < turn < high]
-    values = [_value(trimmed, point) for point in (low, high, *inside)]
+    finite = [point for point in (low, high, *inside) if math.isfinite(point)]
+    values = np.polynomial.polynomial.polyval(finite, trimmed).tolist()
+    values += [float(trimmed[-1]) * end ** (trimmed.size - 1) for end in (low, high) if math.isinf(end)]
     return min(values), max(values)
 
 
@@ -78,13 +69,6 @@ def _power(base: float, exponent: float) -> float:
     """base ** exponent for base >= 0, where Python raises an OverflowError for infinity."""
     with np.errstate(over="ignore"):
         return float(np.float64(base) ** exponent)
-
-
-def _value(coefficients: FloatArray, point: float) -> float:
-    if math.isinf(point):
-        degree = coefficients.size - 1
-        return math.copysign(math.inf, coefficients[-1] * (math.copysign(1.0, point) if degree % 2 else 1.0))
-    return float(np.polynomial.polynomial.polyval(point, coefficients))
 
 
 class BoucWenStep(Law):
@@ -164,7 +148,13 @@ class BoucWenLaw(BoucWenStep, MemoryLaw):
     @property
     def memory_bound(self) -> float:
         """Bound of ``|z|`` for every input that begins with z0; inf if ``|z|`` is not bounded."""
-        return memory_bound(self.A, self.beta, self.gamma, self.n, self.z0, self.stability_class)
+        if self.stability_class == "none":
+            return math.inf
+        if self.stability_class in ("II", "IV"):
+            unstable = abs(self.A) / (abs(self.gamma) - self.beta)
+            if abs(self.z0) > _power(unstable, 1.0 / self.n):
+                return math.inf
+        return max(abs(self.z0), self.saturation)
 
     def limit_cycle(self, amplitude: float) -> LimitCycle:
         """Steady loop of the memory between the inputs -amplitude and amplitude [unit of u].
