@@ -14,12 +14,11 @@ of one sign, which lose no digits when the loop is narrow or the memory saturate
     coercive input = beta  int_0^L  w^n / (A - e w^n) dl
     energy         = 4 beta  int_0^L  w^(n+1) / (A - e w^n) dl
 
-w(l) is exact, L is the root of w_c(L) = w_e(2 X - L), and the integrals are Gauss-Legendre sums on intervals that
-shrink towards both ends, where w^n is not analytic. A law with A < 0 is the law (-A, beta, -gamma) of the input -u.
+w(l) is exact, L is the root of w_c(L) = w_e(2 X - L), and the tanh-sinh rule takes the integrals, whose integrands are
+not analytic at the ends. A law with A < 0 is the law (-A, beta, -gamma) of the input -u.
 Sources: Ikhouane and Rodellar 2007, chapter 3, for the limit cycle; the integrals of one sign are ours.
 """
 
-import functools
 import math
 
 import numpy as np
@@ -29,8 +28,7 @@ from hysim._basics.frozen import FloatArray, frozen, read_only
 from hysim.errors import SimulationError
 from hysim.kernels import boucwen as kernels
 
-_PANELS = 32  # on either half; the innermost, where w^n is not analytic, weighs 2^-32 to a power above 1
-_NODES = 40  # on each: the nearest pole of w^n is pi/n away in the angle, which n = 20 needs them for
+_ROUNDING = 1e-14  # of an integral
 
 
 @frozen
@@ -74,17 +72,22 @@ def limit_cycle(A: float, beta: float, gamma: float, n: float, amplitude: float)
     if escape_length(slope, c, n) + escape_length(slope, e, n) <= 2.0 * amplitude:
         raise SimulationError(f"the memory diverges between -{amplitude:g} and {amplitude:g}")
     length = amplitude + _half_difference(slope, c, e, n, amplitude)
-    nodes, weights = _rule()
-    w = _from_rest(slope, c, n, length * nodes)
-    density = weights * length * w**n / (slope - c * w**n + 2.0 * abs(beta) * w**n)
-    coercive = beta * float(density.sum())
+
+    def density(lengths: FloatArray, power: FloatArray) -> FloatArray:
+        w = _from_rest(slope, c, n, lengths.ravel()).reshape(lengths.shape)
+        return np.asarray(w ** (n + power) / (slope - c * w**n + 2.0 * abs(beta) * w**n))
+
+    integrals = scipy.integrate.tanhsinh(
+        density, 0.0, length, args=(np.array([0.0, 1.0]),), rtol=_ROUNDING, minlevel=5
+    ).integral
+    coercive = beta * float(integrals[0])
     peak, middle = _from_rest(slope, c, n, np.array([length, abs(coercive)])).tolist()
     return LimitCycle(
         amplitude=amplitude,
         peak=sign * peak,
         coercive=coercive,
         mid_width=2.0 * middle,
-        energy=sign * 4.0 * beta * float(density @ w),
+        energy=sign * 4.0 * beta * float(integrals[1]),
     )
 
 
@@ -117,14 +120,3 @@ def _from_rest(A: float, c: float, n: float, lengths: FloatArray) -> FloatArray:
     with np.errstate(all="ignore"):  # a memory that diverges overflows, and uncompiled kernels would warn of it
         kernels.batch(laws, memory_itself, u, z)
     return z[:, 1]
-
-
-@functools.cache
-def _rule() -> tuple[FloatArray, FloatArray]:
-    """Nodes and weights on [0, 1], graded towards both ends."""
-    x, w = np.polynomial.legendre.leggauss(_NODES)
-    edges = np.concatenate([[0.0], 0.5 ** np.arange(_PANELS, 0, -1.0)])
-    half = np.diff(edges)[:, np.newaxis] / 2.0
-    nodes = (edges[:-1, np.newaxis] + half * (x + 1.0)).ravel()
-    weights = (half * w).ravel()
-    return np.concatenate([nodes, 1.0 - nodes[::-1]]), np.concatenate([weights, weights[::-1]])
