@@ -34,8 +34,8 @@ ALLOWED: dict[tuple[str, ...], tuple[str, ...]] = {
     ("identification/_assumptions.py", "identification/_identify.py"): ("ReversalFilter",),
     # The diagram of reversal curves is that of a density of relays.
     ("plot/_sweeps.py",): ("Preisach", "PreisachRelays"),
-    # A page computes a curve of knots, which has no step, and plays that widen with the speed, in the browser.
-    ("export/_page_model.py",): ("RateDependentPrandtlIshlinskii", "SingleValued"),
+    # A page computes a curve of knots, which has no step, in the browser.
+    ("export/_page_model.py",): ("SingleValued",),
     # Devices are sums of laws, or laws with the numbers of a material.
     ("export/_page.py",): ("BoucWen", "Dahl", "Dashpot", "ExcessLoss", "JilesAtherton", "Line", "MaxwellSlip"),
     # Messages and examples name a law that a user may take.

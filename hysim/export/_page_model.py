@@ -22,7 +22,6 @@ from hysim.export._compilers import Kernels, kernels_of, module_of
 from hysim.export._packing import packing
 from hysim.kernels import clamps, energy_plays, play_sums
 from hysim.laws.friction.rated_law import TimedLaw
-from hysim.laws.operators.rate_dependent_prandtl_ishlinskii import RateDependentPrandtlIshlinskii
 from hysim.laws.static import SingleValued
 from hysim.models.law import Law
 from hysim.models.sum import Composite
@@ -185,20 +184,12 @@ def _law(thing: Any, u: FloatArray, parts: Parts) -> tuple[dict[str, Any], list[
     if isinstance(thing, TimedLaw):
         node["fields"] = [each for each in node["fields"] if each[0] != _CLOCK]
         return node | {"clock": names.index(_CLOCK)}, sliders_of(law, free, coarse, names)
-    if not isinstance(thing, RateDependentPrandtlIshlinskii):
-        return node, sliders_of(law, free, u, names)
-    place = names.index("width")  # of plays, which is divided by the page's sample time
-    node["fields"] = [["beta" if name == "width" else name, *rest] for name, *rest in node["fields"]]
-    beta = slider("beta", thing.beta, 0.0, 4.0 * thing.beta or 0.1, places=[place])
-    own = [name for name in names if name in thing.plays.scalars]
-    return node | {"per_time": [place]}, [*sliders_of(thing.plays, own, u, names), beta]
+    return node, sliders_of(law, free, u, names)
 
 
 def _at(thing: Any, sample_time: float) -> Any:
     """A law that depends on the rate of its input, at a sample time; other laws unchanged."""
-    if isinstance(thing, TimedLaw):
-        return thing.at_sample_time(sample_time)
-    return thing.at(1.0) if isinstance(thing, RateDependentPrandtlIshlinskii) else thing
+    return thing.at_sample_time(sample_time) if isinstance(thing, TimedLaw) else thing
 
 
 def _node(law: Law, family: type, parts: Parts) -> dict[str, Any]:

@@ -51,8 +51,8 @@ function response(node, values, u, steps, sampleTime) {
     return node.cascade.reduce((signal, stage) => response(stage, values, signal, steps, sampleTime), u);
   }
   if (node.knots) return Float64Array.from(u, (value) => interpolated([value], ...node.knots)[0]);
-  const { first, free, per_time: perTime = [], clock, sizes } = node;
-  const number = (place) => (place === clock ? sampleTime : values[first + place] / (perTime.includes(place) ? sampleTime : 1));
+  const { first, free, clock, sizes } = node;
+  const number = (place) => (place === clock ? sampleTime : values[first + place]);
   const fields = free.map(number);
   const [parameters, memory] = sizes.map((size) => new Float64Array(size));
   node.packed(fields, parameters, memory);

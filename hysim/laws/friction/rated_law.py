@@ -44,6 +44,8 @@ class TimedLaw(Subject, Placed, ABC):
     initial, searched, starts, screened
         As of `hysim.Law`; parameters may have the units ``"v"``, the highest speed of the record, and ``"r"``, the
         speed of an output that follows the input.
+    at_one_time : type of Law, optional
+        What the law at one sample time has beyond its step, such as an inverse.
     """
 
     step: ClassVar[Any]
@@ -51,6 +53,7 @@ class TimedLaw(Subject, Placed, ABC):
     searched: ClassVar[tuple[Parameter, ...]] = ()
     starts: ClassVar[tuple[Mapping[str, float], ...]] = ()
     screened: ClassVar[int | None] = None
+    at_one_time: ClassVar[type[Law] | None] = None
     dynamic: ClassVar[bool] = True
 
     # ------------------------------------------------------------------------------ what a family may say more
@@ -61,6 +64,11 @@ class TimedLaw(Subject, Placed, ABC):
         return 0
 
     @classmethod
+    def completed(cls, tables: dict[str, FloatArray]) -> dict[str, FloatArray]:
+        """The tables with what the constructor would add."""
+        return tables
+
+    @classmethod
     def candidates(cls) -> dict[str, Any]:
         """None for `hysim.compare` to try by itself, since friction is no model of an actuator."""
         return {}
@@ -68,7 +76,7 @@ class TimedLaw(Subject, Placed, ABC):
     @classmethod
     def defaults(cls) -> dict[str, Any]:
         """Values of the fields that have one by default, and a sample time."""
-        return _kind_at_sample_time(cls).defaults()
+        return kind_at_sample_time(cls).defaults()
 
     def placed(self, u0: float | None, u_range: tuple[float, ...] | None = None) -> Self:
         """The law with its memory at `u0`; one without an initial memory begins at the first sample of any input."""
@@ -82,7 +90,7 @@ class TimedLaw(Subject, Placed, ABC):
     def at_sample_time(self, sample_time: float) -> Law:
         """The law for one sample time [s]; ValueError if that is not positive."""
         positive_time(sample_time)
-        kind: Any = _kind_at_sample_time(type(self))
+        kind: Any = kind_at_sample_time(type(self))
         law: Law = kind(sample_time=sample_time, **items(self))
         return law
 
@@ -156,7 +164,7 @@ class TimedLaw(Subject, Placed, ABC):
         """Outputs of many laws at one sample time [s]; else as `hysim.Law.responses`."""
         positive_time(sample_time)
         sets = {**parameters, "sample_time": sample_time}
-        return _kind_at_sample_time(cls).responses(sets, u, reduce=reduce, target=target, workers=workers)
+        return kind_at_sample_time(cls).responses(sets, u, reduce=reduce, target=target, workers=workers)
 
     # ------------------------------------------------------------------------------ identification
 
@@ -213,6 +221,10 @@ class AtSampleTime(Law):
     def check(cls, tables: Tables) -> None:
         cls.family.check(tables)
 
+    @classmethod
+    def completed(cls, tables: dict[str, FloatArray]) -> dict[str, FloatArray]:
+        return cls.family.completed(tables)
+
     def search_space(self, record: Record, freedom: Freedom = ALL_FREE) -> SearchSpace:
         """The box of the family for samples that are the law's sample time apart."""
         times = np.asarray(self.scalars["sample_time"] * np.arange(len(record)), dtype=np.float64)
@@ -225,7 +237,7 @@ class AtSampleTime(Law):
 
 
 @functools.cache
-def _kind_at_sample_time(family: type[TimedLaw]) -> type[Law]:
+def kind_at_sample_time(family: type[TimedLaw]) -> type[Law]:
     """The laws of a family at one sample time: ``sample_time``, then the fields of the family."""
     named = [each for each in fields(cast(Any, family)) if each.name not in last_names(family)]
     defaults = {each.name: each.default for each in named if each.default is not MISSING}
@@ -240,7 +252,8 @@ def _kind_at_sample_time(family: type[TimedLaw]) -> type[Law]:
         "initial": family.initial,
         "searched": family.searched,
     }
-    return checked(type(f"{family.__name__}AtSampleTime", (AtSampleTime,), body))
+    bases = (AtSampleTime,) if family.at_one_time is None else (family.at_one_time, AtSampleTime)
+    return checked(type(f"{family.__name__}AtSampleTime", bases, body))
 
 
 def curve(speed: npt.ArrayLike, coulomb: float, breakaway: float, velocity: float, exponent: float) -> FloatArray:

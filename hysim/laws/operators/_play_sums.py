@@ -6,9 +6,8 @@ from abc import abstractmethod
 import numpy as np
 import numpy.typing as npt
 
-from hysim._basics.frozen import FloatArray, checked, read_only
+from hysim._basics.frozen import FloatArray, read_only
 from hysim.kernels import play_sums as kernels
-from hysim.laws.operators._bank import Plays
 from hysim.laws.operators._bank_search import rows_of
 from hysim.laws.operators.prandtl_ishlinskii import PrandtlIshlinskii
 from hysim.models.law import Law, Packed, State
@@ -80,13 +79,20 @@ class PlaySum(Law):
         return CompiledLaw(kernels.inverse_step, parameters, np.concatenate([[state[0], y], law.state]))
 
 
-@checked
-class PlaysAtSampleTime(Plays, PlaySum):
-    """The law at one sample time, with thresholds ``r_i + width |u_k - u_(k-1)|``."""
+class WideningPlays(PlaySum):
+    """Plays at one sample time, with thresholds ``r_i + width |u_k - u_(k-1)|``."""
 
-    width: float = 0.0
-    offset: float = 0.0
-    z0: tuple[float, ...] = (0.0,)
+    beta: float
+    sample_time: float
+
+    @property
+    def width(self) -> float:
+        """Growth of the thresholds with the step of the input."""
+        return self.beta / self.sample_time
+
+    @classmethod
+    def pack(cls, tables: Tables) -> Packed:
+        return super().pack({**tables, "width": tables["beta"] / tables["sample_time"]})
 
     def refusal(self) -> str | None:
         if (refusal := self.plays.refusal()) is not None:

@@ -12,31 +12,29 @@ are positive: samples must be further apart than about 2 beta. The condition on 
 """
 
 import math
-from dataclasses import fields
-from typing import ClassVar, Self
+from dataclasses import replace
+from typing import Any, ClassVar, Self
 
 import numpy as np
 import numpy.typing as npt
 
 from hysim._basics.frozen import FloatArray, check_positive, items, read_only
-from hysim._basics.names import among
+from hysim.kernels import play_sums as kernels
+from hysim.laws.friction.rated_law import TimedLaw, kind_at_sample_time
 from hysim.laws.operators._bank import Plays
 from hysim.laws.operators._bank_search import Axis, table_of
-from hysim.laws.operators._play_sums import EXAMPLE, PlaysAtSampleTime
-from hysim.laws.operators.prandtl_ishlinskii import PrandtlIshlinskii
-from hysim.models.batch import Reduction
-from hysim.models.composable import Placed
-from hysim.models.law import Advanced, State
+from hysim.laws.operators._play_sums import EXAMPLE, PlaySum, WideningPlays
+from hysim.models.law import State
 from hysim.models.model import Example, family
 from hysim.models.parameters import Parameter
-from hysim.models.protocols import UNLIMITED, CompiledLaw, Limits, Startable, needed_time
+from hysim.models.protocols import UNLIMITED, CompiledLaw, Limits
 from hysim.models.search_space import Parameters
 from hysim.models.tables import Tables, check_signs
 from hysim.records import Record
 
 
 @family
-class RateDependentPrandtlIshlinskii(Plays, Placed):
+class RateDependentPrandtlIshlinskii(Plays, TimedLaw):
     """Rate-dependent Prandtl-Ishlinskii law, ``y = offset + sum w_i z_i``, thresholds ``r_i + beta |u'|``.
 
     ::
@@ -80,16 +78,19 @@ class RateDependentPrandtlIshlinskii(Plays, Placed):
     z0: tuple[float, ...] = (0.0,)
 
     example = Example({**EXAMPLE, "beta": 0.005}, title="Prandtl-Ishlinskii: with the rate")
-    dynamic: ClassVar[bool] = True
+    step = staticmethod(kernels.step)
+    at_one_time = WideningPlays
     by_input: ClassVar[bool] = False
     # up to half a span at the highest speed
     axes = (Axis(Parameter("beta", 0.0, 1.0, unit="h/v", physical=(True, False)), (0.0, 0.1, 0.3)),)
     not_negative = ("beta",)
 
-    @property
-    def plays(self) -> PrandtlIshlinskii:
-        """The sum of plays for an input that stands still, without the offset."""
-        return PrandtlIshlinskii(thresholds=self.thresholds, weights=self.weights, z0=self.z0)
+    plays = PlaySum.plays
+
+    @classmethod
+    def candidates(cls) -> dict[str, Any]:
+        """The class itself, which `hysim.compare` tries as it does other plays."""
+        return {cls.__name__: cls}
 
     @classmethod
     def pushing(cls, parameters: Parameters, record: Record) -> Tables:
@@ -97,14 +98,14 @@ class RateDependentPrandtlIshlinskii(Plays, Placed):
         n_sets = len(table_of("thresholds", parameters))
         return {"width": np.broadcast_to(beta / record.sample_time, (n_sets, 1))}
 
-    def at(self, sample_time: float) -> PlaysAtSampleTime:
+    def at(self, sample_time: float) -> Any:
         """The law at one sample time [s], as loops step it. Raises ValueError if the sample time is not positive."""
-        others = {name: value for name, value in items(self).items() if name != "beta"}
-        return PlaysAtSampleTime(**others, width=float(_width(self.beta, sample_time)))
+        check_positive(sample_time=sample_time)
+        if math.isinf(sample_time):
+            return replace(self, beta=0.0).at(1.0)
+        return kind_at_sample_time(type(self))(sample_time=sample_time, **items(self))
 
-    def memory(self, u: npt.ArrayLike, sample_time: float) -> FloatArray:
-        """Positions of the plays at the samples of `u`, shape (n_samples, n_plays); see `response`."""
-        return self.at(sample_time).memory(u)
+    at_sample_time = at
 
     def response(self, u: npt.ArrayLike, sample_time: float, *, speed: npt.ArrayLike | None = None) -> FloatArray:
         """Output y at the samples of an input that moves evenly between them.
@@ -129,52 +130,12 @@ class RateDependentPrandtlIshlinskii(Plays, Placed):
         """
         law = self.at(sample_time)
         if speed is None:
-            return law.response(u)
+            return np.asarray(law.response(u))
         speeds = read_only(speed, "speed", ndim=1)
         if speeds.size != np.size(u):
             raise ValueError(f"speed must have {np.size(u)} samples as the signal has, got {speeds.size}")
         check_signs({"speed": speeds}, (), ("speed",))
-        return law.response_at(u, self.beta * speeds)
-
-    def signals(self, u: npt.ArrayLike, sample_time: float) -> dict[str, FloatArray]:
-        """Output ``"y"`` and positions ``"z"`` at the samples of `u`; see `response`."""
-        law = self.at(sample_time)
-        return {"y": law.response(u), "z": law.memory(u)}
-
-    def advance(self, u: npt.ArrayLike, state: State | None = None, *, sample_time: float | None = None) -> Advanced:
-        """Output continued from `state`, input and positions at the last sample so far, and the state at the end.
-
-        The bits are those of one uncut input, which moves evenly from the state's input to its first sample; arguments
-        and errors are those of `response`. By default the state is ``(u[0], *z0)``.
-        """
-        return self.at(needed_time(self, sample_time)).advance(u, state)
-
-    def compiled(self, u0: float = 0.0, *, sample_time: float) -> CompiledLaw:
-        """The law as compiled loops take it, after a first sample at the input `u0`."""
-        return self.at(sample_time).compiled(u0)
-
-    def startable(self, sample_time: float | None = None) -> Startable:
-        """The law at a sample time [s] as a step that runs from any first input, for exports."""
-        return self.at(needed_time(self, sample_time)).startable()
-
-    @classmethod
-    def responses(
-        cls,
-        parameters: Parameters,
-        u: npt.ArrayLike,
-        sample_time: float,
-        *,
-        reduce: Reduction | None = None,
-        target: npt.ArrayLike | None = None,
-        workers: int | None = None,
-    ) -> FloatArray:
-        """Outputs of many laws at one sample time [s]; else as `PrandtlIshlinskii.responses`, with ``beta``."""
-        width = _width(parameters.get("beta", cls.beta), sample_time)
-        known = [each.name for each in fields(cls)]
-        if wrong := [name for name in parameters if name not in known]:
-            raise TypeError(f"unknown parameter {wrong[0]!r}: {cls.__name__} has {among(wrong[0], known)}")
-        sets = {name: value for name, value in parameters.items() if name != "beta"} | {"width": width}
-        return PlaysAtSampleTime.responses(sets, u, reduce=reduce, target=target, workers=workers)
+        return np.asarray(law.response_at(u, self.beta * speeds))
 
     def is_invertible(self, sample_time: float | None = None) -> bool:
         """Whether there is an `inverse`, for a known speed; with a sample time, an `inverse_response` without one."""
@@ -221,11 +182,3 @@ class RateDependentPrandtlIshlinskii(Plays, Placed):
     def compiled_inverse(self, u0: float, limits: Limits = UNLIMITED, sample_time: float = math.inf) -> CompiledLaw:
         """The inverse at a sample time [s], stepped; see `hysim.Law.compiled_inverse`."""
         return self.at(sample_time).compiled_inverse(u0, limits)
-
-
-def _width(beta: npt.ArrayLike, sample_time: float) -> FloatArray:
-    """Growth of the thresholds with the step of the input."""
-    growth = np.asarray(beta, dtype=float)
-    check_signs({"beta": growth}, (), ("beta",))
-    check_positive(sample_time=sample_time)
-    return np.asarray(growth / sample_time)
