@@ -167,16 +167,6 @@ def inverse_step(parameters: FloatArray, state: FloatArray, y: float) -> float:
     return float(u)
 
 
-@kernel
-def positions(parameters: FloatArray, state: FloatArray, u: FloatArray, out: FloatArray) -> None:
-    """Positions of the plays of many laws, one a row, at the samples of `u`: (n_sets, n_samples, n_plays)."""
-    for i in range(out.shape[0]):
-        for k in range(u.size):
-            step(parameters[i], state[i], u[k])
-            for j in range(out.shape[2]):
-                out[i, k, j] = state[i, 1 + j]
-
-
 @signed_kernel(void(CONSTANTS, VECTOR, CONSTANTS, CONSTANTS, VECTOR))
 def widened(parameters: FloatArray, state: FloatArray, u: FloatArray, widening: FloatArray, out: FloatArray) -> None:
     """Outputs at the samples of `u` into `out`, thresholds beyond zero being wider by `widening`."""

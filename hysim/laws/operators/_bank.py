@@ -46,7 +46,7 @@ class Elements:
 class Bank(Elements, ByStructure):
     """Several plays or stops, whose fields are tuples.
 
-    A family that pushes its plays otherwise than `Clamps` has `pushing`, one with another output `outputs_of_one`.
+    A family with another output than `Clamps` has `outputs_of_one`.
     """
 
     thresholds_name: ClassVar[str] = "thresholds"
@@ -76,11 +76,6 @@ class Bank(Elements, ByStructure):
         """Refuse elements that are no plays or stops of this law."""
         check_signs(tables, cls.positive, cls.not_negative)
         check_elements(cls, *(tables[name] for name in (cls.thresholds_name, cls.weights_name, "z0")))
-
-    @classmethod
-    def pushing(cls, parameters: Parameters, record: Record) -> Tables:
-        """Parameters that change how the input pushes the plays, as `rows_of` takes them."""
-        return {}
 
     @classmethod
     def outputs_of_one(cls, z: FloatArray, parameters: Parameters, record: Record) -> FloatArray:

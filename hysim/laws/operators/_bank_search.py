@@ -41,6 +41,7 @@ import numpy as np
 
 from hysim._basics.frozen import FloatArray, check_whole, checked, read_only
 from hysim.kernels import play_sums as kernels
+from hysim.models.compiled_step import pointer
 from hysim.models.composable import Composable
 from hysim.models.parameters import Coordinate, Parameter, rate_spans, space_of, spans, unit_of
 from hysim.models.protocols import Subject, Variant
@@ -289,11 +290,16 @@ class BankStructure(SignedStructure):
 
     def _positions(self, parameters: Parameters, record: Record) -> FloatArray:
         """Positions (n_sets, n_samples, n_plays) along a record, which do not depend on the weights."""
+        from hysim.kernels.memories import drive_memory  # compiled where it is needed
+
         thresholds, z0 = table_of(self.law.thresholds_name, parameters), self.initial(parameters)
-        tables = {"offset": np.zeros((len(z0), 1)), "thresholds": thresholds, "weights": np.zeros_like(z0), "z0": z0}
-        rows = read_only(rows_of({**tables, **self.law.pushing(parameters, record)}))
-        z, state = np.empty((len(z0), len(record), z0.shape[1])), np.insert(z0, 0, record.u[0], axis=1)
-        kernels.positions(rows, state, record.u, z)
+        tables = {"offset": np.zeros((len(z0), 1)), "thresholds": thresholds, "weights": np.zeros_like(z0)}
+        tables |= {name: table_of(name, parameters) for name in ("left", "right") if f"{name}[0]" in parameters}
+        if "beta" in parameters:
+            tables |= {"beta": np.reshape(parameters["beta"], (-1, 1)), "sample_time": np.array([[record.sample_time]])}
+        z, states = np.empty((len(z0), len(record), z0.shape[1])), np.insert(z0, 0, record.u[0], axis=1)
+        for row, state, positions in zip(read_only(rows_of(tables)), states, z, strict=True):
+            drive_memory(pointer(kernels.step), row, state, record.u, positions)
         return z
 
 
@@ -321,12 +327,14 @@ def with_offset(*columns: FloatArray) -> FloatArray:
 def rows_of(tables: Tables) -> FloatArray:
     """Rows as the kernels take them: offset, width, envelopes, thresholds, weights, and then the dead zones.
 
-    Width, envelopes `left` and `right`, dead zones may be absent; `right` without coefficients is the left one.
+    Growth `beta` at a sample time, envelopes `left` and `right`, and dead zones may be absent; `right` without
+    coefficients is the left one.
     """
     offset = tables["offset"]
+    width = tables["beta"] / tables["sample_time"] if "beta" in tables else 0.0
     left = tables.get("left", np.tile(IDENTITY, (len(offset), 1)))
     right = tables.get("right", left)
-    head = [offset, tables.get("width", np.zeros_like(offset)), left, right if right.shape[1] else left]
+    head = [offset, width + np.zeros_like(offset), left, right if right.shape[1] else left]
     behind = [tables[name] for name in ("dead_zones", "dead_zone_weights") if name in tables]
     return np.concatenate([*head, tables["thresholds"], tables["weights"], *behind], axis=1)
 

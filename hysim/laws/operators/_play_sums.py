@@ -90,10 +90,6 @@ class WideningPlays(PlaySum):
         """Growth of the thresholds with the step of the input."""
         return self.beta / self.sample_time
 
-    @classmethod
-    def pack(cls, tables: Tables) -> Packed:
-        return super().pack({**tables, "width": tables["beta"] / tables["sample_time"]})
-
     def refusal(self) -> str | None:
         if (refusal := self.plays.refusal()) is not None:
             return refusal

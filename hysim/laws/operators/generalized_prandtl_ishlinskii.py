@@ -8,7 +8,7 @@ import numpy.typing as npt
 
 from hysim._basics.frozen import FloatArray, read_only
 from hysim.laws.operators._bank import Plays
-from hysim.laws.operators._bank_search import IDENTITY, Axis, BankStructure, named, table_of
+from hysim.laws.operators._bank_search import IDENTITY, Axis, BankStructure, named
 from hysim.laws.operators._play_sums import EXAMPLE, PlaySum
 from hysim.models.model import Example, family
 from hysim.models.parameters import Parameter, spans
@@ -116,10 +116,6 @@ class GeneralizedPrandtlIshlinskii(Plays, PlaySum):
             return replace(plain, axes=_AXES[: 1 + envelopes])
         numbers = [named(side, each.tolist()) for side, each in known.items()]
         return replace(plain, known=numbers[0] | numbers[1])
-
-    @classmethod
-    def pushing(cls, parameters: Parameters, record: Record) -> Tables:
-        return {side: table_of(side, parameters) for side in ("left", "right")}
 
     @classmethod
     def derived(cls, parameters: Parameters, record: Record) -> dict[str, FloatArray]:

@@ -22,15 +22,13 @@ from hysim._basics.frozen import FloatArray, check_positive, items, read_only
 from hysim.kernels import play_sums as kernels
 from hysim.laws.friction.rated_law import TimedLaw, kind_at_sample_time
 from hysim.laws.operators._bank import Plays
-from hysim.laws.operators._bank_search import Axis, table_of
+from hysim.laws.operators._bank_search import Axis
 from hysim.laws.operators._play_sums import EXAMPLE, PlaySum, WideningPlays
 from hysim.models.law import State
 from hysim.models.model import Example, family
 from hysim.models.parameters import Parameter
 from hysim.models.protocols import UNLIMITED, CompiledLaw, Limits
-from hysim.models.search_space import Parameters
-from hysim.models.tables import Tables, check_signs
-from hysim.records import Record
+from hysim.models.tables import check_signs
 
 
 @family
@@ -91,12 +89,6 @@ class RateDependentPrandtlIshlinskii(Plays, TimedLaw):
     def candidates(cls) -> dict[str, Any]:
         """The class itself, which `hysim.compare` tries as it does other plays."""
         return {cls.__name__: cls}
-
-    @classmethod
-    def pushing(cls, parameters: Parameters, record: Record) -> Tables:
-        beta = np.reshape(parameters["beta"], (-1, 1))
-        n_sets = len(table_of("thresholds", parameters))
-        return {"width": np.broadcast_to(beta / record.sample_time, (n_sets, 1))}
 
     def at(self, sample_time: float) -> Any:
         """The law at one sample time [s], as loops step it. Raises ValueError if the sample time is not positive."""
