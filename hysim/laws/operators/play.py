@@ -6,14 +6,9 @@ Sources: M. A. Krasnosel'skii and A. V. Pokrovskii, Systems with Hysteresis, 198
 from dataclasses import dataclass
 from typing import ClassVar
 
-import numpy as np
-
-from hysim._basics.frozen import FloatArray
 from hysim.laws.operators._bank import Clamps
-from hysim.models.law import Outputs
 from hysim.models.model import Example, family
 from hysim.models.parameters import Parameter
-from hysim.models.search_space import Parameters
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -34,11 +29,6 @@ class Element(Clamps):
     )
     starts = tuple({"threshold": share, "z0": 0.0} for share in (0.1, 0.3, 0.6))
     screened = 256
-
-    def columns_by(self, outputs: Outputs, parameters: Parameters, u: FloatArray) -> FloatArray:
-        """Columns z (or u - z), 1 and 0 of the output, shape (n_sets, n_samples, 3)."""
-        element = outputs({**parameters, "gain": 1.0, "offset": 0.0}, u)
-        return np.stack([element, np.ones_like(element), np.zeros_like(element)], axis=-1)
 
 
 @family
