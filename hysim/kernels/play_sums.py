@@ -35,17 +35,11 @@ _FIRST_STEP = 2.0**-10  # where the output stands still; doubled until it moves
 
 
 @inlined
-def envelope(u: float, parameters: FloatArray, first: int) -> float:
-    """The envelope whose coefficients begin at the place `first`."""
-    bend = parameters[first] * math.tanh(parameters[first + 1] * u + parameters[first + 2])
-    return float(bend + parameters[first + 3] + parameters[first + 4] * u)
-
-
-@inlined
-def envelope_slope(u: float, parameters: FloatArray, first: int) -> float:
-    """Derivative of `envelope`."""
-    bend = math.tanh(parameters[first + 1] * u + parameters[first + 2])
-    return float(parameters[first] * parameters[first + 1] * (1.0 - bend * bend) + parameters[first + 4])
+def envelope(u: float, parameters: FloatArray, first: int) -> tuple[float, float]:
+    """The envelope whose coefficients begin at the place `first`, and its slope."""
+    height, steepness, line = parameters[first], parameters[first + 1], parameters[first + 4]
+    bend = math.tanh(steepness * u + parameters[first + 2])
+    return height * bend + parameters[first + 3] + line * u, height * steepness * (1.0 - bend * bend) + line
 
 
 @inlined
@@ -70,7 +64,7 @@ def through_dead_zones(x: float, parameters: FloatArray, first: int) -> float:
 def output_after(parameters: FloatArray, state: FloatArray, u: float, widening: float) -> float:
     """Output at the next input `u`, thresholds beyond zero being wider by `widening`; `state` moves along."""
     n_plays = state.size - 1
-    below, above = envelope(u, parameters, LEFT), envelope(u, parameters, RIGHT)
+    below, above = envelope(u, parameters, LEFT)[0], envelope(u, parameters, RIGHT)[0]
     total = 0.0
     for i in range(n_plays):
         r = parameters[N_HEAD + i]
@@ -87,8 +81,7 @@ def output_and_slope(
 ) -> tuple[float, float, float]:
     """Output, slope in a direction of the input, and size of the terms at the next input `u`, without dead zones."""
     n_plays = state.size - 1
-    below, above = envelope(u, parameters, LEFT), envelope(u, parameters, RIGHT)
-    rising, falling = envelope_slope(u, parameters, LEFT), envelope_slope(u, parameters, RIGHT)
+    (below, rising), (above, falling) = envelope(u, parameters, LEFT), envelope(u, parameters, RIGHT)
     total, slope, size = parameters[0], 0.0, abs(parameters[0])
     for i in range(n_plays):
         r, weight = parameters[N_HEAD + i], parameters[N_HEAD + n_plays + i]
@@ -154,9 +147,8 @@ def inverse_step(parameters: FloatArray, state: FloatArray, y: float) -> float:
     `parameters` are the limits and those of `step`; `state` is (u, y) and that of `step`.
     """
     own, law = borrowed(parameters)[N_LIMITS:], borrowed(state)[N_PLACE:]
-    n_plays, rising = law.size - 1, 0.0  # the sign of all weights together
-    for i in range(n_plays):
-        rising += own[N_HEAD + n_plays + i]
+    n_plays = law.size - 1
+    rising = own[N_HEAD + n_plays : N_HEAD + 2 * n_plays].sum()  # the sign of all weights together
     side = math.copysign(1.0, y - output_and_slope(own, law, law[0], 1.0)[0])
     direction = math.copysign(1.0, rising) * side
     u = solved(own, law, y, direction, side)

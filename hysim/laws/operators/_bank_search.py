@@ -34,7 +34,7 @@ import itertools
 from abc import abstractmethod
 from collections import ChainMap
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import field, fields, replace
+from dataclasses import dataclass, field, fields, replace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -67,21 +67,21 @@ class Axis(NamedTuple):
     starts: tuple[float, ...]
 
 
+@dataclass(frozen=True, kw_only=True, eq=False)
 class SignedStructure(Subject, Composable):
     """A bank whose weights may have one sign: that of the record's loop, or the other one."""
 
     law: Any
-    one_signed: bool | None
-    against: bool
+    one_signed: bool | None = None
+    against: bool = False  # whether weights of one sign turn against the loop of the record
 
     def variants(self) -> tuple[Variant, ...]:
         """Weights of one sign, of that of the record's loop or the other, or of both."""
         if self.one_signed:
             return ()
-        this: Any = self
-        along = Variant(replace(this, one_signed=True), "weights of one sign", self.one_signed is None)
-        against = Variant(replace(this, one_signed=True, against=True), along.words, along.offered)
-        return along, against, Variant(replace(this, one_signed=False), "weights of both signs")
+        along = Variant(replace(self, one_signed=True), "weights of one sign", self.one_signed is None)
+        against = Variant(replace(self, one_signed=True, against=True), along.words, along.offered)
+        return along, against, Variant(replace(self, one_signed=False), "weights of both signs")
 
     def side(self, record: Record, *, clockwise: bool = False) -> tuple[float, float] | None:
         """Bounds of the weights that turn the loop, where they have one sign; `clockwise` if positive ones do so.
@@ -113,11 +113,8 @@ class BankStructure(SignedStructure):
     `own` values, by name, where there are some. `known` are numbers that are not searched.
     """
 
-    law: Any
     thresholds: tuple[float, ...] = ()
     plays: int = 10
-    one_signed: bool | None = None
-    against: bool = False  # whether weights of one sign turn against the loop of the record
     turns: int = 1  # former turning points that describe a free memory
     spacing: float = 1.0  # power of the even steps at which free thresholds lie
     axes: tuple[Axis, ...] = ()
@@ -170,6 +167,7 @@ class BankStructure(SignedStructure):
         defaults = {**thresholds, **{name: begins[0] for name, begins in starts.items()}, **rest}
         chosen = freedom.held(defaults, at_rest=turns if freedom.starts_at_rest("rest") else ())
         held = {name: value for name, value in thresholds.items() if name not in freedom.free} | chosen
+        constants = {**held, **self.known}
         limits = freedom.limits(defaults, held)
         box = [
             *(Coordinate(*each, half, physical=(True, True)) for each in _gaps(thresholds)),
@@ -191,13 +189,11 @@ class BankStructure(SignedStructure):
         bounds |= {name: pair for name, pair in limits.items() if name in columns}
         searched = {each.name for each in box} - set(held)
         few = 0 if searched <= {*turns} else 64 if searched <= {*turns, *starts} else 256
-        space = space_of(box, columns, defaults, held, limits, points, bounds=bounds, state=turns, screened=few)
+        space = space_of(box, columns, defaults, constants, limits, points, bounds=bounds, state=turns, screened=few)
 
         def parameters(x: FloatArray) -> dict[str, FloatArray]:
             numbers = space.parameters(x)
-            derived: dict[str, FloatArray] = self.law.derived(numbers, record)
-            known = {name: np.full(len(np.atleast_2d(x)), value) for name, value in self.known.items()}
-            return numbers | derived | known
+            return {**numbers, **self.law.derived(numbers, record)}
 
         return replace(space, parameters=parameters)
 

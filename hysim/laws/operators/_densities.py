@@ -25,7 +25,6 @@ The state before a record, all relays down or what the record itself leaves, is 
 Source: P. H. C. Eilers, B. D. Marx, Statist. Sci. 11 (1996), for differences as a penalty on many coefficients.
 """
 
-import itertools
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
@@ -268,12 +267,7 @@ def linear_between(cells: int, n: int) -> FloatArray:
     share = centre - first
     tents = np.zeros((n, cells))  # of each coarse cell at the centres of the intervals
     tents[np.arange(n), first], tents[np.arange(n), first + 1] = 1.0 - share, share
-    values = _beyond_diagonal(cells)
-    table = np.zeros((rows.size, values.shape[2]))
-    for a, b in itertools.product((0, 1), repeat=2):
-        p, q = first[rows] + a, first[columns] + b
-        table += (tents[rows, p] * tents[columns, q])[:, np.newaxis] * values[p, q]
-    table *= ratio**2
+    table = ratio**2 * np.einsum("kp,kq,pqc->kc", tents[rows], tents[columns], _beyond_diagonal(cells), optimize=True)
     table[rows == columns] = 0.0
     of_diagonal = np.flatnonzero(np.equal(*np.tril_indices(cells)))
     table[np.ix_(np.flatnonzero(rows == columns), of_diagonal)] = ratio * tents

@@ -4,7 +4,6 @@ import math
 from abc import abstractmethod
 
 import numpy as np
-import numpy.typing as npt
 
 from hysim._basics.frozen import FloatArray, read_only
 from hysim.kernels import play_sums as kernels
@@ -77,41 +76,3 @@ class PlaySum(Law):
         y = kernels.step(law.parameters, law.state.copy(), state[0])
         parameters = read_only(np.concatenate([limits, law.parameters]), finite=False)
         return CompiledLaw(kernels.inverse_step, parameters, np.concatenate([[state[0], y], law.state]))
-
-
-class WideningPlays(PlaySum):
-    """Plays at one sample time, with thresholds ``r_i + width |u_k - u_(k-1)|``."""
-
-    beta: float
-    sample_time: float
-
-    @property
-    def width(self) -> float:
-        """Growth of the thresholds with the step of the input."""
-        return self.beta / self.sample_time
-
-    def refusal(self) -> str | None:
-        if (refusal := self.plays.refusal()) is not None:
-            return refusal
-        sums = np.cumsum(self.weights)
-        with np.errstate(divide="ignore"):
-            limits = np.abs(sums) / (2.0 * np.abs(sums - sums[0]))
-        i = int(np.argmin(limits))
-        if self.width < limits[i]:
-            return None
-        return (
-            f"the law has no stable inverse at this sample time: beta / sample_time is {self.width:g}, but the sums of "
-            f"weights s_i = w_0 + ... + w_i ask for less than |s_i| / (2 |s_i - s_0|), {limits[i]:g} for i = {i}; "
-            "give the speed, or take longer samples"
-        )
-
-    def response_at(self, u: npt.ArrayLike, widening: FloatArray) -> FloatArray:
-        """Output at the samples of `u` of plays whose thresholds are wider by `widening`, shape (n_samples,)."""
-        inputs = read_only(u, "u", ndim=1)
-        if self.u0 is not None:
-            longer = np.append(self.u0, inputs), np.append(widening[:1], widening)
-            return np.asarray(self.placed(None).response_at(*longer)[1:])
-        y = np.empty(inputs.size)
-        parameters, memory = self.packed
-        kernels.widened(parameters, memory.copy(), inputs, read_only(widening), y)
-        return y

@@ -60,11 +60,8 @@ _NOTHING = np.array([[0.0, 1.0]]), np.array([[0.0]])  # levels and weights of a 
 class PreisachStructure(SignedStructure):
     """A bank of relays to be identified; see `Preisach.structure`."""
 
-    law: Any
     levels: tuple[float, ...] = ()
     intervals: int | None = None  # four, or a smooth density where that predicts better
-    one_signed: bool | None = None
-    against: bool = False  # whether weights of one sign turn against the loop of the record
 
     def __post_init__(self) -> None:
         if self.intervals is not None:
