@@ -5,7 +5,7 @@ from dataclasses import dataclass, field, replace
 from types import MappingProxyType
 from typing import Any, ClassVar, NamedTuple, Self
 
-from hysim._basics.frozen import LAST, items, own_items
+from hysim._basics.frozen import LAST, FloatArray, items, own_items
 from hysim._basics.results import model_of
 from hysim.models.model import Example
 from hysim.models.protocols import Responding
@@ -84,6 +84,11 @@ class Placed(Composable):
     within: ClassVar[Mapping[str, tuple[str, float]]] = {}
     # Any, so that type checkers take BoucWen(**parameters) with a dict of floats
     u_range: Any = field(default=None, compare=False, metadata={**LAST, "kind": tuple[float, ...] | None})
+
+    @classmethod
+    def completed(cls, tables: dict[str, FloatArray]) -> dict[str, FloatArray]:
+        """The tables with what the constructor would add."""
+        return tables
 
     @classmethod
     def check(cls, tables: Tables) -> None:

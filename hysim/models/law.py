@@ -712,11 +712,6 @@ class Law(Placed, Subject, ABC):
         """As `outputs`, not computed yet; parameters that the constructor would refuse are not refused."""
         return _batch(self, parameters, u)
 
-    @classmethod
-    def completed(cls, tables: dict[str, FloatArray]) -> dict[str, FloatArray]:
-        """The tables with what the constructor would add."""
-        return tables
-
     def _begun(self, u0: float, state: State | None) -> tuple[CompiledLaw, State]:
         """The law before a first sample at `u0`, or in a state; and the front of its state."""
         size = self.packed[1].size

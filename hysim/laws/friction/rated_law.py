@@ -64,11 +64,6 @@ class TimedLaw(Subject, Placed, ABC):
         return 0
 
     @classmethod
-    def completed(cls, tables: dict[str, FloatArray]) -> dict[str, FloatArray]:
-        """The tables with what the constructor would add."""
-        return tables
-
-    @classmethod
     def candidates(cls) -> dict[str, Any]:
         """None for `hysim.compare` to try by itself, since friction is no model of an actuator."""
         return {}
@@ -217,14 +212,6 @@ class AtSampleTime(Law):
 
     family: ClassVar[type[TimedLaw]]
 
-    @classmethod
-    def check(cls, tables: Tables) -> None:
-        cls.family.check(tables)
-
-    @classmethod
-    def completed(cls, tables: dict[str, FloatArray]) -> dict[str, FloatArray]:
-        return cls.family.completed(tables)
-
     def search_space(self, record: Record, freedom: Freedom = ALL_FREE) -> SearchSpace:
         """The box of the family for samples that are the law's sample time apart."""
         times = np.asarray(self.scalars["sample_time"] * np.arange(len(record)), dtype=np.float64)
@@ -250,6 +237,8 @@ def kind_at_sample_time(family: type[TimedLaw]) -> type[Law]:
         "family": family,
         "step": staticmethod(family.step),
         "initial": family.initial,
+        "check": family.check,
+        "completed": family.completed,
         "searched": family.searched,
     }
     bases = (AtSampleTime,) if family.at_one_time is None else (family.at_one_time, AtSampleTime)
