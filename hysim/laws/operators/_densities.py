@@ -43,7 +43,6 @@ STRENGTHS = np.logspace(-10.0, 4.0, 43)
 _SMALLEST = 1e-280  # a smaller incomplete gamma function is its first term
 _RIDGE = 1e-3  # of the squares of second differences
 _MOST_CURVES = 8
-_FOLDS = 64  # of single samples, or of every 64th
 _MOST_INTERVALS = 64
 _MOST_CELLS = 24  # along a threshold; of 16, 24 and 32 those with the best predictions for their time
 _MOST_SAMPLES = 2000  # of a record, with its reversals
@@ -221,13 +220,6 @@ def parts_of(records: Sequence[Record]) -> list[Parts]:
         count = min(_MOST_CURVES, len(curves))
         complete = [np.concatenate(curves[k::count]) for k in range(count if count > 2 else 0)]
     return [complete, quarters] if complete else [quarters]
-
-
-def judged_parts(records: Sequence[Record]) -> list[Parts]:
-    """As `parts_of`; of one loop, whose quarters tell nothing of each other without assumptions, all samples."""
-    kinds = parts_of(records)
-    n = sum(len(record) for record in records)
-    return kinds if len(kinds) > 1 else [[np.arange(k, n, _FOLDS) for k in range(min(n, _FOLDS))]]
 
 
 def _covered(u: FloatArray, others: Sequence[Record]) -> bool:

@@ -38,7 +38,7 @@ from hysim._basics.parallel import in_pieces
 from hysim.errors import warn_beyond
 from hysim.kernels import preisach as kernels
 from hysim.laws.operators._bank_search import TURN, SignedStructure, check_increasing, named, table_of, with_offset
-from hysim.laws.operators._densities import Parts, check_strength, judged_parts, smooth
+from hysim.laws.operators._densities import Parts, check_strength, parts_of, smooth
 from hysim.models.by_structure import ByStructure
 from hysim.models.law import Advanced, Law, Packed, State
 from hysim.models.parameters import Coordinate, space_of, spans
@@ -52,7 +52,9 @@ _INTERVALS = 4
 _STIFFER = 10.0  # from one strength of the penalty to the next, as long as a law is not safe
 _STIFFEST, _LEAST = 1e8, 1e-10  # strengths: beyond, a density has no shape any more, and none at all
 _RANK = 1e-9  # of a column's length: what is left of one that others make up for
-_ROOM = 1000  # extremes that a compiled loop remembers
+ROOM = 1000
+"""Extremes that a compiled loop remembers."""
+_FOLDS = 64  # of single samples, or of every 64th
 _NOTHING = np.array([[0.0, 1.0]]), np.array([[0.0]])  # levels and weights of a law without any
 
 
@@ -163,8 +165,12 @@ class SmoothRelays:
         return fit._replace(smoother_family=replace(self, smoothness=_STIFFER * max(strength, _LEAST)))
 
     def parts(self, records: Sequence[Record]) -> list[Parts]:
-        """Samples by which such a law is compared with others."""
-        return judged_parts(records)
+        """Samples by which such a law is compared with others.
+
+        Of one loop, whose quarters are not predicted from each other without assumptions, these are all samples.
+        """
+        kinds, n = parts_of(records), sum(len(record) for record in records)
+        return kinds if len(kinds) > 1 else [[np.arange(k, n, _FOLDS) for k in range(min(n, _FOLDS))]]
 
 
 def check_relays(levels: FloatArray, weights: FloatArray) -> None:
@@ -234,7 +240,7 @@ class RelayLaw(ByStructure, Law):
         """Parameters and state as `hysim.kernels.preisach.step` takes them, after the inputs z0."""
         parameters = cls._rows(tables)
         lowest, low = parameters[:, kernels.HEAD : kernels.HEAD + 1], parameters[:, 1:2]
-        rest = np.zeros((len(parameters), _ROOM - 1))
+        rest = np.zeros((len(parameters), ROOM - 1))
         memory = np.concatenate([rest[:, :2], lowest, rest, low, rest], axis=1)
         if tables["z0"].shape[1]:
             memory = np.asarray(memory, dtype=float)

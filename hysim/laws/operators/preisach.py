@@ -26,15 +26,13 @@ from hysim._basics.frozen import FloatArray, check_whole, read_only
 from hysim._columns.turning import TOLERANCE
 from hysim.kernels import preisach as kernels
 from hysim.laws.operators._densities import Density, check_strength, relay_weights, smooth
-from hysim.laws.operators._relays import RelayLaw, everett_of, weights_of
+from hysim.laws.operators._relays import ROOM, RelayLaw, everett_of, weights_of
 from hysim.laws.operators.prandtl_ishlinskii import PrandtlIshlinskii
 from hysim.laws.operators.reversal_curves import everett_from_curves
 from hysim.models.law import State
 from hysim.models.model import Example, family
 from hysim.models.protocols import UNLIMITED, CompiledLaw, Limits
 from hysim.records import Record, several
-
-_ROOM = 1000  # extremes that the inverse keeps in a loop
 
 
 def _two_bells(up: FloatArray, down: FloatArray) -> FloatArray:
@@ -300,7 +298,7 @@ class Preisach(RelayLaw):
         return self.offset - bound, self.offset + bound
 
     def compiled_inverse(self, u0: float, limits: Limits = UNLIMITED, sample_time: float = math.inf) -> CompiledLaw:
-        return self.inverse_from((*self.past, u0), limits, room=_ROOM)
+        return self.inverse_from((*self.past, u0), limits, room=ROOM)
 
     def inverse_from(self, past: State, limits: Limits = UNLIMITED, *, room: int = 0) -> CompiledLaw:
         """The inverse after the inputs `past`, with room for more extremes; see `hysim.kernels.inverses`."""
