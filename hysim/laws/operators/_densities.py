@@ -263,7 +263,7 @@ def linear_between(cells: int, n: int) -> FloatArray:
     table[rows == columns] = 0.0
     of_diagonal = np.flatnonzero(np.equal(*np.tril_indices(cells)))
     table[np.ix_(np.flatnonzero(rows == columns), of_diagonal)] = ratio * tents
-    return table
+    return np.asarray(table)
 
 
 def _beyond_diagonal(cells: int) -> FloatArray:

@@ -18,24 +18,28 @@ EXAMPLE = {"thresholds": (0.0, 0.1, 0.2, 0.35, 0.5, 0.7), "weights": (0.4, 0.3, 
 """Plays of the laws that stand for the families."""
 
 
-class PlaySum(Law):
-    """A sum of plays after envelopes, with wider thresholds or in front of dead zones: a bank of one of these."""
-
-    step = staticmethod(kernels.step)
+class ExtendedPlays:
+    """A law of plays and something in addition."""
 
     thresholds: tuple[float, ...]
     weights: tuple[float, ...]
     z0: tuple[float, ...]
 
-    @classmethod
-    def pack(cls, tables: Tables) -> Packed:
-        """Rows with the parameters that the family has in addition to plays."""
-        return Packed(rows_of(tables), cls.initial_memory(tables))
-
     @property
     def plays(self) -> PrandtlIshlinskii:
         """The sum of plays without the extension and the offset."""
         return PrandtlIshlinskii(thresholds=self.thresholds, weights=self.weights, z0=self.z0)
+
+
+class PlaySum(ExtendedPlays, Law):
+    """A sum of plays after envelopes, with wider thresholds or in front of dead zones: a bank of one of these."""
+
+    step = staticmethod(kernels.step)
+
+    @classmethod
+    def pack(cls, tables: Tables) -> Packed:
+        """Rows with the parameters that the family has in addition to plays."""
+        return Packed(rows_of(tables), cls.initial_memory(tables))
 
     @abstractmethod
     def refusal(self) -> str | None:

@@ -23,7 +23,7 @@ from hysim.kernels import play_sums as kernels
 from hysim.laws.friction.rated_law import TimedLaw, kind_at_sample_time
 from hysim.laws.operators._bank import Plays
 from hysim.laws.operators._bank_search import Axis
-from hysim.laws.operators._play_sums import EXAMPLE, PlaySum
+from hysim.laws.operators._play_sums import EXAMPLE, ExtendedPlays, PlaySum
 from hysim.models.law import State
 from hysim.models.model import Example, family
 from hysim.models.parameters import Parameter
@@ -70,7 +70,7 @@ class WideningPlays(PlaySum):
 
 
 @family
-class RateDependentPrandtlIshlinskii(Plays, TimedLaw):
+class RateDependentPrandtlIshlinskii(Plays, ExtendedPlays, TimedLaw):
     """Rate-dependent Prandtl-Ishlinskii law, ``y = offset + sum w_i z_i``, thresholds ``r_i + beta |u'|``.
 
     ::
@@ -121,19 +121,19 @@ class RateDependentPrandtlIshlinskii(Plays, TimedLaw):
     axes = (Axis(Parameter("beta", 0.0, 1.0, unit="h/v", physical=(True, False)), (0.0, 0.1, 0.3)),)
     not_negative = ("beta",)
 
-    plays = PlaySum.plays
-
     @classmethod
     def candidates(cls) -> dict[str, Any]:
         """The class itself, which `hysim.compare` tries as it does other plays."""
         return {cls.__name__: cls}
 
-    def at(self, sample_time: float) -> Any:
+    def at(self, sample_time: float) -> WideningPlays:
         """The law at one sample time [s], as loops step it. Raises ValueError if the sample time is not positive."""
         check_positive(sample_time=sample_time)
         if math.isinf(sample_time):
             return replace(self, beta=0.0).at(1.0)
-        return kind_at_sample_time(type(self))(sample_time=sample_time, **items(self))
+        kind: Any = kind_at_sample_time(type(self))
+        law: WideningPlays = kind(sample_time=sample_time, **items(self))
+        return law
 
     at_sample_time = at
 
@@ -160,12 +160,12 @@ class RateDependentPrandtlIshlinskii(Plays, TimedLaw):
         """
         law = self.at(sample_time)
         if speed is None:
-            return np.asarray(law.response(u))
+            return law.response(u)
         speeds = read_only(speed, "speed", ndim=1)
         if speeds.size != np.size(u):
             raise ValueError(f"speed must have {np.size(u)} samples as the signal has, got {speeds.size}")
         check_signs({"speed": speeds}, (), ("speed",))
-        return np.asarray(law.response_at(u, self.beta * speeds))
+        return law.response_at(u, self.beta * speeds)
 
     def is_invertible(self, sample_time: float | None = None) -> bool:
         """Whether there is an `inverse`, for a known speed; with a sample time, an `inverse_response` without one."""
