@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import scipy.signal
+from strategies import assert_refused
 
 import hysim as hs
 
@@ -135,19 +136,15 @@ def test_sequences_in_the_layout_of_the_magnet_challenge_are_predicted(tmp_path,
     ],
 )
 def test_numbers_that_are_no_law_are_refused(fields, words):
-    with pytest.raises(ValueError, match=words):
-        hs.CoreField(**fields)
+    assert_refused(words, hs.CoreField, **fields)
 
 
 def test_records_that_tell_nothing_are_refused():
     rest = hs.Record(u=np.ones(50), y=np.ones(50), t=STEP * np.arange(50))
-    with pytest.raises(ValueError, match="the input is constant"):
-        hs.identify(hs.CoreField, rest)
+    assert_refused("the input is constant", hs.identify, hs.CoreField, rest)
     with pytest.raises(ValueError, match="the record has no channel 'T'"):
         hs.identify(hs.CoreField.structure(channel="T"), record_of(hs.CoreField(), path(np.random.default_rng(0))))
-    with pytest.raises(TypeError, match="condition takes a CoreField at a constant channel"):
-        hs.condition(hs.Dahl(), rest)
-    with pytest.raises(TypeError, match="condition takes a Record"):
-        hs.condition(hs.CoreField(), rest.u)
+    assert_refused("takes a CoreField at a constant channel", hs.condition, hs.Dahl(), rest, error=TypeError)
+    assert_refused("condition takes a Record", hs.condition, hs.CoreField(), rest.u, error=TypeError)
     with pytest.raises(ValueError, match="tell too little of"):
         hs.identify(hs.CoreField, hs.Record(u=rest.t, y=rest.y, t=rest.t), weights=np.eye(50)[0])

@@ -186,8 +186,7 @@ def test_half_a_unit_of_the_last_digit(text, half):
 
 @pytest.mark.parametrize("text", ["nine", "", "nan", "inf", "1,5"])
 def test_what_is_no_printed_number(text):
-    with pytest.raises(ValueError, match="printed number"):
-        half_unit(text)
+    assert_refused("printed number", half_unit, text)
 
 
 def test_a_spread_is_the_range_over_the_corners():
