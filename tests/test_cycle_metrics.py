@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
-from strategies import assert_refused, refused
+from strategies import assert_refused
 
 import hysim as hs
 from hysim._columns.excursions import protocol
@@ -330,16 +330,6 @@ def test_the_table_is_text_and_csv_with_units():
     flat = hs.cycle_metrics([0, 1, 0, -1, 0], [1, 1, 1, 1, 1])
     assert next(csv.DictReader(io.StringIO(flat.to_csv())))["equivalent_damping"] == ""  # no stiffness, no ratio
     assert repr(table).startswith("<CycleMetrics: 3 cycles from u = 0")
-
-
-test_what_has_no_cycle_is_refused = refused(
-    ([0, 1, 0], [0, 1], "equal lengths, got 3 and 2"),
-    ([0, 1], [0, 1], "at least 3 samples"),
-    ([2, 2, 2], [0, 1, 0], "constant at 2"),
-    ([0, math.nan, 0], [0, 1, 0], "u must be finite"),
-    ([0, 1, 2, 3], [0, 1, 2, 3], "or from a level to one extreme or to both and back to the level"),
-    call=hs.cycle_metrics,
-)
 
 
 def test_a_wrong_tolerance_is_refused():

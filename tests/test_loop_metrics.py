@@ -277,16 +277,22 @@ def test_the_width_error_is_the_rms_difference_of_signed_widths():
     assert_refused("share no input", hs.metrics.width_rmse, up, far)
 
 
-test_what_is_no_loop_is_refused = refused(
+NO_LOOPS = (
     ([0, 1, 0], [0, 1], "equal lengths, got 3 and 2"),
     ([0, 1], [0, 1], "at least 3 samples, got 2"),
     ([2, 2, 2], [0, 1, 0], "constant at 2"),
+    ([0, 1e300, 0], [0, 1, 0], "y must be below 1e.150, and u move by 1e-150: convert the units"),
+    ([0, 1e-300, 0], [0, 1, 0], "y must be below 1e.150, and u move by 1e-150: convert the units"),
     ([0, math.nan, 0], [0, 1, 0], "u must be finite, got nan at index 1"),
     ([0, 1, 0], [0, 1, math.inf], "y must be finite, got inf at index 2"),
-    ([0, 1, 2, 3], [0, 1, 2, 3], "found 0: it turns at 0, 3"),
-    ([0, 1, 0.5], [0, 1, 0], "found 0: it turns at 0, 1, 0.5"),
-    ([0, 3, -3, -1], [0, 1, -1, 0], "a level to one extreme or to both and back to the level, such as 0, max"),
-    call=hs.loop_metrics,
+)
+test_what_is_no_loop_is_refused = refused(
+    *((verb, *case) for verb in (hs.loop_metrics, hs.cycle_metrics, hs.magnetic_metrics) for case in NO_LOOPS),
+    (hs.loop_metrics, [0, 1, 2, 3], [0, 1, 2, 3], "found 0: it turns at 0, 3"),
+    (hs.loop_metrics, [0, 1, 0.5], [0, 1, 0], "found 0: it turns at 0, 1, 0.5"),
+    (hs.loop_metrics, [0, 3, -3, -1], [0, 1, -1, 0], "to one extreme or to both and back to the level, such as 0, max"),
+    (hs.cycle_metrics, [0, 1, 2, 3], [0, 1, 2, 3], "or from a level to one extreme or to both and back to the level"),
+    call=lambda verb, u, y: verb(u, y),
 )
 
 

@@ -46,6 +46,7 @@ FORCE = "Energy is the integral of y du: what a force y on a displacement u diss
 
 
 Orientation = Literal["counterclockwise", "clockwise", "none"]
+_LARGEST = 1e150  # of inputs and outputs, and of one over the span of inputs: their products are numbers
 _SMALLEST_LOBE = 0.02  # of the area of all lobes: where the branches meet at the ends they cross by less
 _END = 0.1  # of the span of the field
 _DEGREE = 3  # of the width there, without noise
@@ -223,7 +224,7 @@ def loop_metrics(u: npt.ArrayLike, y: npt.ArrayLike, *, cycles: int = 1, toleran
     Raises
     ------
     ValueError
-        If lengths differ, a value is not finite, the input is constant, or there are below 3 samples or too few cycles.
+        If lengths differ, a value is infinite, nan or extreme, u is constant, or it has under 3 samples or few cycles.
 
     Examples
     --------
@@ -252,6 +253,7 @@ def measure(inputs: FloatArray, outputs: FloatArray, cycles: list[Cycle]) -> Loo
     area = float(signed_area(path_u, path_y))
     max_width = float(magnitude.max())
     stiffness = float(np.mean([loading[-1] - loading[0], unloading[-1] - unloading[0]]) / np.ptp(grid))
+    stored = math.pi * stiffness * span**2
     return LoopMetrics(
         max_width=max_width,
         max_width_at=float(grid[np.argmax(magnitude >= max_width - ROUNDING * stroke)]),
@@ -265,7 +267,7 @@ def measure(inputs: FloatArray, outputs: FloatArray, cycles: list[Cycle]) -> Loo
         n_cycles=len(cycles),
         energy=0.0 - area,
         secant_stiffness=stiffness,
-        equivalent_damping=(0.0 - area) * 2.0 / (math.pi * stiffness * span**2) if stiffness > 0 else math.nan,
+        equivalent_damping=(0.0 - area) * 2.0 / stored if stored > 0.0 else math.nan,
         u=grid,
         loading=loading,
         unloading=unloading,
@@ -357,6 +359,8 @@ def samples_of_a_loop(u: npt.ArrayLike, y: npt.ArrayLike) -> tuple[FloatArray, F
     inputs, outputs = vectors(u=u, y=y)
     if inputs.size < 3:
         raise ValueError(f"a loop needs at least 3 samples, got {inputs.size}")
+    if max(np.abs(inputs).max(), np.abs(outputs).max()) > _LARGEST or 0.0 < np.ptp(inputs) < 1.0 / _LARGEST:
+        raise ValueError(f"u and y must be below {_LARGEST:g}, and u move by {1.0 / _LARGEST:g}: convert the units")
     if np.ptp(inputs) == 0:
         raise ValueError(f"the input is constant at {inputs[0]}: a loop needs an input that rises and falls")
     return inputs, outputs
