@@ -28,7 +28,7 @@ _RULES = (Positive, NotNegative, Interval, Count)
 LAST = {"last": True}  # metadata of a field of a base class that stands behind those of its families
 T = TypeVar("T")
 
-_MOST_SUBSTEPS = 1e9
+_MOST_SUBSTEPS = 1e6
 _TOO_LARGE = f"a number beyond {sys.float_info.max:.2g}"
 
 
