@@ -132,8 +132,9 @@ def test_the_most_likely_drift_is_found_and_reported(record):
 
 def test_of_two_drifts_one_may_be_given(record):
     short = record[:61]
-    track = hs.track_parameters(LAW, short, ["gain", "beta"], drift={"beta": 0.05}, jump={"gain": 0.0}, noise=NOISE)
-    assert track.searched == ("gain",)
+    names, options = ["gain", "beta", "gain"], {"drift": {"beta": 0.05}, "jump": {"gain": 0.0}, "noise": NOISE}
+    track = hs.track_parameters(LAW, short, names, **options)
+    assert (track.names, track.searched) == (("gain", "beta"), ("gain",))
     assert track.drift["beta"] == 0.05
 
 
@@ -154,6 +155,7 @@ test_arguments_are_checked = refused(
     (LAW, "slope", {}, "free has 'slope': a BoucWen has A, beta"),
     (LAW, "z0", {}, "z0 is the memory at the first sample"),
     (LAW, "gain", {"drift": {"n": 1.0}}, "drift has 'n', which is not free"),
+    (LAW, "gain", {"particles_count": 0}, "particles_count must be an integer of at least 1, got 0"),
     (LAW, "gain", {"method": "kalman"}, "method must be one of sigma-point, particle, got 'kalman'"),
     (PLAYS, "offset", {}, 'remembers 51 numbers: use method="particle"'),
     (hs.PID(kp=1.0), "kp", {}, TypeError, "law must be a law that a step describes"),

@@ -24,7 +24,7 @@ from typing import Any, Literal, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from hysim._basics.frozen import FloatArray, check_choice, read_only
+from hysim._basics.frozen import FloatArray, check_choice, check_count, read_only
 from hysim._basics.printing import frozen_result, summary_text
 from hysim._basics.results import model_of
 from hysim.kernels.copies import step_each
@@ -64,8 +64,9 @@ def coordinates_of(law: Law, free: Sequence[str]) -> Coordinates:
         raise ValueError(f"{initial[0]} is the memory at the first sample, which does not drift: leave it out of free")
     if not free:
         raise ValueError("free must name at least one number that drifts")
-    values = np.array([law.scalars[name] for name in free])
-    return Coordinates(tuple(free), values, np.array([_must_be_positive(law, name) for name in free]))
+    names = tuple(dict.fromkeys(free))
+    values = np.array([law.scalars[name] for name in names])
+    return Coordinates(names, values, np.array([_must_be_positive(law, name) for name in names]))
 
 
 def _must_be_positive(law: Law, name: str) -> bool:
@@ -437,6 +438,7 @@ def track_parameters(
     if not spread > 0.0:
         raise ValueError("noise must be positive: give the standard deviation of the measurement")
     check_choice("method", method, ("sigma-point", "particle"))
+    check_count("particles_count", particles_count)
     copies, x = Copies(law, coordinates), coordinates.encode(coordinates.values)
     if method == "sigma-point" and copies.memory.size > _MOST_MEMORIES:
         raise ValueError(f'this law remembers {copies.memory.size} numbers: use method="particle"')
