@@ -99,13 +99,14 @@ def quantile_bands(result: Sweep, parameter: str, output: str, ax: Axes | None =
     'y'
     """
     finite = np.isfinite(result[output])
+    if not finite.any():
+        raise ValueError(f"there is no finite value of {output!r} to draw")
     x, y = np.asarray(result[parameter], dtype=float)[finite], result[output][finite]
-    order = np.argsort(x, kind="stable")
     distinct = np.unique(x)
     if distinct.size <= slices:
         parts = [np.flatnonzero(x == value) for value in distinct]
     else:
-        parts = np.array_split(order, slices)
+        parts = np.array_split(np.argsort(x, kind="stable"), slices)
     middles = [float(np.median(x[part])) for part in parts]
     with one(ax) as axes:
         for low, high in _BANDS:

@@ -162,7 +162,10 @@ def _column(name: str, values: Any) -> Column:
     kinds = {type(value) for value in plain}
     for kinds_of_column, dtype in (({bool}, bool), ({str}, str), ({int}, np.int64), ({int, float}, np.float64)):
         if kinds <= kinds_of_column:
-            return np.array(plain, dtype=dtype)
+            try:
+                return np.array(plain, dtype=dtype)
+            except OverflowError:
+                raise ValueError(f"the values of {name} have an integer beyond 2^63: give floats, as 1e30") from None
     names = ", ".join(sorted(kind.__name__ for kind in kinds))
     raise TypeError(f"the values of {name} must be all numbers, all strings or all booleans, got {names}")
 
