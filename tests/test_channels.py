@@ -223,8 +223,7 @@ def test_friction_that_depends_on_the_velocity_follows_a_channel_along_a_record(
     dahl = hs.Dependent(law=hs.Dahl(stiffness=5.0), polynomials=(levels[0],))
     y = bristles.response(U, 0.1, channels={"T": load})
     np.testing.assert_allclose(y, dahl.response(U, channels={"T": load}), atol=1e-12)
-    with pytest.raises(ValueError, match="a LuGre moves in time: give sample_time"):
-        bristles.response(U, channels={"T": load})
+    assert_refused("a LuGre moves in time: give sample_time", bristles.response, U, channels={"T": load})
     rec = hs.Record(u=U, y=y, t=0.1 * np.arange(U.size), channels={"T": load})
     known = {**bristles.law.scalars, "breakaway": 0.5, "stribeck_velocity": 1e-9}  # no peak at any speed
     depends, free = {"coulomb": ("T", 1)}, ("coulomb", "sigma2")
@@ -374,6 +373,7 @@ def test_an_unknown_channel_is_estimated_with_its_error(fit):
     assert_refused("not on 'I'", hs.estimate_channel, fit, unknown, "I")
     with pytest.raises(TypeError, match="takes a law that depends on channels"):
         hs.estimate_channel(hs.Play(), unknown, "T")
+    assert_refused("takes one Record, got list", hs.estimate_channel, fit, [unknown], "T", error=TypeError)
 
 
 def test_a_dependence_is_compared_with_one_law_and_with_fits_one_by_one(fit):

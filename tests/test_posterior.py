@@ -135,6 +135,7 @@ def test_weights_and_bounds_of_a_fit_are_those_of_its_posterior():
         assert post.mean["offset"] == pytest.approx(fit.estimates["offset"], abs=0.2 * fit.stderr["offset"])
         assert np.std(post.samples["slope"]) == pytest.approx(fit.stderr["slope"], rel=0.15)
     assert_refused("are for noise=", hs.sample_posterior, fit, record, noise="robust")
+    assert_refused("takes a result of hs.identify", hs.sample_posterior, hs.Line, record, error=TypeError)
     bounded = hs.identify(hs.Line, part, bounds={"slope": (2.01, 3.0)})
     assert hs.sample_posterior(bounded, part, samples=400).samples["slope"].min() >= 2.01
 

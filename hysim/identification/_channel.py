@@ -196,6 +196,8 @@ def estimate_channel(
         raise TypeError(f"estimate_channel takes a law that depends on channels, got {type(model).__name__}")
     if channel not in model.channels:
         raise ValueError(f"the law depends on {', '.join(map(repr, model.channels))}, not on {channel!r}")
+    if not isinstance(record, Record):
+        raise TypeError(f"estimate_channel takes one Record, got {type(record).__name__}: call it for each of several")
     others = {}
     for name in model.channels:
         if name != channel:
@@ -227,14 +229,14 @@ class _UnknownChannel(Subject):
     def search_space(self, record: Record, freedom: Freedom = ALL_FREE) -> SearchSpace:
         law = self.model.law
         fixed = {name: value for name, value in law.scalars.items() if name not in self.state}
-        own = law.search_space(record, replace(freedom, fixed=fixed))
+        own: SearchSpace = law.search_space(record, replace(freedom, fixed=fixed))
         low, high = self.bounds
         place = Coordinate(self.channel, low, high, max(abs(low), abs(high)))
         points = [{self.channel: low + share * (high - low)} for share in _STARTS]
         alone = space_of([place], (), points[0], {}, {}, points)
         starts = own.starts[:1] if own.coordinates else np.empty((1, 0))
         held = {name: value for name, value in own.held.items() if name in self.state}
-        joint: SearchSpace = replace(
+        return replace(
             own,
             held=held,
             physical={**own.physical, self.channel: (True, True)},  # where the box ends, whatever lies beyond
@@ -254,7 +256,6 @@ class _UnknownChannel(Subject):
             encoded=None,
             screened=_SCREENED,
         )
-        return joint
 
     def regressors(self, parameters: Parameters, record: Record) -> FloatArray:
         numbers = {**self.model.law.scalars, **self._numbers(parameters)}

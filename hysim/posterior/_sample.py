@@ -375,6 +375,8 @@ def sample_posterior(
     >>> abs(post.mean["slope"] - fit.estimates["slope"]) < fit.stderr["slope"]
     True
     """
+    if not isinstance(fit, Identification):
+        raise TypeError(f"sample_posterior takes a result of hs.identify, got {fit!r}")
     records = several(record_or_records, "sample_posterior")
     for name, value in (("samples", samples), ("most_steps", most_steps)):
         check_count(name, value)
