@@ -16,14 +16,13 @@ little: with 14 numbers 50 % off the search took half as long with them, and end
 its noise; the input is repeated for each of them.
 """
 
-import math
 from collections.abc import Mapping, Sequence
 from dataclasses import field, replace
 from typing import Any
 
 import numpy as np
 
-from hysim._basics.frozen import FloatArray, checked, read_only
+from hysim._basics.frozen import FloatArray, checked, read_only, whole_substeps
 from hysim._basics.parallel import in_chunks
 from hysim._basics.printing import frozen_result, summary_text
 from hysim.errors import SimulationError
@@ -305,7 +304,7 @@ class SearchedStructure(MovingStructure, Subject):
     def search_substeps(self, sample_time: float) -> int:
         if self.substeps is not None:
             return self.substeps
-        return max(1, math.ceil(sample_time * self.fastest_rate / _PHASE))
+        return whole_substeps(sample_time * self.fastest_rate / _PHASE)
 
     def as_records(self, records: Any) -> Any:
         """Records of several sensors as records of one output, others unchanged; ValueError if columns do not fit."""

@@ -32,7 +32,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy.linalg import LinAlgError, cholesky
 
-from hysim._basics.frozen import FloatArray, check_choice, check_positive, check_whole, read_only
+from hysim._basics.frozen import FloatArray, check_choice, check_positive, check_whole, read_only, whole_substeps
 from hysim._basics.parallel import in_chunks, map_on_threads
 from hysim._basics.printing import aligned, extent, frozen_result, summary_text
 from hysim._basics.results import model_of
@@ -677,7 +677,7 @@ def response_spectrum(
         raise ValueError("a law needs either ductility= or strength=; elastic oscillators have no law and neither")
     omega, spring = 2.0 * math.pi / T, Line(slope=1.0) if law is None else model_of(law)
     oscillator = shear_frame([1.0], laws=spring, damping=1.0, tolerance=_TOLERANCE)
-    parts = [(w, math.ceil(w * h / _PHASE)) for w in omega.tolist()]
+    parts = [(w, whole_substeps(w * h / _PHASE)) for w in omega.tolist()]
     linear = [shear_frame([1.0], laws=Line(slope=w * w), damping=2.0 * damping * w, substeps=n) for w, n in parts]
     at_yield, mass = omega**2 * yield_input, _slope(oscillator, yield_input) / omega**2
 
