@@ -59,11 +59,14 @@ def test_the_search_comes_back_from_where_the_memory_has_grown_without_bound():
         hs.BoucWenBaberNoori(n=2.0, zeta_s=0.3, delta_nu=-1e-3, p=0.1, psi=1.0, input_coefficients=(1.0,)),
         hs.GeneralizedBoucWen(n=1.5, gain=-0.3, input_coefficients=(1.0,)),
         hs.Duhem.from_terms({"u'": 1.0, "|u'| z": -0.5}, feedthrough=2.0),
+        hs.Tellinen(saturation=1.8, coercivity=120.0, squareness=0.5),
+        hs.Chan(saturation=0.44, coercivity=16.0, squareness=0.25),
     ],
 )
 @pytest.mark.parametrize("tiny", [5e-324, -5e-324, 1e-309])
 def test_an_output_below_the_smallest_number_of_full_precision_stays_where_it_is(law, tiny):
     assert law.inverse_response([0.0, tiny], u0=0.0).tolist() == [0.0, 0.0]
+    assert np.abs(law.inverse_response([tiny])).max() < 1e-13
 
 
 CURVE = hs.ZhuWangBoucWen(A=0.0, beta=0.0, gamma=0.0, input_coefficients=(0.05, 3.0, -3.0, 0.7))

@@ -17,6 +17,7 @@ from hysim.models.protocols import UNLIMITED, CompiledLaw, Limits, Saturating, S
 _REACH, _WIDER = 1e-6, 16.0  # how far at most the output is looked at to either side of the first input; the ratio
 _SHORTEST = 2.0**-46  # of the first input, or this number
 _NEXT_TO_NOTHING = 1e-150
+_HALVINGS = 10_000  # at most, of a bracket down to 1e-300: about a thousand where rounding hides the slope at zero
 _HIDDEN, _FARTHEST = 2.0**-44, 1e150  # part of the output by which rounding may hide a rise: it is then sought further
 _FLAT = 1e-6  # of the highest slope: one that is flatter somewhere is looked at, as one that turns
 _ROUNDING = 1e-12  # of the largest output: what the sum that an output is may miss of the saturation
@@ -121,8 +122,8 @@ def first_input(law: Any, y: float) -> float:
     reach = 1e-6
     while reach < 1e150:
         for end in (reach, -reach):
-            if error(end) * error(0.0) <= 0.0:
-                return float(brentq(error, 0.0, end, xtol=1e-300, rtol=4.0 * np.finfo(float).eps))
+            if np.sign(error(end)) * np.sign(error(0.0)) <= 0.0:  # their product may be too small for a number
+                return float(brentq(error, 0.0, end, xtol=1e-300, rtol=4.0 * np.finfo(float).eps, maxiter=_HALVINGS))
         reach *= 2.0
     raise ValueError("the first input cannot be computed from the first output: give u0")
 
