@@ -133,4 +133,5 @@ def _mean_square(residual: npt.ArrayLike, n_parameters: int) -> tuple[float, int
 
 
 def _rms(values: FloatArray) -> float:
-    return math.sqrt(np.mean(values**2))
+    _, power = np.frexp(np.abs(values).max())  # by which the squares are neither too large nor too small for numbers
+    return math.ldexp(math.sqrt(np.mean(np.ldexp(values, -power) ** 2)), int(power))
