@@ -117,14 +117,12 @@ def first_input(law: Any, y: float) -> float:
     def error(u: float) -> float:
         return float(law.response([u])[0]) - y
 
-    if error(0.0) == 0.0:
+    if (here := error(0.0)) == 0.0:
         return 0.0
-    reach = 1e-6
-    while reach < 1e150:
+    for reach in np.ldexp(1e-6, range(519)).tolist():  # up to 1e150
         for end in (reach, -reach):
-            if np.sign(error(end)) * np.sign(error(0.0)) <= 0.0:  # their product may be too small for a number
+            if np.sign(error(end)) * np.sign(here) <= 0.0:  # their product may be too small for a number
                 return float(brentq(error, 0.0, end, xtol=1e-300, rtol=4.0 * np.finfo(float).eps, maxiter=_HALVINGS))
-        reach *= 2.0
     raise ValueError("the first input cannot be computed from the first output: give u0")
 
 
