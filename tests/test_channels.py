@@ -371,8 +371,7 @@ def test_an_unknown_channel_is_estimated_with_its_error(fit):
     assert within.estimates["T"] == 4.0
     assert "T is at its physical bound 4" in within.message
     assert_refused("not on 'I'", hs.estimate_channel, fit, unknown, "I")
-    with pytest.raises(TypeError, match="takes a law that depends on channels"):
-        hs.estimate_channel(hs.Play(), unknown, "T")
+    assert_refused("a law that depends on channels", hs.estimate_channel, hs.Play(), unknown, "T", error=TypeError)
     assert_refused("takes one Record, got list", hs.estimate_channel, fit, [unknown], "T", error=TypeError)
 
 

@@ -73,6 +73,7 @@ test_what_has_no_loss_is_refused = refused(
     (lambda: hs.loss_map(hs.Play(), [2.0], [1.0]), "every loss is negative"),
     (lambda: hs.loss_map(hs.Stop(), [1.0], [1.0], channels={"T": [1.0]}), TypeError, "depends on no channel"),
     (lambda: hs.loss_map(hs.Stop(), [], [1.0]), "needs an amplitude"),
+    (lambda: hs.loss_map(hs.Stop(), [1.0], [1.0], bias=1e20), hs.SimulationError, "repeat under B from 1e.20 to 1e.20"),
     (lambda: hs.loss_map(hs.Stop(), [1.0], [1.0], waveform=[0.0, 2.0, -2.0, 0.0]), "the amplitude 1"),
     (lambda: LAW.loss(1.0, -1.0), "amplitude must not be negative"),
     (lambda: hs.Steinmetz.from_losses([1.0, 2.0], [1.0, 2.0], [1.0, 0.0]), "loss must be positive"),

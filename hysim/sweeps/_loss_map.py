@@ -149,7 +149,7 @@ def _energy(model: Any, cycle: FloatArray, sample_time: float) -> float:
     if isinstance(model, Sum):
         return sum(_energy(part, cycle, sample_time) for part in model.parts)
     period = cycle[:-1] if needs_time(model) else cycle[[first for first, _ in turns(cycle, 0.0).plateaus[:-1]]]
-    for cycles in (each for each in _CYCLES if each * period.size <= _LONGEST):
+    for cycles in (each for each in _CYCLES if 0 < each * period.size <= _LONGEST):
         path = np.concatenate([np.tile(period, cycles), cycle[:-1], cycle])
         H = response_of(model, path, sample_time)
         field, earlier = H[-cycle.size :], H[: cycles * period.size].reshape(cycles, -1)
