@@ -27,6 +27,7 @@ class Element(Clamps):
         Parameter("gain", unit="y/u", affine=True),
         Parameter("offset", unit="y", affine=True),
     )
+    powers: ClassVar = {"gain": None, "offset": 0}
     starts = tuple({"threshold": share, "z0": 0.0} for share in (0.1, 0.3, 0.6))
     screened = 256
 
