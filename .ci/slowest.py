@@ -63,31 +63,31 @@ def print_seconds(arguments: Sequence[str]) -> None:
         print(f"{total:6.1f} CPU s  {purpose}")
 
 
-def print_coverage(arguments: Sequence[str]) -> None:
-    """Lines of each room that the whole suite runs, and the share of them that the first circle runs."""
+def covered(circle: str, arguments: Sequence[str]) -> dict[str, set[int]]:
+    """Lines of each file of hysim/ that the tests with the markers of a `circle` run."""
     from coverage import CoverageData
 
-    second = purposes()
-    lines: dict[str, list[int]] = defaultdict(lambda: [0, 0])
     with tempfile.TemporaryDirectory() as folder:
         file = Path(folder) / "coverage"
-        subprocess.run(
-            [*SUITE, "--cov=hysim", "--cov-context=test", "--cov-report=", *arguments],
-            cwd=ROOT,
-            stdout=subprocess.DEVNULL,
-            env={**os.environ, "COVERAGE_FILE": str(file)},
-        )
+        command = [*SUITE[:-1], circle, "--cov=hysim", "--cov-report=", *arguments]
+        subprocess.run(command, cwd=ROOT, stdout=subprocess.DEVNULL, env={**os.environ, "COVERAGE_FILE": str(file)})
         data = CoverageData(str(file))
         data.read()
-        for path in data.measured_files():
-            room = Path(path).relative_to(ROOT / "hysim").parts[0]
-            for contexts in data.contexts_by_lineno(path).values():
-                tests = {each.partition("|")[0].partition("[")[0].removeprefix("tests/") for each in contexts}
-                for name in [room] if room == "kernels" else ["total", room]:
-                    lines[name][0] += 1
-                    lines[name][1] += not tests <= second.keys()
-    for name, (whole, first) in sorted(lines.items(), key=lambda each: each[1][1] / each[1][0]):
-        print(f"{100.0 * first / whole:6.2f} % of {whole:6} lines  {name}")
+        return {path: set(data.lines(path) or ()) for path in data.measured_files()}
+
+
+def print_coverage(arguments: Sequence[str]) -> None:
+    """Lines of each room that the whole suite runs, and the share of them that the first circle runs."""
+    second_circle = " or ".join([*tomllib.loads((ROOT / "tests" / "circles.toml").read_text()), "extra"])
+    first, second = (covered(circle, arguments) for circle in (f"not ({second_circle})", second_circle))
+    lines: dict[str, list[int]] = defaultdict(lambda: [0, 0])
+    for path in first.keys() | second.keys():
+        room, own = Path(path).relative_to(ROOT / "hysim").parts[0], first.get(path, set())
+        for name in [room] if room == "kernels" else ["total", room]:
+            lines[name][0] += len(own | second.get(path, set()))
+            lines[name][1] += len(own)
+    for name, (whole, part) in sorted(lines.items(), key=lambda each: each[1][1] / max(each[1][0], 1)):
+        print(f"{100.0 * part / max(whole, 1):6.2f} % of {whole:6} lines  {name}")
 
 
 if __name__ == "__main__":
