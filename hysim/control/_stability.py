@@ -54,7 +54,8 @@ from hysim.plants.stages import Sensor
 
 _FREQUENCIES = 300
 _SLOWEST = 1e-4
-"""Lowest frequency, in units of the highest, pi / sample time."""
+_SLOWER = 1e-6
+"""Lowest frequencies, in units of the highest, pi / sample time, and of the lowest for a slow integral."""
 
 _PLANTS_POLES = np.sinh(np.linspace(-8.0, 8.0, 80))
 _LOOPS_POLES = np.sinh(np.linspace(-2.0, 2.0, 9))
@@ -121,16 +122,16 @@ class LinearLoop:
             return math.inf
         own = _around(_light(poles), _LOOPS_POLES) / self.sample_time
         frequencies = np.concatenate([self.frequencies, own])
-        values = np.concatenate([_sensitivity(slope * self.response(controller)), self._at(own, controller, slope)])
+        loop = np.concatenate([slope * self.response(controller), self._at(own, controller, slope)])
         order = np.argsort(frequencies, kind="stable")
-        frequencies, values = frequencies[order], values[order]
+        frequencies, values = frequencies[order], _sensitivity(loop[order])
         before, after = np.append(0.0, values[:-1]), np.append(values[1:], 0.0)
         highest = float(values.max())
         peaks = np.flatnonzero((values > before) & (values >= after) & (values >= _HIGH * highest))
         low, high = frequencies[np.maximum(peaks - 1, 0)], frequencies[np.minimum(peaks + 1, values.size - 1)]
         for _ in range(_ROUNDS):
             between = np.linspace(low, high, _BETWEEN)
-            finer = self._at(between.ravel(), controller, slope).reshape(between.shape)
+            finer = _sensitivity(self._at(between.ravel(), controller, slope)).reshape(between.shape)
             highest = max(highest, float(finer.max()))
             best, each = finer.argmax(axis=0), np.arange(low.size)
             low, high = between[np.maximum(best - 1, 0), each], between[np.minimum(best + 1, _BETWEEN - 1), each]
@@ -151,10 +152,13 @@ class LinearLoop:
 
         if not self.is_stable(controller, slope):
             return math.nan, math.nan
-        loop = slope * self.response(controller)
+        loop, highest = slope * self.response(controller), np.array([math.pi / self.sample_time])
         gain, phase = control.margin(control.frd(loop, self.frequencies))[:2]
-        at_nyquist = -1.0 / loop[-1].real if loop[-1].real < 0.0 else math.inf
-        return min(float(gain), at_nyquist), float(phase)
+        last = float(self._at(highest, controller, slope)[0].real)
+        if abs(loop[0]) < 1.0:  # a slow integral has its crossover below
+            slower = self.frequencies[0] * np.geomspace(_SLOWER, 1.0, _FREQUENCIES)
+            phase = min(phase, control.margin(control.frd(self._at(slower, controller, slope), slower))[1])
+        return min(float(gain), -1.0 / last if last < 0.0 else math.inf), float(phase)
 
     def noise_gain(self, controller: SampledController, slope: float = 1.0) -> float:
         """Rms of the command for white noise of rms one in the measurement; infinite if the loop is unstable."""
@@ -181,9 +185,9 @@ class LinearLoop:
         states = np.linalg.solve(z * np.eye(len(A)) - A, np.broadcast_to(B, (z.size, *B.shape)))
         return np.asarray((C @ states)[:, 0, 0])
 
-    def _at(self, frequencies: FloatArray, controller: SampledController, slope: float) -> FloatArray:
+    def _at(self, frequencies: FloatArray, controller: SampledController, slope: float) -> npt.NDArray[np.complex128]:
         feedback = controller.frequency_response(frequencies, self.sample_time)
-        return _sensitivity(slope * self.plant_at(frequencies) * feedback)
+        return np.asarray(slope * self.plant_at(frequencies) * feedback)
 
     def _closed(self, feedback: Feedback, slope: float) -> _Loop:
         n = len(self.system.A)
