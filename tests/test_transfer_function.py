@@ -134,12 +134,14 @@ def test_poles_zeros_and_gain():
     assert hs.TransferFunction(num=(1.0,), den=(1.0, 0.0)).dc_gain == np.inf
 
 
-def test_simulate_needs_an_even_time():
-    plant = hs.TransferFunction(num=(1.0,), den=(1.0, 1.0))
-    u = np.ones(4)
+def test_simulate_needs_an_even_time_and_advance_that_of_its_state():
+    plant, u = hs.TransferFunction(num=(1.0,), den=(1.0, 1.0)), np.ones(4)
     assert hs.simulate(plant, [0.0, 0.5, 1.0, 1.5], u).y == pytest.approx(plant.response(u, 0.5))
     assert_refused("needs times: pass t", hs.simulate, plant, None, u)
     assert_refused("evenly spaced", hs.simulate, plant, [0.0, 0.5, 1.1, 1.5], u)
+    for each in (plant, hs.Actuator(vibration=plant)):
+        state = each.advance(u, sample_time=0.5)[1]
+        assert_refused("of steps of 0.5 s, .* got 0.1 s", each.advance, u, state, sample_time=0.1)
 
 
 test_wrong_arguments_are_named = refused(

@@ -488,6 +488,12 @@ def needed_time(plant: Any, sample_time: float | None) -> float:
     return sample_time
 
 
+def check_continued(step: float, state_step: float) -> None:
+    """Refuse a state whose numbers are of other steps [s]: their units and dead times depend on them."""
+    if step != state_step:
+        raise ValueError(f"the state is of steps of {state_step:g} s, which it must be continued with, got {step:g} s")
+
+
 def positive_time(sample_time: float) -> float:
     """A sample time [s]; ValueError if it is not positive and finite."""
     if not 0.0 < sample_time < math.inf:

@@ -57,10 +57,11 @@ def affine_columns(
 
 
 class LinearState(NamedTuple):
-    """States (n_inputs, n) at the last sample, and the inputs (n_inputs, m) that still act, up to that sample's."""
+    """States (n_inputs, n) at the last sample, inputs (n_inputs, m) that still act, up to that sample's."""
 
     x: FloatArray
     past: FloatArray
+    sample_time: float = 0.0
 
 
 class LinearPlants(NamedTuple):

@@ -15,7 +15,15 @@ from hysim.kernels import controllers
 from hysim.kernels import loop as kernels
 from hysim.laws.static import Line
 from hysim.models.compiled_step import startable
-from hysim.models.protocols import CompiledController, CompiledLaw, Startable, law_at, positive_time
+from hysim.models.protocols import (
+    CompiledController,
+    CompiledLaw,
+    Startable,
+    check_continued,
+    law_at,
+    needs_time,
+    positive_time,
+)
 from hysim.plants import stages as linear
 from hysim.plants.stages import Amplifier, Creep, Sensor, Stage, Vibration
 
@@ -41,7 +49,7 @@ class ChainState(NamedTuple):
     """Samples so far, and the states of the stages.
 
     `past` holds the law's last outputs, the latest at its end, and `readings` the displacements that the sensor has
-    still to give, the oldest first, and at its end the one within the last sample.
+    still to give, the oldest first, and at its end the one within the last sample. `step` is that of the chain [s].
     """
 
     samples: int
@@ -50,6 +58,7 @@ class ChainState(NamedTuple):
     x: FloatArray
     past: FloatArray
     readings: FloatArray
+    step: float
 
 
 class Signals(NamedTuple):
@@ -88,6 +97,8 @@ class Chain:
             self.seen_in, at = linear.whole_and_part((1.0 - part) * self.substeps)
             reading = linear.seen_within(self.linear, self.step, self.delay, at, **between)
         self.outputs = read_only([self.stage.output, reading])
+        is_scaled, delays = self.linear.rate != 1.0, self.delay or self.sensor.delay
+        self.is_of_its_step = is_scaled or delays > 0.0 or needs_time(hysteresis)
 
     @property
     def linear_block(self) -> FloatArray:
@@ -107,7 +118,8 @@ class Chain:
         if not np.isfinite(x).all():
             raise ValueError(f"the vibration integrates: it cannot rest at the law's output {level:g}")
         law = CompiledLaw(*self.hysteresis.compiled(float(voltages[1])))
-        state = ChainState(0, voltages, law, x, np.full(self.stage.lag + 3, level), np.empty(self.samples_late + 2))
+        past, readings = np.full(self.stage.lag + 3, level), np.empty(self.samples_late + 2)
+        state = ChainState(0, voltages, law, x, past, readings, self.step)
         state.readings[:] = self.displacement(state)
         return state
 
@@ -134,6 +146,8 @@ class Chain:
     ) -> tuple[Signals, ChainState]:
         """Run a controller, whose state moves along, from a state of the chain; the state at the end with it."""
         n = reference.size
+        if self.is_of_its_step:
+            check_continued(self.step, state.step)
         law = state.law._replace(state=state.law.state.copy())
         parts = (state.voltages, state.x, state.past, state.readings)
         plant_state, inputs = np.concatenate(parts), self._inputs(state, reference)
@@ -149,7 +163,7 @@ class Chain:
         lost = in_pieces(piece, n)
         voltages, x, past, readings = np.split(plant_state, np.cumsum([part.size for part in parts])[:-1])
         remaining = np.append(np.roll(readings[:-1], -n), readings[-1])
-        end = ChainState(state.samples + n, voltages, law, x, np.roll(past, -n * self.substeps), remaining)
+        end = ChainState(state.samples + n, voltages, law, x, np.roll(past, -n * self.substeps), remaining, self.step)
         (command, drive, y, measurement), (v, w) = samples, path
         u = np.append(state.voltages[1], v)[: -1 : self.substeps] if self.amplifier.dynamic else v
         return Signals(command, drive, u, v, w, y, measurement, lost), end

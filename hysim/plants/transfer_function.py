@@ -21,7 +21,7 @@ from hysim._basics.frozen import FloatArray, NotNegative, check_not_negative, ch
 from hysim.errors import SimulationError
 from hysim.models.composable import Composable
 from hysim.models.model import family
-from hysim.models.protocols import CompiledLaw, Startable, Subject, needed_time, positive_time
+from hysim.models.protocols import CompiledLaw, Startable, Subject, check_continued, needed_time, positive_time
 from hysim.models.search_space import ALL_FREE, Freedom, Parameters, SearchSpace
 from hysim.plants import _transfer_function_search as search
 from hysim.plants._linear_response import LinearPlants, LinearState, affine_columns
@@ -141,7 +141,8 @@ class TransferFunction(Composable):
             begin = state
             if begin is None:
                 free = np.array(self.initial_state or [0.0] * self.order) * plant.rate[0] ** -np.arange(self.order)
-                begin = LinearState(np.stack([np.zeros(self.order), free]), np.empty((2, 0)))
+                begin = LinearState(np.stack([np.zeros(self.order), free]), np.empty((2, 0)), time)
+            check_continued(time, begin.sample_time)
             if not inputs.size:
                 return inputs, begin
             both = np.stack([inputs, np.zeros_like(inputs)])
@@ -150,7 +151,7 @@ class TransferFunction(Composable):
         if not np.isfinite(y).all():
             k = int(np.argmin(np.isfinite(y)))
             raise SimulationError(f"the output leaves the finite numbers at sample {k}; the poles are {self.poles}")
-        return y, end
+        return y, end._replace(sample_time=time)
 
     def startable(self, sample_time: float | None = None) -> Startable:
         """A step with the bits of `response` at a sample time [s]; the input is zero before its first sample."""
