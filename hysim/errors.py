@@ -42,11 +42,13 @@ def warn_unsafe(thing: Any) -> None:
         warnings.warn(thing.unsafe, HysimWarning, stacklevel=3)
 
 
-def warn_limited(limited: int, samples: int) -> None:
-    """Warn if a command stands at a limit for more than 5 % of its samples."""
+def warn_limited(limited: int, samples: int, *, may_invert: bool) -> None:
+    """Warn if a command stands at a limit for more than 5 % of its samples, maybe of a law that `may_invert`."""
     if limited > _LIMITED * samples:
         at_limit = f"the command is at a limit of the controller or the amplifier in {limited} of {samples} samples"
-        warnings.warn(f"{at_limit}: the reference is out of reach there", HysimWarning, stacklevel=_CLOSED)
+        turns = ", or the slope of an inverted law changes its sign before, which inverse_response names"
+        reason = f"the reference is out of reach there{turns if may_invert else ''}"
+        warnings.warn(f"{at_limit}: {reason}", HysimWarning, stacklevel=_CLOSED)
 
 
 class Interrupted(KeyboardInterrupt):

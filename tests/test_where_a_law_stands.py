@@ -168,10 +168,12 @@ def test_an_input_beyond_the_identified_range_is_warned_of():
 def test_a_command_at_its_limit_is_warned_of():
     t = 0.01 * np.arange(100)
     limited = hs.TrackingController(feedforward=hs.InverseFeedforward(), limits=(0.0, 0.5))
-    words = "at a limit of the controller or the amplifier in 49 of 100 samples"
-    with pytest.warns(hs.HysimWarning, match=words) as told:
-        hs.close_loop(hs.Line(slope=1.0), limited, t, t)
-    assert [each.filename for each in told] == [__file__]
+    turning = hs.BoucWen(feedthrough=-0.2)  # its slope is zero at ln 5, where its output is 0.48
+    for law, controller, n in ((hs.Line(slope=1.0), limited, 49), (turning, hs.InverseFeedforward(law=turning), 52)):
+        words = f"in {n} of 100 samples: the reference .* there, or the slope of an inverted law changes"
+        with pytest.warns(hs.HysimWarning, match=words) as told:
+            hs.close_loop(law, controller, t, t)
+        assert [each.filename for each in told] == [__file__]
 
 
 def test_an_identified_law_stands_at_the_first_input_of_its_record():

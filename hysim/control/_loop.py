@@ -17,7 +17,7 @@ from hysim._basics.frozen import FloatArray, read_only, vectors
 from hysim._basics.printing import extent, frozen_result, quantity, summary_text
 from hysim._basics.progress import Reports, along, reports
 from hysim._basics.results import model_of
-from hysim.control._controller import Controller, SteppedController, begun, held_samples, limits_of, preview
+from hysim.control._controller import PID, Controller, SteppedController, begun, held_samples, limits_of, preview
 from hysim.errors import SimulationError, warn_beyond, warn_limited
 from hysim.laws.static import Line
 from hysim.models.model import in_brief
@@ -193,7 +193,7 @@ def close_loop(
         raise ValueError(f"only a Structure stands on the ground, got {type(plant).__name__} and ground_acceleration")
     run = around(RestingPlant(actuator, h, u0, substeps), controller, times, r, units, progress)
     warn_beyond(actuator.u_range, run.u, type(actuator.hysteresis).__name__)
-    warn_limited(run.conditions["limited_samples"], run.u.size)
+    warn_limited(run.conditions["limited_samples"], run.u.size, may_invert=not isinstance(controller, PID))
     return run
 
 
