@@ -328,8 +328,7 @@ def test_a_period_longer_than_the_reference_is_named():
 
 
 def test_an_unstable_loop_has_no_margins_and_no_bandwidth():
-    loop = hs.control.LinearLoop(MODE, H)
-    assert np.isnan(loop.margins(hs.PID(ki=3.0))).all()
+    assert np.isnan(hs.control.LinearLoop(MODE, H).margins(hs.PID(ki=3.0))).all()
     sine = {"sample_time": H, "amplitude": 1.0, "lowest": 0.1, "transient": 5.0, "error": hs.SimulationError}
     for pid in (hs.PID(ki=3.0), hs.PID(ki=3.0, limits=(-2.0, 2.0))):
         assert_refused("unstable: it has no bandwidth", bandwidth, MODE, pid, **sine)

@@ -79,6 +79,7 @@ def test_it_is_printed_and_drawn():
 test_wrong_arguments_are_named = refused(
     ({"periods": [0.5, 0.0]}, "periods must be positive"),
     ({"periods": [0.5, 1e-9], "strength": 1.0}, "a sample would take 6.98e.08 sub-steps"),
+    ({"periods": [0.5, 1e9]}, "periods of up to 1e.09 s need .* zeros after a record"),
     ({"damping": 1.0}, "damping must be from 0 to below 1"),
     ({"ductility": 0.9}, "ductility at least 1, got 0.05 and 0.9"),
     ({"ductility": 2.0, "strength": 1.0}, "either ductility= or strength="),

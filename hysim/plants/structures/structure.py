@@ -574,6 +574,7 @@ _TOLERANCE = 1e-8  # ductilities err by less than 1e-6; coarser steps make small
 _AT_REST, _EQUAL = 1e-8, 1e-3  # stroke by yield_input; difference of the slopes to both sides
 _STEP, _MOST = math.log(1.2), math.log(1e8)  # of a scale; half the step was tried, and misses as many crossings
 _CLOSE, _NARROW = 1e-6, 1e-10  # in ln(ductility); in ln(scale) where the ductility jumps
+_MOST_ZEROS = 1e7  # after a record, whose last velocity an oscillator stores for a quarter of its period
 _DIVERGED = 1e6  # times the elastic displacement; down to periods of 1 ms the weakest oscillators follow the ground
 
 
@@ -668,7 +669,9 @@ def response_spectrum(
     [[2.176, 2.441]]
     """
     h, T = positive_time(sample_time), read_only(periods, "periods", ndim=1)
-    records = ground_records(ground_accelerations, math.ceil(T.max(initial=0.0) / h))
+    if (n_zeros := T.max(initial=0.0) / h) > _MOST_ZEROS:
+        raise ValueError(f"periods of up to {T.max():g} s need {n_zeros:.3g} zeros after a record: take shorter ones")
+    records = ground_records(ground_accelerations, math.ceil(n_zeros))
     strengths = np.broadcast_to(read_only(1.0 if strength is None else strength, "strength"), (len(records), T.size))
     check_positive(periods=min(T, default=0.0), yield_input=yield_input, strength=strengths.min(initial=1.0))
     if not 0.0 <= damping < 1.0 <= (1.0 if ductility is None else ductility) < math.inf:
