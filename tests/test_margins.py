@@ -69,12 +69,9 @@ def discrete(plant, h):
 )
 def test_the_maximum_sensitivity_is_that_of_a_million_frequencies(modes, delay, margin, shape, notched):
     """Modes of any damping from 0.001, and gains from next to nothing to nearly unstable."""
-    plant = hs.Modes(
-        natural_frequencies=[w for w, _ in modes],
-        damping_ratios=[10.0**exponent for _, exponent in modes],
-        gains=np.ones(len(modes)),
-    )
-    plant = hs.Actuator(vibration=plant, sensor=hs.Sensor(delay=delay))
+    frequencies, exponents = np.transpose(modes)
+    vibration = hs.Modes(natural_frequencies=frequencies, damping_ratios=10.0**exponents, gains=np.ones(len(modes)))
+    plant = hs.Actuator(vibration=vibration, sensor=hs.Sensor(delay=delay))
     loop = hs.control.LinearLoop(plant, 1.0)
     (kp, ki, kd), notch = shape, hs.Notch(natural_frequency=modes[0][0], damping_ratio=0.01) if notched else None
 
@@ -122,6 +119,8 @@ def test_margins_do_not_end_with_the_frequencies():
     whole, part = (hs.control.LinearLoop(LAG, H, each) for each in (None, np.geomspace(0.1, 20.0, 300)))
     assert part.margins(hs.PID(kp=5.0)) == pytest.approx(whole.margins(hs.PID(kp=5.0)), rel=1e-4)  # interpolated
     assert whole.margins(hs.PID(ki=1e-4))[1] == pytest.approx(90.0 - np.degrees(1e-4 * (1.0 + H)), abs=1e-3)
+    unstable, pid = hs.TransferFunction(num=(1.0,), den=(1.0, -1.0)), hs.PID(kp=30.0, ki=0.5)  # 1 / 30 is farther off
+    assert hs.control.LinearLoop(unstable, H).margins(pid)[0] == pytest.approx(1.0 / (30.0 * np.tanh(H / 2)), rel=1e-3)
 
 
 def test_a_controller_of_parts_has_the_margins_of_its_feedback():

@@ -158,7 +158,7 @@ class LinearLoop:
         if abs(loop[0]) < 1.0:  # a slow integral has its crossover below
             slower = self.frequencies[0] * np.geomspace(_SLOWER, 1.0, _FREQUENCIES)
             phase = min(phase, control.margin(control.frd(self._at(slower, controller, slope), slower))[1])
-        return min(float(gain), -1.0 / last if last < 0.0 else math.inf), float(phase)
+        return nearest_to_one([gain, -1.0 / last if last < 0.0 else math.inf]), float(phase)
 
     def noise_gain(self, controller: SampledController, slope: float = 1.0) -> float:
         """Rms of the command for white noise of rms one in the measurement; infinite if the loop is unstable."""
@@ -198,6 +198,12 @@ class LinearLoop:
         M[:n, :n] += self.system.A
         M[n:, :n], M[n:, n:] = np.outer(feedback.B, output), feedback.A
         return _Loop(M, np.concatenate([feedback.D * drive, feedback.B]), K, feedback.D)
+
+
+def nearest_to_one(gain_margins: npt.ArrayLike) -> float:
+    """The factor that a loop reaches first; those below one are of loops that a smaller gain makes unstable."""
+    gains = np.asarray(gain_margins, dtype=float)
+    return float(gains[np.argmin(np.abs(np.log(gains)))])
 
 
 def _sensitivity(loop: npt.NDArray[np.complex128]) -> FloatArray:

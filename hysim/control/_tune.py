@@ -38,7 +38,7 @@ from hysim._basics.frozen import FloatArray, Interval, check_choice, check_posit
 from hysim._basics.printing import frozen_result, summary_text
 from hysim.control._controller import PID, Feedback, SampledController, limits_of
 from hysim.control._loop import RestingPlant, inverted, sampled, secant_gain, slopes
-from hysim.control._stability import LinearLoop, limit_cycle, slowest_decay
+from hysim.control._stability import LinearLoop, limit_cycle, nearest_to_one, slowest_decay
 from hysim.control._tracking import TrackingController
 from hysim.kernels import controllers as kernels
 from hysim.models.model import family, in_brief
@@ -180,7 +180,7 @@ class Tuning:
     controller, objective, max_sensitivity
         As in the best `Trial`.
     gain_margin, phase_margin : float
-        Factor and angle [degrees] by which the loop may change before it is unstable: the smallest of all plants.
+        Factor and angle [degrees] by which the loop may change before it is unstable: the least changes of all plants.
     voltage_noise : float
         As in the best `Trial`. The noise also moves the memory of a law, which `close_loop` has in its conditions.
     trade_off : tuple of Trial
@@ -428,7 +428,7 @@ class _Search:
         noise = f", voltage noise {best.voltage_noise:.2g} of {self.max_voltage_noise:g}"
         return Tuning(
             **vars(best),
-            gain_margin=float(gains.min()),
+            gain_margin=nearest_to_one(gains),
             phase_margin=float(phases.min()),
             trade_off=trade_off,
             trials=tuple(self.trials),
