@@ -81,7 +81,8 @@ def output_and_slope(
 ) -> tuple[float, float, float]:
     """Output, slope in a direction of the input, and size of the terms at the next input `u`, without dead zones."""
     n_plays = state.size - 1
-    (below, rising), (above, falling) = envelope(u, parameters, LEFT), envelope(u, parameters, RIGHT)
+    below, rising = envelope(u, parameters, LEFT)
+    above, falling = envelope(u, parameters, RIGHT)
     total, slope, size = parameters[0], 0.0, abs(parameters[0])
     for i in range(n_plays):
         r, weight = parameters[N_HEAD + i], parameters[N_HEAD + n_plays + i]
@@ -147,8 +148,9 @@ def inverse_step(parameters: FloatArray, state: FloatArray, y: float) -> float:
     `parameters` are the limits and those of `step`; `state` is (u, y) and that of `step`.
     """
     own, law = borrowed(parameters)[N_LIMITS:], borrowed(state)[N_PLACE:]
-    n_plays = law.size - 1
-    rising = own[N_HEAD + n_plays : N_HEAD + 2 * n_plays].sum()  # the sign of all weights together
+    n_plays, rising = law.size - 1, 0.0
+    for i in range(n_plays):
+        rising += own[N_HEAD + n_plays + i]  # the sign of all weights together
     side = math.copysign(1.0, y - output_and_slope(own, law, law[0], 1.0)[0])
     direction = math.copysign(1.0, rising) * side
     u = solved(own, law, y, direction, side)
