@@ -231,13 +231,14 @@ def test_the_worked_main_prints_the_response(name, tmp_path):
 
 @needs_compiler
 @pytest.mark.parametrize("law", LAWS.values(), ids=LAWS)
-def test_the_user_s_name_meets_none_of_ours(law, tmp_path):
+def test_a_law_and_its_inverse_are_c_and_the_user_s_name_meets_none_of_ours(law, tmp_path):
     """Public names are name_init, name_step, name_state and name_held; the natural one is that of our own step."""
     ours = re.findall(r"^static .*?(\w+)(?:\(|\[)", hs.to_c(law, H).source, re.MULTILINE)
     assert not [each for each in ours if each.endswith(("_init", "_step", "_state", "_held"))]
     *_, name = type(law).__name__.lower(), *(each[: -len("_step_")] for each in ours if each.endswith("_step_"))
-    hs.to_c(law, H, name=name).write(tmp_path)
-    subprocess.run([COMPILER, *STRICT, "-fsyntax-only", f"{name}.c"], cwd=tmp_path, check=True)
+    for thing in (law, hs.InverseFeedforward(law=law)):
+        hs.to_c(thing, 1.0, name=name).write(tmp_path)
+        subprocess.run([COMPILER, *STRICT, "-fsyntax-only", f"{name}.c"], cwd=tmp_path, check=True)
 
 
 @needs_compiler
