@@ -153,10 +153,12 @@ def test_a_loop_that_crosses_itself_gets_both_signs():
     assert fit.rmse < 0.2 * error(hs.Preisach.structure(one_signed=True, intervals=10), record)
 
 
-def test_a_loop_that_saturates_gets_both_signs():
-    fit = hs.identify(hs.PrandtlIshlinskii, inductor())
+@pytest.mark.parametrize("offset", [0.0, 1e10])
+def test_a_loop_that_saturates_gets_both_signs(offset):
+    record = hs.Record(u=inductor().u, y=inductor().y + offset)
+    fit = hs.identify(hs.PrandtlIshlinskii, record)
     assert "weights of both signs (else the BIC is" in fit.message
-    assert fit.rmse < 0.5 * error(hs.PrandtlIshlinskii.structure(one_signed=True), inductor())
+    assert fit.rmse < 0.5 * error(hs.PrandtlIshlinskii.structure(one_signed=True), record)
     assert fit.message.count("search bound") <= 1
 
 

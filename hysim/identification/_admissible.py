@@ -52,7 +52,6 @@ _LOOPS = ((-0.5, 0.1), (-0.5, 0.4), (0.0, 0.1), (0.0, 0.4), (0.5, 0.1), (0.5, 0.
 _REPEATED = 50
 _CLEAR = 10.0  # difference of two BIC: that of `_assumptions`
 _MOST_LOSS = 1.25  # rmse over that of the best law
-_ROUNDING = 1e-10  # of the output's size: smaller residuals are those of a perfect fit
 _N_SCREENED = 256
 _N_TRIED = 64  # points that are tried for safety, the best first
 _N_BEGUN = 4  # safe points from which the best safe law is approached
@@ -202,7 +201,7 @@ def _is_as_good(search: Search, best: FloatArray, other: FloatArray) -> bool:
     problem = search.problem
     share = np.sqrt(problem.weights)
     first, second = (share * search.residual(theta) for theta in (best, other))
-    rounding = max(_ROUNDING * problem.scale, (problem.parts[0].record.resolution or 0.0) / math.sqrt(12.0))
+    rounding = max(problem.rounding, (problem.parts[0].record.resolution or 0.0) / math.sqrt(12.0))
     least, more = (max(float(np.mean(each**2)), rounding**2) for each in (first, second))
     return more <= _MOST_LOSS**2 * least and effective_samples(first) * math.log(more / least) <= _CLEAR
 

@@ -37,12 +37,11 @@ from hysim.simulation import free_run
 # choice adds numbers to a model that is not exact, whose correlated residuals make smaller differences by chance.
 _STRONG = 10.0
 _IN_VAIN = 2  # longer pasts in a row that are no better: one number more may be of use only with another one
-_ROUNDING = 1e-10  # of the output's size: smaller residuals are those of a perfect fit
 _WEIGHINGS = 4
 _EVEN = 1.25  # largest noise of a sensor over the smallest, in the units of a search: weights cost < 3 % of precision
 _AS_GOOD = 1.05  # times the error of the filtered law: differences below are met by chance on ten simulated records
 _TURN = 0.1  # of the span: a half record without such a reversal shows no loop
-_AT_BOUND = 1e-9  # of the largest linear parameter
+_AT_BOUND = 1e-9  # of the largest linear parameter with a bound
 
 _STATES = {
     "rest": "rest at zero before the first sample",
@@ -298,9 +297,10 @@ def _bic(attempt: Problem, x: FloatArray, cost: float) -> float:
         return math.inf
     if attempt.space.bounds:
         linear = attempt.condensed().completed(x[np.newaxis])[0, attempt.n_x :]
-        near = _AT_BOUND * float(np.abs(linear).max(initial=0.0))
-        d -= int(np.sum(np.minimum(*np.abs(linear - attempt.linear_box())) <= near))
-    return information(max(cost / n, (_ROUNDING * attempt.scale) ** 2), n, d)
+        near = np.min(np.abs(linear - attempt.linear_box()), axis=0)
+        bounded = np.isfinite(near)
+        d -= int(np.sum(near[bounded] <= _AT_BOUND * np.abs(linear[bounded]).max(initial=0.0)))
+    return information(max(cost / n, attempt.rounding**2), n, d)
 
 
 def _best(choices: Sequence[int], bic: Callable[[int], float]) -> int:

@@ -59,6 +59,8 @@ _LARGEST = 1e150  # beyond it squares overflow: such a set counts as one that ha
 _FEWEST = 2  # samples of a record
 _MOST_OF_SPAN = 0.8
 _ROUGH, _CLOSE = 1e-4, 1e-8  # of the range: of differences over 1e-6 of the box only the second leaves slopes
+_PERFECT = 1e-10  # of half the range: smaller residuals are those of a perfect fit
+_EPSILONS = 16.0  # of the largest output: a sum of some products is rounded by less
 _DIFFERENCE = 1e-6  # step of a central difference in units of the box: truncation and rounding both ~1e-10
 
 
@@ -124,6 +126,11 @@ class Problem:
         if self.below is not None:
             return self.below.scale
         return float(np.abs(self.y).max()) or 1.0
+
+    @property
+    def rounding(self) -> float:
+        """Size of residuals that are those of a perfect fit [unit of y], whatever the offset of the outputs."""
+        return max(_PERFECT * 0.5 * float(np.ptp(self.y)), _EPSILONS * np.finfo(float).eps * self.scale)
 
     @cached_property
     def cuts(self) -> list[int]:
