@@ -537,15 +537,17 @@ def _restarted(free_run: FreeRun, chosen: Candidate[Terms], seed: int, restarts:
 
 
 def shifted(slopes: Slopes, terms: tuple[Term, ...], *, feedthrough: bool, offset: bool) -> tuple[Start, ...]:
-    """Regressions to begin at: that of the output itself, and those at the best places of the scan."""
+    """Regressions to begin at: that of the output itself, from a level in its range, and the best ones of the scan."""
     trial = symmetric(terms, "odd") or terms  # about the origin of z a law is odd, or nearly
     chord = max((np.copysign(np.ptp(r.y) / np.ptp(r.u), np.cov(r.u, r.y)[0, 1]) for r in slopes.rows), key=abs)
+    outputs = np.concatenate([rows.y for rows in slopes.rows])
+    origin = float(np.clip(0.0, outputs.min(), outputs.max())) if offset else 0.0  # far outside, all z have one sign
     places = []
     for slope in [0.0, *(chord * _FEEDTHROUGHS).tolist()] if feedthrough else [0.0]:
         memory = np.concatenate([rows.y - slope * rows.u for rows in slopes.rows])
         levels = (memory.min() + (memory.max() - memory.min()) * _OFFSETS).tolist() if offset else []
-        places += [(slopes.misfit(trial, slope, level), slope, level) for level in (0.0, *levels)]
-    chosen = [(0.0, 0.0)] if feedthrough or offset else []
+        places += [(slopes.misfit(trial, slope, level), slope, level) for level in (origin, *levels)]
+    chosen = [(0.0, origin)] if feedthrough or offset else []
     chosen += [(slope, level) for _, slope, level in sorted(places)[:_KEPT]]
     return tuple(Start(slopes.regression(terms, *place), *place) for place in dict.fromkeys(chosen))
 
