@@ -388,6 +388,13 @@ def test_a_parameter_that_runs_away_is_no_success():
     assert words in fit.warnings
 
 
+def test_where_a_parameter_runs_away_to_does_not_depend_on_the_seed():
+    noisy_line = hs.Record(u=U, y=2.0 * U + 0.01 * np.random.default_rng(3).standard_normal(U.size))
+    first, *others = (hs.identify(hs.Dahl, noisy_line, seed=seed, admissible=False) for seed in range(4))
+    assert first.message.startswith("coulomb reached its search bound")
+    assert {each.message for each in others} == {first.message}
+
+
 def test_a_bound_that_was_given_is_the_users():
     law = hs.BoucWen(beta=1.2, gamma=0.4, n=1.5)
     fit = hs.identify(hs.BoucWen, record(law), bounds={"n": (2.0, 3.0)})

@@ -10,6 +10,7 @@ which is often compared itself. The first that needs a search does it; the other
 """
 
 import hashlib
+import itertools
 import math
 import threading
 from collections.abc import Callable, Hashable, Iterator, Sequence
@@ -55,6 +56,8 @@ _SAME = 0.01  # by hand: likewise of two points after the descent, which are nea
 _GAIN = 1e-5  # by hand: share of the sum of squares; a descent that gains less rests, and ranks are known
 _TOLERANCE = 2e-8  # likewise of a polish: far less than a likelihood can tell on records of some 1e5 samples
 _HOPELESS = 3.0  # by hand: times the least sum of squares on a thinned record, beyond which an optimum is no rival
+_ALIKE = 1e-6  # relative difference of two sums of squares that are the same
+_EFFECT = 1e-7  # of the outputs' range: smaller changes are none
 _WIDENINGS = 4  # by hand: of a box, each by a quarter of its width, in all to 2.4 times it
 _ROUGH = 0.1  # by hand: share of the cost by which the rough law's may differ; beyond, it does not say what stays
 _FAR_FROM_CLOSE = 100.0  # by hand: times the accuracy of a close law; a residual of this size is fitted as well by it
@@ -111,7 +114,7 @@ def widened(problem: Problem, optima: Sequence[Optimum]) -> tuple[Problem, list[
     Where it stands at a side that is neither physical nor the user's, the box is widened and the optimum polished in
     it, a few times: a parameter that runs away stays at the side.
     """
-    best = list(optima)
+    best = _in_its_tail(problem, optima)
     for _ in range(_WIDENINGS if best else 0):
         low, high = problem.space.open_sides(best[0].x)
         if not (low | high).any():
@@ -120,8 +123,30 @@ def widened(problem: Problem, optima: Sequence[Optimum]) -> tuple[Problem, list[
         reached = polish(wider, best[0].x[np.newaxis])
         if not reached or not reached[0].cost <= best[0].cost:
             break
-        problem, best = wider, _distinct([reached[0], *best[1:]])
+        problem, best = wider, _in_its_tail(wider, _distinct([reached[0], *best[1:]]))
     return problem, best
+
+
+def _in_its_tail(problem: Problem, optima: Sequence[Optimum]) -> list[Optimum]:
+    """The optima, the best one at the open side of the box up to which its cost stays the same.
+
+    In a flat tail a descent rests anywhere, and where it began must not matter. A coordinate stays that the data do not
+    determine: it has no effect, or the cost is the same up to both sides, or it is redundant.
+    """
+    best, space = [*optima], problem.space
+    alone = [name not in itertools.chain(*space.redundant) for name in space.coordinates]
+    for k in np.flatnonzero(alone if best else []).tolist():
+        ends = np.tile(best[0].x, (2, 1))
+        ends[:, k] = space.lower[k], space.upper[k]
+        costs = problem.costs(ends)
+        kept = np.flatnonzero(costs <= (1.0 + _ALIKE) * optima[0].cost)
+        if kept.size != 1 or not np.logical_or(*space.open_sides(ends[kept[0]]))[k]:
+            continue
+        here = problem.completed(best[0].x[np.newaxis])
+        there = np.append(ends[kept], here[:, problem.n_x :], axis=1)
+        if np.ptp(problem.model(there) - problem.model(here)) > _EFFECT * np.ptp(problem.y):
+            best[0] = best[0]._replace(x=ends[kept[0]], cost=float(costs[kept[0]]))
+    return best
 
 
 def stages_in_words(problems: Sequence[Problem], last: Stage | None) -> str:
@@ -330,7 +355,7 @@ def apart(
 def _distinct(optima: list[Optimum]) -> list[Optimum]:
     distinct: list[Optimum] = []
     for optimum in sorted(optima, key=lambda candidate: candidate.cost):
-        if not distinct or optimum.cost > distinct[-1].cost * (1.0 + 1e-6):
+        if not distinct or optimum.cost > distinct[-1].cost * (1.0 + _ALIKE):
             distinct.append(optimum)
     return distinct
 
