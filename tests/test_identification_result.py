@@ -146,6 +146,20 @@ def students(record):
     return design, estimates, covariance, stats.t.ppf(0.975, len(record) - 2) * np.sqrt(np.diag(covariance))
 
 
+def test_intervals_of_a_line_are_those_of_the_weighted_regression():
+    """Noise of the scale sigma / sqrt(weight), and a beginning without weight that no line fits."""
+    u, weights = line_record(200).u, np.repeat([0.0, 1e-2, 1.0, 1e2], 50)
+    root, noise = np.sqrt(weights), np.random.default_rng(5).standard_normal(200)
+    record = hs.Record(u=u, y=2.0 * u + np.where(root > 0.0, 0.01 * noise / np.maximum(root, 0.1), 9.0))
+    design = root[:, np.newaxis] * np.column_stack([np.ones(200), u])
+    estimates, squares = np.linalg.lstsq(design, root * record.y, rcond=None)[:2]
+    reach = stats.t.ppf(0.975, 148) * np.sqrt(np.diag(np.linalg.inv(design.T @ design)) * squares[0] / 148)
+    exact = np.column_stack([estimates - reach, estimates + reach])
+    for kind, tolerance in zip(KINDS, (1e-9, 0.02, 0.2), strict=True):  # as in the test above
+        found = hs.identify(hs.Line, record, weights=weights, intervals=kind).intervals
+        np.testing.assert_allclose([found["offset"], found["slope"]], exact, atol=tolerance * reach.max())
+
+
 def noisy(sigma=0.01, seed=0):
     y = LAW.response(INPUT) + sigma * np.random.default_rng(seed).standard_normal(INPUT.size)
     return hs.Record(u=INPUT, y=y)

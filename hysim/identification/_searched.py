@@ -182,7 +182,7 @@ class Search:
         n_samples, n_names = self.problem.n_samples, len(self.problem.space.names)
         if n_samples <= n_names:
             return {}, None
-        limit = float(n_samples * np.log1p(self._quantile(n_samples) ** 2 / (n_samples - n_names)))
+        limit = float(n_samples * np.log1p(self._quantile() ** 2 / (n_samples - n_names)))
         inside = [optimum for optimum in likely if 2.0 * (optimum.loss - likely[0].loss) < limit]
         thetas, losses = np.array([each.theta for each in inside]), np.array([each.loss for each in inside])
         return _profiles(self.descent, thetas, losses, known, limit)
@@ -202,7 +202,7 @@ class Search:
         limit = float(chi2.ppf(LEVEL, len(names))) if names else 0.0
         rivals = tuple(self.candidate(each.theta) for each in likely[1:] if 2.0 * (each.loss - best.loss) < limit)
         stderr = dict(zip(names, np.sqrt(np.diag(known.covariance)).tolist(), strict=True))
-        n_draws = N_BOOTSTRAP if intervals == "bootstrap" and residual.size > len(names) else 0
+        n_draws = N_BOOTSTRAP if intervals == "bootstrap" and problem.n_samples > len(names) else 0
         draws = bootstrap(problem, self.noise, best.theta, residual, best.sigma, draws=n_draws, seed=self.seed)
         spread, exact = float(np.std(problem.y)), is_exact(problem, chosen.rmse)
         why, probability = (*known.stopped, *known.reasons), measures["whiteness"]
@@ -256,13 +256,13 @@ class Search:
             ends = np.quantile(self.problem.named(draws), TAILS, axis=0).T.tolist()
             both = zip(stderr, ends, strict=True)
             return unknown | {name: (low, high) for name, (low, high) in both if np.isfinite(stderr[name])}
-        reach = {name: value * self._quantile(self.problem.y.size) for name, value in stderr.items()}
+        reach = {name: value * self._quantile() for name, value in stderr.items()}
         return {name: (estimates[name] - each, estimates[name] + each) for name, each in reach.items()}
 
-    def _quantile(self, n_samples: int) -> float:
+    def _quantile(self) -> float:
         from scipy.stats import t
 
-        freedom = n_samples - len(self.problem.space.names)
+        freedom = self.problem.n_samples - len(self.problem.space.names)
         return float(t.ppf(TAILS[1], freedom)) if freedom > 0 else float("nan")
 
     def _width(self, theta: FloatArray, known: Uncertainty, draws: FloatArray) -> Width | None:
@@ -273,9 +273,7 @@ class Search:
         if len(draws):
             lower, upper = np.quantile(loop_widths(self.descent, draws), TAILS).tolist()
         else:
-            reach = self._quantile(self.problem.y.size) * width_stderr(
-                self.problem, theta, known.of_theta, known.slopes
-            )
+            reach = self._quantile() * width_stderr(self.problem, theta, known.of_theta, known.slopes)
             lower, upper = width - reach, width + reach
         return Width(value=width, lower=lower, upper=upper)
 

@@ -396,16 +396,21 @@ def _left_out_errors(problem: Problem, noise: Noise, starts: FloatArray, every_f
 def bootstrap(
     problem: Problem, noise: Noise, theta: FloatArray, residual: FloatArray, sigma: float, *, draws: int, seed: int
 ) -> FloatArray:
-    """Theta (draws, n_theta) of records drawn anew: residuals enlarged by sqrt(N / (N - d)), or other noise."""
+    """Theta (draws, n_theta) of records drawn anew: residuals enlarged by sqrt(N / (N - d)), or other noise.
+
+    Residuals are drawn in units of sigma / sqrt(weight), from the samples that are not left out.
+    """
     if not draws:
         return np.empty((0, theta.size))
     rng = np.random.default_rng(seed)
-    y_model = np.broadcast_to(problem.y - residual, (draws, residual.size))
-    freedom = residual.size - len(problem.space.names)
+    targets = np.tile(problem.y - residual, (draws, 1))
+    enlarged = np.sqrt(problem.n_samples / (problem.n_samples - len(problem.space.names)))
     if isinstance(noise, Gaussian):
-        enlarged = (residual - residual.mean()) * np.sqrt(residual.size / freedom)
-        targets = y_model + rng.choice(enlarged, (draws, residual.size))
+        kept = problem.weights > 0.0
+        root = np.sqrt(problem.weights[kept])
+        own = root * residual[kept]
+        targets[:, kept] += rng.choice((own - own.mean()) * enlarged, (draws, own.size)) / root
     else:
-        targets = noise.draw(y_model, sigma * np.sqrt(residual.size / freedom), rng)
+        targets = noise.draw(targets, sigma * enlarged, rng)
     reached = Descent(problem, noise, targets, np.ones((1, residual.size))).run(np.tile(theta, (draws, 1)))
     return reached.theta[np.isfinite(reached.loss)]
