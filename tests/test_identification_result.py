@@ -146,7 +146,7 @@ def noisy(sigma=0.01, seed=0):
 @pytest.mark.parametrize(("n", "shares"), [(5, [1.0]), (20, [1.0]), (200, [1.0]), (200, [0.0, 0.01, 1.0, 100.0])])
 def test_intervals_of_a_line_are_those_of_student(n, shares):
     """Of the weighted regression: noise has the scale sigma / sqrt(weight), samples without weight have no say."""
-    weights, record = np.repeat(shares, n // len(shares)), line_record(n)
+    weights, record = np.repeat(shares, n // len(shares)), line_record(n, seed=4)
     root, line = np.sqrt(weights), 1.0 + 2.0 * record.u
     record = hs.Record(u=record.u, y=line + (record.y - line) / np.maximum(root, 1e-2))
     columns = np.column_stack([np.ones(n), record.u])
@@ -163,6 +163,7 @@ def test_intervals_of_a_line_are_those_of_student(n, shares):
     if n == 200:  # 500 draws: a quantile at 2.5 % scatters by 7 % of the standard error, and residuals are few
         np.testing.assert_allclose(found["bootstrap"], exact, atol=0.2 * reach.max())
     linear = fits["linear"]
+    assert linear.warnings == ()  # independent noise of any weights is white, and no sample stands out
     np.testing.assert_allclose(linear.covariance, covariance, rtol=1e-10)
     np.testing.assert_allclose(linear.correlation, covariance / np.sqrt(np.outer(*[np.diag(covariance)] * 2)))
     np.testing.assert_allclose(linear.condition, np.linalg.cond(design / np.linalg.norm(design, axis=0)), rtol=1e-10)

@@ -198,7 +198,7 @@ class Search:
         share = np.sqrt(problem.weights[kept])
         measures = fit_measures(problem.y[kept], residual[kept], len(names))
         by_weight = fit_measures(problem.y[kept], share * residual[kept], len(names))
-        measures |= {"fpe": by_weight["fpe"], "aic": by_weight["aic"], "bic": by_weight["bic"]}
+        measures |= {name: by_weight[name] for name in ("fpe", "aic", "bic", "whiteness")}
         limit = float(chi2.ppf(LEVEL, len(names))) if names else 0.0
         rivals = tuple(self.candidate(each.theta) for each in likely[1:] if 2.0 * (each.loss - best.loss) < limit)
         stderr = dict(zip(names, np.sqrt(np.diag(known.covariance)).tolist(), strict=True))

@@ -62,7 +62,7 @@ def is_exact(problem: Problem, rmse: float) -> bool:
 
 def odd_residuals(problem: Problem, residual: FloatArray) -> list[str]:
     """Sentences on a sample that carries a fit, and on a record or sensor whose residual is mostly its mean."""
-    counted, n = np.where(problem.weights > 0.0, residual, 0.0), np.count_nonzero(problem.weights)
+    counted, n = np.sqrt(problem.weights) * residual, np.count_nonzero(problem.weights)
     rms, k, several = float(np.sqrt(counted @ counted / n)), int(np.argmax(np.abs(counted))), len(problem.parts) > 1
     if is_exact(problem, rms):
         return []
