@@ -219,8 +219,6 @@ def test_a_wrong_family_is_not_excused_by_its_correlated_residual():
     assert effective_samples(fit.residual) * 2.0 * np.log(other.rmse / fit.rmse) < 10.0
     assert other.rmse > 1.25 * fit.rmse
     assert excursion([other.model], [table]).is_safe
-    again = [hs.identify(hs.Dahl, table, seed=seed).regions["admissible"].fit_percent for seed in (1, 2, 3)]
-    assert again == pytest.approx([other.fit_percent] * 3, abs=3e-3)  # boxes that are halved to 1/512 differ by 0.02
 
 
 def test_a_verb_that_drives_a_device_warns_of_an_unsafe_law(only_unsafe):

@@ -130,8 +130,7 @@ def widened(problem: Problem, optima: Sequence[Optimum]) -> tuple[Problem, list[
 def _in_its_tail(problem: Problem, optima: Sequence[Optimum]) -> list[Optimum]:
     """The optima, the best one at the open side of the box up to which its cost stays the same.
 
-    In a flat tail a descent rests anywhere, and where it began must not matter. A coordinate stays that the data do not
-    determine: it has no effect, or the cost is the same up to both sides, or it is redundant.
+    In a flat tail a descent rests anywhere. A coordinate stays that has no effect, is redundant, or flat to both sides.
     """
     best, space = [*optima], problem.space
     alone = [name not in itertools.chain(*space.redundant) for name in space.coordinates]
