@@ -490,7 +490,7 @@ def needed_time(plant: Any, sample_time: float | None) -> float:
 
 def check_continued(step: float, state_step: float) -> None:
     """Refuse a state whose numbers are of other steps [s]: their units and dead times depend on them."""
-    if step != state_step:
+    if not math.isclose(step, state_step):  # those of two pieces of a record differ by rounding
         raise ValueError(f"the state is of steps of {state_step:g} s, which it must be continued with, got {step:g} s")
 
 
