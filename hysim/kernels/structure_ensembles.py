@@ -49,7 +49,7 @@ def fill_slopes(
     steps: IntArray, starts: IntArray, parameters: FloatArray, parameter_ends: IntArray, states: FloatArray,
     state_ends: IntArray, slopes: FloatArray,
 ) -> None:  # fmt: skip
-    """Elastic slopes of laws at their start: the limit of secants of shorter and shorter strokes.
+    """Elastic slopes of laws at their start: the limit of secants of shorter and shorter strokes, zero if negative.
 
     Of all secants that one is taken which differs least, relatively, from the one before. The laws are those of each
     row of parameters (n_sets, n_parameters) and states.
@@ -73,7 +73,7 @@ def fill_slopes(
                 size = max(abs(secant), abs(before))
                 change = 0.0 if size == 0.0 else abs(secant - before) / size
                 if change < least:
-                    least, slopes[i, e] = change, secant
+                    least, slopes[i, e] = change, max(secant, 0.0)
                 before = secant
 
 

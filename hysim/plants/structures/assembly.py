@@ -259,7 +259,7 @@ class MovingStructure:
 
     @cached_property
     def elastic_slopes(self) -> FloatArray:
-        """Slope of each element at its start, shape (n_elements,) [N/m]."""
+        """Slope of each element at its start, zero where it is negative, shape (n_elements,) [N/m]."""
         rows = (read_only(each[np.newaxis], finite=False) for each in (self.laws.parameters, self.laws.states))
         return read_only(self.laws.slopes(*rows)[0])
 
