@@ -5,8 +5,9 @@
 
 For the seconds the suite runs twice, first to compile. The second circle should hold the tests of more than MOST CPU s
 a case or MOST_IN_ALL in all cases; what it lacks, and what it could give back, is printed. A line counts for the first
-circle if one of its tests or an import runs it. Kernels are left out of the total: both circles run them compiled,
-which no measurement of lines sees, and a few tests of the second one uncompiled.
+circle if one of its tests or an import runs it; tests that need extras count for the second one. Kernels are left out
+of the total: both circles run them compiled, which no measurement of lines sees, and a few tests of the second one
+uncompiled.
 """
 
 import os

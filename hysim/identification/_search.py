@@ -128,7 +128,7 @@ def widened(problem: Problem, optima: Sequence[Optimum]) -> tuple[Problem, list[
 
 
 def _in_its_tail(problem: Problem, optima: Sequence[Optimum]) -> list[Optimum]:
-    """The optima, the best one at the open side of the box up to which its cost stays the same.
+    """The optima, the best one at the search bound up to which its cost is the same, if there is one.
 
     In a flat tail a descent rests anywhere. A coordinate stays that has no effect, is redundant, or flat to both sides.
     """
