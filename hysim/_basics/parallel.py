@@ -246,15 +246,21 @@ def processes(number: int, begin: Callable[..., None], *arguments: Any) -> Itera
     context = multiprocessing.get_context("fork" if sys.platform.startswith("linux") else None)
     # Windows cannot wait for more than 61 processes.
     most = 61 if sys.platform == "win32" else number
-    pool = ProcessPoolExecutor(min(number, most), context, _begin, (begin, arguments))
+    pool: Any = ProcessPoolExecutor(min(number, most), context, _begin, (begin, arguments))
     try:
         with _one_blas_thread_if_loaded(), _without_signals():
             pool.submit(os.getpid)  # which starts the processes, where they are forked
         yield pool
     except BaseException:
+        reader, results = pool._executor_manager_thread, pool._result_queue
         pool.shutdown(wait=False, cancel_futures=True)
         for process in {*multiprocessing.active_children()} - before:
             process.terminate()
+        # Wait for the thread that reads, since the interpreter's end would write to a pipe that it is just closing. If
+        # half a second is not enough it is within a result, which ends when nobody can write any more.
+        reader.join(0.5)
+        results._writer.close()
+        reader.join()
         raise
     pool.shutdown()
 
