@@ -59,7 +59,7 @@ _SCALES = (1.0, 0.3, 0.1, 0.03)  # of a template's own gains
 _FILTER = 0.1
 _LARGEST_WEIGHT = 1.0
 _LARGEST_LOG = 100.0
-_STEP = 0.2  # of the first simplex along the logarithm of a gain
+_STEP = 0.2  # of the first simplex, along the logarithm of a gain and down from the setpoint weight
 
 
 class StandardForm:
@@ -88,9 +88,9 @@ class StandardForm:
     def own(self) -> list[FloatArray]:
         return []
 
-    def simplex(self, x: FloatArray) -> FloatArray | None:
-        """Corners from which a search around a point begins; None for the search's own."""
-        return None
+    def simplex(self, x: FloatArray) -> FloatArray:
+        """Corners from which a search around a point begins, each a factor away: the unit of a gain plays no part."""
+        return np.vstack([x, x + _STEP * np.diag([1.0, 1.0, 1.0, -1.0])])
 
 
 class FreeGains:
@@ -128,7 +128,7 @@ class FreeGains:
         own = np.log(np.abs(self.gains[self.free]))
         return [own + math.log(scale) for scale in _SCALES]
 
-    def simplex(self, x: FloatArray) -> FloatArray | None:
+    def simplex(self, x: FloatArray) -> FloatArray:
         return np.vstack([x, x + _STEP * np.eye(x.size)])
 
 
