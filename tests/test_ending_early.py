@@ -245,7 +245,7 @@ def answer_by_half(written):
 
 
 @linux
-def test_processes_that_are_no_longer_needed_are_ended_at_work_and_within_an_answer(tmp_path):
+def test_processes_that_are_no_longer_needed_are_ended_at_work_and_within_an_answer(tmp_path, monkeypatch):
     def run():
         with processes(2, int) as pool:
             pool.submit(answer_by_half, str(tmp_path / "written"))
@@ -258,6 +258,8 @@ def test_processes_that_are_no_longer_needed_are_ended_at_work_and_within_an_ans
     assert len(pids) == 2
     assert not any(Path(f"/proc/{pid}").exists() for pid in pids)
     assert threading.enumerate() == threads_before
+    monkeypatch.setattr(os, "fork", lambda: 1 // 0)  # a process that cannot be started is what is said
+    assert_refused("division", processes(1, int).__enter__, error=ZeroDivisionError)
 
 
 @pytest.mark.parametrize(("name", "code"), [("SIGTERM", 143), ("SIGHUP", 129), ("SIGINT", 130)])

@@ -258,9 +258,10 @@ def processes(number: int, begin: Callable[..., None], *arguments: Any) -> Itera
             process.terminate()
         # Wait for the thread that reads, since the interpreter's end would write to a pipe that it is just closing. If
         # half a second is not enough it is within a result, which ends when nobody can write any more.
-        reader.join(0.5)
-        results._writer.close()
-        reader.join()
+        if reader is not None:  # where a process could be started
+            reader.join(0.5)
+            results._writer.close()
+            reader.join()
         raise
     pool.shutdown()
 
