@@ -35,7 +35,7 @@ def noise(n_samples: int, seed: int = 0) -> np.ndarray:
 
 def converged(law, u: np.ndarray, sample_time: float) -> np.ndarray:
     """A literal transcription, begun anew at every sample of the input, by an adaptive method near its tightest."""
-    coefficients = [law.scalars[name] for name in law.coefficient_names]
+    coefficients = law.input_polynomial.tolist()
 
     def rates(t, x, begin, slope):
         y, v, z = x

@@ -262,18 +262,18 @@ class Law(Placed, Subject, ABC):
             tables[field] = np.where(chosen, column, tables[field])
         return tables
 
-    @property
+    @cached_property
     def initial_names(self) -> tuple[str, ...]:
         """Names of the numbers of the initial memory."""
         return tuple(name for name in self.scalars if name.partition("[")[0] in self.initial)
 
-    @property
+    @cached_property
     def columns(self) -> tuple[str, ...]:
         """Names in which the output is affine."""
         affine = {parameter.name for parameter in self.searched if parameter.affine}
         return tuple(name for name in self.scalars if name.partition("[")[0] in affine)
 
-    @property
+    @cached_property
     def memory_only(self) -> dict[str, float]:
         """Parameters for which the output of a law with `powers` is the memory itself."""
         return {name: float(power is None) for name, power in self.powers.items()}
@@ -604,14 +604,14 @@ class Law(Placed, Subject, ABC):
     def columns_by(self, outputs: Outputs, parameters: Parameters, u: FloatArray) -> FloatArray:
         """As `regressors`, by a function from parameters and an input to outputs (n_sets, n_samples)."""
         if self.powers and self.columns:
-            z, own = outputs({**parameters, **self.memory_only}, u), {**self.scalars, **parameters}
-            columns = np.zeros((*z.shape, len(self.columns) + 1))
+            z, places = outputs({**parameters, **self.memory_only}, u), {name: k for k, name in enumerate(self.columns)}
+            columns = np.zeros((*z.shape, len(places) + 1))
             for name, power in self.powers.items():
                 column = z if power is None else u**power
-                if name in self.columns:
-                    columns[..., self.columns.index(name)] = column
+                if name in places:
+                    columns[..., places[name]] = column
                 else:
-                    columns[..., -1] += np.reshape(own[name], (-1, 1)) * column
+                    columns[..., -1] += np.reshape({**self.scalars, **parameters}[name], (-1, 1)) * column
             return columns
         zero = {**parameters, **dict.fromkeys(self.columns, 0.0)}
         rest = outputs(zero, u)

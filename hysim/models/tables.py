@@ -71,22 +71,22 @@ def tables_of(
     inputs = np.atleast_2d(read_only(u, "u"))
     if inputs.ndim != 2:
         raise ValueError(f"u must have 1 axis or 2, got shape {inputs.shape}")
-    parameters = {name: value for name, value in parameters.items() if value is not None}
-    complete = {**defaults, **{name: value for name, value in parameters.items() if "[" not in name}}
-    elements = {name: value for name, value in parameters.items() if "[" in name}
-    for name in (*complete, *(name.partition("[")[0] for name in elements)):
+    given = {name: value for name, value in parameters.items() if value is not None}
+    for name in (name.partition("[")[0] for name in given):
         if name not in defaults:
             raise TypeError(f"unknown parameter {name!r}: {family} has {among(name, defaults)}")
-    tables = {name: _table(name, value, np.ndim(defaults[name])) for name, value in complete.items()}
-    columns = {name: _table(name, value, 0) for name, value in elements.items()}
-    lengths = {name: len(table) for name, table in {**tables, **columns, "u": inputs}.items() if len(table) != 1}
+    tables = {
+        name: _table(name, given.get(name, default), 0 if type(default) is float else np.ndim(default))
+        for name, default in defaults.items()
+    }
+    columns = {name: _table(name, value, 0) for name, value in given.items() if "[" in name}
+    lengths = {name: len(table) for name, table in (tables | columns | {"u": inputs}).items() if len(table) != 1}
     if len(set(lengths.values())) > 1:
         raise ValueError(f"parameters and inputs must have one length or length 1, got {lengths}")
     n_sets = next(iter(lengths.values()), 1)
-    tables = {
-        name: table if len(table) == n_sets else np.broadcast_to(table, (n_sets, *table.shape[1:]))
-        for name, table in tables.items()
-    }
+    for name, own in tables.items():
+        if len(own) != n_sets:  # numbers, which are most of them, cost less time without a view
+            tables[name] = own.repeat(n_sets, 0) if own.size == 1 else np.broadcast_to(own, (n_sets, *own[0].shape))
     for name, column in columns.items():
         field, _, place = name.partition("[")
         table, k = tables[field], int(place[:-1])
@@ -106,9 +106,7 @@ def table_of_one(value: Any) -> FloatArray:
 def _table(name: str, values: Any, ndim: int) -> FloatArray:
     """Values over sets, of a number (n_sets, 1), of a field with `ndim` axes (n_sets, ...)."""
     if ndim == 0 and type(values) is float and math.isfinite(values):  # most of them: checks take most of the time
-        number = table_of_one(values)
-        number.setflags(write=False)
-        return number
+        return table_of_one(values)
     array = read_only([values] if ndim == 1 and np.ndim(values) == 0 else values, name)  # as the constructor takes it
     if array.ndim > ndim + 1:
         raise ValueError(f"{name} has too many axes: got shape {array.shape}")

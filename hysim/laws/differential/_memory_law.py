@@ -8,6 +8,7 @@ u is the input, z the memory, y the output; time has no part in it.
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any, ClassVar
 
 import numpy as np
@@ -75,14 +76,9 @@ class MemoryLaw(ShapedLaw):
         return ("n",) if self.n in self.elementary else ()
 
     @property
-    def coefficient_names(self) -> tuple[str, ...]:
-        """One name for each coefficient of the polynomial, as in `scalars`."""
-        return tuple(name for name in self.scalars if name.partition("[")[0] == self.polynomial)
-
-    @property
     def input_polynomial(self) -> FloatArray:
         """(c1, c2, ...)."""
-        return np.array([self.scalars[name] for name in self.coefficient_names])
+        return self.tables[self.polynomial].ravel()
 
     @property
     def input_slope(self) -> FloatArray:
@@ -90,12 +86,12 @@ class MemoryLaw(ShapedLaw):
         c = self.input_polynomial
         return np.asarray(c * np.arange(1.0, c.size + 1.0))
 
-    @property
+    @cached_property
     def powers(self) -> Mapping[str, int | None]:  # type: ignore[override]
-        coefficients = {name: k for k, name in enumerate(self.coefficient_names, 1)}
-        return {**coefficients, "gain": None, "offset": 0}
+        coefficients = (name for name in self.scalars if name.partition("[")[0] == self.polynomial)
+        return {**{name: k for k, name in enumerate(coefficients, 1)}, "gain": None, "offset": 0}
 
-    @property
+    @cached_property
     def columns(self) -> tuple[str, ...]:
         return tuple(self.powers)
 

@@ -98,5 +98,6 @@ def branches(parts: Polynomials) -> FloatArray:
 
 def _padded(part: FloatArray, rows: int, columns: int, *, shift: int = 0) -> FloatArray:
     """`part` in an array of zeros of this size, `shift` powers of z higher."""
-    before = [(0, 0)] * (part.ndim - 2)
-    return np.pad(part, [*before, (0, rows - part.shape[-2]), (shift, columns - shift - part.shape[-1])])
+    larger = np.zeros_like(part, shape=(*part.shape[:-2], rows, columns))
+    larger[..., : part.shape[-2], shift : shift + part.shape[-1]] = part
+    return larger
