@@ -306,6 +306,28 @@ def test_modes_are_orthogonal_and_as_the_periods():
     assert hs.Structure(mass=(1.0, 2.0), stiffness=[[1.0, -1.0], [-1.0, 1.0]]).periods()[0] > 1e6
 
 
+def test_elements_that_fall_in_both_directions_count_in_the_modes_and_their_damping():
+    def leaning(*laws):
+        elements = [hs.Element(law, between=(0, 1)) for law in laws]
+        return hs.Structure(mass=1.0, elements=elements, damping=hs.ModalDamping(ratio=0.05))
+
+    apart, together = leaning(hs.Line(slope=100.0), hs.Line(slope=-64.0)), leaning(hs.Line(slope=36.0))
+    assert apart.periods() == pytest.approx(together.periods(), rel=1e-9)
+    assert apart.damping_matrix == pytest.approx(together.damping_matrix, rel=1e-9)
+    softening = hs.BoucWen(A=-0.5, beta=0.5, gamma=0.2, gain=128.0)
+    assert leaning(hs.Line(slope=100.0), softening).periods() == pytest.approx(together.periods(), rel=1e-6)
+    saturated = leaning(hs.Line(slope=36.0), hs.BoucWen(beta=0.5, gamma=0.2, z0=3.0))  # rises where it turns back
+    assert saturated.elastic_slopes.tolist() == [36.0, 0.0]
+    assert_refused("stiffness at the start is negative", leaning, hs.Line(slope=-1.0))
+
+
+def test_a_free_vibration_without_damping_keeps_its_energy():
+    spring = hs.Structure(mass=1.0, stiffness=10.0, initial_state=(0.1, 0.0))
+    t = 0.01 * np.arange(1001)
+    for u in (0.0 * t, 1e-9 * np.sin(t)):
+        assert hs.simulate(spring, t, u).y == pytest.approx(0.1 * np.cos(np.sqrt(10.0) * t), abs=1e-7)
+
+
 def test_a_shear_frame_is_its_storeys():
     frame = hs.shear_frame([1.0, 2.0, 3.0], [30.0, 20.0, 10.0], laws=[bouc_wen(), None, hs.Dahl()])
     assert frame.stiffness_matrix.tolist() == [[50.0, -20.0, 0.0], [-20.0, 30.0, -10.0], [0.0, -10.0, 10.0]]

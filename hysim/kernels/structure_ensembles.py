@@ -49,10 +49,11 @@ def fill_slopes(
     steps: IntArray, starts: IntArray, parameters: FloatArray, parameter_ends: IntArray, states: FloatArray,
     state_ends: IntArray, slopes: FloatArray,
 ) -> None:  # fmt: skip
-    """Elastic slopes of laws at their start: the limit of secants of shorter and shorter strokes, zero if negative.
+    """Elastic slopes of laws at their start: the limit of secants of shorter and shorter strokes.
 
-    Of all secants that one is taken which differs least, relatively, from the one before. The laws are those of each
-    row of parameters (n_sets, n_parameters) and states.
+    Of all secants that one is taken which differs least, relatively, from the one before. A law that falls in both
+    directions has a negative slope, one that only falls ahead, beyond its saturation, has none. The laws are those of
+    each row of parameters (n_sets, n_parameters) and states.
     """
     spare = np.empty(states.shape[1])
     for i in range(slopes.shape[0]):
@@ -61,20 +62,22 @@ def fill_slopes(
             own = numbers[parameter_ends[e] : parameter_ends[e + 1]]
             begin, end = state_ends[e], state_ends[e + 1]
             step, start = step_at(steps[e]), start_at(starts[e])
-            before, least = math.nan, math.inf
-            slopes[i, e] = 0.0
-            for k in range(_PROBES):
-                stroke = 10.0**-k
-                for q in range(begin, end):
-                    spare[q] = memories[q]
-                start(own, spare[begin:end], 0.0)
-                f0 = step(own, spare[begin:end], 0.0)
-                secant = (step(own, spare[begin:end], stroke) - f0) / stroke
-                size = max(abs(secant), abs(before))
-                change = 0.0 if size == 0.0 else abs(secant - before) / size
-                if change < least:
-                    least, slopes[i, e] = change, max(secant, 0.0)
-                before = secant
+            slope, behind = 0.0, 0.0
+            for way in (-1.0, 1.0):
+                before, least, behind = math.nan, math.inf, slope
+                for k in range(_PROBES):
+                    stroke = way * 10.0**-k
+                    for q in range(begin, end):
+                        spare[q] = memories[q]
+                    start(own, spare[begin:end], 0.0)
+                    f0 = step(own, spare[begin:end], 0.0)
+                    secant = (step(own, spare[begin:end], stroke) - f0) / stroke
+                    size = max(abs(secant), abs(before))
+                    change = 0.0 if size == 0.0 else abs(secant - before) / size
+                    if change < least:
+                        least, slope = change, secant
+                    before = secant
+            slopes[i, e] = slope if behind < 0.0 else max(slope, 0.0)
 
 
 @kernel

@@ -259,7 +259,7 @@ class MovingStructure:
 
     @cached_property
     def elastic_slopes(self) -> FloatArray:
-        """Slope of each element at its start, zero where it is negative, shape (n_elements,) [N/m]."""
+        """Slope of each element at its start, zero where it falls in one direction, shape (n_elements,) [N/m]."""
         rows = (read_only(each[np.newaxis], finite=False) for each in (self.laws.parameters, self.laws.states))
         return read_only(self.laws.slopes(*rows)[0])
 
@@ -472,7 +472,7 @@ class MovingStructure:
             "dissipated": work - returned,
             "imbalance": imbalance,
         }
-        largest = float(np.abs(tracks.work).max(initial=0.0))
+        largest = float(np.abs(np.append(tracks.work, [kinetic, elastic])).max(initial=0.0))
         if (wrong := float(np.abs(imbalance).max(initial=0.0))) > _IMBALANCE * largest:
             raise SimulationError(
                 f"the motion is not resolved: {wrong / largest:.2g} of the energy is missing; "
