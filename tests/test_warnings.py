@@ -63,6 +63,19 @@ def test_a_fit_that_is_worse_than_a_constant_says_so():
         assert any("mean of y" in each for each in hs.identify(hs.Line, record, fixed={"slope": slope}).warnings) != fit
 
 
+@pytest.mark.parametrize("law", [hs.FlagShape(), hs.Slack(), hs.Chan(saturation=1.3, squareness=0.6)])
+def test_an_offset_that_a_law_lacks_is_said(law):
+    u = 4.0 * np.sin(np.linspace(0.0, 31.4, 300)) * np.linspace(0.5, 1.0, 300)
+    y = law.response(u)
+    y = y + 0.01 * np.ptp(y) * np.random.default_rng(0).standard_normal(u.size)
+    assert not [each for each in hs.identify(type(law), hs.Record(u=u, y=y)).warnings if "an offset" in each]
+    shifted = hs.Record(u=u, y=y + 0.2 * np.ptp(y))
+    fit = hs.identify(type(law), shifted)
+    assert fit.fit_percent < 95.0
+    assert "the output may have an offset, which this law does not have" in " ".join(fit.warnings)
+    assert hs.identify(law + hs.Line(), shifted).fit_percent > 95.0
+
+
 def test_columns_that_one_family_fits_better_in_reverse_are_suspected(table1):
     """Noise on the voltage hides the generator; a play cannot make the voltage from the displacement."""
     shaken = table1.u + 0.05 * np.random.default_rng(0).standard_normal(len(table1))

@@ -159,6 +159,7 @@ _PHRASES = {
     r"hysim\.to_c and hysim\.to_fmu": "hysim c and hysim fmu",
     "must be None or": "must be left out or",
     ", names as in Structure.scalars": "",
+    r", or identify the law \+ hs\.Line\(\)": "",
 }  # fmt: skip
 _CALL = re.compile(r"(\b[A-Za-z_]\w*\((?:[^()]|\([^()]*\))*\))")
 _VALUE = r"""(?:("[^"]*"|'[^']*'|\[[^\]]*\]|\{[^}]*\}|False|True|-?\d(?:[\w.+-]*\w)?)|(?!\w))"""

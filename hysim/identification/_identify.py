@@ -31,7 +31,7 @@ from hysim.identification._search import PERFECT, chosen, sharing, stages_in_wor
 from hysim.identification._searched import Search
 from hysim.identification._starts import begun, begun_by_parts
 from hysim.identification._uncertainty import Folds, left_out, left_out_errors, rms_of_known
-from hysim.identification.doubts import rate_noise_warning, swapped_columns, swapped_for
+from hysim.identification.doubts import offset_for, rate_noise_warning, swapped_columns, swapped_for
 from hysim.laws.operators.reversal_filter import ReversalFilter
 from hysim.models.by_structure import searched
 from hysim.models.cascade import Cascade
@@ -122,7 +122,8 @@ def identify(
         Intervals at 95 %: from the standard errors, by the profile of the likelihood, or from 500 records drawn anew.
     cross_validate : {None, "loo", "cycles", "records"} or int, optional
         What is left out at a time: an output sample, a cycle of the input (not the first), a record, or one of that
-        many blocks of samples; the input is kept. Fills `Identification.cv_rmse` and `Identification.cv_residual`.
+        many blocks of samples (without the first share of each record); the input is kept. Fills
+        `Identification.cv_rmse` and `Identification.cv_residual`.
     admissible : bool, optional
         Whether the law must be safe on smaller cycles: tried on minor loops, fading stairs and the record's path at
         smaller amplitudes, an admissible law leaves the band of the record by no more than half of the output's range,
@@ -246,7 +247,11 @@ def identify(
                 stopped = f"partial: the search stopped at max_evaluations={max_evaluations}"
                 fit = replace(fit, success=False, message=f"{stopped}, better parameters may exist; {fit.message}")
             if not any(doubts) and not is_partial and not needs_time(fit.model):
-                doubts = [swapped_for(first.family, setting, 1.0 - fit.fit_percent / 100.0)]
+                error = 1.0 - fit.fit_percent / 100.0
+                doubts = [
+                    swapped_for(first.family, setting, error),
+                    offset_for(first.family, fit.free_names, setting, error),
+                ]
             on_their_records = [on_record(each, record) for each, record in zip(fit.models, records, strict=True)]
             off = excursion(on_their_records, searched_on)
             worse = "the fit is negative: the mean of y predicts it better" if fit.fit_percent < 0.0 else ""
@@ -383,8 +388,10 @@ class _Structured(Protocol):
 
 
 def _in_words(subject: Any) -> str:
-    if isinstance(subject, type) and isinstance(subject, _Structured):
-        return f"the class {subject.__name__}: pass its structure, hs.{subject.__name__}.structure(...)"
+    kind = subject if isinstance(subject, type) else type(subject)
+    if isinstance(kind, _Structured):
+        what = "the class" if kind is subject else "a finished"
+        return f"{what} {kind.__name__}: pass its structure, hs.{kind.__name__}.structure(...)"
     return repr(subject)
 
 

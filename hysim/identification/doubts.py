@@ -20,6 +20,9 @@ from hysim._columns.input_noise import noise_level
 from hysim.errors import SimulationError
 from hysim.identification._problem import Problem, Setting, problems
 from hysim.identification._search import brief_optimum
+from hysim.laws.static import Line
+from hysim.models.law import Law
+from hysim.models.parts import labels
 from hysim.models.protocols import Identifiable, Rescalable, needs_time
 from hysim.records import Record
 
@@ -38,6 +41,7 @@ _SMOOTH = 1e-3  # of the second differences: a sine's follow from its samples, n
 _MOST_SAMPLES = 500
 _BETTER = 0.8  # of the forward error: a reverse fit that is better by chance, or by a parameter, is not
 _GOOD = 0.1  # of the standard deviation: a reverse model that is worse describes nothing
+_NOTABLE = 0.05  # of the standard deviation: a smaller error hides no offset that a user would miss
 _PERFECT = 1e-3  # forward errors below this leave nothing to suspect
 
 
@@ -135,23 +139,48 @@ def swapped_for(family: Identifiable, setting: Setting, error: float) -> str:
     record = setting.records[0]
     if len(setting.records) > 1 or not error > _PERFECT or not _is_clockwise(record):
         return ""
-    reverse = replace(record, u=record.y, y=record.u, resolution=None, units={})[:: -(-len(record) // _MOST_SAMPLES)]
-    try:
-        attempt = problems(family, [reverse], setting.freedom, setting.initial)[0]
-        if len(attempt.space.names) >= len(reverse):
-            return ""
-        while attempt.stage is not None and attempt.simpler is not None:
-            attempt = attempt.simpler
-        cost = brief_optimum(attempt)[1]
-    except (ValueError, TypeError, ArithmeticError, SimulationError):
-        return ""  # what cannot be fitted in reverse was not swapped
-    other = float(np.sqrt(cost / len(reverse)) / np.std(reverse.y))
+    reverse = replace(record, u=record.y, y=record.u, resolution=None, units={})
+    other = _error_in_short(family, reverse, setting)
     if not other < min(_BETTER * error, _GOOD):
         return ""
     return (
         f"{SWAPPED}: from y to u the same family leaves an error of {100.0 * other:.2g} % instead of "
         f"{100.0 * error:.2g} %, and the loop runs counterclockwise as an actuator's does; check the columns"
     )
+
+
+def offset_for(family: Identifiable, free: Sequence[str], setting: Setting, error: float) -> str:
+    """A sentence if a law that has no free offset fits the first record clearly better with a constant."""
+    record, freedom = setting.records[0], setting.freedom
+    if not isinstance(family, Law) or not error > _NOTABLE or "offset" in (*free, *freedom.fixed):
+        return ""
+    both = family + Line(slope=0.0)
+    label, line = labels(both.members)
+    fixed = {f"{label}.{name}": value for name, value in freedom.fixed.items()} | {f"{line}.slope": 0.0}
+    bounds = {f"{label}.{name}": pair for name, pair in freedom.bounds.items()}
+    own = replace(freedom, fixed=fixed, free=tuple(f"{label}.{name}" for name in freedom.free), bounds=bounds)
+    other = _error_in_short(both, record, replace(setting, freedom=own))
+    if not other < _BETTER * error:
+        return ""
+    return (
+        "the output may have an offset, which this law does not have: with a constant added it leaves an error of "
+        f"{100.0 * other:.2g} % instead of {100.0 * error:.2g} %; subtract the offset, or identify the law + hs.Line()"
+    )
+
+
+def _error_in_short(family: Identifiable, record: Record, setting: Setting) -> float:
+    """Error of a short fit to part of a record, relative to the spread of its output; inf if it cannot be fitted."""
+    record = record[:: -(-len(record) // _MOST_SAMPLES)]
+    try:
+        attempt = problems(family, [record], setting.freedom, setting.initial)[0]
+        if len(attempt.space.names) >= len(record):
+            return math.inf
+        while attempt.stage is not None and attempt.simpler is not None:
+            attempt = attempt.simpler
+        cost = brief_optimum(attempt)[1]
+    except (ValueError, TypeError, ArithmeticError, SimulationError):
+        return math.inf
+    return float(np.sqrt(cost / len(record)) / np.std(record.y))
 
 
 def _is_clockwise(record: Record) -> bool:
