@@ -43,6 +43,12 @@ def test_a_generous_bound_changes_nothing():
     assert bounded.estimates == whole.estimates
 
 
+def test_errors_of_samples_left_out_need_no_budget():
+    whole, bounded = (hs.identify(hs.Dahl, RECORD, max_evaluations=most, cross_validate=5) for most in (None, 100))
+    assert not bounded.success
+    assert abs(bounded.cv_rmse / whole.cv_rmse - 1.0) < 1e-3
+
+
 def test_a_comparison_marks_partial_results_and_says_which_runs():
     names = []
     table = hs.compare(

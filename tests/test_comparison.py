@@ -89,6 +89,15 @@ def test_tables_hold_every_row(comparison):
     assert r"fit [\%]" in latex[2]
 
 
+def test_the_order_of_records_chooses_no_other_winner():
+    """A block that holds the beginning of a record would be predicted from a state that nothing tells."""
+    k, law, rng = np.arange(240), hs.BoucWen(beta=1.2, gamma=0.4, gain=1.5, feedthrough=0.1), np.random.default_rng(0)
+    u = np.sin(2.0 * np.pi * k / 60.0) * (0.5 + 0.5 * k / 240.0)
+    records = [hs.Record(u=x, y=law.response(x) + 0.03 * rng.standard_normal(x.size)) for x in (u, 0.7 * u[:180])]
+    models = {"bouc-wen": hs.BoucWen, "dahl": hs.Dahl, "plays": hs.PrandtlIshlinskii}
+    assert {hs.compare(models, each).winner for each in (records, records[::-1])} == {"bouc-wen"}
+
+
 def test_long_records_are_cross_validated_by_blocks():
     u = hs.signals.triangle(0.0, 1.0, cycles=3, samples_per_cycle=80)
     record = hs.Record(u=u, y=hs.BoucWen(beta=2.0, gamma=0.5).response(u))

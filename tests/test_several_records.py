@@ -94,14 +94,16 @@ def test_records_are_left_out_one_at_a_time():
     assert_refused("at least 2 records", hs.identify, hs.Line, records[0], cross_validate="records")
 
 
-def test_blocks_are_left_out_one_at_a_time():
+def test_blocks_are_left_out_one_at_a_time_and_the_beginnings_of_records_never():
     u, y = np.arange(10.0), np.random.default_rng(4).standard_normal(10)
-    fit = hs.identify(hs.Line, hs.Record(u=u, y=y), cross_validate=3)
-    errors = []
-    for block in np.array_split(np.arange(10), 3):
+    errors = np.full(10, np.nan)
+    for block in (np.arange(4, 7), np.arange(7, 10)):  # of the blocks of four, three and three samples
         kept = np.setdiff1d(np.arange(10), block)
-        errors.append(y[block] - np.polyval(np.polyfit(u[kept], y[kept], 1), u[block]))
-    assert fit.cv_rmse == pytest.approx(np.sqrt(np.mean(np.concatenate(errors) ** 2)), rel=1e-10)
+        errors[block] = y[block] - np.polyval(np.polyfit(u[kept], y[kept], 1), u[block])
+    fit = hs.identify(hs.Line, hs.Record(u=u, y=y), cross_validate=3)
+    assert fit.cv_residual == pytest.approx(errors, rel=1e-10, nan_ok=True)
+    several = hs.identify(hs.Line, [hs.Record(u=u, y=y), hs.Record(u=u[:5], y=y[:5])], cross_validate=3)
+    assert np.flatnonzero(np.isnan(several.cv_residual)).tolist() == [0, 1, 2, 3, 10, 11]
 
 
 def test_a_transfer_function_has_a_state_for_each_record():

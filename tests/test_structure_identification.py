@@ -177,5 +177,11 @@ test_a_record_is_checked = refused(
 )
 
 
+def test_a_loop_of_sensors_in_units_of_their_noise_has_no_width():
+    structure = frame()
+    fit = hs.identify(structure, record(structure, noise=1e-3), free=("damping",))
+    assert fit.loop_width is None
+
+
 def test_a_structure_is_no_candidate_of_its_own():
     assert "Structure" not in candidates()

@@ -32,6 +32,7 @@ from hysim.identification._problem import Problem
 from hysim.identification.marquardt import pieces
 from hysim.metrics.rows import LoopRows
 from hysim.models.law import Law
+from hysim.models.protocols import Rescalable
 from hysim.models.search_space import Flags
 from hysim.records import Record
 
@@ -302,6 +303,8 @@ def whiteness(residual: FloatArray, n_parameters: int) -> float:
 
 def loop_widths(descent: Descent, theta: FloatArray) -> FloatArray:
     record = descent.problem.parts[0].record
+    if isinstance(record, Rescalable):  # of sensors, in units of their noise
+        return np.empty(0)
     outputs = descent.problem.model(theta)[:, : len(record)]
     finite = outputs[np.isfinite(outputs).all(axis=1)]
     try:
@@ -345,7 +348,13 @@ def left_out(cross_validate: str | int | None, records: Sequence[Record]) -> lis
         return np.split(np.arange(cuts[-1]), cuts[1:-1])
     if cross_validate == "cycles":
         return _cycles(records, cuts)
-    return folds(cross_validate, cuts[-1], name="cross_validate")
+    parts = folds(cross_validate, cuts[-1], name="cross_validate")
+    if cross_validate == "loo":
+        return parts
+    # The beginning of a record says what the state was there: without it errors are those of a guess.
+    sizes = [(cut, -(-len(record) // len(parts))) for cut, record in zip(cuts, records, strict=False)]
+    kept = np.concatenate([cut + np.arange(size) for cut, size in sizes])
+    return [part for part in (np.setdiff1d(each, kept) for each in parts) if part.size]
 
 
 def _cycles(records: Sequence[Record], cuts: Sequence[int]) -> list[Samples]:
@@ -386,7 +395,8 @@ def _left_out_errors(problem: Problem, noise: Noise, starts: FloatArray, every_f
     weights = np.ones((len(every_fold), problem.y.size))
     for fold, samples in enumerate(every_fold):
         weights[fold, samples] = 0.0
-    descent = Descent(problem, noise, problem.y[np.newaxis], np.repeat(weights, len(starts), axis=0))
+    # Beyond the budget of the search, which may be spent: without a step the errors would be those of the fit.
+    descent = Descent(problem.within(None), noise, problem.y[np.newaxis], np.repeat(weights, len(starts), axis=0))
     reached = descent.run(np.tile(starts, (len(every_fold), 1)), tolerance=_TOLERANCE)
     best = np.arange(len(every_fold)) * len(starts) + reached.loss.reshape(len(every_fold), -1).argmin(axis=1)
     errors = (problem.y - problem.model(reached.theta[best]))[weights == 0.0]
