@@ -324,6 +324,18 @@ def test_no_core_falls_at_saturation():
     assert box(Freedom()).bounds == {"feedthrough": (0.0, math.inf)}
 
 
+def test_a_core_whose_feedthrough_is_most_of_its_output_is_found():
+    """Its magnetisation at saturation is less than half of the output over the gain."""
+    k, true = np.arange(400), {"Ms": 300.0, "a": 0.1, "k": 0.08, "c": 0.2, "feedthrough": 2.6e-4}
+    u = np.sin(2.0 * np.pi * k / 100.0) * (0.3 + 0.7 * np.minimum(1.0, k / 200.0)) * 1.5
+    y = hs.JilesAtherton(**true, alpha=5e-4, gain=hs.JilesAtherton().gain).response(u)
+    y = y + 1e-3 * np.ptp(y) * np.random.default_rng(0).standard_normal(k.size)
+    fit = hs.identify(hs.JilesAtherton, hs.Record(u=u, y=y))
+    assert fit.success
+    for name, value in true.items():
+        assert abs(fit.estimates[name] - value) < 4.0 * fit.stderr[name]
+
+
 # ---------------------------------------------------------------------------------- numbers of a data sheet
 
 SHEET = {"Hc": 15.0, "Br": 0.17, "Bs": 0.47, "Hs": 1200.0, "mu_i": 2300.0}

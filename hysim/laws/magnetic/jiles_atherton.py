@@ -511,7 +511,10 @@ class JilesAtherton(Law):
         if "feedthrough" not in held and "gain" in held and held["gain"] > 0.0:  # no core falls at saturation
             bounds = {"feedthrough": (0.0, np.inf), **bounds}
         size = 0.5 * unit["y"] / (abs(held.get("gain", self.gain)) or 1.0)
-        chart = _Chart(rows=_ROWS, defaults=scalars, held=held, bounds=bounds, field=unit["h"], magnetisation=size)
+        rows = _ROWS
+        if "feedthrough" not in held:  # which may be most of the output
+            rows = rows | {"Ms": rows["Ms"]._replace(physical=(False, False))}
+        chart = _Chart(rows=rows, defaults=scalars, held=held, bounds=bounds, field=unit["h"], magnetisation=size)
         chart.check_finite()
         is_by_default = freedom.starts_anew and self.arguments == self.defaults()
         low, high = sides(chart.box(is_drawn=True))
