@@ -202,6 +202,14 @@ def test_a_decaying_sine_of_one_frequency_shows_several_rates(plant, refit, verd
     assert all(np.isnan(found.widths[name]).all() for name in ("law", "rival"))  # there is no complete cycle
 
 
+def test_of_a_motion_that_fades_blocks_are_left_out():
+    u = np.ravel([size * np.array([-1.0, -0.5, 0.0, 0.5, 1.0, 0.5, 0.0, -0.5]) for size in np.linspace(1.0, 0.2, 40)])
+    found = judged([measured(u, LAW.response(u), np.arange(320.0))], as_bouc_wen)
+    assert found.held_out_by == "block"  # some of its cycles are as wide as the first
+    assert np.isfinite([*found.held_out.values()]).all()
+    assert found.verdict == "rate-independent hysteresis"
+
+
 def test_a_short_record_has_a_rival_of_few_parameters():
     u = np.append(np.linspace(0.0, 1.0, 6), np.linspace(0.8, 0.0, 5))
     found = judged([measured(u, LAW.response(u), np.arange(11.0))], as_bouc_wen)

@@ -141,7 +141,9 @@ def _folds_of(record: Record) -> tuple[str, list[Samples]]:
     if len(parts) > 1:
         return "rate", parts
     cycles = [np.arange(*cycle.path.indices(len(record))) for cycle in complete_cycles(record.u, TOLERANCE)[::-1]]
-    return ("cycle", cycles) if len(cycles) > 2 else ("block", blocks(min(2 * _FOLDS, len(record)), len(record)))
+    if len(cycles) > 2 and 2 * sum(cycle.size for cycle in cycles) > len(record):  # of a fading motion few are complete
+        return "cycle", cycles
+    return "block", blocks(min(2 * _FOLDS, len(record)), len(record))
 
 
 def _covers(training: FloatArray, other: FloatArray) -> bool:
@@ -483,7 +485,7 @@ def _no_structure(judgement: Judgement, turning: float, linear: float, curve: fl
         return (
             f"A single-valued curve of the input predicts held-out samples {how} a model with memory (rmse "
             f"{curve:.3g} against {min(turning, linear):.3g}){then} the records show no loop that is wider than their "
-            "noise."
+            "noise, or too few cycles to predict one that is left out."
         )
     if set(judgement.explained_by) <= {CURVE}:
         return (
