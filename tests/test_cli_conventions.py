@@ -369,6 +369,10 @@ def test_a_model_takes_times_in_its_own_unit(run, tmp_path):
     hs.save_record(hs.Record(u=u, y=u, t=1e-3 * t, units={"t": "s"}), tmp_path / "s.csv")
     _, *lines = run("simulate", tmp_path / "ms.json", tmp_path / "s.csv")[1].splitlines()
     assert np.loadtxt(lines, delimiter=",")[:, 2] == pytest.approx(lag.response(u, 1.0), abs=1e-12)
+    hs.save(lag, tmp_path / "unlabelled.json")  # which counts in s
+    hs.save_record(hs.Record(u=u, y=u, t=1e3 * t, units={"t": "ms"}), tmp_path / "ms.csv")
+    _, *lines = run("simulate", tmp_path / "unlabelled.json", tmp_path / "ms.csv")[1].splitlines()
+    assert np.loadtxt(lines, delimiter=",")[:, 2] == pytest.approx(lag.response(u, 1.0), abs=1e-12)
     for words in (
         ("control", "--range", "0,1"),
         ("c", "--out", tmp_path / "m.c"),

@@ -99,6 +99,8 @@ def test_trials_go_on_from_a_correction_and_on_a_stage_of_ones_own():
     assert np.allclose(own.rms, first.rms, rtol=1e-9, atol=1e-12)
     with pytest.raises(ValueError, match=r"trial must return a measurement of shape"):
         learner().learn(lambda command: command[1:], T, R, trials=1)
+    with pytest.raises(ValueError, match=r"trial must return a measurement that is not nan throughout"):
+        learner().learn(lambda command: np.nan * command, T, R, trials=1)
 
 
 def test_a_line_in_place_of_the_law_learns_slower_and_says_so():

@@ -163,6 +163,7 @@ def test_estimates_recover_the_truth_and_intervals_and_bands_cover_it(same_recor
         limits = np.transpose([curve.median_interval, curve.dispersion_interval, *curve.band(x).T])
         estimates.append((curve.median, curve.dispersion))
         covered.append((limits[0] <= (MEDIAN, DISPERSION, *truth)) & ((MEDIAN, DISPERSION, *truth) <= limits[1]))
+        assert curve.band([0.0]).tolist() == [[0.0], [0.0]]
     assert np.mean(estimates, axis=0) == pytest.approx((MEDIAN, DISPERSION), rel=0.03)  # 40 records: 2 % too small
     assert np.mean(covered, axis=0) == pytest.approx(0.945, abs=0.035)  # three standard errors of a share of 400
 

@@ -73,7 +73,8 @@ class LearningCondition(NamedTuple):
     def __str__(self) -> str:
         hertz, corner = self.frequency / (2.0 * math.pi), self.cutoff / (2.0 * math.pi)
         shrinks = f"a repetition leaves at most {100.0 * self.rate:.3g} % of the error, at {hertz:.4g} Hz"
-        return f"{'converges' if self.converges else 'MAY DIVERGE'}: {shrinks}; learns up to {corner:.4g} Hz"
+        condition = "converges" if self.converges else "MAY DIVERGE"
+        return f"{condition}: with a line for the law, {shrinks}; learns up to {corner:.4g} Hz"
 
 
 class _Filters(NamedTuple):
@@ -321,6 +322,8 @@ class IterativeLearning(_Learning):
             measurement = np.array(trial(after), dtype=float)
             if measurement.shape != r.shape:
                 raise ValueError(f"trial must return a measurement of shape {r.shape}, got {measurement.shape}")
+            if np.isnan(measurement).all():
+                raise ValueError("trial must return a measurement that is not nan throughout")
             return measurement, before, after
         plant = model_of(trial)
         if not isinstance(plant, Structure) and (sensor := as_actuator(plant).sensor) is not None:

@@ -438,7 +438,7 @@ def _secant(before: tuple[float, float], now: tuple[float, float]) -> float:
 def _usable(gain: float) -> float:
     if not (math.isfinite(gain) and gain != 0.0):
         raise ValueError(
-            f"the plant's gain is {gain}: no voltage drives it along the reference; if its law is unsafe on smaller "
-            "cycles, identify it with admissible=True, or take a sum of plays"
+            f"the plant's gain is {gain}: no voltage drives it along the reference, as where it integrates; if its law "
+            "is unsafe on smaller cycles, identify it with admissible=True, or take a sum of plays"
         )
     return gain

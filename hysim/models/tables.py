@@ -71,15 +71,15 @@ def tables_of(
     inputs = np.atleast_2d(read_only(u, "u"))
     if inputs.ndim != 2:
         raise ValueError(f"u must have 1 axis or 2, got shape {inputs.shape}")
-    given = {name: value for name, value in parameters.items() if value is not None}
-    for name in (name.partition("[")[0] for name in given):
+    known = {name: value for name, value in parameters.items() if value is not None}
+    for name in (name.partition("[")[0] for name in known):
         if name not in defaults:
             raise TypeError(f"unknown parameter {name!r}: {family} has {among(name, defaults)}")
     tables = {
-        name: _table(name, given.get(name, default), 0 if type(default) is float else np.ndim(default))
+        name: _table(name, known.get(name, default), 0 if type(default) is float else np.ndim(default))
         for name, default in defaults.items()
     }
-    columns = {name: _table(name, value, 0) for name, value in given.items() if "[" in name}
+    columns = {name: _table(name, value, 0) for name, value in known.items() if "[" in name}
     lengths = {name: len(table) for name, table in (tables | columns | {"u": inputs}).items() if len(table) != 1}
     if len(set(lengths.values())) > 1:
         raise ValueError(f"parameters and inputs must have one length or length 1, got {lengths}")

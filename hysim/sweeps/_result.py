@@ -350,8 +350,8 @@ class Fragility:
             return np.asarray(special.ndtr(np.log(np.divide(intensities, self.median)) / self.dispersion))
 
     def band(self, intensities: npt.ArrayLike) -> FloatArray:
-        """Confidence limits of the curve, shape (2, n), at each of n positive intensities."""
-        eta = np.log(np.divide(intensities, self.median)) / self.dispersion
+        """Confidence limits of the curve, shape (2, n), at each of n intensities."""
+        eta = np.log(np.maximum(np.divide(intensities, self.median), np.finfo(float).tiny)) / self.dispersion
         slopes = np.array([np.full_like(eta, -1.0 / self.dispersion), -eta])
         error = special.ndtri(0.5 + 0.5 * self.level) * np.sqrt((slopes * (self.covariance @ slopes)).sum(axis=0))
         return np.asarray(special.ndtr([eta - error, eta + error]))
