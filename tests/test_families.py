@@ -32,6 +32,8 @@ ALLOWED: dict[tuple[str, ...], tuple[str, ...]] = {
     ("plants/structures/parts.py",): ("Dashpot", "Line"),
     # The filter of small reversals is what a fit of a noisy input has in front of any law.
     ("identification/_assumptions.py", "identification/_identify.py"): ("ReversalFilter",),
+    # An offset that a law lacks is a line beside it.
+    ("identification/doubts.py",): ("Line",),
     # The diagram of reversal curves is that of a density of relays.
     ("plot/_sweeps.py",): ("Preisach", "PreisachRelays"),
     # A page computes a curve of knots, which has no step, in the browser.

@@ -322,6 +322,7 @@ test_bounds_that_make_no_box_are_refused = refused(
 
 def test_no_core_falls_at_saturation():
     assert box(Freedom()).bounds == {"feedthrough": (0.0, math.inf)}
+    assert box(Freedom(fixed={"feedthrough": 0.0})).physical["Ms"] == (True, False)  # nor has it more than Ms there
 
 
 def test_a_core_whose_feedthrough_is_most_of_its_output_is_found():

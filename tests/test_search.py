@@ -418,7 +418,7 @@ def test_damage_does_not_heal():
     ("family", "physical"),
     [
         (hs.Tellinen, {"squareness": (True, True), "z0": (True, True), "coercivity": (False, False)}),
-        (hs.JilesAtherton, {"c": (True, True), "Ms": (True, False)}),
+        (hs.JilesAtherton, {"c": (True, True), "Ms": (False, False)}),
         (hs.BoucWenBaberNoori(zeta_s=0.5), {"delta_nu": (True, False), "zeta_s": (True, True), "n": (False, True)}),
         (hs.Play(threshold=0.1, gain=1.0), {"threshold": (True, False), "z0": (False, False)}),
     ],

@@ -49,9 +49,9 @@ def simulate(
     if file.endswith(".json") and model.endswith((".csv", ".tsv", ".txt", ".npz", ".mat", ".h5")):
         raise ValueError(f"the model stands before the record: hysim simulate {file} {model}")
     law, units = models.read(model)
-    units = {"t": "s", **units} if needs_time(law) else units
     of_the_ground = isinstance(law, _Shaken) and law.excitation == "base"
-    record = models.in_units(records.read_input(settings, file, of_the_ground=of_the_ground), units, file, "tu")
+    known = {"t": "s", **units} if needs_time(law) else units
+    record = models.in_units(records.read_input(settings, file, of_the_ground=of_the_ground), known, file, "tu")
     units |= (settings.units or {}) | {signal: unit for signal, unit in record.units.items() if signal != "y"}
     simulation = models.simulated(law, record, units)
     columns = simulation.columns

@@ -275,7 +275,7 @@ def tune(
     Parameters
     ----------
     plant, t, reference
-        As in `hysim.close_loop`.
+        As in `hysim.close_loop`; the plant is a law, a transfer function or an actuator.
     controller : PID or TrackingController, optional
         A template: nonzero gains of its PID and damping loop are tuned, the rest stays; ``hs.PID(ki=1.0)`` asks for an
         integral alone. By default a standard-form PID with its setpoint weight and a derivative filter of Td / 10.

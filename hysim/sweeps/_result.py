@@ -241,7 +241,7 @@ class SobolIndices:
 
 
 def sobol_indices(result: Sweep, *, seed: int = 0) -> SobolIndices:
-    """Sobol indices of every output of a study of a ``Sample(..., method="saltelli")``.
+    """Sobol indices of every output that is a number, of a study of a ``Sample(..., method="saltelli")``.
 
     Parameters
     ----------
