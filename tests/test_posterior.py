@@ -136,8 +136,21 @@ def test_weights_and_bounds_of_a_fit_are_those_of_its_posterior():
         assert np.std(post.samples["slope"]) == pytest.approx(fit.stderr["slope"], rel=0.15)
     assert_refused("are for noise=", hs.sample_posterior, fit, record, noise="robust")
     assert_refused("takes a result of hs.identify", hs.sample_posterior, hs.Line, record, error=TypeError)
-    bounded = hs.identify(hs.Line, part, bounds={"slope": (2.01, 3.0)})
-    assert hs.sample_posterior(bounded, part, samples=400).samples["slope"].min() >= 2.01
+    for highest in (3.0, np.inf):
+        bounded = hs.identify(hs.Line, part, bounds={"slope": (2.01, highest)})
+        assert hs.sample_posterior(bounded, part, samples=400).samples["slope"].min() >= 2.01
+
+
+@pytest.mark.extra("emcee")
+def test_a_bound_of_physics_is_one_of_the_posterior():
+    u = 1.5 * np.sin(2.0 * np.pi * np.arange(200) / 50.0)
+    y = hs.Chan(saturation=1.3, squareness=0.6).response(u) - 0.01 * u
+    record = hs.Record(u=u, y=y + 0.01 * np.random.default_rng(0).standard_normal(u.size))
+    fit = hs.identify(hs.Chan, record)
+    assert fit.estimates["feedthrough"] == 0.0  # the best one would be negative
+    feedthrough = hs.sample_posterior(fit, record, samples=200).samples["feedthrough"]
+    assert feedthrough.min() >= 0.0
+    assert np.median(feedthrough) < 0.005
 
 
 @pytest.mark.parametrize(("name", "law"), [("gaussian", stats.norm), ("robust", stats.t(4.0))])

@@ -26,7 +26,7 @@ Bounds = Mapping[str, tuple[float, float]]
 
 
 def again(fit: Identification, records: Sequence[Record], bounds: Bounds, initial: Initial) -> Problem:
-    """The problem that `fit` solves, beginning at its model, with `bounds` of parameters that are not linear.
+    """The problem that `fit` solves, beginning at its model, with `bounds`, of linear parameters only to one side.
 
     States at the first sample are those of `initial`; by default they are free if they were, else held at their values.
     A ValueError is raised if the model has no search box, or does not have the residual of the fit on these records.
@@ -53,7 +53,9 @@ def optima(fit: Identification, known: Problem, bounds: Bounds, initial: Initial
 
 
 def _inner(bounds: Bounds, known: Problem) -> dict[str, tuple[float, float]]:
-    return {name: pair for name, pair in bounds.items() if name not in known.own.columns}
+    """The bounds that are no priors: of parameters that are not linear, and of others to one side."""
+    own = known.own.columns
+    return {name: pair for name, pair in bounds.items() if name not in own or not np.isfinite(pair).all()}
 
 
 def _freedom(

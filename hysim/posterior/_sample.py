@@ -400,9 +400,9 @@ def posed(
     quanta = {record.resolution for record in records}
     kind = density(noise or fit.noise, quanta.pop() if len(quanta) == 1 else None)
     names = {*fit.free_names, *(name.rpartition("[")[0] for name in fit.free_names)}
-    limits = {name: pair for name, pair in fit.bounds.items() if name in fit.free_names and np.isfinite(pair).all()}
-    priors = {**given(limits), **priors}
-    bounds = {name: (prior.low, prior.high) for name, prior in priors.items() if name in names}
+    limits = {name: pair for name, pair in fit.bounds.items() if name in fit.free_names}
+    priors = {**given({name: pair for name, pair in limits.items() if np.isfinite(pair).all()}), **priors}
+    bounds = {**limits, **{name: (prior.low, prior.high) for name, prior in priors.items() if name in names}}
     problem = again(fit, records, bounds, initial)
     if kind.name != "gaussian" and np.unique(fit.weights[fit.weights > 0.0]).size > 1:
         raise ValueError(f'samples of different weights are for noise="gaussian", got {kind.name!r}')

@@ -237,10 +237,12 @@ def _scale(problem: Problem, k: int) -> Scale:
 class Linear:
     """Prior of the linear parameters b, in units (n_sets, n_linear) in which it has about the width one.
 
-    With `priors` by place, the others are flat in w from `centre` - `reach` to `centre` + `reach`.
+    With `priors` by place, the others are flat in w from `centre` - `reach` to `centre` + `reach`, as far as that is
+    within the `box` of their least and largest values (2, n_linear), such as bounds of physics.
     """
 
     priors: Mapping[int, Given]
+    box: FloatArray
     reach: float
     span: float  # of the measured output
     mean: float
@@ -261,20 +263,21 @@ class Linear:
 
     def log_density(self, w: FloatArray, units: tuple[FloatArray, FloatArray, FloatArray]) -> FloatArray:
         """Logarithm of the density of the parameters in their units (n_sets,)."""
-        unit, centre, _ = units
+        unit, (low, high) = units[0], self.ends(units)
         total = np.zeros(len(w))
         for k in range(w.shape[1]):
             if k in self.priors:
                 total = total + self.priors[k].log_density(unit[:, k] * w[:, k]) + np.log(unit[:, k])
             else:
-                inside = np.abs(w[:, k] - centre[:, k]) <= self.reach
-                total = total + np.where(inside, -math.log(2.0 * self.reach), -np.inf)
+                inside = (low[:, k] <= w[:, k]) & (w[:, k] <= high[:, k])
+                total = total + np.where(inside, -np.log(high[:, k] - low[:, k]), -np.inf)
         return total
 
     def quantile(self, share: FloatArray, units: tuple[FloatArray, FloatArray, FloatArray]) -> FloatArray:
         """Parameters in their units from numbers that are uniform between 0 and 1."""
         unit, centre, _ = units
-        w = centre + self.reach * (2.0 * share - 1.0)
+        (low, high), is_free = self.ends(units), np.isinf(self.box).all(axis=0)
+        w = np.where(is_free, centre + self.reach * (2.0 * share - 1.0), low + (high - low) * share)
         for k, prior in self.priors.items():
             w[:, k] = prior.quantile(share[:, k]) / unit[:, k]
         return w
@@ -285,14 +288,14 @@ class Linear:
         low, high = centre - self.reach, centre + self.reach
         for k, prior in self.priors.items():
             low[:, k], high[:, k] = prior.low / unit[:, k], prior.high / unit[:, k]
-        return low, high
+        return np.maximum(low, self.box[0] / unit), np.minimum(high, self.box[1] / unit)
 
 
 def linear(problem: Problem, priors: Mapping[str, Given], factor: float = 1.0) -> Linear:
     names = problem.space.linear
     own = {k: priors[key].scaled(factor) for k, name in enumerate(names) if (key := _key(name, priors)) is not None}
     span = float(np.ptp(problem.y)) or problem.scale
-    return Linear(own, factor * REACH, span, float(problem.y.mean()))
+    return Linear(own, np.array(problem.linear_box()), factor * REACH, span, float(problem.y.mean()))
 
 
 def _ends_of_sigma(problem: Problem, own: Given | None, quantum: float | None) -> tuple[float, float]:
