@@ -314,6 +314,9 @@ def test_elements_that_fall_in_both_directions_count_in_the_modes_and_their_damp
     apart, together = leaning(hs.Line(slope=100.0), hs.Line(slope=-64.0)), leaning(hs.Line(slope=36.0))
     assert apart.periods() == pytest.approx(together.periods(), rel=1e-9)
     assert apart.damping_matrix == pytest.approx(together.damping_matrix, rel=1e-9)
+    t = 0.01 * np.arange(400)
+    swung = hs.simulate(leaning(hs.Line(slope=100.0), hs.Line(slope=-64.0)), t, np.sin(3.0 * t)).signals
+    assert np.abs(swung["dissipated"]).max() < 1e-10 * np.abs(swung["element_work"]).max()
     softening = hs.BoucWen(A=-0.5, beta=0.5, gamma=0.2, gain=128.0)
     assert leaning(hs.Line(slope=100.0), softening).periods() == pytest.approx(together.periods(), rel=1e-6)
     saturated = leaning(hs.Line(slope=36.0), hs.BoucWen(beta=0.5, gamma=0.2, z0=3.0))  # rises where it turns back

@@ -285,10 +285,11 @@ class Linear:
     def ends(self, units: tuple[FloatArray, FloatArray, FloatArray]) -> tuple[FloatArray, FloatArray]:
         """The least and the largest values that the prior allows, in units, (n_sets, n_linear)."""
         unit, centre, _ = units
-        low, high = centre - self.reach, centre + self.reach
+        low = np.maximum(centre - self.reach, self.box[0] / unit)
+        high = np.minimum(centre + self.reach, self.box[1] / unit)
         for k, prior in self.priors.items():
             low[:, k], high[:, k] = prior.low / unit[:, k], prior.high / unit[:, k]
-        return np.maximum(low, self.box[0] / unit), np.minimum(high, self.box[1] / unit)
+        return low, high
 
 
 def linear(problem: Problem, priors: Mapping[str, Given], factor: float = 1.0) -> Linear:

@@ -454,7 +454,7 @@ class MovingStructure:
         work = tracks.work[:, 2:]
         slopes = self.elastic_slopes
         with np.errstate(divide="ignore", invalid="ignore"):
-            returned = np.where(slopes > 0.0, (force**2 - self._first_forces**2) / (2.0 * slopes), 0.0)
+            returned = np.where(slopes != 0.0, (force**2 - self._first_forces**2) / (2.0 * slopes), 0.0)
         imbalance = tracks.work[:, 0] - tracks.work[:, 1] - work.sum(axis=1) - (kinetic + elastic - state.stored)
         viscous = rate * self.viscosities
         signals = {
