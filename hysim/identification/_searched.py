@@ -18,6 +18,7 @@ import numpy as np
 
 from hysim import metrics
 from hysim._basics.frozen import FloatArray
+from hysim._columns.turning import TOLERANCE
 from hysim.identification._assumptions import Treated
 from hysim.identification._descent import Constraint, Descent
 from hysim.identification._noise import Gaussian, Noise, Quantised, Robust
@@ -283,9 +284,10 @@ def _phrases(
 ) -> list[str]:
     ended = known.stopped or (("converged",) if converged else ())
     phrases = [*ended, *(() if converged else ("the search did not converge",)), *known.reasons]
-    inputs = [part.record.u for part in problem.parts]
-    if all((np.diff(u) >= 0.0).all() or (np.diff(u) <= 0.0).all() for u in inputs):
-        phrases.append("the input never turns back: the parameters of unloading are not determined")
+    turning = [any(part.record.reversals(least).size for part in problem.parts) for least in (0.0, TOLERANCE)]
+    if not all(turning):
+        what = f"turns back by no more than {100.0 * TOLERANCE:.0f} % of its span" if any(turning) else "never turns back"
+        phrases.append(f"the input {what}: the parameters of unloading are not determined")
     ends = [name for name, curve in curves.items() if any(curve.at_box)]
     phrases += [f"the interval of {name} ends at its search bound" for name in ends]
     if rivals:
