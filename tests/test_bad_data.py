@@ -72,7 +72,7 @@ def test_loading_alone_tells_nothing_of_unloading(family):
     assert "do not determine beta, gamma separately" in fit.message
     trembling = np.where(np.arange(30) == 10, RISE[9] - 0.004, RISE)
     noisy = hs.identify(family, hs.Record(u=trembling, y=np.tanh(RISE)), fixed={"n": 2.0, "z0": 0.0})
-    assert "the input turns back by no more than 1 % of its span" in noisy.message
+    assert "the input turns back by at most 1 % of its span" in noisy.message
     assert np.isnan([fit.stderr["beta"], fit.stderr["gamma"]]).all()
     assert fit.model.beta + fit.model.gamma == pytest.approx(1.0, abs=1e-6)  # tanh' = 1 - tanh^2
 

@@ -286,7 +286,7 @@ def _phrases(
     phrases = [*ended, *(() if converged else ("the search did not converge",)), *known.reasons]
     turning = [any(part.record.reversals(least).size for part in problem.parts) for least in (0.0, TOLERANCE)]
     if not all(turning):
-        what = f"turns back by no more than {100.0 * TOLERANCE:.0f} % of its span" if any(turning) else "never turns back"
+        what = f"turns back by at most {100.0 * TOLERANCE:.0f} % of its span" if any(turning) else "never turns back"
         phrases.append(f"the input {what}: the parameters of unloading are not determined")
     ends = [name for name, curve in curves.items() if any(curve.at_box)]
     phrases += [f"the interval of {name} ends at its search bound" for name in ends]
