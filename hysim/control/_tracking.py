@@ -312,7 +312,7 @@ class AdaptiveInverse(WithoutFeedback):
     free : sequence of str
         Numbers that drift, as in ``law.scalars``; the parameters of the law's step must be affine in them.
     drift : sequence of float
-        For each the change that is expected within one second [unit of each].
+        For each the change that is expected within one second, and its standard error at the start [unit of each].
     noise : float
         Standard deviation of the measurement [unit of y].
     limits : (float, float), optional
