@@ -136,9 +136,10 @@ def test_weights_and_bounds_of_a_fit_are_those_of_its_posterior():
         assert np.std(post.samples["slope"]) == pytest.approx(fit.stderr["slope"], rel=0.15)
     assert_refused("are for noise=", hs.sample_posterior, fit, record, noise="robust")
     assert_refused("takes a result of hs.identify", hs.sample_posterior, hs.Line, record, error=TypeError)
-    for highest in (3.0, np.inf):
-        bounded = hs.identify(hs.Line, part, bounds={"slope": (2.01, highest)})
-        assert hs.sample_posterior(bounded, part, samples=400).samples["slope"].min() >= 2.01
+    for lowest, highest in ((2.01, 3.0), (2.01, np.inf), (50.0, np.inf)):
+        post = hs.sample_posterior(hs.identify(hs.Line, part, bounds={"slope": (lowest, highest)}), part, samples=200)
+        assert post.samples["slope"].min() >= lowest
+        assert f"from {lowest:g} to {highest:g}" in post.priors["slope"]
 
 
 @pytest.mark.extra("emcee")

@@ -319,9 +319,13 @@ def test_elements_that_fall_in_both_directions_count_in_the_modes_and_their_damp
     assert np.abs(swung["dissipated"]).max() < 1e-10 * np.abs(swung["element_work"]).max()
     softening = hs.BoucWen(A=-0.5, beta=0.5, gamma=0.2, gain=128.0)
     assert leaning(hs.Line(slope=100.0), softening).periods() == pytest.approx(together.periods(), rel=1e-6)
+    for z0 in (0.0, 0.5, 0.9):
+        assert leaning(hs.Line(slope=100.0), hs.BoucWen(gain=-10.0, z0=z0)).elastic_slopes[1] == pytest.approx(-10.0)
     saturated = leaning(hs.Line(slope=36.0), hs.BoucWen(beta=0.5, gamma=0.2, z0=3.0))  # rises where it turns back
     assert saturated.elastic_slopes.tolist() == [36.0, 0.0]
     assert_refused("stiffness at the start is negative", leaning, hs.Line(slope=-1.0))
+    driven = hs.Rayleigh(mass=0.0, stiffness=0.05)
+    assert_refused("Rayleigh damping would drive", hs.Structure, mass=1.0, stiffness=-1.0, damping=driven)
 
 
 def test_a_free_vibration_without_damping_keeps_its_energy():

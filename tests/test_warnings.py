@@ -74,6 +74,8 @@ def test_an_offset_that_a_law_lacks_is_said(law):
     assert fit.fit_percent < 95.0
     assert "the output may have an offset, which this law does not have" in " ".join(fit.warnings)
     assert hs.identify(law + hs.Line(), shifted).fit_percent > 95.0
+    noisy = hs.Record(u=u, y=y + 0.3 * np.ptp(y) * np.random.default_rng(1).standard_normal(u.size))
+    assert not [each for each in hs.identify(type(law), [hs.Record(u=u, y=y), noisy]).warnings if "may have an" in each]
 
 
 def test_columns_that_one_family_fits_better_in_reverse_are_suspected(table1):

@@ -245,7 +245,10 @@ def identify(
             first, doubts = choice.problems[0], [swapped_columns(records)]
             if is_partial := is_cut or (first.budget is not None and (first.budget.cut or not fit.success)):
                 stopped = f"partial: the search stopped at max_evaluations={max_evaluations}"
-                fit = replace(fit, success=False, message=f"{stopped}, better parameters may exist; {fit.message}")
+                further = "cv_rmse is that of longer searches; " * bool(folds)
+                fit = replace(
+                    fit, success=False, message=f"{stopped}, better parameters may exist; {further}{fit.message}"
+                )
             if not any(doubts) and not is_partial and not needs_time(fit.model):
                 error = 1.0 - fit.fit_percent / 100.0
                 doubts = [

@@ -352,8 +352,10 @@ def left_out(cross_validate: str | int | None, records: Sequence[Record]) -> lis
     if cross_validate == "loo":
         return parts
     # The beginning of a record says what the state was there: without it errors are those of a guess.
-    sizes = [(cut, -(-len(record) // len(parts))) for cut, record in zip(cuts, records, strict=False)]
-    kept = np.concatenate([cut + np.arange(size) for cut, size in sizes])
+    sensors = [record.input.size if isinstance(record, Rescalable) else len(record) for record in records]
+    begins = [range(cut, end, n) for cut, end, n in zip(cuts, cuts[1:], sensors, strict=False)]
+    sizes = [(begin, -(-n // len(parts))) for each, n in zip(begins, sensors, strict=True) for begin in each]
+    kept = np.concatenate([begin + np.arange(size) for begin, size in sizes])
     return [part for part in (np.setdiff1d(each, kept) for each in parts) if part.size]
 
 

@@ -159,12 +159,14 @@ def offset_for(family: Identifiable, free: Sequence[str], setting: Setting, erro
     fixed = {f"{label}.{name}": value for name, value in freedom.fixed.items()} | {f"{line}.slope": 0.0}
     bounds = {f"{label}.{name}": pair for name, pair in freedom.bounds.items()}
     own = replace(freedom, fixed=fixed, free=tuple(f"{label}.{name}" for name in freedom.free), bounds=bounds)
+    before = _error_in_short(family, record, setting)
     other = _error_in_short(both, record, replace(setting, freedom=own))
-    if not other < _BETTER * error:
+    if not other < _BETTER * before:
         return ""
     return (
-        "the output may have an offset, which this law does not have: with a constant added it leaves an error of "
-        f"{100.0 * other:.2g} % instead of {100.0 * error:.2g} %; subtract the offset, or identify the law + hs.Line()"
+        "the output may have an offset, which this law does not have: a short fit with a constant added leaves an "
+        f"error of {100.0 * other:.2g} % instead of {100.0 * before:.2g} %; subtract the offset, or identify the "
+        "law + hs.Line()"
     )
 
 
@@ -173,7 +175,7 @@ def _error_in_short(family: Identifiable, record: Record, setting: Setting) -> f
     record = record[:: -(-len(record) // _MOST_SAMPLES)]
     try:
         attempt = problems(family, [record], setting.freedom, setting.initial)[0]
-        if len(attempt.space.names) >= len(record):
+        if len(attempt.space.names) >= len(record) or not np.ptp(record.y):
             return math.inf
         while attempt.stage is not None and attempt.simpler is not None:
             attempt = attempt.simpler

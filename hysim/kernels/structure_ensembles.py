@@ -52,8 +52,8 @@ def fill_slopes(
     """Elastic slopes of laws at their start: the limit of secants of shorter and shorter strokes.
 
     Of all secants that one is taken which differs least, relatively, from the one before. A law that falls in both
-    directions has a negative slope, one that only falls ahead, beyond its saturation, has none. The laws are those of
-    each row of parameters (n_sets, n_parameters) and states.
+    directions has the steeper slope, that of unloading; one that only falls ahead, beyond its saturation, has none. The
+    laws are those of each row of parameters (n_sets, n_parameters) and states.
     """
     spare = np.empty(states.shape[1])
     for i in range(slopes.shape[0]):
@@ -77,7 +77,7 @@ def fill_slopes(
                     if change < least:
                         least, slope = change, secant
                     before = secant
-            slopes[i, e] = slope if behind < 0.0 else max(slope, 0.0)
+            slopes[i, e] = min(behind, slope) if max(behind, slope) < 0.0 else max(slope, 0.0)
 
 
 @kernel

@@ -270,7 +270,8 @@ class Linear:
                 total = total + self.priors[k].log_density(unit[:, k] * w[:, k]) + np.log(unit[:, k])
             else:
                 inside = (low[:, k] <= w[:, k]) & (w[:, k] <= high[:, k])
-                total = total + np.where(inside, -np.log(high[:, k] - low[:, k]), -np.inf)
+                width = np.maximum(high[:, k] - low[:, k], _LEAST_WIDTH)  # a huge bound loses its width to rounding
+                total = total + np.where(inside, -np.log(width), -np.inf)
         return total
 
     def quantile(self, share: FloatArray, units: tuple[FloatArray, FloatArray, FloatArray]) -> FloatArray:
@@ -285,8 +286,9 @@ class Linear:
     def ends(self, units: tuple[FloatArray, FloatArray, FloatArray]) -> tuple[FloatArray, FloatArray]:
         """The least and the largest values that the prior allows, in units, (n_sets, n_linear)."""
         unit, centre, _ = units
-        low = np.maximum(centre - self.reach, self.box[0] / unit)
-        high = np.minimum(centre + self.reach, self.box[1] / unit)
+        least, most = self.box[0] / unit, self.box[1] / unit  # beyond the reach it begins there
+        low = np.maximum(np.minimum(centre - self.reach, most - self.reach), least)
+        high = np.minimum(np.maximum(centre + self.reach, least + self.reach), most)
         for k, prior in self.priors.items():
             low[:, k], high[:, k] = prior.low / unit[:, k], prior.high / unit[:, k]
         return low, high
@@ -346,11 +348,13 @@ def between(e: FloatArray, low: FloatArray, high: FloatArray) -> tuple[FloatArra
     is_above = low + high > 0.0  # the tail on the other side keeps the digits
     least, most = np.where(is_above, -high, low), np.where(is_above, -low, high)
     below, above = log_ndtr(least), log_ndtr(most)
-    mass = above + np.log1p(-np.exp(np.minimum(below - above, -1e-300)))
+    with np.errstate(divide="ignore"):  # there is nothing between equal ends
+        mass = above + np.log1p(-np.exp(np.minimum(below - above, -1e-300)))
     x = np.clip(ndtri_exp(np.logaddexp(below, log_ndtr(np.where(is_above, -e, e)) + mass)), least, most)
     return np.where(is_above, -x, x), mass + 0.5 * (x**2 - e**2)
 
 
+_LEAST_WIDTH = 1e-300
 _SAMPLES_AT_ONCE = 50_000
 _LOG_2PI = float(np.log(2.0 * np.pi))
 _EDGE = 1e-12  # share of a box next to its sides
@@ -409,7 +413,11 @@ class Target:
             for name, (low, high) in zip(space.coordinates, ends, strict=True)
         }
         flat = f"flat, within {self.b_prior.reach:g} spans of the output of what it adds to it"
-        words |= {name: str(self.b_prior.priors.get(k, flat)) for k, name in enumerate(space.linear)}
+        within = [
+            f", from {low:.4g} to {high:.4g}" if np.isfinite([low, high]).any() else ""
+            for low, high in self.b_prior.box.T
+        ]
+        words |= {name: str(self.b_prior.priors.get(k, flat + within[k])) for k, name in enumerate(space.linear)}
         low, high = np.exp(of_sigma).tolist()
         words |= {SIGMA: f"flat in its logarithm from {low:.3g} to {high:.3g}"}
         return words | {(*space.coordinates, SIGMA)[k]: str(own) for k, (own, _) in self.v_prior.own.items()}

@@ -78,7 +78,7 @@ class MemoryLaw(ShapedLaw):
     @property
     def input_polynomial(self) -> FloatArray:
         """(c1, c2, ...)."""
-        return self.tables[self.polynomial].ravel()
+        return self.tables[self.polynomial].flatten()
 
     @property
     def input_slope(self) -> FloatArray:

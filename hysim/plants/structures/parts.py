@@ -181,7 +181,10 @@ class Rayleigh:
 
     def matrix(self, mass: FloatArray, stiffness: FloatArray) -> FloatArray:
         """The damping matrix, shape (n_nodes, n_nodes)."""
-        return self.mass * mass + self.stiffness * stiffness
+        damping = self.mass * mass + self.stiffness * stiffness
+        if np.linalg.eigvalsh(damping)[0] < -1e-9 * np.abs(damping).max():
+            raise ValueError("the stiffness at the start is negative: Rayleigh damping would drive the motion")
+        return damping
 
 
 @family
