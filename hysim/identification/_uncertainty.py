@@ -15,6 +15,7 @@ the output bends within the step, as at a stiff optimum in a wide box: there the
 (`hysim.Law.response_jacobian`), and those of others, or of long records, differences over a shorter step.
 """
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
@@ -352,11 +353,12 @@ def left_out(cross_validate: str | int | None, records: Sequence[Record]) -> lis
     if cross_validate == "loo":
         return parts
     # The beginning of a record says what the state was there: without it errors are those of a guess.
-    sensors = [record.input.size if isinstance(record, Rescalable) else len(record) for record in records]
-    begins = [range(cut, end, n) for cut, end, n in zip(cuts, cuts[1:], sensors, strict=False)]
-    sizes = [(begin, -(-n // len(parts))) for each, n in zip(begins, sensors, strict=True) for begin in each]
-    kept = np.concatenate([begin + np.arange(size) for begin, size in sizes])
-    return [part for part in (np.setdiff1d(each, kept) for each in parts) if part.size]
+    kept: list[Samples] = []
+    for record, begin, end in zip(records, cuts, cuts[1:], strict=False):
+        n = record.input.size if isinstance(record, Rescalable) else len(record)  # of each sensor
+        kept += [first + np.arange(math.ceil(n / len(parts))) for first in range(begin, end, n)]
+    others = [np.setdiff1d(part, np.concatenate(kept)) for part in parts]
+    return [part for part in others if part.size]
 
 
 def _cycles(records: Sequence[Record], cuts: Sequence[int]) -> list[Samples]:
