@@ -25,7 +25,7 @@ from hysim.identification._admissible import choose, danger, excursion, implausi
 from hysim.identification._assumptions import Treated, decided, in_units_of_noise, quiet_rmse, treated
 from hysim.identification._choice import better, in_one_step, of_any_family, refuse
 from hysim.identification._noise import Quantised, density
-from hysim.identification._problem import Problem, Setting, Weights
+from hysim.identification._problem import Problem, Setting, Weights, samples_of_sensor
 from hysim.identification._result import Candidate, Identification
 from hysim.identification._search import PERFECT, chosen, sharing, stages_in_words, widened
 from hysim.identification._searched import Search
@@ -46,7 +46,6 @@ from hysim.models.protocols import (
     PartByPart,
     Placeable,
     Recorded,
-    Rescalable,
     needs_time,
     placed,
     with_law,
@@ -326,7 +325,7 @@ def _weights(weights: Any, records: Sequence[Record]) -> Weights:
         return None
     single = len(records) == 1 and np.ndim(weights[0]) == 0
     shares = [read_only(each, "weights", ndim=1) for each in ([weights] if single else weights)]
-    sizes = [each.input.size if isinstance(each, Rescalable) else len(each) for each in records]
+    sizes = [samples_of_sensor(each) for each in records]
     if [each.size for each in shares] != sizes:
         raise ValueError(
             f"weights must hold one number for each sample, {', '.join(map(str, sizes))}; "

@@ -24,7 +24,7 @@ from hysim._columns.input_noise import repeated_cycle
 from hysim.identification.marquardt import Settled, least_squares, triangle
 from hysim.metrics.criteria import information
 from hysim.models.by_structure import searched
-from hysim.models.protocols import Identifiable, placed
+from hysim.models.protocols import Identifiable, Rescalable, placed
 from hysim.models.search_space import STATES, STATES_IN_WORDS, Freedom, SearchSpace
 from hysim.models.stages import BASE, Stage
 from hysim.records import Record, few_places
@@ -414,6 +414,11 @@ class Problem:
         limits = [self.space.bounds.get(name, (-np.inf, np.inf)) for name in self.space.linear]
         lower, upper = np.array(limits).reshape(-1, 2).T
         return lower, upper
+
+
+def samples_of_sensor(record: Any) -> int:
+    """Samples of each sensor of a record, which follow those of the one before."""
+    return record.input.size if isinstance(record, Rescalable) else len(record)
 
 
 def _beginning(part: Part, samples: int) -> Part:

@@ -29,7 +29,7 @@ from hysim._columns.turning import TOLERANCE
 from hysim.errors import SimulationError
 from hysim.identification._descent import Descent, named_slopes
 from hysim.identification._noise import Gaussian, Noise
-from hysim.identification._problem import Problem
+from hysim.identification._problem import Problem, samples_of_sensor
 from hysim.identification.marquardt import pieces
 from hysim.metrics.rows import LoopRows
 from hysim.models.law import Law
@@ -355,7 +355,7 @@ def left_out(cross_validate: str | int | None, records: Sequence[Record]) -> lis
     # The beginning of a record says what the state was there: without it errors are those of a guess.
     kept: list[Samples] = []
     for record, begin, end in zip(records, cuts, cuts[1:], strict=False):
-        n = record.input.size if isinstance(record, Rescalable) else len(record)  # of each sensor
+        n = samples_of_sensor(record)
         kept += [first + np.arange(math.ceil(n / len(parts))) for first in range(begin, end, n)]
     others = [np.setdiff1d(part, np.concatenate(kept)) for part in parts]
     return [part for part in others if part.size]

@@ -18,12 +18,12 @@ from hysim import metrics
 from hysim._basics.frozen import FloatArray
 from hysim._columns.input_noise import noise_level
 from hysim.errors import SimulationError
-from hysim.identification._problem import Problem, Setting, problems
+from hysim.identification._problem import Problem, Setting, problems, samples_of_sensor
 from hysim.identification._search import brief_optimum
 from hysim.laws.static import Line
 from hysim.models.law import Law
 from hysim.models.parts import labels
-from hysim.models.protocols import Identifiable, Rescalable, needs_time
+from hysim.models.protocols import Identifiable, needs_time
 from hysim.records import Record
 
 CONSTANT = "the output is constant: the fit in percent is not defined, and the output shows no effect of the input"
@@ -73,7 +73,7 @@ def odd_residuals(problem: Problem, residual: FloatArray) -> list[str]:
     told = [f'sample {k} alone makes most of the residual: leave it out by weights=, or take noise="robust"']
     told = told if n > _FEW and abs(counted[k]) > _ALONE * math.sqrt(n) * rms else []
     for place, (record, own) in enumerate(problem.pieces):
-        n_sensors = len(record) // record.input.size if isinstance(record, Rescalable) else 1
+        n_sensors = len(record) // samples_of_sensor(record)
         for sensor, part in enumerate(np.split(counted[own], n_sensors)):
             if part.size > _FEW and abs(part.mean()) > _ALONE * max(float(np.sqrt(np.mean(part**2))), rms):
                 of = f" of sensor {sensor}" * (n_sensors > 1) + f" of record {place}" * several
