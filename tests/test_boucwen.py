@@ -661,3 +661,10 @@ def test_slopes_that_grow_without_bound_are_still_of_one_sign():
     law = hs.BoucWen(A=5e4, beta=800.0, gamma=-1100.0)
     assert law.slope_bounds() == (5e4, math.inf)
     assert law.is_invertible()
+
+
+def test_coefficients_that_are_given_away_change_no_law():
+    law = hs.BoucWen(feedthrough=0.5)
+    coefficients = law.input_polynomial
+    coefficients += 1.0
+    assert law.response([0.0, 1.0]).tolist() == hs.BoucWen(feedthrough=0.5).response([0.0, 1.0]).tolist()
