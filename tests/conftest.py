@@ -12,6 +12,7 @@ import sqlite3
 import subprocess
 import sys
 import tomllib
+import zlib
 from collections import defaultdict
 from importlib.util import find_spec
 from pathlib import Path
@@ -119,7 +120,22 @@ def pytest_collection_finish():
 
 CIRCLES = tomllib.loads((ROOT / "tests" / "circles.toml").read_text())
 purposes = {name: purpose for purpose, names in CIRCLES.items() for name in names}
+DRAWN, SHARE = ("page", "search", "slow"), 3  # of these purposes `--draw` leaves one test of so many
 begun = pytest.StashKey[float]()
+
+
+def pytest_addoption(parser):
+    parser.addoption("--draw", metavar="TEXT", help="run a third of the longest tests, which TEXT decides")
+
+
+def purpose_of(nodeid):
+    """Why a test stands in the second circle; None in the first one."""
+    return purposes.get(nodeid.partition("[")[0].removeprefix("tests/"))
+
+
+def is_drawn(text, nodeid):
+    """Whether a text, by which the gate names the state of all files, leaves a test in."""
+    return purpose_of(nodeid) not in DRAWN or zlib.crc32(f"{text} {nodeid}".encode()) % SHARE == 0
 
 
 def cpu_seconds():
@@ -151,12 +167,16 @@ def pytest_terminal_summary(terminalreporter):
 
 
 @pytest.hookimpl(tryfirst=True)
-def pytest_collection_modifyitems(items):
+def pytest_collection_modifyitems(config, items):
     """Mark the second circle, skip tests that need missing packages, and put those last that are divided one by one."""
+    if (text := config.getoption("draw")) is not None:
+        left = [item for item in items if not is_drawn(text, item.nodeid)]
+        items[:] = [item for item in items if is_drawn(text, item.nodeid)]
+        config.hook.pytest_deselected(items=left)
     items.sort(key=lambda item: item.path.name in ONE_BY_ONE or ROOT / "hysim" in item.path.parents)
     for item in items:
-        if (name := item.nodeid.partition("[")[0].removeprefix("tests/")) in purposes:
-            item.add_marker(purposes[name])
+        if purpose := purpose_of(item.nodeid):
+            item.add_marker(purpose)
         wanted = {package for mark in item.iter_markers("extra") for package in mark.args}
         if missing := sorted(package for package in wanted if find_spec(package) is None):
             item.add_marker(pytest.mark.skip(reason=f"needs {', '.join(missing)}"))

@@ -11,6 +11,7 @@ from pathlib import Path
 
 import pytest
 
+import conftest
 import hysim
 
 PACKAGE = Path(hysim.__file__).parent
@@ -208,3 +209,15 @@ def test_the_second_circle_names_tests():
         path, _, test = name.partition("::")
         folder = tests.parent if path.startswith("hysim/") else tests
         assert re.search(rf"(def|class) {test.rpartition('.')[2]}\(", (folder / path).read_text()), name
+
+
+def test_every_test_that_a_draw_may_leave_out_is_in_some_other_draw():
+    circles = tomllib.loads((Path(__file__).parent / "circles.toml").read_text())
+    in_draws = {
+        name: sum(conftest.is_drawn(f"draw {k}", f"tests/{name}[case]") for k in range(60))
+        for name in itertools.chain(*circles.values())
+    }
+    always = [*circles["digits"], *circles["smoke"]]
+    assert {in_draws[name] for name in always} == {60}
+    assert all(5 <= in_draws[name] <= 40 for name in in_draws.keys() - set(always) if not name.startswith("hysim/"))
+    assert conftest.is_drawn("draw", "tests/test_architecture.py::test_the_second_circle_names_tests")
