@@ -120,10 +120,13 @@ class CameraLoop:
     saturated_percent: float
 
 
-def learned_cameras(law: Any) -> list[CameraLoop]:
+def learned_triangles(law: Any) -> list[CameraLoop]:
     """The paper's own camera, up to 100 frames a second, where the reference is learned; laws as `loops` takes them."""
-    rates = FRAME_RATES[:-1]
-    return [*(_learned_triangle(law, rate) for rate in rates), *(_learned_step(rate) for rate in rates)]
+    return [_learned_triangle(law, rate) for rate in FRAME_RATES[:-1]]
+
+
+def learned_steps() -> list[CameraLoop]:
+    return [_learned_step(rate) for rate in FRAME_RATES[:-1]]
 
 
 def _learned_triangle(law: Any, rate: float) -> CameraLoop:

@@ -5,7 +5,14 @@ from typing import Any
 
 from hysim._basics.frozen import frozen
 from hysim._basics.parallel import awaited, second_process
-from hysim.paper.camera import CameraLoop, hysteresis_cameras, learned_cameras, period_rows, vibration_cameras
+from hysim.paper.camera import (
+    CameraLoop,
+    hysteresis_cameras,
+    learned_steps,
+    learned_triangles,
+    period_rows,
+    vibration_cameras,
+)
 from hysim.paper.claims import Claim, claims, evidence
 from hysim.paper.equations import Approximation, Characteristics, printed_characteristics
 from hysim.paper.loops import Case, Loops, control_measures, law_plant, on_equations, with_law
@@ -85,10 +92,12 @@ def find(*, quick: bool = False, thorough: bool = False, progress: Progress | No
         again = beside.submit(reidentify, models.fits["tf-identified"])
         say(last - 1, last, "closed loops")
         asymmetric_model = models.fits["bouc-wen-asymmetric"].model
-        learned = beside.submit(learned_cameras, asymmetric_model)
+        triangles = beside.submit(learned_triangles, asymmetric_model)
         cameras = (*hysteresis_cameras(asymmetric_model, starts), *on_vibration)
         closed = with_law(awaited(equations), asymmetric_model, starts)
-        reidentification, learned_rows = awaited(again), awaited(learned)
+        steps = learned_steps()
+        periods = period_rows(asymmetric_model, closed.hysteresis[0], cameras)
+        reidentification, learned = awaited(again), (*awaited(triangles), *steps)
     say(last, last, "claims")
     law, of = models.fits["bouc-wen"].model, evidence(models, reidentification, control_measures(closed))
     return Findings(
@@ -96,8 +105,8 @@ def find(*, quick: bool = False, thorough: bool = False, progress: Progress | No
         reidentification=reidentification,
         loops=closed,
         cameras=cameras,
-        learned=tuple(learned_rows),
-        periods=period_rows(asymmetric_model, closed.hysteresis[0], cameras),
+        learned=learned,
+        periods=periods,
         dwell=dwell_rows(law, law_plant(law)),
         claims=claims(of),
         approximations=tuple(of.approximations.values()),
