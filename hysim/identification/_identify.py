@@ -1,4 +1,4 @@
-"""The verb `identify`: declare, search, describe.
+"""The verb `identify`: choose what the record decides, search, describe.
 
 A family that is fitted in one step (`hysim.models.protocols.Direct`) is not searched. Its number of parameters is its
 degrees of freedom, rounded; it has none by name.
@@ -8,8 +8,8 @@ The model that is returned has the filter of its input, the start of its record,
 
 import inspect
 from collections.abc import Mapping, Sequence
-from dataclasses import MISSING, fields, replace
-from typing import Any, Literal, Protocol, runtime_checkable
+from dataclasses import MISSING, dataclass, fields, replace
+from typing import Any, Literal, NamedTuple, Protocol, runtime_checkable
 
 import numpy as np
 import numpy.typing as npt
@@ -205,62 +205,136 @@ def identify(
     shares = None if energy else _weights(weights, records)
     if max_evaluations is not None:
         check_count("max_evaluations", max_evaluations)
+    folds = left_out(cross_validate, records)
+    asked = _Asked(records, shares, folds, noise, intervals, admissible, progress or None, energy)
     with at_most(workers), one_blas_thread(), sharing():
         if isinstance(model_or_class, Direct) and depends is None:
-            if energy:
-                raise ValueError('weights="energy" is for models that are searched for')
-            refuse(model_or_class, options, noise or "gaussian", intervals)
-            fit = in_one_step(model_or_class, records, shares, left_out(cross_validate, records), seed, admissible)
-            doubts = [swapped_columns(records)]
-            if isinstance(fit.model, Placeable):
-                fit = as_measured(fit, records, shares, Treated(records))
-                off = excursion(fit.models, records)
-                doubts += [implausible(off)]
-                fit = _marked(fit, danger(off, records, None), admissible)
+            fit = _without_search(model_or_class, options, asked, seed)
         else:
-            family, ends, is_cut = placed(_family(model_or_class, depends), None), None, False
-            searched_on = _without_left_out(records, shares)
-            setting = Setting(searched_on, options, initial, shares, max_evaluations, seed)
-            if isinstance(family, DependentStructure):
-                family = begun(family.over(searched_on), setting)
-            treatment = treated(family, setting, input)
-            along = replace(setting, records=treatment.records)
-            if isinstance(family, PartByPart):
-                family, paths, ends, is_cut = begun_by_parts(family, along)
-                along, noise = replace(along, records=paths), noise or family.noise
-            choice = decided(family, along)
-            if ends is not None:
-                choice = choice._replace(problems=[replace(each, ends=ends) for each in choice.problems])
-            searched = [in_units_of_noise(each, seed) for each in choice.problems]
-            folds = left_out(cross_validate, records)
-            is_plain = (options == _freedom({}, (), {}) and not energy, initial, noise or "gaussian", intervals)
-            rival = family.in_one_step() if is_plain == (True, None, "gaussian", "linear") else None
-            kind, shown = noise or "gaussian", progress or None
-            fit = _searched(searched, kind, intervals, folds, seed, shown, treatment, admissible, rival, energy=energy)
-            fit = replace(fit, message="; ".join(filter(None, (fit.message, choice.sentence))))
-            if all(type(record) is Record for record in records):  # not in units of sensors, nor weighted by a verb
-                fit = as_measured(fit, records, shares, treatment)
-                fit = said_of_noise(fit, records, treatment, quiet_rmse(family, setting, treatment))
-            first, doubts = choice.problems[0], [swapped_columns(records)]
-            if is_partial := is_cut or (first.budget is not None and (first.budget.cut or not fit.success)):
-                stopped = f"partial: the search stopped at max_evaluations={max_evaluations}"
-                further = "cv_rmse is that of longer searches; " * bool(folds)
-                fit = replace(
-                    fit, success=False, message=f"{stopped}, better parameters may exist; {further}{fit.message}"
-                )
-            if not any(doubts) and not is_partial and not needs_time(fit.model):
-                error = 1.0 - fit.fit_percent / 100.0
-                doubts = [
-                    swapped_for(first.family, setting, error),
-                    offset_for(first.family, fit.free_names, setting, error),
-                ]
-            on_their_records = [on_record(each, record) for each, record in zip(fit.models, records, strict=True)]
-            off = excursion(on_their_records, searched_on)
-            worse = "the fit is negative: the mean of y predicts it better" if fit.fit_percent < 0.0 else ""
-            doubts += [implausible(off), rate_noise_warning(on_their_records, records), worse]
-            fit = _marked(fit, danger(off, searched_on, fit.regions.get("admissible")), admissible)
+            family = placed(_family(model_or_class, depends), None)
+            setting = Setting(_without_left_out(records, shares), options, initial, shares, max_evaluations, seed)
+            assumed = _assumed(family, setting, input, asked)
+            fit = _described(_searched(assumed, asked), assumed, asked)
         every = np.empty(0) if shares is None else np.concatenate(shares)
-        return replace(fit, warnings=(*fit.warnings, *filter(None, doubts)), weights=every, bounds=options.bounds)
+        return replace(fit, weights=every, bounds=options.bounds)
+
+
+@dataclass(frozen=True)
+class _Asked:
+    """What the user asks of a fit; the records are as they were measured."""
+
+    records: Sequence[Record]
+    weights: Weights
+    folds: Folds
+    noise: str | None
+    intervals: str
+    admissible: bool | None
+    progress: Progress | None
+    energy: bool
+
+
+class _Assumed(NamedTuple):
+    """What a search begins with: its family on records without what has no weight, and the problems, simplest first."""
+
+    family: Any
+    setting: Setting
+    treatment: Treated
+    noise: str
+    problems: Sequence[Problem]
+    sentence: str
+    is_cut: bool
+
+
+def _without_search(family: Direct, options: Freedom, asked: _Asked, seed: int) -> Identification:
+    records = asked.records
+    if asked.energy:
+        raise ValueError('weights="energy" is for models that are searched for')
+    refuse(family, options, asked.noise or "gaussian", asked.intervals)
+    fit = in_one_step(family, records, asked.weights, asked.folds, seed, asked.admissible)
+    doubts = [swapped_columns(records)]
+    if isinstance(fit.model, Placeable):
+        fit = as_measured(fit, records, asked.weights, Treated(records))
+        off = excursion(fit.models, records)
+        doubts.append(implausible(off))
+        fit = _marked(fit, danger(off, records, None), asked.admissible)
+    return replace(fit, warnings=(*fit.warnings, *filter(None, doubts)))
+
+
+def _assumed(family: Any, setting: Setting, how: str, asked: _Asked) -> _Assumed:
+    """Choose what a family leaves to the record: noise of the input, treated as `how` says, states and signs."""
+    if isinstance(family, DependentStructure):
+        family = begun(family.over(setting.records), setting)
+    treatment = treated(family, setting, how)
+    along, noise, ends, is_cut = replace(setting, records=treatment.records), asked.noise, None, False
+    if isinstance(family, PartByPart):
+        family, paths, ends, is_cut = begun_by_parts(family, along)
+        along, noise = replace(along, records=paths), noise or family.noise
+    problems, sentence = decided(family, along)
+    if ends is not None:
+        problems = [replace(each, ends=ends) for each in problems]
+    searched = [in_units_of_noise(each, setting.seed) for each in problems]
+    return _Assumed(family, setting, treatment, noise or "gaussian", searched, sentence, is_cut)
+
+
+def _searched(assumed: _Assumed, asked: _Asked) -> Identification:
+    """Search the problems, and describe the optimum on the records as they were searched."""
+    problems, problem, seed = assumed.problems, assumed.problems[0], assumed.setting.seed
+    n_samples, n_names = problem.n_samples, len(problem.space.names)
+    if not n_names:
+        raise ValueError("every parameter is fixed: leave at least one free")
+    if n_samples < n_names:
+        raise ValueError(f"{n_names} parameters cannot be estimated from {n_samples} samples; fix some of them")
+    quanta = {part.record.resolution for part in problem.parts}
+    floor = PERFECT * (float(np.abs(problem.y).max()) or 1.0)
+    noise = density(assumed.noise, quanta.pop() if len(quanta) == 1 else None, floor)
+    problem, squares = widened(*chosen(problems, seed=seed, progress=asked.progress))
+    if not squares:
+        raise ValueError("every parameter set tried diverged: check the units, or pass bounds=")
+    if isinstance(noise, Quantised):
+        noise = noise.at_least(squares[0].cost, n_samples - len(problem.space.names))
+    best = Search(problem, noise, seed, assumed.treatment)
+    (search, likely), named, remark = choose(best, best.likely(squares), asked.admissible)
+    plain, said = squares[0].x if search is best else likely[0].theta[: problem.n_x], ""
+    if asked.energy:
+        search, likely = search.on_energy(likely[0])
+    result, likely = search.described(likely, asked.intervals, plain)
+    if asked.energy and result.least_squares is not None:
+        possible = result.least_squares.fit_percent
+        said = f"the work fits best: the fit of y is {result.fit_percent:.4g} % where {possible:.4g} % is possible"
+    message = "; ".join(filter(None, (result.message, remark, said, stages_in_words(problems, problem.stage))))
+    optima = np.array([optimum.theta for optimum in likely])
+    errors = left_out_errors(search.problem, noise, optima, asked.folds)
+    fit = replace(result, message=message, regions=named, cv_residual=errors, cv_rmse=rms_of_known(errors))
+    is_plain = assumed.setting.freedom == _freedom({}, (), {}) and assumed.setting.initial is None and not asked.energy
+    rival = assumed.family.in_one_step() if is_plain and assumed.noise == "gaussian" else None
+    if rival is None or asked.intervals != "linear":
+        return fit
+    return better(fit, search, optima, rival, asked.folds, asked.admissible)
+
+
+def _described(fit: Identification, assumed: _Assumed, asked: _Asked) -> Identification:
+    """The result on the records as they were measured, with all that speaks against it."""
+    records, setting, first = asked.records, assumed.setting, assumed.problems[0]
+    fit = replace(fit, message="; ".join(filter(None, (fit.message, assumed.sentence))))
+    if all(type(record) is Record for record in records):  # not in units of sensors, nor weighted by a verb
+        fit = as_measured(fit, records, asked.weights, assumed.treatment)
+        fit = said_of_noise(fit, records, assumed.treatment, quiet_rmse(assumed.family, setting, assumed.treatment))
+    doubts = [swapped_columns(records)]
+    if assumed.is_cut or (first.budget is not None and (first.budget.cut or not fit.success)):
+        stopped = f"partial: the search stopped at max_evaluations={setting.max_evaluations}"
+        further = "cv_rmse is that of longer searches; " * bool(asked.folds)
+        message = f"{stopped}, better parameters may exist; {further}{fit.message}"
+        fit = replace(fit, success=False, message=message)
+    elif not any(doubts) and not needs_time(fit.model):
+        error = 1.0 - fit.fit_percent / 100.0
+        names = fit.free_names
+        doubts += [swapped_for(first.family, setting, error), offset_for(first.family, names, setting, error)]
+    on_their_records = [on_record(each, record) for each, record in zip(fit.models, records, strict=True)]
+    off = excursion(on_their_records, setting.records)
+    worse = "the fit is negative: the mean of y predicts it better" if fit.fit_percent < 0.0 else ""
+    doubts += [implausible(off), rate_noise_warning(on_their_records, records), worse]
+    fit = _marked(fit, danger(off, setting.records, fit.regions.get("admissible")), asked.admissible)
+    return replace(fit, warnings=(*fit.warnings, *filter(None, doubts)))
 
 
 def _refuse_for_any(subject: Any, options: Mapping[str, Any]) -> None:
@@ -274,50 +348,6 @@ def _refuse_for_any(subject: Any, options: Mapping[str, Any]) -> None:
 def _marked(fit: Identification, unsafe: str, admissible: bool | None) -> Identification:
     """The fit of a law that is not safe, said in its first line; no success unless this was asked for."""
     return replace(fit, unsafe=unsafe, success=fit.success and admissible is False) if unsafe else fit
-
-
-def _searched(
-    problems: Sequence[Problem],
-    noise: str,
-    intervals: str,
-    folds: Folds,
-    seed: int,
-    progress: Progress | None,
-    treatment: Treated,
-    admissible: bool | None,
-    rival: Any | None,
-    *,
-    energy: bool,
-) -> Identification:
-    problem = problems[0]
-    n_samples, n_names = problem.n_samples, len(problem.space.names)
-    if not n_names:
-        raise ValueError("every parameter is fixed: leave at least one free")
-    if n_samples < n_names:
-        raise ValueError(f"{n_names} parameters cannot be estimated from {n_samples} samples; fix some of them")
-    quanta = {part.record.resolution for part in problem.parts}
-    floor = PERFECT * (float(np.abs(problem.y).max()) or 1.0)
-    noise_model = density(noise, quanta.pop() if len(quanta) == 1 else None, floor)
-    problem, squares = widened(*chosen(problems, seed=seed, progress=progress))
-    if not squares:
-        raise ValueError("every parameter set tried diverged: check the units, or pass bounds=")
-    if isinstance(noise_model, Quantised):
-        noise_model = noise_model.at_least(squares[0].cost, n_samples - len(problem.space.names))
-    best = Search(problem, noise_model, seed, treatment)
-    (search, likely), named, remark = choose(best, best.likely(squares), admissible)
-    plain = squares[0].x if search is best else likely[0].theta[: problem.n_x]
-    if energy:
-        search, likely = search.on_energy(likely[0])
-    result, likely = search.described(likely, intervals, plain)
-    if energy and result.least_squares is not None:
-        possible = result.least_squares.fit_percent
-        said = f"the work fits best: the fit of y is {result.fit_percent:.4g} % where {possible:.4g} % is possible"
-        remark = "; ".join(filter(None, (remark, said)))
-    message = "; ".join(filter(None, (result.message, remark, stages_in_words(problems, problem.stage))))
-    optima = np.array([optimum.theta for optimum in likely])
-    errors = left_out_errors(search.problem, noise_model, optima, folds)
-    fit = replace(result, message=message, regions=named, cv_residual=errors, cv_rmse=rms_of_known(errors))
-    return fit if rival is None else better(fit, search, optima, rival, folds, admissible)
 
 
 def _weights(weights: Any, records: Sequence[Record]) -> Weights:
