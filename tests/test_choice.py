@@ -1,5 +1,7 @@
 """`identify` without a family, and `select`: what predicts parts that are left out, and the order behind noise."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from strategies import rao_garnier, refused
@@ -102,6 +104,16 @@ def test_no_further_family_is_begun_after_the_time(few):
     assert choice.family == "Line"
     assert choice.untried == ("Dahl", "BoucWen")
     assert "no time for Dahl, BoucWen" in choice.in_words()
+
+
+def test_processes_choose_what_one_alone_does(few, monkeypatch):
+    few(Line=hs.Line, Dahl=hs.Dahl)
+    own = []
+    for cores in (1, 2):
+        monkeypatch.setattr(_choice, "cores", lambda cores=cores: cores)
+        own.append(replace(hs.identify(record_of(LAW)), choice=None))
+        own.append(replace(hs.identify(record_of(LAW)).choice, seconds=0.0))
+    assert str(own[:2]) == str(own[2:])
 
 
 def test_a_loop_alone_and_several_records_are_judged_by_samples(few):

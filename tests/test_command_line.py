@@ -193,7 +193,7 @@ def test_full_searches_come_to_the_same_verdicts(reproduction, summary, tmp_path
         "findings.bouc_wen": lambda name, _: of.study.fits[name],
         "findings.reidentify": lambda _: of.reidentification,
         "findings.learned_triangles": lambda _: of.learned[:3],
-        "findings.second_process": lambda: contextlib.nullcontext(_AtOnce()),
+        "findings.forked": lambda _: contextlib.nullcontext(_AtOnce()),
         **dict.fromkeys(("camera._FIRST", "camera._NEXT", "camera._FAST"), (1, 1, 0)),
         **dict.fromkeys(("camera._AGAIN", "camera._FEW", "camera.NOISES"), 1),
     }

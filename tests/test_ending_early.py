@@ -22,7 +22,7 @@ import hysim as hs
 from hysim._basics import atomic as _atomic
 from hysim._basics import parallel as _parallel
 from hysim._basics.atomic import write_all
-from hysim._basics.parallel import awaited, in_chunks, in_pieces, map_on_threads, processes, second_process, threads
+from hysim._basics.parallel import awaited, forked, in_chunks, in_pieces, map_on_threads, processes, threads
 from hysim.cli import Ended, main
 
 ON_LINUX = sys.platform.startswith("linux")
@@ -232,7 +232,7 @@ def report_its_handlers():
 @linux
 @pytest.mark.skipif(_parallel.cores() < 2, reason="on one core there is no second process")
 def test_a_second_process_leaves_interrupts_and_the_standard_output_to_its_parent():
-    with second_process() as pool:
+    with forked(1) as pool:
         on_interrupt, on_end, output = pool.submit(report_its_handlers).result()
     assert (on_interrupt, on_end, output) == (signal.SIG_IGN, signal.SIG_DFL, os.devnull)
 

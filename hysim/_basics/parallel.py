@@ -227,12 +227,16 @@ class _Threads(Executor):
 
 
 @contextmanager
-def second_process() -> Iterator[Executor]:
-    """An executor of one forked process, which cannot print; on one core or without fork, one that works at once."""
-    if not sys.platform.startswith("linux") or cores() < 2:
+def forked(number: int) -> Iterator[Executor]:
+    """An executor of so many forked processes, which cannot print; for 0 one that works at once.
+
+    It works at once on one core, without fork, and in a thread or process of others, who may hold locks.
+    """
+    is_first = multiprocessing.parent_process() is None and threading.current_thread() is threading.main_thread()
+    if number < 1 or cores() < 2 or not is_first or not sys.platform.startswith("linux"):
         yield _AtOnce()
         return
-    with processes(1, _print_to_nowhere) as pool:
+    with processes(number, _begin_aside) as pool:
         yield pool
 
 
@@ -317,8 +321,9 @@ def _end_with_parent() -> None:
         os._exit(1)
 
 
-def _print_to_nowhere() -> None:
-    """Close the standard output, so that its reader need not wait for this process."""
+def _begin_aside() -> None:
+    """Use one thread, and close the standard output, so that its reader need not wait for this process."""
+    _most.set(1)
     with open(os.devnull, "wb") as nowhere:
         os.dup2(nowhere.fileno(), 1)
 

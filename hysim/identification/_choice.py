@@ -23,14 +23,18 @@ worse than the best have no second one (as in successive halving: K. Jamieson, A
 
 import math
 import time
+from collections import deque
 from collections.abc import Callable, Mapping, Sequence
+from concurrent.futures import Future
 from dataclasses import replace
+from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from hysim import metrics
 from hysim._basics.frozen import FloatArray
+from hysim._basics.parallel import awaited, cores, forked
 from hysim._basics.progress import Progress
 from hysim._columns.turning import TOLERANCE
 from hysim.errors import SimulationError
@@ -57,6 +61,7 @@ _CYCLE = 2  # reversals at least before a cut
 _EVALUATIONS = 3000  # of a short search: within some per cent of the complete one's error in a tenth of its time
 _SAMPLES = 3000  # of all records that a short search has, beside their reversals
 _WORSE = 2.0  # times the best of the first round: a family has no second one
+_MOST_PROCESSES = 8  # beyond, the few families of many numbers take as long
 _COMPLETE = 3  # complete searches at most, until one succeeds
 _EQUAL = 1.05  # times the best score: noise of the outputs may hide the difference
 _MOST_TIED = 6
@@ -195,37 +200,47 @@ def of_any_family(
     identify: Identify, records: Sequence[Record], options: Mapping[str, Any], seconds: float, progress: Progress | None
 ) -> Identification:
     """The complete search of the family with the best score, with its `choice`."""
-    begin, trials, subjects = time.process_time(), _Trials(identify, records, options), candidates()
+    trials, subjects = _Trials(identify, records, options), candidates()
     size = max(float(np.ptp(record.y)) for record in records)
-    names = sorted(subjects, key=lambda name: trials.unknowns(subjects[name]))
+    names = sorted(subjects, key=trials.unknowns)
+    number, spent = min(options["workers"] or cores(), _MOST_PROCESSES), 0.0
 
-    def errors_of(every: Sequence[str], which: slice, done: int) -> dict[str, FloatArray]:
-        errors: dict[str, FloatArray] = {}
-        for name in every:
-            if errors and time.process_time() - begin > seconds:
-                break
-            errors[name] = trials.of(subjects[name], which)
-            if progress:
-                progress(done + len(errors), 2 * len(names))
-        return errors
+    def results(of: Callable[[str], Any], every: Sequence[str], seconds: float, done: int) -> dict[str, Any]:
+        """Of the families that are begun within so many seconds; processes are never far ahead of what is known."""
+        nonlocal spent
+        known: dict[str, Any] = {}
+        rest, waiting = deque(every), deque[tuple[str, Future[tuple[Any, float]]]]()
+        while waiting or (rest and (spent < seconds or not known)):
+            is_full = len(waiting) == 2 * number - 1 or bool(waiting and waiting[0][1].done())
+            if rest and not is_full and (spent < seconds or not (known or waiting)):
+                waiting.append((rest[0], pool.submit(_timed, of, rest.popleft())))
+            else:
+                name, future = waiting.popleft()
+                known[name], cpu = awaited(future)
+                spent += cpu
+                if progress:
+                    progress(done + len(known), 2 * len(names))
+        return known
 
-    first = errors_of(names, slice(0, 1), 0)
-    rounds = _scores(first, size)
-    ranked, worst = sorted(rounds, key=lambda name: rounds[name]), _WORSE * min(rounds.values())
-    close = [name for name in ranked if rounds[name] <= worst]
-    second = errors_of(close, slice(None), len(names))
-    if len(second) < len(close):  # not all have had all parts: the errors of the first round are of the same ones
-        errors, compared = first, [*first]
-    else:
-        errors, compared = first | second, close
-    score = _scores(errors, size)
-    ranked = sorted(score, key=lambda name: (name not in compared, score[name]))
-    tied = [name for name in ranked if name in compared and score[name] <= _EQUAL * score[ranked[0]]][:_MOST_TIED]
-    bic = {name: trials.bic(subjects[name]) for name in tied} if len(tied) > 1 else {}
+    with forked(number if number > 1 else 0) as pool:
+        first = results(partial(trials.of, which=slice(0, 1)), names, seconds, 0)
+        rounds = _scores(first, size)
+        ranked, worst = sorted(rounds, key=lambda name: rounds[name]), _WORSE * min(rounds.values())
+        close = [name for name in ranked if rounds[name] <= worst]
+        second = results(partial(trials.of, which=slice(None)), close, seconds, len(names))
+        if len(second) < len(close):  # not all have had all parts: the errors of the first round are of the same ones
+            errors, compared = first, [*first]
+        else:
+            errors, compared = first | second, close
+        score = _scores(errors, size)
+        ranked = sorted(score, key=lambda name: (name not in compared, score[name]))
+        tied = [name for name in ranked if name in compared and score[name] <= _EQUAL * score[ranked[0]]][:_MOST_TIED]
+        bic = results(trials.bic, tied, math.inf, 2 * len(names) - len(tied)) if len(tied) > 1 else {}
     ranked = [*sorted(bic, key=lambda name: bic[name]), *(name for name in ranked if name not in bic)]
-    fits = {}
+    fits: dict[str, Identification] = {}
     for name in ranked[:_COMPLETE]:
-        fits[name] = identify(subjects[name], records, **options)
+        fits[name], cpu = _timed(lambda name: identify(subjects[name], records, **options), name)
+        spent += cpu
         if fits[name].success:
             break
     name = next((name for name, fit in fits.items() if fit.success), ranked[0])
@@ -239,9 +254,15 @@ def of_any_family(
         untried=tuple(each for each in names if each not in errors),
         amplitude=trials.amplitude,
         span=(min(float(each.u.min()) for each in records), max(float(each.u.max()) for each in records)),
-        seconds=time.process_time() - begin,
+        seconds=spent,
     )
     return replace(fits[name], choice=choice)
+
+
+def _timed(of: Callable[[str], Any], name: str) -> tuple[Any, float]:
+    """A result and its seconds of the processor."""
+    begin = time.process_time()
+    return of(name), time.process_time() - begin
 
 
 class _Trials:
@@ -257,8 +278,9 @@ class _Trials:
         self.cuts = [cut for cut in cuts if first[:cut].reversals(TOLERANCE).size >= _CYCLE]
         self.amplitude = max((float(np.ptp(first.u) / np.ptp(first.u[:cut])) for cut in self.cuts), default=math.nan)
 
-    def unknowns(self, subject: Any) -> int:
+    def unknowns(self, name: str) -> int:
         """How many numbers a search moves; families that cannot be searched here come last."""
+        subject: Any = candidates()[name]
         if isinstance(subject, Direct):
             return 0
         try:
@@ -267,8 +289,9 @@ class _Trials:
         except (TypeError, ValueError):
             return _LAST
 
-    def of(self, subject: Any, which: slice) -> FloatArray:
+    def of(self, name: str, which: slice) -> FloatArray:
         """Errors of parts left out, of continuations and beyond; inf where a fit fails, nan without such parts."""
+        subject = candidates()[name]
         for sampled in (self.short, self.whole):  # a family that depends on time needs all samples
             try:
                 return np.array([self._left_out(subject, sampled, which), *self._continued(subject, sampled, which)])
@@ -276,8 +299,9 @@ class _Trials:
                 pass
         return np.full(3, np.inf)
 
-    def bic(self, subject: Any) -> float:
+    def bic(self, name: str) -> float:
         """The BIC of a fit to all samples."""
+        subject = candidates()[name]
         try:
             return float(self._fit(subject, self.short.records, None).bic)
         except (TypeError, ValueError, SimulationError):

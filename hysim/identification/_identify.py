@@ -144,7 +144,7 @@ def identify(
     seed : int
         Seed of the starts and of random draws. The optimum does not depend on it.
     workers : int, optional
-        Number of threads; by default one for each core.
+        Number of threads, or without a model of processes; by default one for each core.
     progress : callable or False, optional
         Called as ``progress(done, total)``; see `hysim.simulate`.
     seconds : float, optional

@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from hysim._basics.frozen import frozen
-from hysim._basics.parallel import awaited, second_process
+from hysim._basics.parallel import awaited, forked
 from hysim.paper.camera import (
     CameraLoop,
     hysteresis_cameras,
@@ -79,7 +79,7 @@ def find(*, quick: bool = False, thorough: bool = False, progress: Progress | No
     """
     say, last = progress or (lambda done, total, what: None), 9
     starts = {} if thorough else stored_starts()
-    with second_process() as beside:
+    with forked(1) as beside:
         laws = {name: beside.submit(bouc_wen, name, quick) for name in ("bouc-wen-asymmetric", "bouc-wen")}
         equations = beside.submit(on_equations, starts)
         say(0, last, "cameras")

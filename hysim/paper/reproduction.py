@@ -17,7 +17,7 @@ import numpy as np
 from hysim._basics.atomic import write_all
 from hysim._basics.blas import one_blas_thread
 from hysim._basics.frozen import frozen
-from hysim._basics.parallel import awaited, second_process
+from hysim._basics.parallel import awaited, forked
 from hysim._basics.printing import csv_text
 from hysim._basics.progress import reports
 from hysim.datasets import table2
@@ -121,7 +121,7 @@ def reproduce(
 
 def contents(computed: Findings) -> dict[str, str]:
     """Every file's text by its name relative to the folder."""
-    with second_process() as beside:
+    with forked(1) as beside:
         of_models = beside.submit(_model_drawings, computed.study)
         drawn = _paper_drawings(computed) | awaited(of_models)
     summary = _summary(computed)
