@@ -14,6 +14,7 @@ from numba.core.caching import CacheImpl, IndexDataCacheFile
 from numba.core.codegen import JITCPUCodegen
 
 from hysim.kernels import _compile
+from hysim.models.compiled_step import compiled_step
 
 compiled = pytest.mark.skipif(bool(numba.config.DISABLE_JIT), reason="nothing is compiled")
 
@@ -31,6 +32,21 @@ def halved(x):
 @signed_kernel(float64(float64))
 def thrice(x):
     return twice(x) + x
+"""
+
+
+LAW = """import hysim as hs
+import numba
+import parts
+from parts import K
+other = numba.njit(parts.f)
+@hs.family
+class Own(hs.Law):
+    gain: float = 1.0
+    z0: float = 0.0
+    @staticmethod
+    def slope(p, z, u, s):
+        return parts.K + K + other(K)
 """
 
 
@@ -152,7 +168,7 @@ def test_code_of_a_wheel_is_used_where_all_agrees(kernels, tmp_path, monkeypatch
         build.setattr(numba.config, "CACHE_LOCATOR_CLASSES", "hysim.kernels._compile.Shipped", raising=False)
         build.setattr(JITCPUCodegen, "magic_tuple", lambda _: (TRIPLE, _compile.SHIPPED_CPU, ""))
         assert hits(kernels()) == [0, 0]
-    _compile._hash_of_sources.cache_clear()
+    _compile.hash_of_sources.cache_clear()
     monkeypatch.setattr(JITCPUCodegen, "magic_tuple", lambda _: machine)
     change(monkeypatch, tmp_path)
     assert hits(kernels()) == [wanted, wanted]
@@ -170,3 +186,23 @@ def test_a_process_that_may_write_no_byte_computes(tmp_path):
     )  # fmt: skip
     assert (done.returncode, done.stdout, done.stderr) == (0, "4.5\n", "")
     assert not [file for file in tmp_path.rglob("*.nb?") if file.stat().st_size]
+
+
+@compiled
+def test_code_of_a_law_follows_what_it_takes_from_other_files(tmp_path, monkeypatch):
+    """Constants, by their name or in their module, and functions; what stays is compiled once."""
+    monkeypatch.setattr(numba.config, "CACHE_DIR", str(tmp_path / "cache"))
+    monkeypatch.setattr(sys, "dont_write_bytecode", True)
+    monkeypatch.syspath_prepend(tmp_path)
+    (tmp_path / "law_of_parts.py").write_text(LAW)
+    values, found = [], []
+    for constant, factor in ((1.0, 1.0), (1.0, 1.0), (2.0, 1.0), (2.0, 3.0)):
+        (tmp_path / "parts.py").write_text(f"K = {constant}\ndef f(x):\n    return {factor} * x\n")
+        for module in ("parts", "law_of_parts"):
+            sys.modules.pop(module, None)
+        importlib.invalidate_caches()
+        law = importlib.import_module("law_of_parts").Own()
+        values.append(law.response([0.0, 1.0])[1])
+        found.append(sum(compiled_step(law.step).stats.cache_hits.values()))
+    assert values == [3.0, 3.0, 6.0, 10.0]
+    assert found == [0, 1, 0, 0]

@@ -9,13 +9,15 @@ infinity): kernels raise nothing, they return codes.
 import contextlib
 import functools
 import hashlib
+import inspect
 import os
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
-from types import SimpleNamespace
+from types import CodeType, FunctionType, ModuleType, SimpleNamespace
 from typing import Any, TypeVar
 
 import numba
+import numpy as np
 from numba.core import cgutils, types
 from numba.core.caching import CompileResultCacheImpl, FunctionCache, InTreeCacheLocator, NullCache
 from numba.core.dispatcher import Dispatcher
@@ -153,7 +155,7 @@ class Shipped(InTreeCacheLocator):
         return str(SHIPPED / Path(self._py_file).relative_to(PACKAGE).parent)
 
     def get_source_stamp(self) -> str:  # of all files: the code of a function contains that of others
-        return _hash_of_sources(PACKAGE)
+        return hash_of_sources(PACKAGE)
 
     @classmethod
     def from_function(cls, py_func: Any, py_file: str) -> Any:
@@ -161,22 +163,52 @@ class Shipped(InTreeCacheLocator):
 
 
 @functools.cache
-def _hash_of_sources(folder: Path) -> str:
+def hash_of_sources(folder: Path) -> str:
     return hashlib.sha256(b"".join(path.read_bytes() for path in sorted(folder.rglob("*.py")))).hexdigest()
+
+
+class _Cache(FunctionCache):
+    """numba's own cache; it stamps code with one file, but the code contains functions and constants of others."""
+
+    def _index_key(self, sig: Any, codegen: Any) -> Any:
+        is_ours = Path(self._py_func.__code__.co_filename).is_relative_to(PACKAGE)
+        others = "" if is_ours else hashlib.sha256("".join(_taken_by(self._py_func, set())).encode()).hexdigest()
+        kernels = [hash_of_sources(PACKAGE / room) for room in ("kernels", "laws")]
+        return (*FunctionCache._index_key(self, sig, codegen), *kernels, others)
+
+
+def _taken_by(function: Any, known: set[Any]) -> Iterator[str]:
+    """What the code of a user's function takes from elsewhere, as texts: constants, and the code of functions."""
+    code, around = function.__code__, inspect.getclosurevars(function)
+    known.add(code)
+    yield f"{code.co_code} {[each for each in code.co_consts if not isinstance(each, CodeType)]}"
+    taken = [*around.nonlocals.values()]
+    if function.__module__.partition(".")[0] not in ("hysim", "numba", "numpy"):  # else it has a version
+        modules = [vars(each) for each in around.globals.values() if isinstance(each, ModuleType)]
+        taken += [*around.globals.values()]
+        taken += [module[name] for module in modules for name in around.unbound & module.keys()]
+    for value in taken:
+        plain = getattr(value, "py_func", value)
+        if isinstance(plain, FunctionType) and plain.__code__ not in known:
+            yield from _taken_by(plain, known)
+        elif isinstance(value, np.ndarray):
+            yield f"{value.dtype} {value.shape} {value.tobytes()!r}"
+        elif isinstance(value, (int, float, complex, str, tuple, np.generic)):
+            yield repr(value)
 
 
 class _ShippedFiles(CompileResultCacheImpl):
     _locator_classes = [Shipped]  # noqa: RUF012
 
 
-class _ShippedCache(FunctionCache):
+class _ShippedCache(_Cache):
     _impl_class = _ShippedFiles
 
     def _index_key(self, sig: Any, codegen: Any) -> Any:
         triple, _, features = codegen.magic_tuple()
         theirs = SimpleNamespace(magic_tuple=lambda: (triple, SHIPPED_CPU, ""))
         # The bits are those of code for this processor: LLVM contracts and reorders nothing.
-        return FunctionCache._index_key(self, sig, theirs) if _V3.issubset(features.split(",")) else None
+        return _Cache._index_key(self, sig, theirs) if _V3.issubset(features.split(",")) else None
 
 
 def _load_shipped(function: Any, *key: Any) -> Any:
@@ -190,7 +222,7 @@ def _cache(function: Any) -> Any:
     # its arguments, as in one process: numba's key has the type of the result where a pointer asks for it, so that
     # another process would compile the function once more for a call.
     try:
-        maker: Any = FunctionCache
+        maker: Any = _Cache
         cache = maker(function)
     except (OSError, RuntimeError):  # numba found no writable folder
         cache = NullCache()
