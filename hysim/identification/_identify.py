@@ -54,6 +54,7 @@ from hysim.models.search_space import Freedom
 from hysim.records import Record, several
 from hysim.simulation import free_run
 
+_APART = 0.01  # of the outputs' range, by which the returned model may differ from what was searched
 _UNUSABLE = 2.0  # times the error along a quiet path: beyond, the noise of the input decides what the model does
 
 
@@ -281,6 +282,11 @@ def _searched(assumed: _Assumed, asked: _Asked) -> Identification:
     problems, problem, seed = assumed.problems, assumed.problems[0], assumed.setting.seed
     n_samples, n_names = problem.n_samples, len(problem.space.names)
     if not n_names:
+        if not assumed.setting.freedom.fixed:
+            family = type(problem.family).__name__
+            raise ValueError(
+                f"{family} says in `searched` no parameter to search: declare it, or give free= and bounds="
+            )
         raise ValueError("every parameter is fixed: leave at least one free")
     if n_samples < n_names:
         raise ValueError(f"{n_names} parameters cannot be estimated from {n_samples} samples; fix some of them")
@@ -441,6 +447,10 @@ def as_measured(fit: Identification, records: Sequence[Record], weights: Weights
     y = np.concatenate([record.y for record in records])
     residual = y - np.concatenate([free_run(model, record).y for model, record in zip(models, records, strict=True)])
     kept = np.ones(y.size, dtype=bool) if weights is None else np.concatenate([*weights]) > 0.0
+    if (off := metrics.rmse(fit.residual[kept], residual[kept])) > _APART * float(np.ptp(y)):
+        said = f"the model's run differs by {off:.3g} rms from what was searched: is the output affine in {{}}?"
+        affine = ", ".join(getattr(models[0], "columns", ())) or "what the search solves for"
+        fit = replace(fit, success=False, warnings=(*fit.warnings, said.format(affine)))
     front = {} if treatment.front is None else {"reversal_filter.threshold": treatment.front.threshold}
     return replace(
         fit,

@@ -13,6 +13,7 @@ from abc import ABC
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import MISSING, Field, dataclass, fields
 from functools import cached_property, lru_cache
+from types import FunctionType
 from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple, Self
 
 import numpy as np
@@ -63,6 +64,10 @@ class Packed(NamedTuple):
 
     parameters: FloatArray
     memory: FloatArray
+
+
+# A field of such a name would be taken for the method by which hysim knows another kind of model.
+_ASKED_FOR = ("as_records", "at", "at_sample_time", "candidates", "dynamic", "fitted", "law", "with_unit_gain")
 
 
 class Stepping(NamedTuple):
@@ -133,7 +138,7 @@ class Law(Placed, Subject, ABC):
         `before`; by default a workspace is made anew by the start.
     """
 
-    step: ClassVar[Any]
+    step: ClassVar[Any] = None
     longest: ClassVar[Any] = None
     flow: ClassVar[Any] = None
     flows: ClassVar[Any] = None
@@ -156,6 +161,12 @@ class Law(Placed, Subject, ABC):
 
     def __init_subclass__(cls) -> None:
         super().__init_subclass__()
+        own = {name for name, kind in inspect.get_annotations(cls).items() if "ClassVar" not in str(kind)}
+        taken = sorted(name for name in own if name in _ASKED_FOR or hasattr(Law, name))
+        if taken and cls.__module__.partition(".")[0] != "hysim":
+            raise TypeError(f"{cls.__name__} has a field {taken[0]!r}, a name that hysim uses itself: take another one")
+        if isinstance(vars(cls).get("slope"), FunctionType):
+            raise TypeError(f"the slope of {cls.__name__} must be a plain function, under staticmethod and def")
         says = cls.hidden_states > 0 or isinstance(vars(cls).get("slope"), staticmethod)  # and no number of this name
         if says and (inspect.get_annotations(cls) or not vars(cls).keys().isdisjoint(HOOKS)):
             cls.hidden_states = states_of(cls)
@@ -172,6 +183,8 @@ class Law(Placed, Subject, ABC):
     @classmethod
     def pack(cls, tables: Tables) -> Packed:
         """Laws as the step takes them: by default the fields one after the other, and the initial memory."""
+        if missing := [name for name in cls.initial if name not in tables]:
+            raise TypeError(f"{cls.__name__} has no field {missing[0]!r}: declare it, with @hs.family above the class")
         own = sum(tables[name].shape[1] for name in cls.initial)
         memory = cls.initial_memory(tables, further=max(cls.further_memory, cls.hidden_states - own))
         constants = [tables[name] for name in cls.step_fields or tables if name not in cls.initial]
@@ -206,7 +219,7 @@ class Law(Placed, Subject, ABC):
 
     def divergence(self, sample: int, u: float, y: float) -> str:
         """Message for an output that is not finite at a sample."""
-        what = "cannot be computed (the law is too stiff)" if np.isnan(y) else "diverges"
+        what = "cannot be computed (the law is too stiff, or its slope is no number)" if np.isnan(y) else "diverges"
         return f"the output {what} at sample {sample} (u = {u:g})"
 
     # ------------------------------------------------------------------------------ simulation

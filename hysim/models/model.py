@@ -60,6 +60,8 @@ class _Short(Protocol):
 @dataclass_transform(kw_only_default=True, frozen_default=True, field_specifiers=(field,))
 def family(cls: type[T]) -> type[T]:
     """Make `cls` a frozen model, and enter it into the registry of families under its name."""
+    if cls.__name__ in MODULE_OF and cls.__module__.partition(".")[0] != "hysim":
+        raise TypeError(f"{cls.__name__} is a name of hysim, by which its files are read: take another one")
     specification = checked(cls)
     specification.__str__ = _in_words  # type: ignore[method-assign]
     FAMILIES[cls.__name__] = specification

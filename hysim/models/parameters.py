@@ -13,6 +13,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from hysim._basics.frozen import FloatArray
+from hysim._basics.names import meant
 from hysim.models.search_space import Freedom, SearchSpace
 from hysim.models.tables import scalars_of
 from hysim.records import Record, span_of
@@ -87,7 +88,9 @@ class Coordinate(NamedTuple):
         lower, upper = limits.get(self.name, (self.lower, self.upper))
         positive = " positive and" if self.log else ""
         if not (lower < upper and np.isfinite([lower, upper]).all()) or (self.log and not lower > 0.0):
-            raise ValueError(f"bounds of {self.name!r} must be{positive} finite, got {(lower, upper)}")
+            raise ValueError(
+                f"bounds of {self.name!r} must be{positive} finite and lower < upper, got {(lower, upper)}"
+            )
         return self._replace(lower=lower, upper=upper)
 
 
@@ -113,6 +116,11 @@ def declared_space(
     starts = law.starts if starts is None else starts
     units, first = units or spans(record), float(record.u[0])
     declared = {parameter.name: parameter for parameter in parameters}
+    if unknown := declared.keys() - {name.partition("[")[0] for name in scalars}:
+        first_one = sorted(unknown)[0]
+        raise TypeError(
+            f"`searched` of {type(law).__name__} has {first_one!r}, which is no field{meant(first_one, scalars)}"
+        )
     of = {name: declared.get(name.partition("[")[0]) for name in scalars}
     resting = tuple(name for name in scalars if name.partition("[")[0] in law.initial)
     bounded = {name for name, each in of.items() if each is None and name in {*freedom.free, *freedom.bounds}}

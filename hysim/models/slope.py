@@ -39,7 +39,6 @@ if flows(parameters):
 
 
 HOOKS = ("slope", "output", "longest", "flows", "flow")
-_RESERVED = (*HOOKS, "step", "workspace", "tolerance", "hidden_states")
 
 
 def constants_of(cls: Any) -> dict[str, bool]:
@@ -56,8 +55,8 @@ def constants_of(cls: Any) -> dict[str, bool]:
         for name, kind in annotations.items()
         if "ClassVar" not in str(kind) and name not in kept
     }
-    if taken := [name for name in fields if name in _RESERVED]:
-        raise TypeError(f"{cls.__name__} has a field {taken[0]!r}, which is a name of the law by a slope itself")
+    if "slope" in fields:
+        raise TypeError(f"{cls.__name__} has a field 'slope', which is the name of its function: take another one")
     if early := [name for name in [*fields][:-1] if fields[name]]:
         raise TypeError(
             f"{early[0]!r} of {cls.__name__} is a tuple: it must be the last field apart from the initial memory"

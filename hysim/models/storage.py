@@ -58,6 +58,8 @@ def to_json(model: Any, *, units: Mapping[str, str] | None = None) -> str:
     model = model_of(model)
     if not is_model(model):
         advice = ": hs.save_record(record, path) writes a record" if isinstance(model, _InputOutput) else ""
+        if type(model).__name__ in FAMILIES:
+            advice = ", of a class that was defined anew since: make the model again"
         raise TypeError(f"save takes a model of hysim, got {type(model).__name__}{advice}")
     document = {"hysim": __version__, **to_document(model), "units": dict(units or {})}
     _check_depth(document)

@@ -100,7 +100,7 @@ def tables_of(
 
 def table_of_one(value: Any) -> FloatArray:
     """A number (1, 1), or a field with axes of its own after one of length 1."""
-    return np.array([[value]]) if isinstance(value, float) else np.array([value], dtype=float)
+    return np.array([[value]]) if isinstance(value, (int, float)) else np.array([value], dtype=float)
 
 
 def _table(name: str, values: Any, ndim: int) -> FloatArray:

@@ -27,6 +27,7 @@ import numpy as np
 from hysim._basics.blas import one_blas_thread
 from hysim._basics.frozen import FloatArray, check_choice, check_count, frozen
 from hysim._basics.libraries import optional
+from hysim._basics.names import among
 from hysim._basics.printing import aligned, frozen_result, listed, summary_text
 from hysim._basics.progress import Reports, reports
 from hysim.identification import Identification, identify
@@ -403,6 +404,10 @@ def compare_evidence(
     records = several(record_or_records, "compare_evidence")
     if not models:
         raise ValueError("compare_evidence takes at least one model: {name: model}")
+    if unknown := [name for name in priors or {} if name not in models]:
+        raise ValueError(
+            f"priors are for {unknown[0]!r}, which is no model here: there are {among(unknown[0], models)}"
+        )
     fits = {name: _fitted(model, records, noise, initial) for name, model in models.items()}
     evidence = partial(log_evidence, noise=noise, initial=initial, method=method, live_points=live_points, seed=seed)
     rows = list[EvidenceRow]()
