@@ -42,12 +42,17 @@ def warn_unsafe(thing: Any) -> None:
         warnings.warn(thing.unsafe, HysimWarning, stacklevel=3)
 
 
-def warn_limited(limited: int, samples: int, *, may_invert: bool) -> None:
-    """Warn if a command stands at a limit for more than 5 % of its samples, maybe of a law that `may_invert`."""
+def warn_limited(limited: int, samples: int, *, may_invert: bool, jumps: int = 0) -> None:
+    """Warn if a command stands at a limit for more than 5 % of its samples, maybe of a law that `may_invert`.
+
+    `jumps` are those from one limit to the other, between two samples.
+    """
     if limited > _LIMITED * samples:
         at_limit = f"the command is at a limit of the controller or the amplifier in {limited} of {samples} samples"
         turns = ", or the slope of an inverted law changes its sign before, which inverse_response names"
         reason = f"the reference is out of reach there{turns if may_invert else ''}"
+        if jumps > _LIMITED * samples:
+            reason = "it jumps from one to the other, as an unstable loop does: hs.control.assess_loop says so"
         warnings.warn(f"{at_limit}: {reason}", HysimWarning, stacklevel=_CLOSED)
 
 

@@ -14,6 +14,7 @@ from fading_dahl import FadingDahl
 from scipy.integrate import solve_ivp
 from square_dahl import SquareDahl
 from strategies import assert_cut_or_stepped_it_has_the_same_bits, needs_compiler, printed_by_main
+from strategies import refused as refused_with
 
 import hysim as hs
 
@@ -210,3 +211,63 @@ def test_a_law_that_cannot_be_meant_is_refused_where_it_is_defined(names, messag
     functions = {name: kind for name, kind in names.items() if name == "output"}
     with pytest.raises(TypeError, match=message):
         type("Wrong", (hs.Law,), {"__annotations__": fields, "slope": staticmethod(refused), **functions})
+
+
+def line(p, z, u, s):
+    return p.gain - s * z / p.gain
+
+
+LINE = staticmethod(line)
+
+
+def own(name="Own", slope=LINE, *, entered=True, searched=(), **numbers):
+    names = {"__annotations__": dict.fromkeys(numbers, float), "slope": slope, "searched": searched, **numbers}
+    cls = type(name, (hs.Law,), names)
+    return hs.family(cls) if entered else cls
+
+
+RECORD = hs.Record(u=U, y=hs.Dahl().response(U))
+
+test_a_family_with_an_error_is_refused_by_its_cause = refused_with(
+    (lambda: own(gain=1.0, at=0.2, z0=0.0), "Own has a field 'at', a name that hysim uses itself"),
+    (lambda: own(gain=1.0, memory=0.2, z0=0.0), "Own has a field 'memory'"),
+    (lambda: own("Dahl", gain=1.0, z0=0.0), "Dahl is a name of hysim"),
+    (lambda: own(gain=1.0, slope=line, z0=0.0), "must be a plain function, under staticmethod"),
+    (lambda: own(gain=1.0)().response([0.0, 1.0]), "Own has no field 'z0'"),
+    (lambda: own(gain=1.0, z0=0.0, entered=False)().response([0.0, 1.0]), "@hs.family above the class"),
+    (
+        lambda: hs.identify(own(gain=1.0, z0=0.0, searched=(hs.Parameter("gian", 0.1, 9.0),)), RECORD),
+        "no field; did you mean 'gain'",
+    ),
+    (lambda: hs.family(type("Bare", (hs.Law,), {}))().response([0.0, 1.0]), "Bare has no field 'z0'"),
+    error=TypeError,
+)
+
+test_a_search_of_nothing_and_a_slope_that_is_no_number_are_refused = refused_with(
+    (lambda: hs.identify(own(gain=1.0, z0=0.0), RECORD), "Own says in `searched` no parameter to search"),
+    (lambda: own(gain=1.0, z0=0.0)(gain=0.0).response([0.0, 1.0]), hs.SimulationError, "or its slope is no number"),
+)
+
+
+def test_a_whole_number_is_a_number():
+    assert own(gain=2, z0=0.0)().response([0.0, 0.1])[1] == own(gain=2.0, z0=0.0)().response([0.0, 0.1])[1]
+
+
+def stiff(p, z, u, s):
+    return p.gain * (1.0 - s * z / p.limit)
+
+
+def test_an_output_that_is_not_affine_as_said_is_no_success():
+    searched = hs.Parameter("gain", affine=True), hs.Parameter("limit", 0.05, 10.0, log=True)
+    family = own(gain=1.0, limit=0.5, z0=0.0, slope=staticmethod(stiff), searched=searched)
+    y = family(gain=3.0).response(U) + 2e-3 * np.random.default_rng(0).normal(size=U.size)
+    fit = hs.identify(family, hs.Record(u=U, y=y))
+    assert not fit.success
+    assert any("is the output affine as `searched` says?" in each for each in fit.warnings)
+
+
+def test_a_model_of_a_class_that_is_defined_anew_says_so():
+    before = own(gain=1.0, z0=0.0)()
+    own(gain=1.0, z0=0.0)
+    with pytest.raises(TypeError, match="of a class that was defined anew"):
+        hs.save(before, "own.json")

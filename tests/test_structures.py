@@ -386,7 +386,7 @@ test_errors_of_elements = refused(
     ({"law": hs.Dahl(), "between": (0, 0.5)}, TypeError, "between must be a whole number"),
     ({"law": hs.Dahl(), "direction": (0.0, 0.0)}, "direction must not be zero"),
     ({"law": hs.mode(1.0, 0.1), "between": (0, 1)}, TypeError, "takes friction and dashpots only"),
-    ({"law": hs.Dahl, "between": (0, 1)}, TypeError, "an element takes a law"),
+    ({"law": hs.Dahl, "between": (0, 1)}, TypeError, "got the class Dahl"),
     ({"law": hs.SingleValued(u=[0.0, 1.0], y=[0.0, 1.0]), "between": (0, 1)}, TypeError, "that can be stepped"),
     (
         {"law": hs.RateDependentPrandtlIshlinskii(thresholds=(0.1,), weights=(1.0,)), "between": (0, 1)},

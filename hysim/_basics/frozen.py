@@ -291,6 +291,8 @@ def _as_mapping(values: Mapping[Any, Any], name: str) -> Mapping[Any, Any]:
 
 
 def _as_parts(value: Any, name: str) -> Any:
+    if isinstance(value, type):  # of a structure, whose models are made of it
+        return value
     return type(value)(map(model_of, value)) if type(value) in (list, tuple) else model_of(value)
 
 

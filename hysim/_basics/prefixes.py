@@ -23,7 +23,14 @@ def power_of_ten(old: str, new: str) -> int:
 
 
 def prefixed(unit: str) -> tuple[int, str]:
-    """The power of a unit's prefix, and its base: m is a metre, mm a thousandth of it; ValueError if it is unknown."""
+    """The power of a unit's prefix, and its base: m is a metre, mm a thousandth of it; ValueError if it is unknown.
+
+    Of a quotient, such as mm/s^2, the prefix above counts.
+    """
+    if "/" in unit:
+        above, slash, below = unit.partition("/")
+        power, base = prefixed(above)
+        return power, base + slash + below
     for prefix, power in _POWERS.items():
         if unit.startswith(prefix) and unit[len(prefix) :] in _BASES:
             return power, unit[len(prefix) :]

@@ -14,7 +14,9 @@ class Result(Protocol):
 
 
 def model_of(thing: Any) -> Any:
-    """The model of a result, or a value that is no result as it is; ValueError if a result has no model."""
+    """The model of a result, or another value as it is; ValueError if a result has no model, TypeError for a class."""
+    if isinstance(thing, type):
+        raise TypeError(f"an instance is expected, got the class {thing.__name__}: give it its parameters first")
     if not isinstance(thing, Result):
         return thing
     if thing.model is None:

@@ -193,7 +193,9 @@ def close_loop(
         raise ValueError(f"only a Structure stands on the ground, got {type(plant).__name__} and ground_acceleration")
     run = around(RestingPlant(actuator, h, u0, substeps), controller, times, r, units, progress)
     warn_beyond(actuator.u_range, run.u, type(actuator.hysteresis).__name__)
-    warn_limited(run.conditions["limited_samples"], run.u.size, may_invert=not isinstance(controller, PID))
+    jumps = int(np.count_nonzero(np.abs(np.diff(run.drive)) >= np.ptp(run.drive)))
+    limited = run.conditions["limited_samples"]
+    warn_limited(limited, run.u.size, may_invert=not isinstance(controller, PID), jumps=jumps)
     return run
 
 
@@ -206,7 +208,7 @@ def around(
     progress: Reports = None,
 ) -> ClosedLoop:
     """The loop around a plant, without the warnings of `close_loop`: measures of loops print what these say."""
-    if not is_controller(controller):
+    if not is_controller(model_of(controller)):
         raise TypeError(f"controller must be a PID or the like, got {type(controller).__name__}")
     chain, h = resting.chain, resting.sample_time
     signals = resting.run(controller, r, progress, float(times[0]))

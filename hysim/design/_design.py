@@ -505,7 +505,7 @@ def _highest_frequency(requested: float | None, values: Mapping[str, float], lim
 def _subject(
     plant: Any, limits: InputLimits, free: Sequence[str] | None, values: Mapping[str, float] | None, noise: float | None
 ) -> Subject:
-    if not isinstance(plant, Law | ActuatorStructure):
+    if not isinstance(model_of(plant), Law | ActuatorStructure):
         raise TypeError(
             f"design_input takes a law that a step describes, such as BoucWen, or an Actuator.structure, "
             f"got {type(plant).__name__}"

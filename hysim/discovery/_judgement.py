@@ -66,6 +66,7 @@ SEVERAL = 1.5
 """Rates whose ratio is smaller count as one."""
 
 _EDGES = np.linspace(0.05, 0.95, 10)  # of the bands, in spans of the input
+_ROUNDING = 1e-12  # of the outputs' range: smaller errors are those of the arithmetic
 _TAILS = (0.05, 0.95)
 _AMPLITUDES = (0.25, 0.5, 0.75, 1.0)
 _CYCLES = 10
@@ -407,7 +408,7 @@ def judge(records: Sequence[Record], laws: Sequence[Law], refit: Refit, others: 
         verdict=verdict if stable or verdict == HYSTERESIS else NO_STRUCTURE,
         rival=None if linear is None else linear.plants[longest],
         rival_offset=math.nan if linear is None else linear.offset,
-        held_out=trial.errors,
+        held_out={name: 0.0 if error < _ROUNDING * np.ptp(y) else error for name, error in trial.errors.items()},
         held_out_by=trial.by,
         rates=np.array(RATES),
         widths={"law": (width,) * len(RATES), "rival": of_rival},

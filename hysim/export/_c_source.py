@@ -115,6 +115,8 @@ def to_c(
     warn_unsafe(thing)
     thing = model_of(thing)
     program = program_of(thing, sample_time, u0=u0, y0=y0)
+    if u0 is not None and program.inputs == ("u",):
+        raise ValueError(f"a {type(thing).__name__} begins at the u0 of its law: u0 is for controllers and inverses")
     texts = _texts(program, name, type(thing).__name__, *start_of(thing, sample_time or math.inf, u0, y0))
     templates = (Template((_FOLDER / file).read_text(encoding="utf-8")) for file in ("model.h", "model.c", "main.c"))
     header, source, main = (template.substitute(texts) for template in templates)

@@ -129,6 +129,8 @@ def to_fmu(
     labels = dict(units or {})
     if not all(isinstance(text, str) for pair in labels.items() for text in pair):
         raise TypeError(f"units must be labels by the names u, y and t, got {units!r}")
+    if labels.get("t", "s") != "s":
+        raise ValueError(f"the time of a unit is in s, got {labels['t']}: identify the model on records in s")
     name = type(thing).__name__ if name is None else name
     if not re.fullmatch("[A-Za-z_][A-Za-z0-9_]*", name):
         raise ValueError(f"name must be letters, digits and underscores after a letter, got {name!r}")

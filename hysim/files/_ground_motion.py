@@ -186,6 +186,8 @@ def load_ground_motion(
     >>> t.tolist(), acceleration.round(6).tolist()
     ([0.0, 0.005, 0.01], [0.0, 0.980665, -1.96133])
     """
+    if units is not None and not isinstance(units, str):
+        raise TypeError(f'units is that of the accelerations, such as "g", got {units!r}')
     if units is not None and _name(units) is None:
         raise ValueError(f"units must be a unit of acceleration: {_KNOWN}, got {units!r}")
     is_step = sample_time is None or 0.0 < sample_time < np.inf

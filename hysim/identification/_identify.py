@@ -185,7 +185,7 @@ def identify(
         return of_any_family(identify, several(model_or_class, "identify"), ways, seconds, progress or None)
     if isinstance(model_or_class, str):
         model_or_class = family_named(model_or_class)
-    model_or_class = model_of(model_or_class)
+    model_or_class = model_or_class if isinstance(model_or_class, type) else model_of(model_or_class)
     if isinstance(model_or_class, Recorded):
         record_or_records = model_or_class.as_records(record_or_records)
     records: Sequence[Record] = several(record_or_records, "identify")
@@ -448,9 +448,8 @@ def as_measured(fit: Identification, records: Sequence[Record], weights: Weights
     residual = y - np.concatenate([free_run(model, record).y for model, record in zip(models, records, strict=True)])
     kept = np.ones(y.size, dtype=bool) if weights is None else np.concatenate([*weights]) > 0.0
     if (off := metrics.rmse(fit.residual[kept], residual[kept])) > _APART * float(np.ptp(y)):
-        said = f"the model's run differs by {off:.3g} rms from what was searched: is the output affine in {{}}?"
-        affine = ", ".join(getattr(models[0], "columns", ())) or "what the search solves for"
-        fit = replace(fit, success=False, warnings=(*fit.warnings, said.format(affine)))
+        said = f"the model's run is {off:.3g} rms off what was searched: is the output affine as `searched` says?"
+        fit = replace(fit, success=False, warnings=(*fit.warnings, said))
     front = {} if treatment.front is None else {"reversal_filter.threshold": treatment.front.threshold}
     return replace(
         fit,

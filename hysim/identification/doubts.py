@@ -72,12 +72,15 @@ def odd_residuals(problem: Problem, residual: FloatArray) -> list[str]:
         return []
     told = [f'sample {k} alone makes most of the residual: leave it out by weights=, or take noise="robust"']
     told = told if n > _FEW and abs(counted[k]) > _ALONE * math.sqrt(n) * rms else []
+    held = ", or holds within bounds" if "offset" in problem.space.bounds else ""
     for place, (record, own) in enumerate(problem.pieces):
         n_sensors = len(record) // samples_of_sensor(record)
         for sensor, part in enumerate(np.split(counted[own], n_sensors)):
             if part.size > _FEW and abs(part.mean()) > _ALONE * max(float(np.sqrt(np.mean(part**2))), rms):
                 of = f" of sensor {sensor}" * (n_sensors > 1) + f" of record {place}" * several
-                told.append(f"the residual{of} is mostly its mean {part.mean():.3g}: an offset that the model lacks")
+                told.append(
+                    f"the residual{of} is mostly its mean {part.mean():.3g}: an offset that the model lacks{held}"
+                )
     return told
 
 

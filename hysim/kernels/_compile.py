@@ -188,7 +188,7 @@ def _taken_by(function: Any, known: set[Any]) -> Iterator[str]:
         taken += [*around.globals.values()]
         taken += [module[name] for module in modules for name in around.unbound & module.keys()]
     for value in taken:
-        plain = getattr(value, "py_func", value)
+        plain = value.py_func if isinstance(value, Dispatcher) else value
         if isinstance(plain, FunctionType) and plain.__code__ not in known:
             yield from _taken_by(plain, known)
         elif isinstance(value, np.ndarray):
@@ -202,7 +202,7 @@ class _ShippedFiles(CompileResultCacheImpl):
 
 
 class _ShippedCache(_Cache):
-    _impl_class = _ShippedFiles
+    _impl_class = _ShippedFiles  # type: ignore[assignment]
 
     def _index_key(self, sig: Any, codegen: Any) -> Any:
         triple, _, features = codegen.magic_tuple()

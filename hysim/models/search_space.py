@@ -185,6 +185,8 @@ class Freedom:
     def limits(self, defaults: Mapping[str, float], held: Mapping[str, float]) -> dict[str, tuple[float, float]]:
         """The bounds as floats; ValueError if a name is unknown or held, or a lower bound is not below the upper."""
         for name, pair in self.bounds.items():
+            if name in self.fixed:
+                raise ValueError(f"{name!r} is fixed, and has bounds: give one of both")
             if name not in defaults or name in held:
                 raise ValueError(f"bounds name {name!r}, which is not free; the parameters are {among(name, defaults)}")
             if len(pair) != 2 or not pair[0] < pair[1]:

@@ -24,6 +24,7 @@ from hysim.records import Record
 
 def is_law(value: Any) -> bool:
     """Whether a value has a response and can be stepped in a loop, at a sample time if it needs one."""
+    value = model_of(value)
     steps = isinstance(value, roles.Responding) and isinstance(value, roles.Steppable)
     return steps and (not needs_time(value) or isinstance(value, roles.Sampled))
 

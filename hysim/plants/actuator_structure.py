@@ -283,7 +283,7 @@ class ActuatorStructure(Subject):
         quantum = 0.0 if self.sensor is None else self.sensor.quantum
         if quantum:
             records = [replace(each, resolution=quantum) if each.resolution is None else each for each in records]
-        bank = linear_parts.creep_bank(self.creep, survey.shortest, survey.longest)
+        bank = linear_parts.creep_bank(self.creep, survey)
         idle = {f"creep.weights[{k}]": 0.0 for k in bank.idle} if isinstance(bank, CreepBank) else {}
         idle = {name: value for name, value in idle.items() if name not in {*freedom.free, *freedom.bounds}}
         remarks = (bank.remark,) if isinstance(bank, CreepBank) and idle else ()
@@ -405,7 +405,8 @@ class ActuatorStructure(Subject):
         box = {each.name: each for each in self.parts([]).boxes()["vibration"][0]}[f"{FREQUENCY}[{k}]"]
         low, high = box.lower / (2.0 * math.pi), box.upper / (2.0 * math.pi)
         which = "mode" if not k else "further mode"
-        remark = f"the records show no {which} between {low:.3g} and {high:.3g} Hz: it is left out"
+        unit = self.survey.rate_unit
+        remark = f"the records show no {which} between {low:.3g} and {high:.3g} {unit}: it is left out"
         known = {name: value for name, value in self.known.items() if name not in mine}
         return self._remarked(remark, modes=k, known=known), remark
 
@@ -433,7 +434,7 @@ class ActuatorStructure(Subject):
             return Doubt(name, max(_WEIGHT, abs(value)), without)
         if name == "vibration.delay":
             largest = max(_SAMPLES * self.survey.shortest, value)
-            return Doubt(name, largest, self._held(name, 0.0, "a delay from a mode", " s"))
+            return Doubt(name, largest, self._held(name, 0.0, "a delay from a mode", f" {self.survey.unit}"))
         if name == "amplifier.time_constant":
             remark = "the records do not show the time constant of the amplifier: it is left out"
             return Doubt(name, value, self._remarked(remark, amplifier=None))
@@ -457,7 +458,7 @@ class ActuatorStructure(Subject):
         survey = self.survey if self.survey is not None or not records else Survey.of(records)
         bank: Any = self.creep
         if survey is not None:
-            bank = linear_parts.creep_bank(bank, survey.shortest, survey.longest)
+            bank = linear_parts.creep_bank(bank, survey)
         gains = not isinstance(self.law, ModalGains)
         return LinearParts(self.amplifier, bank, self.modes, self.delay, survey, self.inputs, gains)
 

@@ -96,10 +96,15 @@ class CreepBank:
         return f"the records are too short or too coarse for creep at {times} s: its weights are held at 0"
 
 
-def creep_bank(creep: Any, shortest: float, longest: float) -> CreepBank | Creep | None:
-    """The bank for records with a `shortest` sample time and a `longest` duration [s], or a creep that is known."""
+def creep_bank(creep: Any, survey: "Survey") -> CreepBank | Creep | None:
+    """The bank for these records, or a creep that is known; ValueError where times are not in s, as the bank's are."""
+    shortest, longest = survey.shortest, survey.longest
     if creep is False or creep is None or isinstance(creep, Creep):
         return creep or None
+    if survey.unit != "s" and isinstance(creep, int):
+        raise ValueError(
+            f'creep is searched on times in s, and these are in {survey.unit}: take record.convert({{"t": "s"}})'
+        )
     if creep is True:
         bank = Creep.per_decade(1.0, band=(_BAND[0], max(_BAND[1], longest)))
         return CreepBank(bank.time_constants, bank.weights)
@@ -128,7 +133,7 @@ def checked_creep(creep: Any) -> Any:
 
 @dataclass(frozen=True)
 class Survey:
-    """Rates of several records; times in seconds.
+    """Rates of several records, times in the unit of theirs, seconds if they have none.
 
     `law` is the record on which the law is searched: the slowest among those of a wide input. `fastest` is that of the
     shortest sample time, among equal ones that of the fastest input. `duration` is its duration.
@@ -139,6 +144,12 @@ class Survey:
     shortest: float
     longest: float
     duration: float
+    unit: str = "s"
+
+    @property
+    def rate_unit(self) -> str:
+        """The unit of cycles over time."""
+        return "Hz" if self.unit == "s" else f"cycles/{self.unit}"
 
     @property
     def nyquist(self) -> float:
@@ -161,6 +172,7 @@ class Survey:
             shortest=min(steps),
             longest=max(durations),
             duration=durations[fastest],
+            unit=records[0].units.get("t") or "s",
         )
 
 
@@ -284,10 +296,11 @@ class LinearParts:
             name = f"vibration.{FREQUENCY}[{k}]"
             wanted = [freedom.fixed[name]] if name in freedom.fixed else [*freedom.bounds.get(name, ())][1:]
             if wanted and wanted[0] > self.survey.nyquist:
-                hertz = 2.0 * math.pi
+                survey = self.survey
+                asked, most = (f"{w / (2.0 * math.pi):.4g} {survey.rate_unit}" for w in (wanted[0], survey.nyquist))
                 raise ValueError(
-                    f"{name} = {wanted[0]:g} rad/s ({wanted[0] / hertz:.4g} Hz) is beyond half the highest sampling "
-                    f"rate, {self.survey.nyquist / hertz:.4g} Hz: samples look the same as for a mode below it"
+                    f"{name} = {wanted[0]:g} rad/{survey.unit} ({asked}) is beyond half the highest sampling rate, "
+                    f"{most}: samples look the same as for a mode below it"
                 )
         if min((freedom.fixed.get("vibration.delay", 0.0), *freedom.bounds.get("vibration.delay", (0.0,)))) < 0.0:
             raise ValueError("vibration.delay must not be negative")

@@ -7,7 +7,7 @@ import numpy as np
 from matplotlib.axes import Axes
 
 from hysim._basics.frozen import FloatArray, check_choice
-from hysim._basics.prefixes import in_unit, label
+from hysim._basics.prefixes import in_unit, label, printed
 from hysim._basics.results import model_of
 from hysim.control import ClosedLoop
 from hysim.models.protocols import Responding
@@ -85,10 +85,14 @@ def drawable(results: Sequence[Any], verb: str) -> tuple[Any, ...]:
 
 
 def units_of(*results: Any) -> dict[str, str]:
-    """The units of all results; where they differ, those of the first one."""
+    """The units of all results; ValueError where two have the same signal in different ones."""
     units: dict[str, str] = {}
     for result in results:
-        units = (dict(result.units) if isinstance(result, _WithUnits) else {}) | units
+        own = dict(result.units) if isinstance(result, _WithUnits) else {}
+        if other := [name for name in own.keys() & units.keys() if printed(own[name]) != printed(units[name])]:
+            pair = f"{units[other[0]]} and {own[other[0]]}"
+            raise ValueError(f"one axis cannot show {other[0]} in {pair}: convert a record, as by record.convert")
+        units = own | units
     return units
 
 

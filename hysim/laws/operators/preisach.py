@@ -190,8 +190,9 @@ class Preisach(RelayLaw):
             Levels of the law [unit of u]; by default the turning points and all inputs of the curves, or, if these are
             more than 100, the turning points and about 100 even steps between them.
         smoothing : float or "auto", optional
-            By default the law meets every sample. With a number the curves are those of a local regression, and their
-            drift is subtracted, as in `hysim.forc`; ``"auto"`` takes the number that predicts left-out curves best.
+            By default the law meets the samples at its levels on the way back. With a number the curves are those of a
+            local regression, and their drift is subtracted, as in `hysim.forc`; ``"auto"`` takes the number that
+            predicts left-out curves best.
         tolerance : float
             Retreats of the input up to this fraction of its span are ignored: noise.
 

@@ -6,7 +6,7 @@ from typing import Any, Literal, get_args
 import numpy as np
 import numpy.typing as npt
 
-from hysim._basics.frozen import FloatArray, read_only
+from hysim._basics.frozen import FloatArray, check_not_negative, check_positive, read_only
 from hysim.kernels.structure_ensembles import Results, Sets, follow_each
 from hysim.kernels.structure_layout import Plant, Steps
 from hysim.models.compiled_step import compiled_start, compiled_step
@@ -115,6 +115,11 @@ def _tabled(law: Law, varied: Mapping[str, FloatArray]) -> tuple[Startable, Floa
 def _matrices(structure: Any, numbers: Mapping[str, FloatArray], slopes: FloatArray, n_sets: int) -> assembly.Matrices:
     """Linear parts of structures whose laws have these elastic slopes (n_sets, n_elements)."""
     one, rows, damping = np.eye(structure.n_nodes), structure.drift_matrix, structure.damping
+
+    if (masses := numbers.get("mass")) is not None:
+        check_positive(mass=float(masses.min()))
+    if (dampings := numbers.get("damping")) is not None:
+        check_not_negative(damping=float(dampings.min()))
 
     def scaled(name: str, value: FloatArray, matrix: FloatArray) -> FloatArray:
         numbers_of = numbers.get(name)

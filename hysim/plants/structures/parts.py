@@ -18,6 +18,7 @@ from typing import Any, NamedTuple, Self
 import numpy as np
 
 from hysim._basics.frozen import FloatArray, check_not_negative, check_positive, check_whole, read_only
+from hysim._basics.results import model_of
 from hysim.errors import SimulationError
 from hysim.laws.dashpot import Dashpot
 from hysim.laws.static import Line
@@ -72,9 +73,8 @@ class Element:
     direction: tuple[float, ...] = ()
 
     def __post_init__(self) -> None:
-        if not isinstance(self.law, Stepwise) or isinstance(self.law, type):
-            name = self.law.__name__ if isinstance(self.law, type) else type(self.law).__name__
-            raise TypeError(f"an element takes a law that can be stepped, got {name}")
+        if not isinstance(model_of(self.law), Stepwise):
+            raise TypeError(f"an element takes a law that can be stepped, got {type(self.law).__name__}")
         if isinstance(self.law, Sampled):
             raise TypeError(f"an element's law must not depend on the sample time, got {type(self.law).__name__}")
         parted(self.law)
