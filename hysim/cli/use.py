@@ -163,7 +163,7 @@ def c(
     out : the source; the other files stand beside it
     inverse : the inverse of the law: the input that gives a wanted output
     sample_time : time between two samples of a plant, or of a law that depends on time [s]
-    u0 : input at which it starts (default: where the law in the file stands) [unit of u]
+    u0 : with --inverse, input at which it starts (default: where the law in the file stands) [unit of u]
 
     Examples
     --------

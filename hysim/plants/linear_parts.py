@@ -133,7 +133,7 @@ def checked_creep(creep: Any) -> Any:
 
 @dataclass(frozen=True)
 class Survey:
-    """Rates of several records, times in the unit of theirs, seconds if they have none.
+    """Rates of several records, times in the unit of theirs, in seconds without one.
 
     `law` is the record on which the law is searched: the slowest among those of a wide input. `fastest` is that of the
     shortest sample time, among equal ones that of the fastest input. `duration` is its duration.
