@@ -125,9 +125,12 @@ def _jump(reference: Reference, view: _View) -> FloatArray:
         raise ImportError("measuring displacements needs scikit-image: pip install 'hysim[vision]'") from None
     grid = reference.grid
     scale = np.divide(grid.shape, grid.small)
+    thumbnails = [view.template.thumbnail.copy(), grid.thumbnail(view.spectrum)]
+    for one in thumbnails:  # scikit-image takes the largest size: this constant leaves no correlation negative
+        one[0, 0] = np.linalg.norm(one)
+        one /= one[0, 0] or 1.0
     back, _, _ = phase_cross_correlation(
-        view.template.thumbnail,
-        grid.thumbnail(view.spectrum),
+        *thumbnails,
         upsample_factor=math.ceil(_PARTS * scale.max()),
         space="fourier",
         normalization=None,
