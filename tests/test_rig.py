@@ -196,10 +196,13 @@ def experiment():
     return hs.rig.Rig().run(hs.rig.staircase_drive(0.0, 1.0, 1.0, sample_time=0.1))
 
 
+FAR = replace(hs.rig.table1(), camera=hs.rig.Camera(shape=(64, 64), scale=0.01)).run(hs.rig.staircase_drive(dwell=0.1))
 HURRIED = hs.rig.staircase_drive(dwell=0.1, frames_per_step=5)
 test_what_does_not_fit_together_is_refused = refused(
     (lambda: SMALL.frames([0.0, 1.0], [0.0]), "as long as y, got 2 times and 1 displacements"),
     (lambda: SMALL.frames([0.0, 1.0], [0.0, 0.0], at=[2.0]), "exposures must be within 0 to 1 s, got 2 to"),
+    (lambda: FAR.frames(), "may span 1.28 um, 128 pixels, before the scene repeats, got 2.721 um: take a larger scale"),
+    (lambda: hs.rig.Rig().run([0.0, 1.0]), TypeError, "drive must be a Drive, such as staircase_drive"),
     (lambda: hs.rig.Drive(u=[0.0, 1.0], sample_time=0.3, dwell=1.0), "whole number of samples"),
     (lambda: hs.rig.Drive(u=[0.0, 1.0, 2.0], sample_time=0.5, dwell=1.0), "whole number of levels"),
     (lambda: hs.rig.Rig().run(HURRIED), "take a longer dwell or fewer frames"),
@@ -208,6 +211,12 @@ test_what_does_not_fit_together_is_refused = refused(
     (lambda: experiment().record("exact"), 'method must be "truth"'),
     (lambda: experiment().record("truth", take="first"), 'take must be "mean" or "last"'),
 )
+
+
+def test_a_motion_beyond_the_scene_has_its_truth():
+    assert FAR.record("truth").y.max() == pytest.approx(2.7209, abs=1e-4)
+    assert abs(SMALL.light(180.0 * SMALL.scale) - SMALL.light(0.0)).max() < 1e-12  # it repeats: rounding
+    assert len(SMALL.frames([0.0, 1.0], [-5.0, 5.68])) == 30  # 140 pixels, as far as no column is seen twice
 
 
 @pytest.mark.extra("skimage")

@@ -263,7 +263,8 @@ class Camera:
         Raises
         ------
         ValueError
-            If lengths differ, the times do not increase, or an exposure is not within them.
+            If lengths differ, the times do not increase, an exposure is not within them, or the motion is so long that
+            the scene repeats.
 
         Examples
         --------
@@ -286,7 +287,19 @@ class Camera:
                 f"exposures must be within {times[0]:g} to {times[-1]:g} s, got {starts.min():g} to "
                 f"{starts.max() + self.exposure:g} s"
             )
+        span = float(np.ptp(np.interp(starts, times, displacements))) if starts.size else 0.0
+        if span > self._reach * (1.0 + 1e-9):
+            raise ValueError(
+                f"displacements may span {self._reach:.4g} um, {self._reach / self.scale:.0f} pixels, before the scene "
+                f"repeats, got {span:.4g} um: take a larger scale or a smaller motion"
+            )
         return Frames(self, times, displacements, starts)
+
+    @property
+    def _reach(self) -> float:
+        """The longest motion whose pictures show nothing twice [um]."""
+        spare = [period - view for period, view in zip(self._scene.period, self.shape, strict=True)]
+        return self.scale * min(n / abs(part) for n, part in zip(spare, self._direction, strict=True) if part)
 
     @property
     def signal_to_noise(self) -> float:

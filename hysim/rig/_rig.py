@@ -86,11 +86,15 @@ class Rig:
 
         Raises
         ------
+        TypeError
+            If `drive` is no Drive.
         SimulationError
             If the actuator diverges.
         ValueError
             If the frames of a level take longer than the level.
         """
+        if not isinstance(drive, Drive):
+            raise TypeError(f"drive must be a Drive, such as staircase_drive(), got {type(drive).__name__}")
         at = drive.exposures(self.camera)
         run = simulate(self.actuator, drive.t, drive.u, units=UNITS)
         return Experiment(
@@ -125,7 +129,7 @@ class Experiment:
     @property
     def exposed_y(self) -> FloatArray:
         """True displacement, its mean in each exposure, shape (n_frames,) [um]."""
-        return self.frames().exposed_y
+        return Frames(self.rig.camera, self.t, self.y, self.at).exposed_y
 
     @property
     def voltages(self) -> FloatArray:
@@ -214,7 +218,10 @@ class Experiment:
         y = self.exposed_y if method == "truth" else self.measure(method).y
         rows = y.reshape(-1, frames_per_row)[:, 0 if take == "mean" else -1 :]
         if lost := np.flatnonzero(np.isnan(rows).all(axis=1)).tolist():
-            raise ValueError(f"no frame of the rows {lost} could be measured: take more frames or more light")
+            raise ValueError(
+                f"no frame of the rows {lost} could be measured: take more frames or more light, or, where the motion "
+                "leaves the picture, a camera with a larger scale or shape"
+            )
         means = np.nanmean(rows, axis=1)
         is_whole_pixel = method == "whole-pixel" and rows.shape[1] == 1
         return Record(
