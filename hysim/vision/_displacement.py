@@ -99,7 +99,7 @@ def displacement(
     the shift and over gain, offset and slope of the light go on from there, with windows that move with the picture,
     so that what enters and leaves at the borders does not count. The standard error is that of the least squares under
     white noise in both frames. A frame is lost where the correlation is below 0.5, and blurred where the peak of the
-    correlation is less than 0.7 times as sharp as in the median frame.
+    correlation is less than 0.8 times as sharp as in the median frame.
 
     Examples
     --------
