@@ -97,6 +97,12 @@ def test_the_light_may_change_in_gain_offset_and_slope():
     assert hs.vision.displacement(frames, 1.0, direction="x").y[1] == pytest.approx(0.37, abs=1e-3)
 
 
+@pytest.mark.parametrize("size", [1e30, 1e-30])
+def test_frames_may_be_of_any_size(size):
+    frames = np.array([speckle(np.random.default_rng(5), 2.0)(d) for d in (0.0, 0.37)])
+    assert hs.vision.displacement(size * frames, 1.0, direction="x").y[1] == pytest.approx(0.37, abs=1e-3)
+
+
 def test_the_direction_is_that_of_the_motion_and_positive_to_the_right():
     picture, along = speckle(np.random.default_rng(6), 2.0), np.linspace(0.0, 4.0, 6)
     for angle, expected in ((30.0, 30.0), (150.0, -30.0), (90.0, 90.0), (-90.0, 90.0)):
@@ -134,6 +140,17 @@ def test_lost_and_blurred_frames_are_flagged_and_never_filled_in():
     assert len(moved.record(u=shifts, on_lost="drop")) == 10
     marks = hs.plot.displacement(moved, hs.plot.figure().add_subplot()).get_legend_handles_labels()[1]
     assert marks == ["± 2 standard errors", "blurred", "lost"]
+
+
+@pytest.mark.parametrize("down", [0.0, 1.0], ids=["grating", "checkerboard"])
+@pytest.mark.parametrize("share", [0.3, -0.45])
+def test_a_periodic_picture_is_followed_by_steps_below_half_a_period(down, share):
+    rng, shifts = np.random.default_rng(18), 12.0 * share * np.arange(5.0)
+    rows, columns = (2.0 * np.pi / 12.0 * place for place in np.mgrid[0.0:128.0, 0.0:128.0])
+    frames = seen(lambda x: np.sin(columns - np.pi * x / 6.0) * np.cos(down * rows / 2.0), shifts, 30, rng)
+    moved = hs.vision.displacement(frames, 1.0, direction="x")
+    assert np.abs(moved.y - shifts).max() < 0.05
+    assert set(moved.status) == {"ok"}
 
 
 def test_a_running_reference_follows_a_picture_that_leaves():

@@ -129,7 +129,8 @@ def _grey(frame: npt.NDArray[Any], name: str) -> Picture:
     picture = frame.astype(np.float32)
     if not np.isfinite(picture.sum()):
         raise ValueError(f"{name} must be finite: it holds nan or infinity")
-    return picture
+    largest = np.abs(picture).max(initial=0.0)
+    return picture if largest == 0.0 or 1e-12 < largest < 1e12 else picture / largest  # squares must not overflow
 
 
 def _size(shape: tuple[int, ...]) -> str:
