@@ -98,7 +98,7 @@ def test_the_light_may_change_in_gain_offset_and_slope():
 
 
 @pytest.mark.parametrize("size", [1e30, 1e-30])
-def test_frames_may_be_of_any_size(size):
+def test_frames_may_be_as_large_and_small_as_single_precision(size):
     frames = np.array([speckle(np.random.default_rng(5), 2.0)(d) for d in (0.0, 0.37)])
     assert hs.vision.displacement(size * frames, 1.0, direction="x").y[1] == pytest.approx(0.37, abs=1e-3)
 
@@ -259,7 +259,10 @@ def test_files_of_every_kind_show_the_same(stairs, name):
             "png --region 0,64,0,70",
             "region must be (top, bottom, left, right) inside 64 x 64 pixels, got (0, 64, 0, 70)",
         ),
-        ("png --voltage few.csv --u u", "there are 3 voltages for 11 frames: give one for each frame"),
+        (
+            "png --voltage few.csv --u u",
+            "there are 3 voltages for 11 frames: give one for each frame, or the times of both as --t and --frame-rate",
+        ),
         ("png --voltage few.csv", "--voltage needs --u COLUMN"),
         ("png --u u", "--u and --t are columns of a file with voltages"),
         ("png --frame-rate 0", "'--frame-rate': expected a positive number"),
@@ -298,6 +301,25 @@ def test_voltages_are_joined_by_their_time():
     with pytest.raises(ValueError, match=r"^frame 0 at 0.1 is before the voltages, which begin at 0.2$"):
         moved.record([0.0, 5.0], frame_times=[0.1, 0.3, 0.4], u_times=[0.2, 0.3])
     assert_refused("u_times are given without frame_times", moved.record, [0.0, 5.0], u_times=[0.2, 0.3])
+
+
+def test_frames_beyond_the_log_are_told():
+    moved = hs.vision.displacement(np.array([speckle(np.random.default_rng(16), 2.0)(d) for d in (0.0, 1.0, 2.0)]), 1.0)
+    with pytest.warns(hs.HysimWarning, match=r"^1 of 3 frames come after .* at 0.3: they have its last voltage, 5$"):
+        moved.record([0.0, 3.0, 5.0], frame_times=[0.1, 0.4, 0.5], u_times=[0.1, 0.2, 0.3])
+    assert moved.record([3.0], frame_times=[0.1, 0.2, 0.4], u_times=[0.1]).u.tolist() == [3.0] * 3  # no step is known
+
+
+def test_lost_frames_are_dropped_without_voltages(tmp_path, capsys):
+    picture = speckle(np.random.default_rng(16), 2.0)
+    iio.imwrite(
+        tmp_path / "film.tif", np.float32([picture(0.0), np.zeros((SIZE, SIZE)), *map(picture, [1.0, 2.0, 3.0])])
+    )
+    command = ["measure", str(tmp_path / "film.tif"), "--scale", "1", "--frame-rate", "10", "--out", "-"]
+    for words, lines in ((["--on-lost", "drop"], 5), ([], 6)):
+        assert main([*command, *words]) == 0
+        assert len((table := capsys.readouterr().out).splitlines()) == lines
+        assert table.splitlines()[-1].startswith("0.4,")
 
 
 test_wrong_arguments_are_refused = refused(

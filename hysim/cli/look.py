@@ -257,7 +257,7 @@ def measure(
     --------
     voltage : text file: one line a frame, or a log with times
     u : voltage: name of its column, or its number from 0
-    t : time; with --frame-rate, the voltages are interpolated at the frames
+    t : time; with --frame-rate, a frame has the last voltage before it
     on_lost : frames that are lost
 
     Results

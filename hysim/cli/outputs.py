@@ -143,6 +143,7 @@ OF_OTHER_COMMANDS = {name: f"hysim identify {flag(name)}" for name in _OF_IDENTI
 """Arguments that a message names to readers of a command without such an option, and the option that stands for it."""
 
 _PHRASES = {
+    "as u_times and frame_times": "as --t and --frame-rate",
     r"hs\.load\(\.\.\.\)\.resample\(([^)]*)\)": r"--t, --u and --sample-time \1",
     r', on_missing="split" cuts the record there': "",
     r"hysim\.loop_metrics\(tolerance=\.\.\.\)": "hysim metrics --tolerance",

@@ -1,5 +1,6 @@
 """The result of `displacement`."""
 
+import warnings
 from collections.abc import Mapping
 from dataclasses import field
 from typing import Any, Literal
@@ -8,6 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from hysim._basics.frozen import FloatArray, frozen, read_only
+from hysim.errors import HysimWarning
 from hysim.records import Record, check_increasing
 
 STATUSES = ("ok", "blurred", "lost")
@@ -114,7 +116,8 @@ class Displacement:
         frame_times : array, shape (n,), optional
             Times of the frames in the clock of the log [``units["t"]``]; the record's times too, unless `t` is given.
         u_times : array, shape (m,), optional
-            Increasing times of the log. A frame has the last voltage that was logged at or before its time.
+            Increasing times of the log. A frame has the last voltage that was logged at or before its time. A
+            `hysim.HysimWarning` counts the frames that come after its end by more than its last step.
         on_lost : {"error", "drop"}
             What to do where a frame is lost: raise, or leave it out.
         units : mapping, optional
@@ -169,12 +172,14 @@ class Displacement:
         """Columns of a table, with the voltages of a log if there is one, and their units."""
         columns: dict[str, Any] = {"t": times, "y": self.y}
         units = {"t": "s", "y": self.units["y"], "uncertainty": self.units["y"]}
-        is_kept = np.full(len(self), True)
-        if log is not None:
+        is_kept = np.isfinite(self.y) | (on_lost == "error")
+        if log is None:
+            columns = {signal: values[is_kept] for signal, values in columns.items() if values is not None}
+        else:
             at: dict[str, Any] = {"t": log.t} if times is None else {"frame_times": times, "u_times": log.t}
             labels = {signal: unit for signal, unit in log.units.items() if signal != "y"}
             record = self.record(log.u, **at, on_lost=on_lost, units=labels)
-            columns, is_kept = {"t": record.t, "u": record.u, "y": record.y}, np.isfinite(self.y)
+            columns = {"t": record.t, "u": record.u, "y": record.y}
             units |= record.units
         columns |= {"uncertainty": self.uncertainty[is_kept], "quality": self.quality[is_kept]}
         return {name: values for name, values in columns.items() if values is not None}, units
@@ -204,4 +209,8 @@ class Displacement:
         if (place < 0).any():
             k = int(np.argmax(place < 0))
             raise ValueError(f"frame {k} at {at[k]:g} is before the voltages, which begin at {log[0]:g}")
+        last_step = log[-1] - log[-2] if log.size > 1 else np.inf
+        if beyond := int((at > log[-1] + (1.0 + _ROUNDING) * last_step).sum()):
+            words = f"{beyond} of {len(self)} frames come after the log of voltages, which ends at {log[-1]:g}"
+            warnings.warn(f"{words}: they have its last voltage, {voltages[-1]:g}", HysimWarning, stacklevel=3)
         return np.asarray(voltages[place])
