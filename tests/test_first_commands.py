@@ -24,9 +24,10 @@ def test_the_example_is_table_1(run, name):
     assert hs.load(name) == hs.datasets.table1(dwell=1.0)
 
 
-def test_what_the_example_says_to_try_runs(run):
-    text = run("example", "piezo.csv")[1]
-    tries = [line.split()[1:] for line in text.splitlines() if line.startswith("  hysim ")]
+@pytest.mark.parametrize("name", ["piezo.csv", "a b's.csv"])
+def test_what_the_example_says_to_try_runs(run, name):
+    text = run("example", name)[1]
+    tries = [shlex.split(line)[1:] for line in text.splitlines() if line.startswith("  hysim ")]
     assert len(tries) == 2
     assert run(*tries[0])[0] == 0
     assert tries[1][0] == "identify"

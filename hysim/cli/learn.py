@@ -1,6 +1,7 @@
 """`hysim example`, `explore`, `reproduce`, `completion` and `warm-up`: what helps to learn and to set up."""
 
 import os
+import shlex
 import tempfile
 from collections.abc import Callable
 from contextlib import suppress
@@ -106,14 +107,15 @@ def example(path: options.ResultFile | None = None, *, device: Kind = "piezo") -
         raise ValueError(f"{out} is there already: give another name, as in hysim example mine.csv")
     if out.endswith(".ipynb"):
         notebook = _notebook(Path(out))
-        return outputs.write({out: lambda: notebook}, lambda: f"{out}: a notebook, to open as in: jupyter lab {out}")
+        opened = f"jupyter lab {shlex.quote(out)}"
+        return outputs.write({out: lambda: notebook}, lambda: f"{out}: a notebook, to open as in: {opened}")
     what, make, tries = DEVICES[device]
     record = make()
     columns = {name: values for name in "tuy" if (values := vars(record)[name]) is not None}
     content = outputs.table(out, columns, record.units, resolution=record.resolution, name=record.name)
     names = ", ".join(f"{name} [{record.units[name]}]" for name in columns)
     lines = [f"{out}: {len(record)} samples of {names}: {what}. Try:", *(f"  hysim {each}" for each in tries)]
-    return outputs.write({out: lambda: content}, lambda: "\n".join(lines).replace("{}", out))
+    return outputs.write({out: lambda: content}, lambda: "\n".join(lines).replace("{}", shlex.quote(out)))
 
 
 def explore(*, out: options.Page | None = None, no_browser: bool = False) -> None:
