@@ -3,6 +3,7 @@
 import dataclasses
 import functools
 import json
+import re
 
 import numpy as np
 import pytest
@@ -592,6 +593,14 @@ def test_a_polynomial_of_the_second_degree_is_met_to_rounding():
     known = np.isfinite((diagram := hs.forc(hs.Record(u=U, y=y), smoothing=2.0)).density)
     expected = np.outer([1.5, 0.0], np.ones(known.sum()))
     np.testing.assert_allclose([diagram.density[known], diagram.stderr[known]], expected, atol=1e-9)
+
+
+@pytest.mark.parametrize("y", [2.0 * U, 3.0 * U**2, np.tanh(2.0 * U)], ids=["line", "parabola", "tanh"])
+def test_no_density_is_named_where_none_is_above_its_standard_error_and_rounding(y):
+    diagram = hs.forc(hs.Record(u=U, y=y), smoothing=2.0)
+    assert diagram.ridge.shape == (0, 4)
+    assert re.search(r"largest density +none above three standard errors", str(diagram))
+    assert hs.plot.forc(diagram) is not None
 
 
 def test_curves_that_rise_have_the_density_of_the_record_turned():

@@ -60,6 +60,7 @@ _TERMS = 6
 _SINGULAR = 1e-6  # of the largest diagonal element of R: a regression that the samples around do not determine
 _OF_PEAK = 0.1  # least density of the ridge
 _CLEAR = 3.0  # standard errors, above which a density is not noise
+_ROUNDING = 100.0 * np.finfo(float).eps  # of the stroke over a squared step, the least density: below is rounding
 
 
 @frozen_result
@@ -72,7 +73,8 @@ class Forc:
         Thresholds, in even steps [unit of u].
     density, stderr : array, shape (n, n)
         Weight of relays over area, and its standard error, at upper thresholds along axis 0 and lower ones along axis
-        1, both at `levels` [unit of y / unit of u^2].
+        1, both at `levels` [unit of y / unit of u^2]. The standard error leaves out the bias of the smoothing, which
+        flattens peaks.
     smoothing, growth : float
         Reach of the regression beyond the first curve, and its gain per curve from the diagonal [curve distances].
     left_out : float
@@ -106,9 +108,11 @@ class Forc:
     def ridge(self) -> FloatArray:
         """Half distances, middles, densities and standard errors (m, 4) of the largest densities at each distance.
 
-        Of distances at which no density is above three standard errors and a tenth of the peak's, there is no row.
+        Of distances at which no density is above three standard errors, a tenth of the peak's and rounding, there is
+        no row.
         """
-        rows, least = [], _OF_PEAK * float(np.nanmax(self.density - _CLEAR * self.stderr))
+        rounding = _ROUNDING * self.stroke / (self.levels[1] - self.levels[0]) ** 2
+        rows, least = [], max(_OF_PEAK * float(np.nanmax(self.density - _CLEAR * self.stderr)), rounding)
         for k in range(self.levels.size):
             density, stderr = np.diagonal(self.density, -k), np.diagonal(self.stderr, -k)
             clear = np.where(density > np.maximum(_CLEAR * stderr, least), density, -np.inf)
@@ -125,14 +129,15 @@ class Forc:
         """The text of ``str``, with the units of ``"u"`` and ``"y"``."""
         u, y = ((units or {}).get(signal, "") for signal in "uy")
         a, b = self.peak
+        place = f"half distance {quantity((a - b) / 2.0, u)}, middle {quantity((a + b) / 2.0, u)}"
+        peak = f"at thresholds {quantity(a, u)} and {quantity(b, u)}: {place}"
         smooth = f"{self.smoothing:g}, growing by {self.growth:g}" if self.growth else f"{self.smoothing:g}"
         share = f", {100.0 * self.left_out / self.stroke:.2g} % of the stroke" if self.left_out > 0.0 else ""
         return summary_text(
             [f"Forc: {self.n_curves} reversal curves, u of {extent(self.levels, u)}"],
             {
                 "stroke": quantity(self.stroke, y),
-                "largest density": f"at thresholds {quantity(a, u)} and {quantity(b, u)}: half distance "
-                f"{quantity((a - b) / 2.0, u)}, middle {quantity((a + b) / 2.0, u)}",
+                "largest density": peak if self.ridge.size else "none above three standard errors",
                 "smoothing": smooth,
                 "error": f"{quantity(self.left_out, y)} at curves left out{share}" if share else "",
                 "drift": self._drift_in_words(y),
