@@ -129,10 +129,12 @@ def test_slow_motions_have_the_friction_of_rest():
 def test_many_structures_are_those_one_by_one():
     plant = mass_on(LAWS["LuGre"])
     values = {"elements.0.sigma0": [300.0, 500.0], "elements.0.sigma2": [0.1, 0.4]}
-    peaks = plant.responses(values, FORCE, sample_time=H)
+    signals = {"peak_drift": "peak_drift", "peak_force": "peak_force", "energy": "element_work"}
+    many = {name: plant.responses(values, FORCE, sample_time=H, reduce=name) for name in signals}
     for k in range(2):
-        one = plant.assemble({name: column[k] for name, column in values.items()})
-        assert peaks[k, 0] == one.signals(FORCE, H)["peak_drift"][-1, 0]
+        one = plant.assemble({name: column[k] for name, column in values.items()}).signals(FORCE, H)
+        for name, signal in signals.items():
+            assert many[name][k, 0] == one[signal][-1, 0], name
 
 
 def test_friction_stands_in_an_element_of_its_own():

@@ -6,6 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from frame_laws import FAMILIES, JUMPING, LAWS, SMOOTH, bouc_wen
+from scipy.integrate import cumulative_trapezoid
 from scipy.linalg import eigvals, expm
 from strategies import COMPILED, assert_refused, refused
 
@@ -142,6 +143,40 @@ def test_random_structures_balance_their_energy_and_their_tolerances_agree(seed)
     energies = run.signals["kinetic"] + run.signals["elastic"] + np.abs(run.signals["input_work"])
     assert np.abs(run.signals["imbalance"]).max() < 5e-8 * energies.max()  # errors of many steps of 1e-8
     assert off(run, tight) < 2e-7
+
+
+# ---------------------------------------------------------------------------------- dashpots
+
+CURVE = {"coulomb": 0.8, "breakaway": 1.2}
+DAMPED = {
+    "a dashpot": hs.Dashpot(c=2.0),
+    "a sum": bouc_wen(2.0) + hs.Dashpot(c=2.0),
+    "LuGre": hs.LuGre(sigma0=2000.0, sigma1=5.0, sigma2=0.5, stribeck_velocity=0.05, **CURVE),
+    "StribeckFriction": hs.StribeckFriction(breakaway_velocity=0.05, viscous=0.5, **CURVE),
+}
+
+
+@pytest.mark.parametrize("law", DAMPED.values(), ids=DAMPED)
+def test_peaks_and_energies_of_an_element_contain_its_dashpots(law):
+    """Against the integrals of the powers by the trapezoidal rule, and in an ensemble."""
+    many = 40
+    quake = np.interp(np.arange(many * (T.size - 1) + 1) / many, np.arange(T.size), QUAKE)
+    frame = hs.shear_frame([1.0, 0.8, 0.6], [60.0, 50.0, 40.0], [law, bouc_wen(2.0), law], damping=0.3)
+    signals = frame.signals(quake, H / many)
+    speed, force, unit = signals["velocity"], signals["force"], signals["input_work"].max()
+    of_elements = force * (speed @ (np.eye(3) - np.eye(3, k=-1)).T)
+    of_damping = 0.3 * (speed**2).sum(axis=1)
+    for name, power in (("element_work", of_elements), ("damping_loss", of_damping)):
+        work = cumulative_trapezoid(power, dx=H / many, axis=0, initial=0.0)
+        assert np.abs(signals[name] - work).max() < 1e-4 * unit, name
+    assert np.abs(signals["imbalance"]).max() < 1e-6 * unit
+    assert (signals["dissipated"][-1] > 0.0).all()
+    largest = np.maximum.accumulate(np.abs(force), axis=0)
+    assert (signals["peak_force"] >= (1.0 - 1e-12) * largest).all()
+    assert signals["peak_force"] == pytest.approx(largest, rel=1e-3)  # it may be between two samples
+    for reduce, name in (("peak_force", "peak_force"), ("energy", "element_work")):
+        row = frame.responses([1.0], quake, sample_time=H / many, reduce=reduce)[0]
+        assert np.array_equal(row, signals[name][-1]), name
 
 
 # ---------------------------------------------------------------------------------- known motions

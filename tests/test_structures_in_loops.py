@@ -82,7 +82,8 @@ def test_a_constant_force_is_that_of_simulate(output):
     assert run.u.tolist() == [2.5] * T.size
     first = 1 if output.startswith("acceleration") else 0  # the loop reads it before the force begins
     assert run.y[first:] == pytest.approx(free.y[first:], abs=1e-7 * np.abs(free.y).max())
-    for name in ("drift", "displacement", "velocity", "force", "element_work", "input_work", "peak_drift"):
+    energies = ("element_work", "dissipated", "damping_loss", "input_work")
+    for name in ("drift", "displacement", "velocity", "force", "peak_drift", "peak_force", *energies):
         values = free.signals[name]
         assert run.signals[name] == pytest.approx(values, abs=1e-7 * np.abs(values).max()), name
     assert set(run.signals) == set(free.signals) - {"t", "u", "y"}

@@ -18,14 +18,15 @@ _PROBES = 13  # strokes of 1, 0.1, 0.01, ...
 class Sets(NamedTuple):
     """Structures that differ in numbers, one a row.
 
-    `A` is (n_sets, m, m), `loads` (n_sets, 1 + n_elements, m), `rates` (n_sets,), `slopes` (n_sets, n_elements),
-    `parameters` and `states` those of the laws; `scales` (n_sets,) multiply the input.
+    `A` is (n_sets, m, m), `loads` (n_sets, 1 + n_elements, m), `rates` (n_sets,), `slopes` and `viscosities`
+    (n_sets, n_elements), `parameters` and `states` those of the laws; `scales` (n_sets,) multiply the input.
     """
 
     A: FloatArray
     loads: FloatArray
     rates: FloatArray
     slopes: FloatArray
+    viscosities: FloatArray
     parameters: FloatArray
     states: FloatArray
     scales: FloatArray
@@ -105,7 +106,7 @@ def start_motion(elements: Elements, starts: IntArray, state: FloatArray, x: Flo
         force = step(own, law, drift)
         motion.carry[0, e], motion.carry[1, e], motion.carry[2, e] = force, 0.0, drift
         motion.carry[3, e], motion.carry[4, e] = rate, 0.0
-        motion.peaks[e], motion.peaks[n + e] = abs(drift), abs(force)
+        motion.peaks[e], motion.peaks[n + e] = abs(drift), abs(force + elements.viscosity[e] * rate)
     for q in range(n_nodes):
         motion.peaks[2 * n + q] = abs(x[q])
 
@@ -176,8 +177,9 @@ def follow_each(
     loads = np.empty((u.shape[1], 1))
     for i in range(sets.A.shape[0]):
         one = Elements(
-            elements.nodes, elements.weights, elements.node_ends, sets.slopes[i], elements.steps, elements.rated,
-            sets.parameters[i], elements.parameter_ends, elements.state_ends, elements.stretches, elements.stretch_ends,
+            elements.nodes, elements.weights, elements.node_ends, sets.slopes[i], sets.viscosities[i], elements.steps,
+            elements.rated, sets.parameters[i], elements.parameter_ends, elements.state_ends, elements.stretches,
+            elements.stretch_ends,
         )  # fmt: skip
         A, rate = sets.A[i], sets.rates[i]
         base = steps.base

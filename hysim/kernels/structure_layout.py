@@ -16,15 +16,17 @@ class Elements(NamedTuple):
     """Elements with memory, one after the other.
 
     Element e has the nodes ``nodes[node_ends[e]:node_ends[e + 1]]`` with the weights of the drift, its elastic slope
-    ``k0[e]``, the address of its step in ``steps[e]``; likewise its parameters, its state, and the stretches of the
-    state that are memory. Where ``rated[e]`` is 1 the step depends on the rate of the drift, and its state begins as
-    `hysim.kernels.friction_rates` says; else it is 0.
+    ``k0[e]``, its dashpots' coefficient ``viscosity[e]``, the address of its step, which leaves these out, in
+    ``steps[e]``; likewise its parameters, its state, and the stretches of the state that are memory. Where ``rated[e]``
+    is 1 the step depends on the rate of the drift, and its state begins as `hysim.kernels.friction_rates` says; else it
+    is 0.
     """
 
     nodes: IntArray
     weights: FloatArray
     node_ends: IntArray
     k0: FloatArray
+    viscosity: FloatArray
     steps: IntArray
     rated: FloatArray
     parameters: FloatArray
@@ -90,10 +92,11 @@ class Room(NamedTuple):
 class Motion(NamedTuple):
     """The state of a simulation, which moves along.
 
-    `x` is the state (x, v), `laws` are the laws' states, `carry` is (5, n_elements): force, slope of the rest over
-    time, drift, its rate, and the largest error of the drift in a step. `peaks` are the largest sizes so far of drifts,
-    forces, displacements and, where there is room, accelerations; `work` is that of the loads, of the damping and of
-    each element. `division`, (1,), is the present number of halvings. `loads` are those of the last sample.
+    `x` is the state (x, v), `laws` are the laws' states, `carry` is (5, n_elements): force without dashpots, slope of
+    the rest over time, drift, its rate, and the largest error of the drift in a step. `peaks` are the largest sizes so
+    far of drifts, forces with dashpots, displacements and, where there is room, accelerations; `work` is that of the
+    loads, of the damping and of each element. `division`, (1,), is the present number of halvings. `loads` are those of
+    the last sample.
     """
 
     x: FloatArray
@@ -118,8 +121,9 @@ class Tracks(NamedTuple):
 class Plant(NamedTuple):
     """The linear part: A, (m, m), and the loads, (n_loads + n_elements, m), of s' = A s + loads, for accelerations.
 
-    `damping` is (n_nodes, n_nodes) and `directions` (n_loads, n_nodes), for energies; without rows where these are not
-    wanted. `pushing`, (n_loads,), is 1 for a force, and 0 for a moving base, whose acceleration is not counted.
+    `damping`, without dashpots, is (n_nodes, n_nodes) and `directions` (n_loads, n_nodes), for energies; the latter has
+    no rows where these are not wanted. `pushing`, (n_loads,), is 1 for a force, and 0 for a moving base, whose
+    acceleration is not counted.
     """
 
     A: FloatArray

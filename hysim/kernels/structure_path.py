@@ -23,8 +23,10 @@ from hysim.kernels.structure_sweeps import halve, keep, try_step
 
 
 @unfolded
-def add_work(flows: Flows, plant: Plant, level: int, h: float, share: float, motion: Motion, room: Room) -> None:
-    """Work of the loads and of the damping over a step, from the powers and two derivatives at three points of it."""
+def add_work(
+    elements: Elements, flows: Flows, plant: Plant, level: int, h: float, share: float, motion: Motion, room: Room
+) -> None:
+    """Work of loads, damping and dashpots over a step, from the powers and two derivatives at three points of it."""
     x, work, inputs, m = motion.x, motion.work, room.inputs, motion.x.size
     n_loads = motion.loads.size
     for i in range(n_loads):
@@ -38,13 +40,14 @@ def add_work(flows: Flows, plant: Plant, level: int, h: float, share: float, mot
         inputs[m + 2 * i + 1] *= 2.0
     for k in range(3):
         put(x if k == 0 else room.point if k == 1 else room.end, room.now)
-        add_powers(plant, h, share, 0.5 * k, 1.0 - k, room.now, room, work)
+        add_powers(elements, plant, h, share, 0.5 * k, 1.0 - k, room.now, room, work)
 
 
 @unfolded
 def add_powers(
-    plant: Plant, h: float, share: float, s: float, side: float, x: FloatArray, room: Room, work: FloatArray
-) -> None:
+    elements: Elements, plant: Plant, h: float, share: float, s: float, side: float, x: FloatArray, room: Room,
+    work: FloatArray,
+) -> None:  # fmt: skip
     """The part of one point, at the share s of the step, in the integrals of the powers.
 
     Weights of values and two derivatives at begin, middle and end: exact for polynomials of degree 8.
@@ -87,6 +90,15 @@ def add_powers(
             rise += plant.damping[q, p] * a[p]
         work[1] += h * value * force * x[n + q] + 2.0 * h * h * first * force * a[q]
         work[1] += 2.0 * h * h * h * second * (rise * a[q] + force * j[q])
+    for e in range(n_elements):
+        if elements.viscosity[e] != 0.0:
+            rate = change = bend = 0.0
+            for i in range(elements.node_ends[e], elements.node_ends[e + 1]):
+                q, weight = elements.nodes[i], elements.weights[i]
+                rate, change, bend = rate + weight * x[n + q], change + weight * a[q], bend + weight * j[q]
+            power = h * value * rate * rate + 2.0 * h * h * first * rate * change
+            power += 2.0 * h * h * h * second * (change * change + rate * bend)
+            work[2 + e] += elements.viscosity[e] * power
 
 
 @uncounted
@@ -131,7 +143,7 @@ def take_step(
         work[2 + e] += f * (d - end_of_path)
         carry[0, e], carry[2, e], carry[3, e] = f, d, room.drifts[n + e]
         peaks[e] = max(peaks[e], max(abs(d), sums[e, 2]))
-        peaks[n + e] = max(peaks[n + e], abs(f))
+        peaks[n + e] = max(peaks[n + e], abs(f + elements.viscosity[e] * room.drifts[n + e]))
         carry[4, e] = max(carry[4, e], room.errors[e])
     for q in range(n_nodes):
         size = abs(end[q])
@@ -139,7 +151,7 @@ def take_step(
             size = max(size, crest(x[q], h * x[n_nodes + q], end[q], h * end[n_nodes + q]))
         peaks[2 * n + q] = max(peaks[2 * n + q], size)
     if plant.directions.shape[0] > 0:
-        add_work(flows, plant, level, h, share, motion, room)
+        add_work(elements, flows, plant, level, h, share, motion, room)
     put(end, x)
     keep(elements.stretches, motion.laws, room.saved)
 

@@ -28,8 +28,8 @@ def _typed(kind: Any, *members: Any) -> Any:
 FOLLOW = types.FunctionType(
     int64(
         _typed(
-            Elements, _PLACES, CONSTANTS, _PLACES, CONSTANTS, _PLACES, VECTOR, CONSTANTS, _PLACES, _PLACES, _PAIRS,
-            _PLACES,
+            Elements, _PLACES, CONSTANTS, _PLACES, CONSTANTS, CONSTANTS, _PLACES, VECTOR, CONSTANTS, _PLACES, _PLACES,
+            _PAIRS, _PLACES,
         ),
         _typed(Flows, *[_TABLES] * 4),
         _typed(Plant, *[_ROWS] * 4, VECTOR),

@@ -85,8 +85,9 @@ class Laws(NamedTuple):
 class Matrices(NamedTuple):
     """Linear parts, one structure a row: mass, damping and stiffness (n_sets, n, n).
 
-    The stiffness has the elastic slopes of the elements. `rows` is (n_elements, n), the drifts; `directions`
-    (n_sets, n_loads, n), the forces of unit loads.
+    The stiffness has the elastic slopes of the elements, the damping their dashpots, which are also apart,
+    `viscosities` (n_sets, n_elements). `rows` is (n_elements, n), the drifts; `directions` (n_sets, n_loads, n), the
+    forces of unit loads.
     """
 
     mass: FloatArray
@@ -94,6 +95,7 @@ class Matrices(NamedTuple):
     stiffness: FloatArray
     rows: FloatArray
     directions: FloatArray
+    viscosities: FloatArray
 
 
 def laws_of(models: Sequence[Any]) -> Laws:
@@ -106,7 +108,7 @@ def laws_of(models: Sequence[Any]) -> Laws:
     return Laws(steppers, stretches, rated)
 
 
-def elements_of(laws: Laws, rows: FloatArray, slopes: FloatArray) -> Elements:
+def elements_of(laws: Laws, rows: FloatArray, slopes: FloatArray, viscosity: FloatArray) -> Elements:
     nodes = [np.flatnonzero(row) for row in rows]
     begins = zip(laws.stretches, laws.state_ends, strict=False)
     stretches = [np.array([(begin + a, n) for a, n in each], dtype=np.int64).reshape(-1, 2) for each, begin in begins]
@@ -115,6 +117,7 @@ def elements_of(laws: Laws, rows: FloatArray, slopes: FloatArray) -> Elements:
         weights=read_only(joined([row[each] for row, each in zip(rows, nodes, strict=True)])),
         node_ends=ends([each.size for each in nodes]),
         k0=read_only(slopes),
+        viscosity=read_only(viscosity),
         steps=addresses([each.step for each in laws.steppers]),
         rated=np.array(laws.rated, dtype=float),
         parameters=laws.parameters,
@@ -298,13 +301,13 @@ class MovingStructure:
     @cached_property
     def matrices(self) -> Matrices:
         """The linear part, as one row."""
-        parts = (self.mass_matrix, self.damping_matrix, self.initial_stiffness, self.force_directions)
-        mass, damping, stiffness, directions = (part[np.newaxis] for part in parts)
-        return Matrices(mass, damping, stiffness, self.drift_matrix, directions)
+        parts = (self.mass_matrix, self.damping_matrix, self.initial_stiffness, self.force_directions, self.viscosities)
+        mass, damping, stiffness, directions, viscosities = (part[np.newaxis] for part in parts)
+        return Matrices(mass, damping, stiffness, self.drift_matrix, directions, viscosities)
 
     @cached_property
     def kernel_elements(self) -> Elements:
-        return elements_of(self.laws, self.drift_matrix, self.elastic_slopes)
+        return elements_of(self.laws, self.drift_matrix, self.elastic_slopes, self.viscosities)
 
     @property
     def fastest_rate(self) -> float:
@@ -366,12 +369,14 @@ class MovingStructure:
         mapping
             ``"y"``; ``"displacement"``, ``"velocity"`` (n_samples, n), relative to the ground [m], [m/s];
             ``"acceleration"``, absolute under a moving base of influence 1 [m/s^2]; ``"drift"``, ``"force"``
-            (n_samples, n_elements) [m], [N]; ``"peak_drift"``, ``"peak_force"``, ``"peak_displacement"``,
-            ``"peak_acceleration"``, the largest sizes so far, those of drifts and displacements also between samples;
-            and energies since the start [J]: ``"kinetic"``, ``"elastic"`` (of `stiffness`), ``"damping_loss"``,
-            ``"input_work"``, ``"element_work"`` (n_samples, n_elements), which is stored and dissipated, and
-            ``"dissipated"``, without what elastic unloading would return, force^2 / (2 k) with the slope k at the
-            start; ``"imbalance"`` is the input less all others, the error of the method.
+            (n_samples, n_elements) [m], [N], with dashpots; ``"peak_drift"``, ``"peak_force"``,
+            ``"peak_displacement"``, ``"peak_acceleration"``, the largest sizes so far, those of drifts and
+            displacements also between samples; and energies since the start [J]: ``"kinetic"``, ``"elastic"`` (of
+            `stiffness`), ``"damping_loss"`` (of `damping`), ``"input_work"``, ``"element_work"``
+            (n_samples, n_elements), that of ``"force"``, which is stored and dissipated, and ``"dissipated"``, without
+            what elastic unloading would return, force^2 / (2 k) of the force without dashpots and the slope k at the
+            start; ``"imbalance"`` is the input less kinetic and elastic energy, damping_loss and element_work, the
+            error of the method.
         """
         return self.advance(u, sample_time=sample_time)[0]
 
@@ -428,7 +433,7 @@ class MovingStructure:
     ) -> tuple[Elements, Flows, Plant, Steps]:
         """Tables by which the kernels move the structure, under loads in the directions (n_loads, n_nodes)."""
         A, loads, rates = linear_parts(self.matrices._replace(directions=directions[np.newaxis]))
-        plant = Plant(A[0], loads[0], np.array(self.damping_matrix), np.array(directions), np.array(pushing))
+        plant = Plant(A[0], loads[0], np.array(self.own_damping), np.array(directions), np.array(pushing))
         n, halvings = self.substeps, 0
         if n is None:  # by the tolerance, from the phase on with which the sweeps converge
             n, halvings = whole_substeps(sample_time * float(rates[0]) / PHASE), HALVINGS

@@ -44,7 +44,7 @@ def reduced(
     laws, parameters, states, slopes, matrices = _stacked(structure, values, n_sets)
     A, loads, rates = assembly.linear_parts(matrices)
     n_elements, n = len(structure.elements), structure.n_nodes
-    elements = assembly.elements_of(laws, structure.drift_matrix, slopes[0])
+    elements = assembly.elements_of(laws, structure.drift_matrix, slopes[0], matrices.viscosities[0])
     halvings = 0 if structure.substeps else assembly.HALVINGS
     steps = Steps(float(sample_time), 0.0, structure.substeps or 0, halvings, structure.tolerance)
     with_accelerations = reduce == "peak_acceleration"
@@ -52,11 +52,12 @@ def reduced(
     E, P, flows = assembly.empty_flows(halvings, 2 * n, 1, n_elements)
     results = Results(np.empty((n_sets, motion.peaks.size)), *(np.empty((n_sets, n_elements)) for _ in range(3)))
     sets = Sets(
-        A, loads, np.ascontiguousarray(rates), slopes, parameters, states,
+        A, loads, np.ascontiguousarray(rates), slopes, read_only(matrices.viscosities), parameters, states,
         np.array(np.broadcast_to(values.get("scale", np.ones(1)), n_sets)),
     )  # fmt: skip
     pushing = np.array([float(structure.excitation == "force")])
-    plant = Plant(A[0], loads[0], np.zeros((n, n)), np.zeros((0, n)), pushing)
+    n_worked = int(reduce == "energy" and bool(matrices.viscosities.any()))  # work of dashpots comes with that of loads
+    plant = Plant(A[0], loads[0], np.zeros((n, n)), np.zeros((n_worked, n)), pushing)
     x = read_only(structure.initial_state or np.zeros(2 * n))
     with np.errstate(all="ignore"):
         follow_each(
@@ -144,7 +145,9 @@ def _matrices(structure: Any, numbers: Mapping[str, FloatArray], slopes: FloatAr
     directions = structure.force_directions
     if structure.excitation == "base":
         directions = -(mass @ np.array(structure.influence or np.ones(structure.n_nodes)))[:, np.newaxis, :]
-    return assembly.Matrices(mass, full, stiffness, rows, np.broadcast_to(directions, (n_sets, 1, structure.n_nodes)))
+    directions = np.broadcast_to(directions, (n_sets, 1, structure.n_nodes))
+    viscosities = np.broadcast_to(structure.viscosities, slopes.shape)
+    return assembly.Matrices(mass, full, stiffness, rows, directions, viscosities)
 
 
 def _one_by_one(structure: Any, numbers: Mapping[str, FloatArray], n_sets: int) -> _Stack:
@@ -160,9 +163,9 @@ def _one_by_one(structure: Any, numbers: Mapping[str, FloatArray], n_sets: int) 
     if any(each.initial_state != structure.initial_state for each in made):
         raise ValueError("all sets begin with the same initial_state")
     mass, damping, stiffness = (np.concatenate([each.matrices[k] for each in made]) for k in (0, 1, 2))
-    directions = np.concatenate([each.matrices.directions for each in made])
+    directions, viscosities = (np.concatenate([each.matrices[k] for each in made]) for k in (4, 5))
     constants = read_only(np.stack([each.laws.parameters for each in made]), finite=False)
     memories = read_only(np.stack([each.laws.states for each in made]), finite=False)
     slopes = read_only(np.stack([each.elastic_slopes for each in made]))
-    matrices = assembly.Matrices(mass, damping, stiffness, first.drift_matrix, directions)
+    matrices = assembly.Matrices(mass, damping, stiffness, first.drift_matrix, directions, viscosities)
     return first.laws, constants, memories, slopes, matrices

@@ -242,7 +242,7 @@ class Structure(SearchedStructure):
     stiffness : float or array, shape (n,) or (n, n)
         Of linear springs from each mass to the ground, or a symmetric matrix [N/m].
     elements : sequence of Element
-        Laws between the nodes; their dashpots are a part of the damping.
+        Laws between the nodes. Their dashpots are a part of the damping matrix; forces and work are the elements' own.
     excitation : {"base", "force"}
         Whether the input is the acceleration of the base [m/s^2] or a force [N].
     influence : tuple of float
@@ -349,8 +349,8 @@ class Structure(SearchedStructure):
             Time between two samples [s].
         reduce : str
             ``"peak_drift"``, also between samples, ``"residual_drift"`` (after the last sample), ``"peak_force"`` or
-            ``"energy"`` (the work that each element has taken), of each element; ``"peak_displacement"`` or
-            ``"peak_acceleration"`` (absolute, at samples), of each mass.
+            ``"energy"`` (the work that each element has taken), both with dashpots, of each element;
+            ``"peak_displacement"`` or ``"peak_acceleration"`` (absolute, at samples), of each mass.
         workers : int, optional
             Number of threads; by default one for each core. The result does not depend on it.
 
