@@ -15,7 +15,7 @@ import numpy as np
 import numpy.typing as npt
 
 from hysim._basics.names import among, meant
-from hysim._basics.results import model_of
+from hysim._basics.results import model_or_class
 
 FloatArray = npt.NDArray[np.float64]
 Positive = typing.Annotated[float, "positive"]
@@ -291,13 +291,11 @@ def _as_mapping(values: Mapping[Any, Any], name: str) -> Mapping[Any, Any]:
 
 
 def _as_parts(value: Any, name: str) -> Any:
-    if isinstance(value, type):  # of a structure, whose models are made of it
-        return value
-    return type(value)(map(model_of, value)) if type(value) in (list, tuple) else model_of(value)
+    return type(value)(map(model_or_class, value)) if type(value) in (list, tuple) else model_or_class(value)
 
 
 def _as_named_parts(values: Mapping[str, Any], name: str) -> Mapping[str, Any]:
-    return MappingProxyType({key: model_of(each) for key, each in _as_mapping(values, name).items()})
+    return MappingProxyType({key: model_or_class(each) for key, each in _as_mapping(values, name).items()})
 
 
 def check_whole(value: Any, name: str, *, least: int = 1) -> None:

@@ -17,6 +17,11 @@ def model_of(thing: Any) -> Any:
     """The model of a result, or another value as it is; ValueError if a result has no model, TypeError for a class."""
     if isinstance(thing, type):
         raise TypeError(f"an instance is expected, got the class {thing.__name__}: give it its parameters first")
+    return model_or_class(thing)
+
+
+def model_or_class(thing: Any) -> Any:
+    """As `model_of`, where a class stands for its family."""
     if not isinstance(thing, Result):
         return thing
     if thing.model is None:

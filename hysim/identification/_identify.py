@@ -15,11 +15,11 @@ import numpy as np
 import numpy.typing as npt
 
 from hysim import metrics
+from hysim._basics import results
 from hysim._basics.blas import one_blas_thread
 from hysim._basics.frozen import check_choice, check_count, read_only
 from hysim._basics.parallel import at_most
 from hysim._basics.progress import Progress, Reports, reports
-from hysim._basics.results import model_of
 from hysim.errors import SimulationError
 from hysim.identification._admissible import choose, danger, excursion, implausible
 from hysim.identification._assumptions import Treated, decided, in_units_of_noise, quiet_rmse, treated
@@ -185,7 +185,7 @@ def identify(
         return of_any_family(identify, several(model_or_class, "identify"), ways, seconds, progress or None)
     if isinstance(model_or_class, str):
         model_or_class = family_named(model_or_class)
-    model_or_class = model_or_class if isinstance(model_or_class, type) else model_of(model_or_class)
+    model_or_class = results.model_or_class(model_or_class)
     if isinstance(model_or_class, Recorded):
         record_or_records = model_or_class.as_records(record_or_records)
     records: Sequence[Record] = several(record_or_records, "identify")

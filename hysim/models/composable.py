@@ -6,7 +6,7 @@ from types import MappingProxyType
 from typing import Any, ClassVar, NamedTuple, Self
 
 from hysim._basics.frozen import LAST, FloatArray, items, own_items
-from hysim._basics.results import model_of
+from hysim._basics.results import model_or_class
 from hysim.models.model import Example
 from hysim.models.protocols import Responding
 from hysim.models.tables import Tables, arguments_of, check_signs, check_within, scalars_of
@@ -115,7 +115,7 @@ class Placed(Composable):
 
 
 def _joined(first: Any, second: Any, kind: _Kind) -> Any:
-    first, second = model_of(first), model_of(second)
+    first, second = model_or_class(first), model_or_class(second)
     if not (isinstance(first, Composable) and isinstance(second, Composable)):
         return NotImplemented
     kinds = kind.model, kind.structure

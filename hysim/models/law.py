@@ -162,7 +162,7 @@ class Law(Placed, Subject, ABC):
     def __init_subclass__(cls) -> None:
         super().__init_subclass__()
         own = {name for name, kind in inspect.get_annotations(cls).items() if "ClassVar" not in str(kind)}
-        taken = sorted(name for name in own if name in _ASKED_FOR or hasattr(Law, name))
+        taken = sorted(name for name in own if name in _ASKED_FOR or name in dir(Law))
         if taken and cls.__module__.partition(".")[0] != "hysim":
             raise TypeError(f"{cls.__name__} has a field {taken[0]!r}, a name that hysim uses itself: take another one")
         if isinstance(vars(cls).get("slope"), FunctionType):
