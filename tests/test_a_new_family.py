@@ -17,6 +17,7 @@ from strategies import assert_cut_or_stepped_it_has_the_same_bits, needs_compile
 from strategies import refused as refused_with
 
 import hysim as hs
+from hysim.models.model import FAMILIES
 
 LAWS = {
     "step": SquareDahl(k=3.0, coulomb=0.4, c=0.8, offset=0.1),
@@ -227,6 +228,14 @@ def own(name="Own", slope=LINE, *, entered=True, searched=(), **numbers):
 
 
 RECORD = hs.Record(u=U, y=hs.Dahl().response(U))
+
+
+@pytest.fixture(autouse=True)
+def families_of_hysim_stay_alone():
+    yield
+    for name in [name for name, family in FAMILIES.items() if family.__module__ == __name__]:
+        del FAMILIES[name]
+
 
 test_a_family_with_an_error_is_refused_by_its_cause = refused_with(
     (lambda: own(gain=1.0, at=0.2, z0=0.0), "Own has a field 'at', a name that hysim uses itself"),

@@ -38,7 +38,7 @@ def test_stdout_holds_the_table_and_stderr_the_progress(reproduction, again):
     assert all(name in out for name in MODELS)
     assert re.search(r"\d+ claims: \d+ agrees, ", out)
     assert re.search(r"hysteresis-90-bouc-wen: 9\d\.\d % where the paper says 90 %, reached", out)
-    assert all(re.match(r"reproduce: ([\w-]+: )?(\d of 9|compiling, once)", line) for line in err.splitlines())
+    assert all(re.match(r"reproduce: ([\w -]+: )?(\d of 9|compiling, once)", line) for line in err.splitlines())
 
 
 def test_summary_of_the_measured_loop(summary):

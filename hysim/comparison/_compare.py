@@ -16,7 +16,7 @@ from hysim import metrics
 from hysim._basics.frozen import FloatArray
 from hysim._basics.parallel import map_on_threads
 from hysim._basics.progress import Reports, announced_by, reports
-from hysim._basics.results import Result, model_of
+from hysim._basics.results import Result, model_of, model_or_class
 from hysim._columns.excursions import measured_cycles
 from hysim._columns.turning import TOLERANCE
 from hysim.comparison._result import Comparison, ComparisonRow
@@ -248,7 +248,7 @@ def _subjects(models: Mapping[str, Any] | Sequence[Any] | str | None, n_records:
                 f"{name}: give one model or result for each of the {n_records} records, got {len(subject)}"
             )
         members = subject if isinstance(subject, list | tuple) else [subject]
-        if not all(is_identifiable(each) or isinstance(model_of(each), Responding) for each in members):
+        if not all(is_identifiable(each) or isinstance(model_or_class(each), Responding) for each in members):
             raise TypeError(f"compare takes a model, a result, a model class or a structure, got {subject!r} as {name}")
     return models
 

@@ -24,6 +24,7 @@ import numpy.typing as npt
 from scipy.linalg import block_diag, solve_discrete_are, toeplitz
 
 from hysim._basics.frozen import Count, FloatArray, Interval, NotNegative, Positive, read_only
+from hysim._basics.results import model_of
 from hysim.control._controller import PID, Feedback, SampledController, SteppedController, WithoutFeedback, compiled_of
 from hysim.control._filters import DampingLoop, ModeInverse, Notch, Shaper
 from hysim.control._to_control import to_control
@@ -85,7 +86,7 @@ class InverseFeedforward(WithoutFeedback):
             )
         if self.law is None:
             return
-        if not is_law(self.law):
+        if not is_law(model_of(self.law)):
             raise TypeError(f"law must be a law that a loop can step, such as BoucWen, got {type(self.law).__name__}")
         if not needs_time(self.law):
             inverse_step(self.law, 0.0)

@@ -24,7 +24,6 @@ from hysim.records import Record
 
 def is_law(value: Any) -> bool:
     """Whether a value has a response and can be stepped in a loop, at a sample time if it needs one."""
-    value = model_of(value)
     steps = isinstance(value, roles.Responding) and isinstance(value, roles.Steppable)
     return steps and (not needs_time(value) or isinstance(value, roles.Sampled))
 
@@ -84,7 +83,7 @@ class Actuator:
         object.__setattr__(self, "vibration", linear_plant(self.vibration))
 
     def __post_init__(self) -> None:
-        if self.hysteresis is not None and not is_law(self.hysteresis):
+        if self.hysteresis is not None and not is_law(model_of(self.hysteresis)):
             raise TypeError(
                 f"hysteresis must be a law that a loop can step, such as BoucWen, got {type(self.hysteresis).__name__}"
             )

@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from hysim._basics.frozen import FloatArray, check_choice, checked, given_items, vectors
-from hysim._basics.results import model_of
+from hysim._basics.results import model_of, model_or_class
 from hysim.plants.structures.ensemble import REDUCTIONS
 from hysim.plants.structures.structure import Structure, ground_records
 
@@ -84,7 +84,7 @@ def response_task(
     (6, (6,))
     """
     check_choice("measure", measure, get_args(Measure))
-    law = model_of(law)
+    law = model_or_class(law)
     family = law if isinstance(law, type) else type(law)
     reduces = isinstance(family, _ComputesMany) and "reduce" in inspect.signature(family.responses).parameters
     if not (isinstance(family, _ComputesMany) and (reduces or measure == "response")):
