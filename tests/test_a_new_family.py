@@ -218,7 +218,11 @@ def line(p, z, u, s):
     return p.gain - s * z / p.gain
 
 
-LINE = staticmethod(line)
+def helped(p, z, u, s):
+    return stiff(p, z, u, s)
+
+
+LINE, HELPED = staticmethod(line), staticmethod(helped)
 
 
 def own(name="Own", slope=LINE, *, entered=True, searched=(), **numbers):
@@ -247,6 +251,10 @@ test_a_family_with_an_error_is_refused_by_its_cause = refused_with(
     (
         lambda: hs.identify(own(gain=1.0, z0=0.0, searched=(hs.Parameter("gian", 0.1, 9.0),)), RECORD),
         "no field; did you mean 'gain'",
+    ),
+    (
+        lambda: own(gain=1.0, slope=HELPED, z0=0.0)().response([0.0, 1.0]),
+        "the slope of Own does not .* put @numba.njit",
     ),
     (lambda: hs.family(type("Bare", (hs.Law,), {}))().response([0.0, 1.0]), "Bare has no field 'z0'"),
     error=TypeError,

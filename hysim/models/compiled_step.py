@@ -2,12 +2,13 @@
 
 import functools
 import inspect
+import re
 from collections.abc import Callable
 from typing import Any, TypeVar
 
 from numba.core.dispatcher import Dispatcher
 
-from hysim.kernels.stepping import START, STEP, Start, Step, by_address, compile_as
+from hysim.kernels.stepping import START, STEP, Start, Step, by_address, compile_as, sources
 from hysim.models.protocols import Startable, Stepwise
 
 _Kernel = TypeVar("_Kernel", Step, Start)
@@ -51,5 +52,8 @@ def _compiled(function: Any, type_: Any, kind: str) -> Any:
     try:
         return compile_as(type_, plain)
     except Exception as error:  # numba's errors share no class
-        reason = " ".join(str(error).split())
-        raise TypeError(f"{plain.__name__} does not compile as {kind}: {reason}") from None
+        reason = re.sub(r"Failed in \w+ mode pipeline \(step: [^)]*\) ", "", " ".join(str(error).split()))
+        reason = reason.partition(" During: ")[0]  # a list of callers
+        who = f"the slope of {plain.__qualname__.rpartition('_')[0]}" if plain in sources else plain.__name__
+        hint = "; put @numba.njit above it" if "of <class 'function'>" in reason else ""
+        raise TypeError(f"{who} does not compile as {kind}: {reason}{hint}") from None
