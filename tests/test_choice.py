@@ -1,10 +1,11 @@
 """`identify` without a family, and `select`: what predicts parts that are left out, and the order behind noise."""
 
+import os
 from dataclasses import replace
 
 import numpy as np
 import pytest
-from strategies import rao_garnier, refused
+from strategies import assert_refused, rao_garnier, refused
 
 import hysim as hs
 from hysim._columns.turning import TOLERANCE
@@ -114,6 +115,25 @@ def test_processes_choose_what_one_alone_does(few, monkeypatch):
         own.append(replace(hs.identify(record_of(LAW)), choice=None))
         own.append(replace(hs.identify(record_of(LAW)).choice, seconds=0.0))
     assert str(own[:2]) == str(own[2:])
+
+
+class Dies(hs.Play):
+    def search_space(self, record, freedom=None):
+        os._exit(3)
+
+
+def test_a_family_that_ends_its_process_is_named_and_a_record_of_an_own_class_is_taken(few, monkeypatch):
+    class Own(hs.Record):
+        pass
+
+    record, dies = record_of(LAW), Dies()
+    few(Line=hs.Line, Play=hs.Play)
+    monkeypatch.setattr(_choice, "cores", lambda: 2)
+    assert hs.identify(Own(u=record.u, y=record.y)).choice.family
+    monkeypatch.setattr(_choice._Trials, "unknowns", lambda self, name: 0)
+    few(Line=hs.Line, Dies=dies)
+    assert_refused("process was ended that searched one of .*Dies", hs.identify, record, error=RuntimeError)
+    assert_refused("workers must be an integer of at least 1", hs.identify, record, workers=0)
 
 
 def test_a_loop_alone_and_several_records_are_judged_by_samples(few):

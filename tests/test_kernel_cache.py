@@ -15,6 +15,7 @@ from numba.core.codegen import JITCPUCodegen
 
 from hysim.kernels import _compile
 from hysim.models.compiled_step import compiled_step
+from hysim.models.model import FAMILIES
 
 compiled = pytest.mark.skipif(bool(numba.config.DISABLE_JIT), reason="nothing is compiled")
 
@@ -38,15 +39,33 @@ def thrice(x):
 LAW = """import hysim as hs
 import numba
 import parts
-from parts import K
-other = numba.njit(parts.f)
+import parts.inner
+from parts import K, f, first, second
+other = numba.njit(f)
+nested = numba.njit(parts.with_inner)
 @hs.family
 class Own(hs.Law):
     gain: float = 1.0
     z0: float = 0.0
     @staticmethod
     def slope(p, z, u, s):
-        return parts.K + K + other(K)
+        return parts.K + K + other(K) + nested(K) + first(K) + second(K) + parts.inner.C + parts.A - parts.B
+"""
+PARTS = """import numba
+from parts.inner import C
+K, A, B = {0}, 5.0, 5.0
+def f(x):
+    return {1} * x
+def with_inner(x):
+    def g(y):
+        return {2} * y
+    return g(x)
+def made(c):
+    @numba.njit
+    def h(x):
+        return c * x
+    return h
+first, second = made(1.0), made({3})
 """
 
 
@@ -188,21 +207,45 @@ def test_a_process_that_may_write_no_byte_computes(tmp_path):
     assert not [file for file in tmp_path.rglob("*.nb?") if file.stat().st_size]
 
 
-@compiled
-def test_code_of_a_law_follows_what_it_takes_from_other_files(tmp_path, monkeypatch):
-    """Constants, by their name or in their module, and functions; what stays is compiled once."""
+@pytest.fixture
+def loaded(tmp_path, monkeypatch):
+    """Load the law anew, as a process of its own would, with these numbers in the files that it takes from."""
     monkeypatch.setattr(numba.config, "CACHE_DIR", str(tmp_path / "cache"))
     monkeypatch.setattr(sys, "dont_write_bytecode", True)
     monkeypatch.syspath_prepend(tmp_path)
     (tmp_path / "law_of_parts.py").write_text(LAW)
-    values, found = [], []
-    for constant, factor in ((1.0, 1.0), (1.0, 1.0), (2.0, 1.0), (2.0, 3.0)):
-        (tmp_path / "parts.py").write_text(f"K = {constant}\ndef f(x):\n    return {factor} * x\n")
-        for module in ("parts", "law_of_parts"):
+    (tmp_path / "parts").mkdir()
+
+    def load(*numbers):
+        (tmp_path / "parts" / "inner.py").write_text(f"C = {numbers[4]}\n")
+        (tmp_path / "parts" / "__init__.py").write_text(PARTS.format(*numbers))
+        for module in ("parts", "parts.inner", "law_of_parts"):
             sys.modules.pop(module, None)
         importlib.invalidate_caches()
-        law = importlib.import_module("law_of_parts").Own()
+        return importlib.import_module("law_of_parts").Own()
+
+    yield load
+    FAMILIES.pop("Own", None)
+
+
+ONES = (1.0,) * 5
+
+
+@compiled
+def test_code_of_a_law_is_compiled_anew_where_it_takes_another_number_from_another_file(loaded):
+    values, found = [], []
+    for numbers in (ONES, ONES, (*ONES[:3], 3.0, 1.0)):
+        law = loaded(*numbers)
         values.append(law.response([0.0, 1.0])[1])
         found.append(sum(compiled_step(law.step).stats.cache_hits.values()))
-    assert values == [3.0, 3.0, 6.0, 10.0]
-    assert found == [0, 1, 0, 0]
+    assert values == pytest.approx([7.0, 7.0, 9.0])
+    assert found == [0, 1, 0]
+
+
+@compiled
+def test_what_a_law_takes_from_other_files_is_all_that_its_code_is_made_of(loaded):
+    def texts(*numbers):
+        return "".join(_compile._texts(loaded(*numbers).slope, {}))
+
+    assert texts(*ONES) == texts(*ONES)
+    assert len({texts(*ONES), *(texts(*ONES[:k], 3.0, *ONES[k + 1 :]) for k in range(5))}) == 6

@@ -32,6 +32,12 @@ test_units_that_differ_are_refused = refused(
     (lambda: hs.load_ground_motion("none.csv", units={"u": "g"}), TypeError, "units is that of the accelerations"),
 )
 
+
+def test_one_unit_in_two_spellings_and_an_unknown_one_are_drawn():
+    units = {"y": "um"}, {"y": "\u00b5m"}, {"y": "\u03bcm"}, {"y": ""}, {"t": "s"}, {"t": "ms"}
+    hs.plot.loop(*(hs.Record(t=T, u=U, y=U, units=each) for each in units), ax=hs.plot.figure().add_subplot())
+
+
 test_numbers_without_a_meaning_are_refused = refused(
     (lambda: FRAME.responses({"mass": [1.0, -0.1]}, U, sample_time=1e-3), "mass must be positive, got -0.1"),
     (lambda: FRAME.responses({"damping": [-0.1]}, U, sample_time=1e-3), "damping must not be negative, got -0.1"),
@@ -66,6 +72,8 @@ def test_a_loop_that_jumps_between_its_limits_is_not_called_out_of_reach():
         hs.close_loop(plant, hs.PID(ki=2e5, limits=(0.0, 100.0)), T, 0.5 + 0.3 * np.sin(20.0 * T))
     with pytest.warns(hs.HysimWarning, match="the reference is out of reach"):
         hs.close_loop(plant, hs.PID(ki=100.0, limits=(0.0, 100.0)), T, 5.0 * np.sin(20.0 * T))
+    with pytest.warns(hs.HysimWarning, match="the reference is out of reach"):
+        hs.close_loop(plant, hs.PID(kp=1e3, limits=(0.0, 100.0)), T, np.full(T.size, 50.0))
 
 
 def test_an_offset_within_bounds_is_not_said_to_be_missing():

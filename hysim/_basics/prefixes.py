@@ -70,4 +70,4 @@ def in_brackets(unit: str) -> str:
 
 def printed(unit: str) -> str:
     """A unit with its micro sign and its square: `µm` for ``"um"``, `m/s²` for ``"m/s^2"``."""
-    return re.sub(r"\bu(?=(m|s|V|A|N)\b)", "µ", unit).replace("^2", "²")
+    return re.sub(r"\bu(?=(m|s|V|A|N)\b)", "µ", unit.replace("\u03bc", "µ")).replace("^2", "²")

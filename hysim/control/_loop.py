@@ -193,7 +193,8 @@ def close_loop(
         raise ValueError(f"only a Structure stands on the ground, got {type(plant).__name__} and ground_acceleration")
     run = around(RestingPlant(actuator, h, u0, substeps), controller, times, r, units, progress)
     warn_beyond(actuator.u_range, run.u, type(actuator.hysteresis).__name__)
-    jumps = int(np.count_nonzero(np.abs(np.diff(run.drive)) >= np.ptp(run.drive)))
+    span = float(np.ptp(run.drive)) or np.inf
+    jumps = int(np.count_nonzero(np.abs(np.diff(run.drive)) >= span))
     limited = run.conditions["limited_samples"]
     warn_limited(limited, run.u.size, may_invert=not isinstance(controller, PID), jumps=jumps)
     return run

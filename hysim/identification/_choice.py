@@ -26,14 +26,16 @@ import time
 from collections import deque
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Future
+from concurrent.futures.process import BrokenProcessPool
 from dataclasses import replace
 from functools import partial
 from typing import Any, NamedTuple
+from weakref import WeakValueDictionary
 
 import numpy as np
 
 from hysim import metrics
-from hysim._basics.frozen import FloatArray
+from hysim._basics.frozen import FloatArray, check_count
 from hysim._basics.parallel import awaited, cores, forked
 from hysim._basics.progress import Progress
 from hysim._columns.turning import TOLERANCE
@@ -203,9 +205,12 @@ def of_any_family(
     trials, subjects = _Trials(identify, records, options), candidates()
     size = max(float(np.ptp(record.y)) for record in records)
     names = sorted(subjects, key=trials.unknowns)
+    if options["workers"] is not None:
+        check_count("workers", options["workers"])
     number, spent = min(options["workers"] or cores(), _MOST_PROCESSES), 0.0
+    _at_hand[id(trials)] = trials  # which forked processes find without pickling
 
-    def results(of: Callable[[str], Any], every: Sequence[str], seconds: float, done: int) -> dict[str, Any]:
+    def results(of: Callable[[Any, str], Any], every: Sequence[str], seconds: float, done: int) -> dict[str, Any]:
         """Of the families that are begun within so many seconds; processes are never far ahead of what is known."""
         nonlocal spent
         known: dict[str, Any] = {}
@@ -213,21 +218,26 @@ def of_any_family(
         while waiting or (rest and (spent < seconds or not known)):
             is_full = len(waiting) == 2 * number - 1 or bool(waiting and waiting[0][1].done())
             if rest and not is_full and (spent < seconds or not (known or waiting)):
-                waiting.append((rest[0], pool.submit(_timed, of, rest.popleft())))
+                waiting.append((rest[0], pool.submit(_timed, id(trials), of, rest.popleft())))
             else:
                 name, future = waiting.popleft()
-                known[name], cpu = awaited(future)
+                try:
+                    known[name], cpu = awaited(future)
+                except BrokenProcessPool:
+                    ended = ", ".join([name, *(each for each, _ in waiting)])
+                    why = "maybe for its memory; workers=1 takes none"
+                    raise RuntimeError(f"a process was ended that searched one of {ended}, {why}") from None
                 spent += cpu
                 if progress:
                     progress(done + len(known), 2 * len(names))
         return known
 
     with forked(number if number > 1 else 0) as pool:
-        first = results(partial(trials.of, which=slice(0, 1)), names, seconds, 0)
+        first = results(partial(_Trials.of, which=slice(0, 1)), names, seconds, 0)
         rounds = _scores(first, size)
         ranked, worst = sorted(rounds, key=lambda name: rounds[name]), _WORSE * min(rounds.values())
         close = [name for name in ranked if rounds[name] <= worst]
-        second = results(partial(trials.of, which=slice(None)), close, seconds, len(names))
+        second = results(partial(_Trials.of, which=slice(None)), close, seconds, len(names))
         if len(second) < len(close):  # not all have had all parts: the errors of the first round are of the same ones
             errors, compared = first, [*first]
         else:
@@ -235,12 +245,13 @@ def of_any_family(
         score = _scores(errors, size)
         ranked = sorted(score, key=lambda name: (name not in compared, score[name]))
         tied = [name for name in ranked if name in compared and score[name] <= _EQUAL * score[ranked[0]]][:_MOST_TIED]
-        bic = results(trials.bic, tied, math.inf, 2 * len(names) - len(tied)) if len(tied) > 1 else {}
+        bic = results(_Trials.bic, tied, math.inf, 2 * len(names) - len(tied)) if len(tied) > 1 else {}
     ranked = [*sorted(bic, key=lambda name: bic[name]), *(name for name in ranked if name not in bic)]
     fits: dict[str, Identification] = {}
     for name in ranked[:_COMPLETE]:
-        fits[name], cpu = _timed(lambda name: identify(subjects[name], records, **options), name)
-        spent += cpu
+        begin = time.process_time()
+        fits[name] = identify(subjects[name], records, **options)
+        spent += time.process_time() - begin
         if fits[name].success:
             break
     name = next((name for name, fit in fits.items() if fit.success), ranked[0])
@@ -259,10 +270,13 @@ def of_any_family(
     return replace(fits[name], choice=choice)
 
 
-def _timed(of: Callable[[str], Any], name: str) -> tuple[Any, float]:
-    """A result and its seconds of the processor."""
+_at_hand = WeakValueDictionary[int, "_Trials"]()
+
+
+def _timed(trials: int, of: Callable[[Any, str], Any], name: str) -> tuple[Any, float]:
+    """A result of the trials at hand, and its seconds of the processor."""
     begin = time.process_time()
-    return of(name), time.process_time() - begin
+    return of(_at_hand[trials], name), time.process_time() - begin
 
 
 class _Trials:

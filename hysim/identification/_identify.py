@@ -321,12 +321,13 @@ def _searched(assumed: _Assumed, asked: _Asked) -> Identification:
 def _described(fit: Identification, assumed: _Assumed, asked: _Asked) -> Identification:
     """The result on the records as they were measured, with all that speaks against it."""
     records, setting, first = asked.records, assumed.setting, assumed.problems[0]
+    is_partial = assumed.is_cut or (first.budget is not None and (first.budget.cut or not fit.success))
     fit = replace(fit, message="; ".join(filter(None, (fit.message, assumed.sentence))))
     if all(type(record) is Record for record in records):  # not in units of sensors, nor weighted by a verb
         fit = as_measured(fit, records, asked.weights, assumed.treatment)
         fit = said_of_noise(fit, records, assumed.treatment, quiet_rmse(assumed.family, setting, assumed.treatment))
     doubts = [swapped_columns(records)]
-    if assumed.is_cut or (first.budget is not None and (first.budget.cut or not fit.success)):
+    if is_partial:
         stopped = f"partial: the search stopped at max_evaluations={setting.max_evaluations}"
         further = "cv_rmse is that of longer searches; " * bool(asked.folds)
         message = f"{stopped}, better parameters may exist; {further}{fit.message}"

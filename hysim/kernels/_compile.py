@@ -9,9 +9,9 @@ infinity): kernels raise nothing, they return codes.
 import contextlib
 import functools
 import hashlib
-import inspect
 import os
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from enum import Enum, EnumMeta
 from pathlib import Path
 from types import CodeType, FunctionType, ModuleType, SimpleNamespace
 from typing import Any, TypeVar
@@ -172,29 +172,54 @@ class _Cache(FunctionCache):
 
     def _index_key(self, sig: Any, codegen: Any) -> Any:
         is_ours = Path(self._py_func.__code__.co_filename).is_relative_to(PACKAGE)
-        others = "" if is_ours else hashlib.sha256("".join(_taken_by(self._py_func, set())).encode()).hexdigest()
+        others = "" if is_ours else hashlib.sha256("".join(_texts(self._py_func, {})).encode()).hexdigest()
         kernels = [hash_of_sources(PACKAGE / room) for room in ("kernels", "laws")]
         return (*FunctionCache._index_key(self, sig, codegen), *kernels, others)
 
 
-def _taken_by(function: Any, known: set[Any]) -> Iterator[str]:
-    """What the code of a user's function takes from elsewhere, as texts: constants, and the code of functions."""
-    code, around = function.__code__, inspect.getclosurevars(function)
-    known.add(code)
-    yield f"{code.co_code} {[each for each in code.co_consts if not isinstance(each, CodeType)]}"
-    taken = [*around.nonlocals.values()]
-    if function.__module__.partition(".")[0] not in ("hysim", "numba", "numpy"):  # else it has a version
-        modules = [vars(each) for each in around.globals.values() if isinstance(each, ModuleType)]
-        taken += [*around.globals.values()]
-        taken += [module[name] for module in modules for name in around.unbound & module.keys()]
-    for value in taken:
-        plain = value.py_func if isinstance(value, Dispatcher) else value
-        if isinstance(plain, FunctionType) and plain.__code__ not in known:
-            yield from _taken_by(plain, known)
-        elif isinstance(value, np.ndarray):
-            yield f"{value.dtype} {value.shape} {value.tobytes()!r}"
-        elif isinstance(value, (int, float, complex, str, tuple, np.generic)):
-            yield repr(value)
+def _texts(value: Any, known: dict[int, Any]) -> Iterator[str]:
+    """What a value puts into the code of a user's function: numbers, arrays, and the code of functions."""
+    plain: Any = value.py_func if isinstance(value, Dispatcher) else value
+    if isinstance(plain, FunctionType):
+        if id(plain) not in known:
+            known[id(plain)] = plain
+            yield from _texts_of_function(plain, known)
+    elif isinstance(plain, np.ndarray):
+        yield f"{plain.dtype} {plain.shape} {plain.tobytes()!r}"
+    elif isinstance(plain, (tuple, frozenset, EnumMeta)):
+        texts = ["".join(_texts(each, known)) for each in plain]
+        yield from sorted(texts) if isinstance(plain, frozenset) else texts
+    elif isinstance(plain, (int, float, complex, str, bytes, np.generic)):
+        yield repr(plain)
+    elif isinstance(plain, Enum):
+        yield from _texts(plain.value, known)
+
+
+def _texts_of_function(function: FunctionType, known: dict[int, Any]) -> Iterator[str]:
+    codes = [function.__code__]
+    for code in codes:
+        codes += [each for each in code.co_consts if isinstance(each, CodeType)]
+        yield code.co_code.hex()
+        yield from _texts(code.co_consts, known)
+    for cell in function.__closure__ or ():
+        yield from _texts(cell.cell_contents, known)
+    if not _is_library(function.__module__):
+        names = sorted({name for code in codes for name in code.co_names})
+        yield from _texts_of_names(function.__globals__, names, known)
+
+
+def _texts_of_names(around: Mapping[str, Any], names: Sequence[str], known: dict[int, Any]) -> Iterator[str]:
+    for value in (around[name] for name in names if name in around):
+        if not isinstance(value, ModuleType):
+            yield from _texts(value, known)
+        elif id(value) not in known and not _is_library(value.__name__):
+            known[id(value)] = value
+            yield from _texts_of_names(vars(value), names, known)
+
+
+def _is_library(name: str) -> bool:
+    """Whether a module has a version that changes with its code."""
+    return name.partition(".")[0] in ("hysim", "math", "numba", "numpy", "scipy")
 
 
 class _ShippedFiles(CompileResultCacheImpl):

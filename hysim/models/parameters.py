@@ -116,7 +116,7 @@ def declared_space(
     starts = law.starts if starts is None else starts
     units, first = units or spans(record), float(record.u[0])
     declared = {parameter.name: parameter for parameter in parameters}
-    if unknown := declared.keys() - {name.partition("[")[0] for name in scalars}:
+    if unknown := declared.keys() - law.arguments.keys():
         first_one = sorted(unknown)[0]
         raise TypeError(
             f"`searched` of {type(law).__name__} has {first_one!r}, which is no field{meant(first_one, scalars)}"

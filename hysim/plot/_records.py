@@ -85,13 +85,14 @@ def drawable(results: Sequence[Any], verb: str) -> tuple[Any, ...]:
 
 
 def units_of(*results: Any) -> dict[str, str]:
-    """The units of all results; ValueError where two have the same signal in different ones."""
+    """The units of all results; ValueError where two have u or y in different ones."""
     units: dict[str, str] = {}
     for result in results:
-        own = dict(result.units) if isinstance(result, _WithUnits) else {}
-        if other := [name for name in own.keys() & units.keys() if printed(own[name]) != printed(units[name])]:
-            pair = f"{units[other[0]]} and {own[other[0]]}"
-            raise ValueError(f"one axis cannot show {other[0]} in {pair}: convert a record, as by record.convert")
+        own = {name: unit for name, unit in result.units.items() if unit} if isinstance(result, _WithUnits) else {}
+        for name in {"u", "y"} & own.keys() & units.keys():
+            if printed(own[name]) != printed(units[name]):
+                pair = f"{units[name]} and {own[name]}"
+                raise ValueError(f"one axis cannot show {name} in {pair}: convert a record, as by record.convert")
         units = own | units
     return units
 
