@@ -435,8 +435,14 @@ class Target:
 
     def parameters(self, q: FloatArray) -> FloatArray:
         """The user's parameters and sigma at points, (n_sets, n_names + 1)."""
-        theta = self.theta(q)
-        return np.column_stack([self.problem.named(theta), np.exp(self._parted(q)[0][:, -1])])
+        v, e = self._parted(q)
+        b = np.empty_like(e)
+        for places in self._chunks(np.arange(len(q))):
+            parts = self._columns(v[places, :-1])
+            w, _ = self._from_normal(parts, e[places], np.exp(v[places, -1]))
+            b[places] = w * parts.units[0]
+        theta = np.concatenate([v[:, :-1], b], axis=1)
+        return np.column_stack([self.problem.named(theta), np.exp(v[:, -1])])
 
     def without_linear(self, q: FloatArray) -> FloatArray:
         """v = (x', s') of points, (n_sets, n_x + 1)."""
@@ -461,16 +467,6 @@ class Target:
             density = self.b_prior.log_density(w, parts.units) + log_volume + 0.5 * self.n_linear * _LOG_2PI
             values[places] = np.maximum(self._log_likelihood(parts, w, sigma) + density, _LOWEST)
         return values, prior
-
-    def theta(self, q: FloatArray) -> FloatArray:
-        """Coordinates and linear parameters of points, (n_sets, n_theta)."""
-        v, e = self._parted(q)
-        b = np.empty_like(e)
-        for places in self._chunks(np.arange(len(q))):
-            parts = self._columns(v[places, :-1])
-            w, _ = self._from_normal(parts, e[places], np.exp(v[places, -1]))
-            b[places] = w * parts.units[0]
-        return np.concatenate([v[:, :-1], b], axis=1)
 
     def log_likelihood_in_cube(self, cube: FloatArray) -> FloatArray:
         """Logarithm of the likelihood at points of the unit cube (n_sets, n_dim), on which the prior is uniform."""
