@@ -72,12 +72,10 @@ def effective_samples(chains: FloatArray) -> float:
 
 def _ranked(chains: FloatArray) -> FloatArray:
     """Normal quantiles of the ranks among all draws; equal draws have their mean rank."""
-    from scipy.special import ndtri
+    from scipy import special, stats
 
-    distinct, places, counts = np.unique(chains, return_inverse=True, return_counts=True)
-    ranks = np.cumsum(counts) - 0.5 * (counts - 1)
-    normal = ndtri((ranks - 0.375) / (chains.size + 0.25)) if distinct.size > 1 else np.zeros(1)
-    return np.asarray(normal[places.reshape(chains.shape)])
+    ranks = stats.rankdata(chains, axis=None).reshape(chains.shape)
+    return np.asarray(special.ndtri((ranks - 0.375) / (chains.size + 0.25)))
 
 
 def _variances(chains: FloatArray) -> tuple[float, float]:
