@@ -32,7 +32,7 @@ from hysim._basics.printing import aligned, frozen_result, listed, summary_text
 from hysim._basics.progress import Reports, reports
 from hysim.identification import Identification, identify
 from hysim.posterior._sample import posed, walkers_of
-from hysim.posterior._sampler import Chains, effective_samples, sampled, split_rhat
+from hysim.posterior._sampler import Chains, effective_samples, fewest_effective, sampled, split_rhat
 from hysim.posterior._target import Target, given
 from hysim.records import Record, several
 
@@ -152,7 +152,7 @@ def bridge_evidence(target: Target, chains: Chains, seed: int) -> LogEvidence:
     drawn = chains.proposal.draw(_DRAWS, rng)
     of_posterior = chains.log_density.ravel() - chains.proposal.log_density(chains.flat)
     of_proposal = target.log_posterior(drawn) - chains.proposal.log_density(drawn)
-    effective = min(effective_samples(chains.q[..., k]) for k in range(target.n_dim))
+    effective = fewest_effective(chains.q)
     log_z = _iterated(of_posterior, of_proposal, effective)
     posterior_share = effective / (effective + _DRAWS)
     error = _error(of_posterior - log_z, of_proposal - log_z, posterior_share, chains.log_density.shape)

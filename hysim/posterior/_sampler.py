@@ -152,10 +152,9 @@ class Chains:
         return self.q.reshape(-1, self.q.shape[2])
 
 
-def worst(chains: FloatArray) -> tuple[float, float]:
-    """Fewest effective samples and largest R-hat of the numbers in chains (n_draws, n_walkers, n_dim)."""
-    every = [chains[..., k] for k in range(chains.shape[2])]
-    return min(map(effective_samples, every)), max(map(split_rhat, every))
+def fewest_effective(chains: FloatArray) -> float:
+    """Fewest effective samples of the numbers in chains (n_draws, n_walkers, n_dim)."""
+    return min(effective_samples(chains[..., k]) for k in range(chains.shape[2]))
 
 
 def sampled(
@@ -188,11 +187,11 @@ def sampled(
         spent += draws * thin
         parts.append((q, log_density))
         q, log_density = (np.concatenate(each) for each in zip(*parts, strict=True))
-        effective = worst(q)[0]
+        effective = fewest_effective(q)
         if is_enough := effective >= samples or spent >= most_steps:  # in these coordinates
             further = target.parameters(q[len(parameters) :].reshape(-1, target.n_dim))
             parameters = np.concatenate([parameters, further.reshape(-1, *parameters.shape[1:])])
-            effective = worst(parameters)[0]
+            effective = fewest_effective(parameters)
         tau = max(len(q) * thin * walkers / effective, 1.0)
         if progress:
             progress(min(int(effective), samples), samples)
@@ -226,7 +225,7 @@ class _Ensemble:
         while True:
             state, q, _ = self.run(state, steps)
             spent += steps
-            tau = steps * self.walkers / worst(q)[0]
+            tau = steps * self.walkers / fewest_effective(q)
             self._shape(q[steps // 4 :], rng)
             if steps >= _LONG * tau or 2 * spent + 2 * steps > most_steps:
                 return state, tau, spent
