@@ -3,7 +3,7 @@
 The evidence Z is the mean of the likelihood over the prior, by nested sampling or by bridge sampling.
 
 **Nested sampling.** dynesty asks for one likelihood at a time. Here all walks for its next live points go on together,
-each step one evaluation of many sets: `_Together` has the walks of ``rwalk``, `_Pool` hands it all starts at once.
+each step one evaluation of many sets: `_Pool` gets all starts of ``rwalk`` at once, and walks in its place.
 Sources: J. Skilling, Bayesian Anal. 1 (2006) 833; J. S. Speagle, Mon. Not. R. Astron. Soc. 493 (2020) 3132.
 
 **Bridge sampling.** With draws q of the posterior p L / Z and draws of a proposal g, whose density is known,
@@ -61,15 +61,15 @@ def nested_evidence(target: Target, live_points: int, seed: int) -> LogEvidence:
     def log_likelihood(cube: FloatArray) -> FloatArray:
         return np.maximum(np.nan_to_num(target.log_likelihood_in_cube(cube), nan=_LOWEST), _LOWEST)
 
-    walk = _together(dynesty.internal_samplers, log_likelihood)
+    samplers = dynesty.internal_samplers
     sampler = dynesty.NestedSampler(
         lambda point: float(log_likelihood(point[np.newaxis])[0]),
         lambda cube: cube,
         target.n_dim,
         nlive=live_points,
         bound="multi",
-        sample=walk(ndim=target.n_dim, ncdim=target.n_dim, walks=_WALK * target.n_dim),
-        pool=_Pool(walk, max(2, live_points // _QUEUE)),
+        sample=samplers.RWalkSampler(ndim=target.n_dim, ncdim=target.n_dim, walks=_WALK * target.n_dim),
+        pool=_Pool(samplers, log_likelihood, max(2, live_points // _QUEUE)),
         first_update={"min_ncall": 0, "min_eff": 100.0},
         rstate=np.random.default_rng(seed),
     )
@@ -78,17 +78,6 @@ def nested_evidence(target: Target, live_points: int, seed: int) -> LogEvidence:
         sampler.run_nested(dlogz=_REMAINS, print_progress=False)
     result = sampler.results
     return LogEvidence(float(result.logz[-1]), float(result.logzerr[-1]), target.evaluations - before)
-
-
-def _together(samplers: Any, log_likelihood: Callable[[FloatArray], FloatArray]) -> Any:
-    """The class of walks in lockstep under this likelihood, as a subclass of dynesty's random walk."""
-
-    class Together(samplers.RWalkSampler):  # type: ignore[misc]
-        @staticmethod
-        def walk_all(arguments: list[Any]) -> list[Any]:
-            return _walked(arguments, log_likelihood, samplers.SamplerReturn)
-
-    return Together
 
 
 def _walked(arguments: list[Any], log_likelihood: Callable[[FloatArray], FloatArray], result: Any) -> list[Any]:
@@ -128,15 +117,16 @@ def _walked(arguments: list[Any], log_likelihood: Callable[[FloatArray], FloatAr
     ]
 
 
-class _Pool:
-    """A pool in dynesty's sense that is one thread, and passes all starts of walks on at once."""
+class _Pool(NamedTuple):
+    """A pool in dynesty's sense that is one thread, and walks from all starts at once."""
 
-    def __init__(self, walk: Any, size: int) -> None:
-        self.walk, self.size = walk, size
+    samplers: Any
+    log_likelihood: Callable[[FloatArray], FloatArray]
+    size: int
 
     def map(self, function: Callable[[Any], Any], items: Iterable[Any]) -> list[Any]:
-        if function is self.walk.sample:
-            return list(self.walk.walk_all(list(items)))
+        if function is self.samplers.RWalkSampler.sample:
+            return _walked(list(items), self.log_likelihood, self.samplers.SamplerReturn)
         return [function(item) for item in items]
 
 
