@@ -25,6 +25,7 @@ is that of v, with the linear parameters integrated out (`hysim.posterior._targe
 """
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -94,9 +95,7 @@ class Proposal:
         return _whole_power(1.0 / (1.0 + squares / self.freedom), (self.freedom + n_v) // 2) * scale, squares
 
     def beside(self, other: "Proposal", share_of_other: float) -> "Proposal":
-        share = np.concatenate([(1.0 - share_of_other) * self.share, share_of_other * other.share])
-        centres, roots = np.concatenate([self.centres, other.centres]), np.concatenate([self.roots, other.roots])
-        return Proposal(centres, roots, share, self.n_x, self.n_linear)
+        return _together([(self, 1.0 - share_of_other), (other, share_of_other)], 1.0)
 
     @cached_property
     def _prepared(self) -> tuple[FloatArray, FloatArray, FloatArray]:
@@ -108,6 +107,14 @@ class Proposal:
         scale = self.share * constant / np.abs(np.diagonal(self.roots, axis1=1, axis2=2)).prod(axis=1)
         columns = inverse.transpose(2, 1, 0).reshape(n_v, n_v * n_parts)
         return columns, np.einsum("pij,pj->ip", inverse, self.centres).ravel(), scale
+
+
+def _together(proposals: Sequence[tuple[Proposal, float]], total: float) -> Proposal:
+    """The mixture of proposals, each with its part of the `total`."""
+    share = np.concatenate([each.share * part / total for each, part in proposals])
+    centres, roots = (np.concatenate(each) for each in zip(*((p.centres, p.roots) for p, _ in proposals), strict=True))
+    first = proposals[0][0]
+    return Proposal(centres, roots, share, first.n_x, first.n_linear)
 
 
 def _whole_power(base: FloatArray, exponent: int) -> FloatArray:
@@ -130,6 +137,11 @@ def mixture(v: FloatArray, weight: FloatArray, n_linear: int, rng: np.random.Gen
     for _ in range(_STEPS):
         closest = _closer(closest, v, weight, covariance)
     return closest.beside(wide, _WIDE)
+
+
+def even_mixture(v: FloatArray, target: Target, rng: np.random.Generator, parts: int = PARTS) -> Proposal:
+    """The proposal closest to points of equal weights."""
+    return mixture(v, np.ones(len(v)), target.n_linear, rng, parts)
 
 
 def _closer(parts: Proposal, v: FloatArray, weight: FloatArray, covariance: FloatArray) -> Proposal:
@@ -195,7 +207,7 @@ _BESIDE = 0.3  # by hand: share of all parts beside that mixture
 def grown(base: Proposal, target: Target, rng: np.random.Generator) -> tuple[Proposal, Proposal]:
     """`base` with the parts that grew, mixed with many parts fitted to the points; and the former alone."""
     v = target.without_linear(base.draw(_FIRST, rng))
-    log_density = _log_density(target, v)
+    log_density = np.add(*target.marginal(v))
     added: list[Proposal] = []
     total = _FIRST * base.densities(v)[0].sum(axis=1)  # of densities times numbers of points
     for _ in range(_GROWTHS):
@@ -205,16 +217,11 @@ def grown(base: Proposal, target: Target, rng: np.random.Generator) -> tuple[Pro
         added.append(new)
         below = _FIRST * base.densities(further)[0].sum(axis=1) + sum(_density(each, further) for each in added)
         v, total = np.concatenate([v, further]), np.concatenate([total, below])
-        log_density = np.concatenate([log_density, _log_density(target, further)])
+        log_density = np.concatenate([log_density, np.add(*target.marginal(further))])
     chosen = rng.choice(len(v), _FITTED, p=_weights(log_density, total))
-    fitted = mixture(v[chosen], np.ones(_FITTED), target.n_linear, rng, parts=_PARTS)
-    every = _together(base, added, len(v))
+    fitted = even_mixture(v[chosen], target, rng, _PARTS)
+    every = _together([(base, _FIRST), *((each, _EACH * len(each.centres)) for each in added)], len(v))
     return fitted.beside(every, _BESIDE), every
-
-
-def _log_density(target: Target, v: FloatArray) -> FloatArray:
-    value, prior = target.marginal(v)
-    return value + prior
 
 
 def _density(parts: Proposal, v: FloatArray) -> FloatArray:
@@ -250,16 +257,6 @@ def _parts(v: FloatArray, weight: FloatArray, base: Proposal) -> Proposal:
     return Proposal(np.array(centres), np.array(roots), even, base.n_x, base.n_linear)
 
 
-def _together(base: Proposal, added: list[Proposal], n: int) -> Proposal:
-    """The mixture from which `n` points were drawn, in all."""
-    every = [(base, _FIRST), *((each, _EACH * len(each.centres)) for each in added)]
-    centres, roots = (
-        np.concatenate(each) for each in zip(*((one.centres, one.roots) for one, _ in every), strict=True)
-    )
-    share = np.concatenate([each.share * count / n for each, count in every])
-    return Proposal(centres, roots, share, base.n_x, base.n_linear)
-
-
 _PARTICLES, _PARTICLES_EACH = 1024, 256  # by hand: at most, and for each number in v
 _MOVES = 6  # by hand: of each particle between two looks at the mean of ln L
 _LEVEL = 0.1  # by hand: rise of power times that mean in so many moves, from which on it counts as level
@@ -291,8 +288,8 @@ def proposal_for(
             f"the posterior was not found: {_distinct(v)} of {len(v)} draws from the priors agree with the "
             "records; pass narrower priors"
         )
-    reaching = _of(early, target, rng)
-    proposal = _of(v, target, rng).beside(reaching, EARLY_SHARE)
+    reaching = even_mixture(early, target, rng)
+    proposal = even_mixture(v, target, rng).beside(reaching, EARLY_SHARE)
     drawn, weights = np.empty((0, target.n_x + 1)), np.empty(0)
     best, best_share = proposal, 0.0
     for _ in range(_ROUNDS + 1):
@@ -310,10 +307,6 @@ def proposal_for(
             break
         proposal = mixture(drawn, weights, target.n_linear, rng).beside(reaching, EARLY_SHARE)
     return (best, reaching) if best_share > least else grown(best, target, rng)
-
-
-def _of(v: FloatArray, target: Target, rng: np.random.Generator) -> Proposal:
-    return mixture(v, np.ones(len(v)), target.n_linear, rng)
 
 
 def _distinct(v: FloatArray) -> int:

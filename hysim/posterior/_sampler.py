@@ -32,7 +32,7 @@ import numpy as np
 from hysim._basics.frozen import FloatArray
 from hysim._basics.libraries import optional
 from hysim._basics.progress import Reports
-from hysim.posterior._proposal import EARLY_SHARE, GOOD, POOR, Proposal, mixture, moved, proposal_for
+from hysim.posterior._proposal import EARLY_SHARE, GOOD, POOR, Proposal, even_mixture, moved, proposal_for
 from hysim.posterior._target import Target
 
 _FEWEST = 8  # draws of a chain
@@ -235,8 +235,7 @@ class _Ensemble:
         """Shape the proposal by one half of these paths, if that has the larger density on the other half."""
         half = len(q) // 2
         first, second = (_some(part.reshape(-1, q.shape[2]), rng) for part in (q[:half], q[half:]))
-        v = self.target.without_linear(first)
-        trial = mixture(v, np.ones(len(v)), self.target.n_linear, rng).beside(self.reaching, EARLY_SHARE)
+        trial = even_mixture(self.target.without_linear(first), self.target, rng).beside(self.reaching, EARLY_SHARE)
         if trial.log_density(second).mean() > self.proposal.log_density(second).mean():
             self.proposal = trial
 
