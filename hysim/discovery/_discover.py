@@ -18,7 +18,7 @@ from hysim import metrics
 from hysim._basics.blas import one_blas_thread
 from hysim._basics.frozen import FloatArray, check_choice
 from hysim._basics.progress import Progress, Reports, reports
-from hysim.discovery._judgement import HYSTERESIS, LAG, NO_STRUCTURE, Trial, competitors, doubts, judge
+from hysim.discovery._judgement import HYSTERESIS, LAG, NO_STRUCTURE, Trial, competitors, doubts, judge, of_each
 from hysim.discovery._refinement import DIVERGED, AnyExponent, Candidate, FreeRun, Samples, Work
 from hysim.discovery._result import Discovery, coefficients, law_from
 from hysim.discovery._search import MOST_WORK, Library, Options, Outcome, or_any_exponent, searched
@@ -155,39 +155,32 @@ def discover(
     )
     report = _in_steps(progress or (lambda done, total: None), _REPORTS, 1 + n_folds)
     share = _SEARCHES / (1 + len(of_output))
-
-    def outcomes_of(
-        libraries: Sequence[Library], how: Options, best: float = math.inf, masks: tuple[Samples, ...] | None = None
-    ) -> list[Outcome]:
-        every = (searched(records, library, how, best=best, masks=masks) for library in libraries)
-        return [outcome for outcome in every if outcome is not None]
-
-    outcomes = outcomes_of([of_memory], replace(options, report=lambda done: report(share * done)))
-    report(share)
     any_exponent = library is None and symmetry is None and not signs
 
-    def chosen(first: list[Outcome], masks: tuple[Samples, ...] | None) -> tuple[Outcome, Candidate[Any]]:
-        of_others = options if masks else replace(options, report=lambda done: report(share * (1.0 + done)))
-        both = [*first, *outcomes_of(of_output, of_others, first[0].searched.bic, masks)]
-        outcome = min(both, key=lambda each: each.candidate.bic)
-        outcome = replace(outcome, is_cut=any(each.is_cut for each in both))
-        if not any_exponent or outcome.is_short:
-            return outcome, outcome.candidate
-        return outcome, or_any_exponent(FreeRun(records, masks), first[0], outcome)
+    def search(masks: tuple[Samples, ...] | None = None) -> tuple[Outcome, Outcome, Candidate[Any]]:
+        """The outcome of the first library, the best outcome, and the law that is taken."""
+        outcomes = list[Outcome]()
+        for k, each in enumerate((of_memory, *of_output)):
+            how = options if masks else replace(options, report=lambda done, k=k: report(share * (k + done)))
+            best = outcomes[0].searched.bic if outcomes else math.inf
+            outcome = searched(records, each, how, best=best, masks=masks)
+            outcomes += [] if outcome is None else [outcome]
+            how.report(1.0)
+        first, chosen = outcomes[0], min(outcomes, key=lambda each: each.candidate.bic)
+        chosen = replace(chosen, is_cut=any(each.is_cut for each in outcomes))
+        if not any_exponent or chosen.is_short:
+            return first, chosen, chosen.candidate
+        return first, chosen, or_any_exponent(FreeRun(records, masks), first, chosen)
 
-    def again(masks: tuple[Samples, ...]) -> Candidate[Any]:
-        return chosen(outcomes_of([of_memory], options, masks=masks), masks)[1]
-
-    outcome, candidate = chosen(outcomes, None)
-    report(_SEARCHES)
+    first, outcome, candidate = search()
     result = _discovery(records, outcome, candidate, others(), seed)
     report(1.0)
     error = math.nan
     if cross_validate is not None:
-        error = left_out_rmse(records, again, cross_validate, lambda done, _: report(1.0 + done))
+        error = left_out_rmse(records, lambda masks: search(masks)[2], cross_validate, lambda k, _: report(1.0 + k))
     warnings = [*result.warnings, swapped_columns(records)]
     is_even = all(r.t is not None and np.ptp(np.diff(r.t)) < 1e-6 * np.ptp(r.t) for r in records)
-    is_poor = _scores(outcomes[0].candidate, records)["fit_percent"] <= _POOR
+    is_poor = _scores(first.candidate, records)["fit_percent"] <= _POOR
     if route == "auto" and result.verdict != LAG and is_even and is_poor:
         warnings.append(_OSCILLATOR)
     return replace(result, warnings=tuple(filter(None, warnings)), cv_rmse=error)
@@ -320,13 +313,13 @@ def left_out_rmse(
     progress: Progress,
 ) -> float:
     """Rmse on samples left out of the search, repeated for each fold [unit of y]; inf where a law diverges."""
-    free_run, edges = FreeRun(tuple(records)), np.cumsum([len(record) for record in records])
+    free_run = FreeRun(tuple(records))
     left_out = folds(count, free_run.n_samples)
     errors = np.empty(free_run.n_samples)
     for done, samples in enumerate(left_out, 1):
         mask = np.ones(free_run.n_samples, dtype=bool)
         mask[samples] = False
-        law = search(tuple(np.split(mask, edges[:-1])))
+        law = search(tuple(of_each(mask, records)))
         errors[samples] = free_run.residuals(law.structure, law.unknowns[np.newaxis])[0, samples]
         progress(done, len(left_out))
     if np.abs(errors).max() >= DIVERGED:

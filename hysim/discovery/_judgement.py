@@ -27,7 +27,7 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
-from typing import NamedTuple, Protocol
+from typing import NamedTuple, Protocol, TypeVar
 
 import numpy as np
 import numpy.typing as npt
@@ -71,6 +71,7 @@ _TAILS = (0.05, 0.95)
 _AMPLITUDES = (0.25, 0.5, 0.75, 1.0)
 _CYCLES = 10
 
+T = TypeVar("T", bound=np.generic)
 Samples = npt.NDArray[np.intp]
 
 Model = Callable[[FloatArray], FloatArray]
@@ -114,18 +115,16 @@ def about_trends(residual: FloatArray, records: Sequence[Record]) -> list[FloatA
     return residuals
 
 
-def of_each(values: FloatArray, records: Sequence[Record]) -> list[FloatArray]:
+def of_each(values: npt.NDArray[T], records: Sequence[Record]) -> list[npt.NDArray[T]]:
     return np.split(values, np.cumsum([len(record) for record in records])[:-1])
 
 
 def folds(records: Sequence[Record]) -> tuple[str, list[Samples]]:
-    lengths = [len(record) for record in records]
-    begins = np.cumsum([0, *lengths])[:-1]
-    counted = np.ones(sum(lengths), dtype=bool)
-    for begin, length in zip(begins, lengths, strict=True):
-        counted[begin : begin + math.ceil(_START * length)] = False
-    by, parts = "record", [begin + np.arange(length) for begin, length in zip(begins, lengths, strict=True)]
     u = np.concatenate([record.u for record in records])
+    by, parts = "record", of_each(np.arange(u.size), records)
+    counted = np.ones(u.size, dtype=bool)
+    for samples in parts:
+        counted[samples[: math.ceil(_START * samples.size)]] = False
     if len(records) == 1:
         by, parts = _folds_of(records[0])
     elif not all(_covers(np.delete(u, samples), u[samples]) for samples in parts):
@@ -175,7 +174,7 @@ def rate_spread(records: Sequence[Record]) -> float:
     crossed = [_crossings(record, low + (high - low) * _EDGES) for record in records]
     bands = list(zip(*crossed, strict=True))
     shared = [band for band in bands if sum(map(bool, band)) > 1]
-    ratios = [ratio for band in shared or bands if (ratio := _ratio(band)) is not None]
+    ratios = [_ratio(band) for band in shared or bands if sum(map(len, band)) > 1]
     return float(np.median(ratios)) if ratios else math.nan
 
 
@@ -207,13 +206,10 @@ def _crossings(record: Record, edges: FloatArray) -> list[list[float]]:
     return bands
 
 
-def _ratio(band: Sequence[list[float]]) -> float | None:
-    """High over low rate of a band's passes, a list for each record; None for fewer than two passes."""
-    rates = np.concatenate(band)
-    if rates.size < 2:
-        return None
+def _ratio(band: Sequence[list[float]]) -> float:
+    """High over low rate of a band's passes, a list for each record."""
     shares = np.concatenate([np.full(len(passes), 1.0 / max(len(passes), 1)) for passes in band])
-    slow, fast = np.quantile(rates, _TAILS, weights=shares, method="inverted_cdf")
+    slow, fast = np.quantile(np.concatenate(band), _TAILS, weights=shares, method="inverted_cdf")
     return float(fast / slow)
 
 
@@ -393,12 +389,11 @@ def judge(records: Sequence[Record], laws: Sequence[Law], refit: Refit, others: 
     trial = replace(others, scores={**others.scores, LAW: scores_of(fitted, records, y, others.left_out)})
     longest = max(range(len(records)), key=lambda k: len(records[k]))
     law, record = laws[longest], records[longest]
-    loops = _loops(law, record.u)
+    loops, outputs = _loops(law, record.u), [_response(law, r.u) for law, r in zip(laws, records, strict=True)]
     areas = np.array([math.nan if loop is None else signed_area(loop) for loop in loops])
-    stable = all(_response(law, record.u) is not None for law, record in zip(laws, records, strict=True))
-    stable = stable and loops[-1] is not None
+    stable = all(output is not None for output in outputs) and loops[-1] is not None
     verdict = trial.verdict(all(loop is not None and loop.relative_width < LEAST for loop in loops))
-    own, width, of_rival = _response(law, record.u), math.nan, (math.nan,) * len(RATES)
+    own, width, of_rival = outputs[longest], math.nan, (math.nan,) * len(RATES)
     cycles = complete_cycles(record.u, TOLERANCE)  # between the extremes: one about a level is no steady cycle
     if cycles and own is not None:
         width = metrics.loop_metrics(record.u, own).relative_width
