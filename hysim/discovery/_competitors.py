@@ -147,11 +147,10 @@ def _yardstick(
     before: FloatArray | None = None,
     u: FloatArray | None = None,
 ) -> Yardstick:
-    trends = np.asarray(block_diag(*(trend(record) for record in records)))
-    groups = [(np.concatenate(parts, axis=1), 0.0), (trends, _SLOW)]
-    groups += [] if before is None else [(before, _BEFORE)]
-    columns = np.concatenate([each for each, _ in groups], axis=1)
-    return Yardstick(columns, np.concatenate([np.full(each.shape[1], ridges) for each, ridges in groups]), u)
+    own, trends = np.concatenate(parts, axis=1), block_diag(*(trend(record) for record in records))
+    before = np.empty((len(own), 0)) if before is None else before
+    ridges = np.repeat([0.0, _SLOW, _BEFORE], [own.shape[1], trends.shape[1], before.shape[1]])
+    return Yardstick(np.concatenate([own, trends, before], axis=1), ridges, u)
 
 
 def _ridge(design: FloatArray, target: FloatArray, n: int) -> FloatArray:
@@ -319,9 +318,7 @@ def _identified(
 
 
 def _line(records: Sequence[Record], weights: Sequence[FloatArray]) -> Rival:
-    u = np.concatenate([record.u for record in records])
-    y = np.concatenate([record.y for record in records])
-    shares = np.concatenate(weights)
+    u, y, shares = _inputs(records), np.concatenate([record.y for record in records]), np.concatenate(weights)
     mean = float(shares @ u / shares.sum())  # so that the columns are orthogonal
     columns = np.stack([u - mean, np.ones(u.size)], axis=1)
     slope, level = np.linalg.lstsq(columns * shares[:, np.newaxis], y * shares)[0].tolist()
