@@ -308,9 +308,9 @@ class Search:
 
 
 def preferred(candidates: Sequence[Candidate[Terms]], letter: str) -> Candidate[Terms]:
-    lowest = min(candidate.bic for candidate in candidates)
     best = min(candidates, key=lambda candidate: candidate.bic)
-    rivals = [c for c in candidates if c.bic <= lowest + INDISTINCT or _is_as_good(c, best)]
+    smaller = [c for c in candidates if c.n_parameters < best.n_parameters and gap(c, best) < ALIKE]
+    rivals = [*(c for c in candidates if c.bic <= best.bic + INDISTINCT), *smaller]
     return min(rivals, key=lambda c: (c.n_parameters, not is_plain(c.structure, letter), c.bic))
 
 
@@ -329,10 +329,6 @@ def pruned(free_run: FreeRun, candidate: Candidate[Terms], required: frozenset[s
         if refined and refined.bic <= candidate.bic + INDISTINCT and refined.settles() >= candidate.settles():
             return pruned(free_run, refined, required)
     return candidate
-
-
-def _is_as_good(candidate: Candidate[Terms], best: Candidate[Terms]) -> bool:
-    return candidate.n_parameters < best.n_parameters and gap(candidate, best) < ALIKE
 
 
 def gap(candidate: Candidate[Any], best: Candidate[Any]) -> float:
