@@ -301,7 +301,7 @@ def test_the_memory_along_a_path_is_that_of_the_law_and_its_slopes_are_derivativ
 
     def run(coefficients: list[float], relaxation: float = 0.0) -> np.ndarray:
         found = np.zeros((5, path.size))
-        polynomial = memory_arrays(dict(zip(terms, coefficients, strict=True)), 1).polynomial
+        polynomial = memory_arrays(dict(zip(terms, coefficients, strict=True)), 1)[0]
         assert memory_terms.along(np.diff(path), 1e-3, polynomial, relaxation, units, found[0], found[1:])
         return found
 

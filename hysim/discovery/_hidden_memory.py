@@ -32,6 +32,7 @@ import scipy
 
 from hysim._basics.frozen import FloatArray
 from hysim._basics.parallel import in_chunks
+from hysim.discovery._judgement import of_each
 from hysim.discovery._search import best_subsets
 from hysim.discovery._slopes import independent, sparse_path
 from hysim.errors import SimulationError
@@ -196,24 +197,18 @@ class _Along(NamedTuple):
     samples: slice
 
 
-class MemoryArrays(NamedTuple):
-    """A law as `hysim.kernels.memory_terms` takes it: polynomials in z by direction and side, and one more power."""
+def memory_arrays(coefficients: Mapping[Term, float], degree: int) -> tuple[FloatArray, FloatArray, float, float]:
+    """A law as `hysim.kernels.memory_terms` takes it: polynomials in z, one more term and its power, the relaxation.
 
-    polynomial: FloatArray
-    extra: FloatArray
-    power: float
-    relaxation: float
-
-
-def memory_arrays(coefficients: Mapping[Term, float], degree: int) -> MemoryArrays:
-    """The law with these coefficients; terms whose powers are not whole must share one power."""
+    The first two are by direction and side. Terms whose powers are not whole must share one power.
+    """
     polynomial, extra, power = np.zeros((2, 2, degree + 1)), np.zeros((2, 2)), 1.0
     for term, value in coefficients.items():
         if term.is_polynomial:
             polynomial += value * cases(term, degree)
         elif not term.relaxing:
             extra, power = extra + value * _signs(term), term.degree
-    return MemoryArrays(polynomial, extra, power, coefficients.get(RELAXATION, 0.0))
+    return polynomial, extra, power, coefficients.get(RELAXATION, 0.0)
 
 
 def cases(term: Term, degree: int) -> FloatArray:
@@ -382,15 +377,13 @@ class Response:
 
     def outputs(self, oscillators: Sequence[Oscillator]) -> FloatArray:
         outputs = np.full((len(oscillators), self.measured.size), np.inf)
-        begins = np.cumsum([0, *map(len, self.records)])
 
         def work(start: int, stop: int) -> None:
-            for k in range(start, stop):
-                for record, begin, force_and_step in zip(self.records, begins, self._inputs, strict=False):
-                    run = self._run(oscillators[k], *force_and_step)
+            for row, oscillator in zip(outputs[start:stop], oscillators[start:stop], strict=True):
+                for y, force_and_step in zip(of_each(row, self.records), self._inputs, strict=True):
+                    run = self._run(oscillator, *force_and_step)
                     if run is not None:
-                        y = np.resize(self.structure.sampled(run[0]), len(record))
-                        outputs[k, begin : begin + len(record)] = y
+                        y[:] = np.resize(self.structure.sampled(run[0]), y.size)
 
         in_chunks(work, len(oscillators), minimum=1)
         return outputs
@@ -504,9 +497,8 @@ class Response:
 
     @cached_property
     def _blocks(self) -> list[npt.NDArray[np.intp]]:
-        blocks, begins = [], np.cumsum([0, *map(len, self.records)])
-        for begin, record in zip(begins, self.records, strict=False):
-            period = self.structure.period
-            n = len(record) // period if period is not None and len(record) >= 2 * period else BLOCKS
-            blocks += [begin + block for block in folds(n, len(record))]
+        blocks, period = [], self.structure.period
+        for samples in of_each(np.arange(self.measured.size), self.records):
+            n = samples.size // period if period is not None and samples.size >= 2 * period else BLOCKS
+            blocks += [samples[block] for block in folds(n, samples.size)]
         return blocks
