@@ -214,10 +214,9 @@ def smoothed_rows(u: FloatArray, y: FloatArray) -> Rows | None:
     smooth = branches(u, y)
     if not smooth:
         return None
-    direction = np.concatenate([np.full(each.u.size, each.direction) for each in smooth])
-    points = (np.concatenate(parts) for parts in zip(*((each.u, each.y, each.slope) for each in smooth), strict=True))
-    inputs, outputs, slope = points
-    return Rows(inputs, outputs, direction, slope, np.ones(direction.size))
+    columns = ((each.u, each.y, np.full(each.u.size, each.direction), each.slope) for each in smooth)
+    points = [np.concatenate(column) for column in zip(*columns, strict=True)]
+    return Rows(*points, length=np.ones(points[0].size))
 
 
 def weak_rows(u: FloatArray, y: FloatArray) -> Rows | None:
