@@ -15,9 +15,9 @@ Where a branch is long enough the features take its smoothed output, elsewhere t
 
 Each column is scaled to unit rms over the rows, and so is the slope: a threshold is the share of a term in the slope.
 
-**PySINDy.** This is the only place that touches PySINDy (2.1): its optimizers, from dense to sparse, and its ensembles.
-Features and slopes are scaled arrays: PySINDy never differentiates, so that nothing is taken across a reversal. Its
-ensembles draw from NumPy's global generator, which is seeded around the call and restored.
+**PySINDy.** This is the only place that touches PySINDy (2.1): its optimizers, from dense to sparse. Features and
+slopes are scaled arrays: PySINDy never differentiates, so that nothing is taken across a reversal. Its ensembles draw
+from NumPy's global generator, so that their rows are drawn here.
 """
 
 import contextlib
@@ -88,12 +88,12 @@ def sparse_fit(features: FloatArray, slope: FloatArray, threshold: float, optimi
 
 def inclusion(features: FloatArray, slope: FloatArray, threshold: float, *, n_models: int, seed: int) -> FloatArray:
     """Share of fits (n_terms,) by STLSQ that keep each term when the rows are drawn anew (PySINDy's bagging)."""
-    import pysindy
-
-    ensemble = pysindy.EnsembleOptimizer(_thresholding("STLSQ", threshold, features), bagging=True, n_models=n_models)
-    with _quiet(), _seeded(seed):
-        ensemble.fit(features, slope[:, np.newaxis])
-    return np.asarray(np.mean([coefficients[0] != 0.0 for coefficients in ensemble.coef_list], axis=0))
+    fitted, n = _thresholding("STLSQ", threshold, features), len(slope)
+    random = np.random.RandomState(seed)  # draws the same rows as PySINDy
+    with _quiet():
+        draws = (random.choice(n, n) for _ in range(n_models))
+        included = [fitted.fit(features[rows], slope[rows, np.newaxis]).coef_[0] != 0.0 for rows in draws]
+    return np.asarray(np.mean(included, axis=0))
 
 
 def check(optimizer: str) -> None:
@@ -145,16 +145,6 @@ def _quiet() -> Iterator[None]:
         warnings.filterwarnings("ignore", message="Sparsity parameter is too big")
         warnings.filterwarnings("ignore", category=sklearn.exceptions.ConvergenceWarning)
         yield
-
-
-@contextlib.contextmanager
-def _seeded(seed: int) -> Iterator[None]:
-    before = np.random.get_state()  # noqa: NPY002  PySINDy takes no generator
-    np.random.seed(seed)  # noqa: NPY002
-    try:
-        yield
-    finally:
-        np.random.set_state(before)  # noqa: NPY002
 
 
 MIN_SAMPLES = 4
