@@ -84,11 +84,12 @@ def save_record(record: Record, path: str | Path) -> None:
 
 def packed(columns: Mapping[str, FloatArray], path: str | Path, notes: Notes) -> bytes:
     """Columns of equal lengths as the content of a file, in the format of its ending; errors as in `save_record`."""
-    write = _WRITERS[ending(path)]
+    write, buffer = _WRITERS[ending(path)], io.BytesIO()
     for text in (notes.name or "", *notes.units.values()):
         if "\0" in text or text.encode("utf-8", "replace").decode() != text:
             raise ValueError(f"names and units must be letters that can be written, got {text!r}")
-    return write(columns, notes)
+    write(buffer, columns, notes)
+    return buffer.getvalue()
 
 
 def ending(path: str | Path) -> str:
@@ -101,7 +102,7 @@ def ending(path: str | Path) -> str:
     return suffix
 
 
-def _text(columns: Mapping[str, FloatArray], notes: Notes, *, delimiter: str) -> bytes:
+def _text(file: io.BytesIO, columns: Mapping[str, FloatArray], notes: Notes, *, delimiter: str) -> None:
     plain = {label: unit for label, unit in notes.units.items() if label in columns and _PLAIN_UNIT.fullmatch(unit)}
     comments: dict[str, Any] = {"name": notes.name, "resolution": notes.resolution}
     comments["units"] = dict(notes.units) if dict(notes.units) != plain else None
@@ -109,42 +110,35 @@ def _text(columns: Mapping[str, FloatArray], notes: Notes, *, delimiter: str) ->
     header = [f"{label} [{plain[label]}]" if label in plain else label for label in columns]
     rows = zip(*(values.tolist() for values in columns.values()), strict=True)
     lines = "".join(f"# {name}: {json.dumps(value)}\n" for name, value in comments.items() if value or value == "")
-    return (lines + csv_text([header, *rows], delimiter=delimiter, nan="nan")).encode()
+    file.write((lines + csv_text([header, *rows], delimiter=delimiter, nan="nan")).encode())
 
 
 def _arrays(columns: Mapping[str, FloatArray], notes: Notes) -> dict[str, Any]:
+    channels = json.dumps(dict(notes.channels)) if notes.channels else None
     others: dict[str, Any] = {f"{label}_units": unit for label, unit in notes.units.items()}
-    if notes.name is not None:
-        others["name"] = notes.name
-    if notes.resolution is not None:
-        others["resolution"] = np.asarray(notes.resolution)
-    if notes.channels:
-        others["channels"] = json.dumps(dict(notes.channels))
-    return {**columns, **others}
+    others |= {"name": notes.name, "resolution": notes.resolution, "channels": channels}
+    return {**columns, **{name: value for name, value in others.items() if value is not None}}
 
 
-def _npz(columns: Mapping[str, FloatArray], notes: Notes) -> bytes:
-    buffer = io.BytesIO()
-    np.savez_compressed(buffer, **_arrays(columns, notes))
-    return buffer.getvalue()
+def _npz(file: io.BytesIO, columns: Mapping[str, FloatArray], notes: Notes) -> None:
+    np.savez_compressed(file, **_arrays(columns, notes))
 
 
-def _mat(columns: Mapping[str, FloatArray], notes: Notes) -> bytes:
+def _mat(file: io.BytesIO, columns: Mapping[str, FloatArray], notes: Notes) -> None:
     from scipy.io import savemat
 
-    buffer = io.BytesIO()
-    savemat(buffer, _arrays(columns, notes), do_compression=True, oned_as="column")
-    return _MAT_TITLE + buffer.getvalue()[len(_MAT_TITLE) :]  # in place of one that holds the time
+    savemat(file, _arrays(columns, notes), do_compression=True, oned_as="column")
+    file.seek(0)
+    file.write(_MAT_TITLE)  # in place of one that holds the time
 
 
 _MAT_TITLE = b"MATLAB 5.0 MAT-file, saved by hysim".ljust(116)
 
 
-def _hdf5(columns: Mapping[str, FloatArray], notes: Notes) -> bytes:
+def _hdf5(file: io.BytesIO, columns: Mapping[str, FloatArray], notes: Notes) -> None:
     import h5py
 
-    buffer = io.BytesIO()
-    with h5py.File(buffer, "w") as root:
+    with h5py.File(file, "w") as root:
         for name, value in _arrays(columns, notes).items():
             label = name.removesuffix("_units")
             if name in columns:
@@ -153,10 +147,9 @@ def _hdf5(columns: Mapping[str, FloatArray], notes: Notes) -> bytes:
                 root[label].attrs["units"] = value
             else:
                 root.attrs[name] = value
-    return buffer.getvalue()
 
 
-_WRITERS: dict[str, Callable[[Mapping[str, FloatArray], Notes], bytes]] = {
+_WRITERS: dict[str, Callable[[io.BytesIO, Mapping[str, FloatArray], Notes], None]] = {
     ".csv": partial(_text, delimiter=","), ".tsv": partial(_text, delimiter="\t"),
     ".npz": _npz, ".mat": _mat, ".h5": _hdf5, ".hdf5": _hdf5,
 }  # fmt: skip
