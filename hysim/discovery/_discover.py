@@ -9,7 +9,7 @@ by simulation error (`_refinement`), choice of one structure (`_search`), and th
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
-from functools import cache
+from functools import cache, partial
 from typing import Any
 
 import numpy as np
@@ -157,11 +157,14 @@ def discover(
     share = _SEARCHES / (1 + len(of_output))
     any_exponent = library is None and symmetry is None and not signs
 
+    def report_search(k: int, done: float) -> None:
+        report(share * (k + done))
+
     def search(masks: tuple[Samples, ...] | None = None) -> tuple[Outcome, Outcome, Candidate[Any]]:
         """The outcome of the first library, the best outcome, and the law that is taken."""
         outcomes = list[Outcome]()
         for k, each in enumerate((of_memory, *of_output)):
-            how = options if masks else replace(options, report=lambda done, k=k: report(share * (k + done)))
+            how = options if masks else replace(options, report=partial(report_search, k))
             best = outcomes[0].searched.bic if outcomes else math.inf
             outcome = searched(records, each, how, best=best, masks=masks)
             outcomes += [] if outcome is None else [outcome]

@@ -205,8 +205,8 @@ def smoothed_rows(u: FloatArray, y: FloatArray) -> Rows | None:
     if not smooth:
         return None
     columns = ((each.u, each.y, np.full(each.u.size, each.direction), each.slope) for each in smooth)
-    points = [np.concatenate(column) for column in zip(*columns, strict=True)]
-    return Rows(*points, length=np.ones(points[0].size))
+    u, y, direction, slope = (np.concatenate(column) for column in zip(*columns, strict=True))
+    return Rows(u, y, direction, slope, np.ones(u.size))
 
 
 def weak_rows(u: FloatArray, y: FloatArray) -> Rows | None:
