@@ -78,9 +78,10 @@ class Expressions:
     def any(self, node: ast.expr) -> Value:
         """A number, a vector, or a function."""
         methods: dict[type[ast.expr], Callable[[Any], Value]] = {
-            ast.Constant: self._constant, ast.Name: self._name, ast.Attribute: self._attribute, ast.BinOp: self._binary,
-            ast.UnaryOp: self._unary, ast.BoolOp: self._junction, ast.Compare: self._comparison,
-            ast.IfExp: self._choice, ast.Subscript: self._subscript, ast.Call: self._call, ast.Tuple: self._tuple,
+            ast.Constant: lambda constant: self._literal(constant, constant.value), ast.Name: self._name,
+            ast.Attribute: self._attribute, ast.BinOp: self._binary, ast.UnaryOp: self._unary,
+            ast.BoolOp: self._junction, ast.Compare: self._comparison, ast.IfExp: self._choice,
+            ast.Subscript: self._subscript, ast.Call: self._call, ast.Tuple: self._tuple,
         }  # fmt: skip
         if type(node) not in methods:
             raise self.refusal(node, f"{type(node).__name__} is no expression of the subset")
@@ -93,9 +94,6 @@ class Expressions:
         return Value(f"({kind.c_type}){{{', '.join(value.text for value in values)}}}", kind)
 
     # ------------------------------------------------------------------------------ names and constants
-
-    def _constant(self, node: ast.Constant) -> Value:
-        return self._literal(node, node.value)
 
     def _literal(self, node: ast.AST, value: Any, name: str = "") -> Value:
         if isinstance(value, bool | np.bool_ | int | np.integer | float):
@@ -303,11 +301,8 @@ class Expressions:
         if len(node.args) != 1 or not isinstance(node.args[0], ast.Tuple):
             raise self.refusal(node, "reshape takes a tuple of lengths")
         array, lengths = self._of_one_axis(of, self.vector(of)), node.args[0].elts
-        extents = tuple(partial(self._extent, each) for each in lengths)
+        extents = tuple(lambda node=each: _length(self.index(node).text) for each in lengths)
         return array._replace(type=Vector(len(lengths)), lengths=extents)
-
-    def _extent(self, node: ast.expr) -> Value:
-        return _length(self.index(node).text)
 
     def _builtin(self, node: ast.Call, called: Any) -> Value | None:
         """A call of a function that C has, or that is a helper; None for another one."""

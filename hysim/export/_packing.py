@@ -119,44 +119,31 @@ class Tape:
 
     def __init__(self, names: tuple[str, ...]) -> None:
         self.names = names
-        self._entries: list[tuple[str, tuple[Number, ...]]] = [("field", ()) for _ in names]
+        self.entries: list[tuple[str, tuple[Number, ...]]] = [("field", ()) for _ in names]
         self._places: dict[Any, int] = {}
 
     def record(self, operation: str, *operands: Number) -> Symbol:
         key = operation, *(_key(operand) for operand in operands)
         if key not in self._places:
-            self._places[key] = len(self._entries)
-            self._entries.append((operation, operands))
+            self._places[key] = len(self.entries)
+            self.entries.append((operation, operands))
         return Symbol(self, self._places[key])
 
     def needed(self, numbers: Iterable[Number]) -> list[int]:
         """Places of the operations on which numbers depend, in order."""
         places = {number.place for number in numbers if isinstance(number, Symbol)}
-        for place in reversed(range(len(self._entries))):
+        for place in reversed(range(len(self.entries))):
             if place in places:
-                places |= {operand.place for operand in self._entries[place][1] if isinstance(operand, Symbol)}
+                places |= {operand.place for operand in self.entries[place][1] if isinstance(operand, Symbol)}
         return sorted(places)
 
     def fields_of(self, number: Number) -> tuple[str, ...]:
         return tuple(self.names[place] for place in self.needed((number,)) if place < len(self.names))
 
-    def evaluate(self, numbers: Sequence[Number], values: Sequence[float]) -> list[float]:
-        results: dict[int, Any] = {k: np.float64(value) for k, value in enumerate(values)}
-
-        def value(number: Number) -> Any:
-            return results[number.place] if isinstance(number, Symbol) else number
-
-        with np.errstate(all="ignore"):
-            for place in self.needed(numbers):
-                operation, operands = self._entries[place]
-                if place not in results:
-                    results[place] = OPERATIONS[operation].evaluate(*map(value, operands))
-        return [float(value(number)) for number in numbers]
-
     def texts(self, numbers: Sequence[Number]) -> tuple[list[str], list[str]]:
         """Declarations of what occurs more than once, in order, and texts of the numbers; ``@`` marks helpers."""
         written = {k: f"fields[{k}]" for k in range(len(self.names))}
-        operations = {place: self._entries[place] for place in self.needed(numbers) if place not in written}
+        operations = {place: self.entries[place] for place in self.needed(numbers) if place not in written}
         uses = Counter(number.place for number in numbers if isinstance(number, Symbol))
         for operation, operands in operations.values():
             for k, operand in enumerate(operands):
@@ -200,13 +187,6 @@ class Packing(NamedTuple):
     parameters: tuple[Number, ...]
     memory: tuple[Number, ...]
     tape: Tape
-
-    def evaluate(self, values: Sequence[float]) -> tuple[FloatArray, FloatArray]:
-        """Parameters and memory for `values` of the fields, in their order, as `Law.packed` has them."""
-        if len(values) != len(self.fields):
-            raise ValueError(f"expected {len(self.fields)} values, got {len(values)}")
-        numbers = self.tape.evaluate((*self.parameters, *self.memory), values)
-        return np.array(numbers[: len(self.parameters)]), np.array(numbers[len(self.parameters) :])
 
     def to_c(self, name: str) -> str:
         """C99 text of ``static void name(const double *fields, double *parameters, double *state)``."""
