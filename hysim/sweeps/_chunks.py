@@ -109,12 +109,10 @@ class Sample:
     def _unit_cube(self) -> FloatArray:
         from scipy.stats import qmc
 
-        rng, d = np.random.default_rng(self.seed), len(self.distributions)
-        if self.method == "latin_hypercube":
-            return np.asarray(qmc.LatinHypercube(d, rng=rng).random(self.n))
-        if self.method == "sobol":
-            return np.asarray(qmc.Sobol(d, rng=rng).random(self.n))
-        return saltelli(*np.hsplit(qmc.Sobol(2 * d, rng=rng).random(self.n), 2))
+        sequence = qmc.LatinHypercube if self.method == "latin_hypercube" else qmc.Sobol
+        n_samples = 2 if self.method == "saltelli" else 1
+        points = sequence(n_samples * len(self.distributions), rng=np.random.default_rng(self.seed)).random(self.n)
+        return saltelli(*np.hsplit(points, 2)) if self.method == "saltelli" else np.asarray(points)
 
 
 def saltelli(a: FloatArray, b: FloatArray) -> FloatArray:
