@@ -69,10 +69,9 @@ def study_of(rows: Mapping[str, Any]) -> Study:
     facts = {name: json.loads(text) for name, text in rows.items()}
     axes = None if facts["axes"] is None else [(_of(str, name), _of(list, values)) for name, values in facts["axes"]]
     layout = [Output(_of(str, n), [*map(_size, shape)], _of(str, c)) for n, shape, c in facts.get("layout", ())]
-    study = Study(
-        *(_texts(facts["identity"]), _size(facts["n_tasks"]), _texts(facts["parameters"]), _texts(facts["kinds"])),
-        *(axes, layout, _of(str, facts.get("shards", ""))),
-    )
+    texts = {name: _texts(facts[name]) for name in ("identity", "parameters", "kinds")}
+    shards = _of(str, facts.get("shards", ""))
+    study = Study(**texts, n_tasks=_size(facts["n_tasks"]), axes=axes, layout=layout, shards=shards)
     is_sound = (
         (layout or "layout" not in facts)
         and (study.parameters and study.parameters.keys() == study.kinds.keys())
@@ -153,7 +152,7 @@ class Store:
         if before is not None and self._is_continued(identity, on_change):
             self._remember(before._replace(identity=identity))
         else:
-            self._create(identity, space, before)
+            self._create(identity, space)
         self._commit()
 
     def space(self) -> Space:
@@ -261,9 +260,9 @@ class Store:
         advice = f'Pass another store, or {keep}on_change="restart" to begin again'
         raise ValueError(f"{self.path} holds another study: {'; '.join(changes.values())}. {advice}")
 
-    def _create(self, identity: Mapping[str, str], space: Space, before: Study | None) -> None:
-        for table in ("results", "study") if before is not None else ():
-            self._database.execute(f"DROP TABLE {table}")
+    def _create(self, identity: Mapping[str, str], space: Space) -> None:
+        for table in ("results", "study"):
+            self._database.execute(f"DROP TABLE IF EXISTS {table}")
         parameters = _distinct(space.columns, OWN_NAMES)
         own = "task INTEGER PRIMARY KEY, seed INTEGER, seconds, error TEXT"
         self._database.execute("CREATE TABLE study (name TEXT PRIMARY KEY, value TEXT)")
