@@ -290,7 +290,7 @@ class _Run:
         self.columns, self.table, self.store, self.workers = own.columns, table, store, workers
         self.places, self.total, self.progress = own.places[~table.done[own.places]], own.places.size, progress
         self.running: dict[Future[list[Rows]], int] = {}  # numbers of tasks
-        self.sent, self.largest, self.seconds_a_task = 0, 0, 0.0
+        self.largest, self.seconds_a_task = 0, 0.0
         self.done, self.n_chunks = self.total - self.places.size, 0
         self.begin, self.busy, self.limit = time.monotonic(), workers.clock(), np.inf if limit is None else limit
 
@@ -315,13 +315,13 @@ class _Run:
 
     def _fill_queues(self) -> bool:
         """Send chunks out, as many as the workers need; whether any was sent."""
-        total, number, before = self.places.size, self.workers.number(), self.sent
-        while self.sent < total and len(self.running) < 2 * number + 1:
-            size = self._size(total - self.sent, number)
+        number, before = self.workers.number(), len(self.running)
+        while self.places.size and len(self.running) < 2 * number + 1:
+            size = self._size(number)
             ends = time.monotonic() - self.begin + self.seconds_a_task * size * (1 + len(self.running) // number)
             if ends >= self.limit:
                 break
-            places = self.places[self.sent : self.sent + size]
+            places, self.places = np.split(self.places, [size])
             chunk = Chunk(places, {name: values[places] for name, values in self.columns.items()})
             try:
                 future = self.workers.submit(chunk)
@@ -329,17 +329,16 @@ class _Run:
                 future = Future()
                 future.set_exception(error)
             self.running[future] = size
-            self.sent += size
-        return self.sent > before
+        return len(self.running) > before
 
-    def _size(self, remaining: int, number: int) -> int:
+    def _size(self, number: int) -> int:
         if not self.largest:
             return 1
         own = (self.workers.clock() - self.busy) / self.n_chunks  # seconds that a chunk takes here
         target = min(max(self.workers.chunk, number / _MOST_A_SECOND, number * own / _BUSY), _LONGEST)
         cost = max(self.seconds_a_task, 1e-9)
-        share = max(remaining / (2 * number), _SHORTEST / cost)
-        return max(1, min(remaining, _MOST_TASKS, int(min(target / cost, share, _GROWTH * self.largest))))
+        share = max(self.places.size / (2 * number), _SHORTEST / cost)
+        return max(1, min(self.places.size, _MOST_TASKS, int(min(target / cost, share, _GROWTH * self.largest))))
 
     def _wait(self) -> None:
         """Wait until a chunk can be settled: before the layout is known, the first one."""
