@@ -407,16 +407,9 @@ def compare_evidence(
             results.append(evidence(fit, records, priors=(priors or {}).get(name), factor=factor))
             if progress:
                 progress(len(FACTORS) * len(rows) + len(results), len(FACTORS) * len(fits))
-        rows.append(
-            EvidenceRow(
-                name=name,
-                n_parameters=fit.n_parameters,
-                fit_percent=fit.fit_percent,
-                log_evidence=tuple(each.value for each in results),
-                error=tuple(each.error for each in results),
-                n_evaluations=sum(each.evaluations for each in results),
-            )
-        )
+        log_z, error, evaluations = zip(*results, strict=True)
+        quality: dict[str, Any] = {"n_parameters": fit.n_parameters, "fit_percent": fit.fit_percent}
+        rows.append(EvidenceRow(name=name, log_evidence=log_z, error=error, n_evaluations=sum(evaluations), **quality))
     rows.sort(key=lambda row: -row.log_evidence[FACTORS.index(1.0)])
     return Evidence(rows=tuple(rows), noise=noise, method=method, seed=seed)
 
