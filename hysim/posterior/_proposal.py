@@ -56,7 +56,6 @@ class Proposal:
     centres: FloatArray  # (n_parts, n_v)
     roots: FloatArray  # (n_parts, n_v, n_v), lower triangles
     share: FloatArray  # (n_parts,), of each part
-    n_x: int
     n_linear: int
 
     @property
@@ -72,12 +71,12 @@ class Proposal:
         normal = rng.standard_normal((n, self.centres.shape[1])) / heavy
         v = self.centres[part] + (self.roots[part] @ normal[..., np.newaxis])[..., 0]
         e = _NORMAL_SPREAD * rng.standard_normal((n, self.n_linear))
-        return np.concatenate([v[:, : self.n_x], e, v[:, self.n_x :]], axis=1)
+        return np.concatenate([v[:, :-1], e, v[:, -1:]], axis=1)
 
     def log_density(self, q: FloatArray) -> FloatArray:
         """Logarithm of the density at points (n_sets, n_dim), (n_sets,)."""
-        v = np.concatenate([q[:, : self.n_x], q[:, -1:]], axis=1)
-        e = q[:, self.n_x : -1] / _NORMAL_SPREAD
+        x, e, s = np.split(q, [self.centres.shape[1] - 1, -1], axis=1)
+        v, e = np.concatenate([x, s], axis=1), e / _NORMAL_SPREAD
         constant = self.n_linear * (0.5 * math.log(2.0 * math.pi) + math.log(_NORMAL_SPREAD))
         return np.asarray(self.log_density_of_v(v) - 0.5 * np.sum(e**2, axis=1) - constant)
 
@@ -113,8 +112,7 @@ def _together(proposals: Sequence[tuple[Proposal, float]], total: float) -> Prop
     """The mixture of proposals, each with its part of the `total`."""
     share = np.concatenate([each.share * part / total for each, part in proposals])
     centres, roots = (np.concatenate(each) for each in zip(*((p.centres, p.roots) for p, _ in proposals), strict=True))
-    first = proposals[0][0]
-    return Proposal(centres, roots, share, first.n_x, first.n_linear)
+    return Proposal(centres, roots, share, proposals[0][0].n_linear)
 
 
 def _whole_power(base: FloatArray, exponent: int) -> FloatArray:
@@ -129,11 +127,11 @@ def mixture(v: FloatArray, weight: FloatArray, n_linear: int, rng: np.random.Gen
     weight = weight / weight.sum()
     mean = weight @ v
     covariance = _covariance(v - mean, weight)
-    n_x, around = v.shape[1] - 1, np.asarray(np.linalg.cholesky(2.0 * covariance), dtype=np.float64)
-    wide = Proposal(mean[np.newaxis], around[np.newaxis], np.ones(1), n_x, n_linear)
+    around = np.asarray(np.linalg.cholesky(2.0 * covariance), dtype=np.float64)
+    wide = Proposal(mean[np.newaxis], around[np.newaxis], np.ones(1), n_linear)
     chosen = rng.choice(len(v), parts, p=weight)
     share = np.full(parts, 1.0 / parts)
-    closest = Proposal(v[chosen], _shapes(v[chosen], v, covariance), share, n_x, n_linear)
+    closest = Proposal(v[chosen], _shapes(v[chosen], v, covariance), share, n_linear)
     for _ in range(_STEPS):
         closest = _closer(closest, v, weight, covariance)
     return closest.beside(wide, _WIDE)
@@ -159,7 +157,7 @@ def _closer(parts: Proposal, v: FloatArray, weight: FloatArray, covariance: Floa
     off = v[np.newaxis] - centres[:, np.newaxis]
     local = np.swapaxes(off, 1, 2) @ (off * near.T[..., np.newaxis]) / share[:, np.newaxis, np.newaxis]
     roots = _roots(local + _RIDGE * covariance, covariance)
-    return Proposal(centres, roots, share / share.sum(), parts.n_x, parts.n_linear)
+    return Proposal(centres, roots, share / share.sum(), parts.n_linear)
 
 
 def _roots(local: FloatArray, covariance: FloatArray) -> FloatArray:
@@ -211,7 +209,7 @@ def grown(base: Proposal, target: Target, rng: np.random.Generator) -> tuple[Pro
     added: list[Proposal] = []
     total = _FIRST * base.densities(v)[0].sum(axis=1)  # of densities times numbers of points
     for _ in range(_GROWTHS):
-        new = _parts(v, _weights(log_density, total), base)
+        new = _parts(v, _weights(log_density, total), target.n_linear)
         further = target.without_linear(new.draw(_EACH * len(new.centres), rng))
         total += _density(new, v)
         added.append(new)
@@ -234,7 +232,7 @@ def _weights(log_density: FloatArray, total: FloatArray) -> FloatArray:
     return np.asarray(weight / weight.sum())
 
 
-def _parts(v: FloatArray, weight: FloatArray, base: Proposal) -> Proposal:
+def _parts(v: FloatArray, weight: FloatArray, n_linear: int) -> Proposal:
     """Parts at points of large weight that are not near one another."""
     mean = weight @ v
     covariance = (v - mean).T @ ((v - mean) * weight[:, np.newaxis])
@@ -254,7 +252,7 @@ def _parts(v: FloatArray, weight: FloatArray, base: Proposal) -> Proposal:
         if len(centres) == _ADDED:
             break
     even = np.full(len(centres), 1.0 / len(centres))
-    return Proposal(np.array(centres), np.array(roots), even, base.n_x, base.n_linear)
+    return Proposal(np.array(centres), np.array(roots), even, n_linear)
 
 
 _PARTICLES, _PARTICLES_EACH = 1024, 256  # by hand: at most, and for each number in v
