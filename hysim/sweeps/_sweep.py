@@ -317,7 +317,7 @@ class _Run:
         """Send chunks out, as many as the workers need; whether any was sent."""
         number, before = self.workers.number(), len(self.running)
         while self.places.size and len(self.running) < 2 * number + 1:
-            size = self._size(number)
+            size = self._size(self.places.size, number)
             ends = time.monotonic() - self.begin + self.seconds_a_task * size * (1 + len(self.running) // number)
             if ends >= self.limit:
                 break
@@ -331,14 +331,14 @@ class _Run:
             self.running[future] = size
         return len(self.running) > before
 
-    def _size(self, number: int) -> int:
+    def _size(self, remaining: int, number: int) -> int:
         if not self.largest:
             return 1
         own = (self.workers.clock() - self.busy) / self.n_chunks  # seconds that a chunk takes here
         target = min(max(self.workers.chunk, number / _MOST_A_SECOND, number * own / _BUSY), _LONGEST)
         cost = max(self.seconds_a_task, 1e-9)
-        share = max(self.places.size / (2 * number), _SHORTEST / cost)
-        return max(1, min(self.places.size, _MOST_TASKS, int(min(target / cost, share, _GROWTH * self.largest))))
+        share = max(remaining / (2 * number), _SHORTEST / cost)
+        return max(1, min(remaining, _MOST_TASKS, int(min(target / cost, share, _GROWTH * self.largest))))
 
     def _wait(self) -> None:
         """Wait until a chunk can be settled: before the layout is known, the first one."""
