@@ -44,6 +44,7 @@ import itertools
 import math
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -52,7 +53,7 @@ import numpy.typing as npt
 from hysim._basics.frozen import FloatArray
 from hysim.discovery._judgement import about_trends, rms
 from hysim.discovery._refinement import POLISH, AnyExponent, Candidate, FreeRun, Samples, Structure, Terms, Work, shifts
-from hysim.discovery._slopes import FORMS, Feature, Regression, Slopes, inclusion, ridge, slopes, sparse_path
+from hysim.discovery._slopes import FORMS, Regression, Slopes, inclusion, ridge, slopes, sparse_path, turning
 from hysim.laws.differential.terms import Term, bouc_wen_exponent, symmetric
 from hysim.records import Record
 
@@ -172,11 +173,6 @@ def thinned(free_run: FreeRun) -> FreeRun:
     records = tuple(Record(u=r.u[k], y=r.y[k]) for r, k in zip(free_run.records, samples, strict=True))
     masks = free_run.masks and tuple(mask[included] for mask, included in zip(free_run.masks, samples, strict=True))
     return FreeRun(records, masks, free_run.signs, free_run.work)
-
-
-def turning(u: FloatArray) -> npt.NDArray[np.bool_]:
-    direction = np.sign(np.diff(u))
-    return np.concatenate([[False], direction[1:] != direction[:-1], [False]])
 
 
 def is_complete(terms: Iterable[Term]) -> bool:
@@ -575,18 +571,15 @@ def _refined(free_run: FreeRun, of_memory: Outcome, structure: AnyExponent) -> C
     starts = []
     for start in of_memory.search.starts:
         for n in _EXPONENTS.tolist():
-            columns, target = of_memory.slopes.equations(_features(n), start.feedthrough, start.offset)
+            columns, target = of_memory.slopes.equations(partial(_features, n), start.feedthrough, start.offset)
             ends = [n, *start.shift(structure), *free_run.measured_starts]
             starts += [[*_ridge(columns, target, weight), *ends] for weight in _WEIGHTS]
     return free_run.refine(structure, np.array(starts))
 
 
-def _features(n: float) -> Feature:
-    def features(u: FloatArray, z: FloatArray, direction: FloatArray) -> FloatArray:
-        power = np.abs(z) ** n
-        return np.stack([direction, np.copysign(power, z), direction * power], axis=1)
-
-    return features
+def _features(n: float, u: FloatArray, z: FloatArray, direction: FloatArray) -> FloatArray:
+    power = np.abs(z) ** n
+    return np.stack([direction, np.copysign(power, z), direction * power], axis=1)
 
 
 def _ridge(columns: FloatArray, target: FloatArray, weight: float) -> list[float]:

@@ -27,9 +27,11 @@ import math
 import warnings
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 from numpy.lib.stride_tricks import sliding_window_view
 from numpy.polynomial import chebyshev
 
@@ -249,9 +251,14 @@ def without_rests(u: FloatArray, y: FloatArray) -> tuple[FloatArray, FloatArray]
 
 def pieces(u: FloatArray) -> list[slice]:
     """Slices of the branches of an input without rests, each with both its ends."""
+    ends = [0, *np.flatnonzero(turning(u)).tolist(), u.size - 1]
+    return [slice(first, last + 1) for first, last in itertools.pairwise(ends)]
+
+
+def turning(u: FloatArray) -> npt.NDArray[np.bool_]:
+    """Where the direction of an input changes; not at its ends."""
     direction = np.sign(np.diff(u))
-    reversals = np.flatnonzero(direction[1:] != direction[:-1]) + 1
-    return [slice(first, last + 1) for first, last in itertools.pairwise([0, *reversals.tolist(), u.size - 1])]
+    return np.concatenate([[False], direction[1:] != direction[:-1], [False]])
 
 
 def _smoothed_where_long(u: FloatArray, y: FloatArray) -> FloatArray:
@@ -326,12 +333,12 @@ class Slopes:
 
     def misfit(self, terms: Sequence[Term], feedthrough: float, offset: float) -> float:
         """Rms of the residual slope with all terms together."""
-        columns, slope = self.equations(_features(terms), feedthrough, offset)
+        columns, slope = self.equations(partial(_features, terms), feedthrough, offset)
         return abs(float(compressed(columns, slope)[1][-1])) / math.sqrt(len(slope))
 
     def regression(self, terms: Sequence[Term], feedthrough: float = 0.0, offset: float = 0.0) -> Regression:
         """Regression on the independent ones of the terms, for z = y - feedthrough u - offset."""
-        raw, slope = self.equations(_features(terms), feedthrough, offset)
+        raw, slope = self.equations(partial(_features, terms), feedthrough, offset)
         sizes, slope_size = np.sqrt(np.mean(raw**2, axis=0)), float(np.sqrt(np.mean(slope**2))) or 1.0
         scaled = raw / np.where(sizes > 0.0, sizes, 1.0)
         by_degree = sorted(range(len(terms)), key=lambda k: (terms[k].degree, k))
@@ -358,11 +365,8 @@ def slopes(records: Sequence[Record], form: str) -> Slopes:
     return Slopes(parts)
 
 
-def _features(terms: Sequence[Term]) -> Feature:
-    def features(u: FloatArray, z: FloatArray, direction: FloatArray) -> FloatArray:
-        return np.stack([feature(term, u, z, direction) for term in terms], axis=1)
-
-    return features
+def _features(terms: Sequence[Term], u: FloatArray, z: FloatArray, direction: FloatArray) -> FloatArray:
+    return np.stack([feature(term, u, z, direction) for term in terms], axis=1)
 
 
 def feature(term: Term, u: FloatArray, z: FloatArray, direction: FloatArray | float) -> FloatArray:
