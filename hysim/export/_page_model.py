@@ -61,10 +61,9 @@ class _Reach:
     """How far the numbers of a law can be moved on an input."""
 
     def __init__(self, law: Law, u: FloatArray) -> None:
-        self.law, self.u = law, u[:: max(1, len(u) // FEW)]
-        self.y = law.response(self.u)
+        self.law, self.u, self.y = law, u, law.response(u)
         self.span = float(np.ptp(self.y)) or 1.0
-        self.boxes = _boxes(law, Record(u=self.u, y=self.y))
+        self.boxes = _boxes(law, Record(u=u, y=self.y))
 
     def slider_of(self, name: str, place: int) -> dict[str, Any]:
         value = self.law.scalars[name]
@@ -179,12 +178,12 @@ def _law(thing: Any, u: FloatArray, parts: Parts) -> tuple[dict[str, Any], list[
         advice = f"{others}; a law with channels is shown as .at(T=...)"
         raise TypeError(f"a page takes a law, or a sum or cascade of laws, got {type(thing).__name__}: {advice}")
     node, names = _node(law, type(thing), parts), list(law.scalars)
-    free = [names[place] for place in node["free"] if names[place] != _CLOCK]
-    parts.timed |= law is not thing
     if isinstance(thing, TimedLaw):
+        parts.timed = True
         node["fields"] = [each for each in node["fields"] if each[0] != _CLOCK]
-        return node | {"clock": names.index(_CLOCK)}, sliders_of(law, free, coarse, names)
-    return node, sliders_of(law, free, u, names)
+        node["clock"] = names.index(_CLOCK)
+    free = [names[place] for place in node["free"] if names[place] != _CLOCK]
+    return node, sliders_of(law, free, coarse, names)
 
 
 def _at(thing: Any, sample_time: float) -> Any:
