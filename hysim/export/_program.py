@@ -212,23 +212,22 @@ def program_of(
     if isinstance(thing, Creep | Amplifier | Vibration):
         thing = as_stepwise(thing)
     if isinstance(thing, Stepwise):
-        timed = sample_time if needs_time(thing) else None
+        step = sample_time if sample_time is not None and needs_time(thing) else math.nan
         law = thing if tunable and isinstance(thing, Law) else None
         free = None if law is None else _packing_of(law)
         if law is None or free is None:
-            return _of_model(thing.startable(sample_time), timed)
+            return _of_model(thing.startable(sample_time), step)
         # placed: its state is completed where the program runs, from its numbers there
-        program = _of_model(law.placed(None).startable(sample_time), timed)
+        program = _of_model(law.placed(None).startable(sample_time), step)
         source = f"{program.source}\n{free.to_c('pack')}"
         fields = tuple(Field(name, law.scalars[name], unit=field_unit(law, name)) for name in free.fields)
         return replace(program, source=source, fields=fields, pack="pack", memory=len(free.memory))
     if isinstance(thing, Controller):
         if isinstance(thing, InverseFeedforward) and not thing.dynamic:
-            begin = start_of(thing, math.inf, u0, y0)
-            return replace(_of_controller(thing, math.inf, *begin), sample_time=math.nan)
+            return replace(_of_controller(thing, math.inf, u0, y0), sample_time=math.nan)
         if sample_time is None:
             raise ValueError(f"a {type(thing).__name__} is sampled: give sample_time")
-        return _of_controller(thing, sample_time, *start_of(thing, sample_time, u0, y0))
+        return _of_controller(thing, sample_time, u0, y0)
     kinds = "a law, a plant or a controller that can be stepped"
     raise TypeError(f"{kinds} is expected, got {type(thing).__name__}; one with channels is exported as .at(T=...)")
 
@@ -257,17 +256,16 @@ def start_of(thing: Any, sample_time: float, u0: float | None, y0: float | None)
     return command, RestingPlant(thing.plant, min(sample_time, 1.0), command).y0
 
 
-def _of_model(model: Startable, sample_time: float | None) -> Program:
+def _of_model(model: Startable, sample_time: float) -> Program:
     sizes = model.parameters.size, model.state.size
     source, has_start = entries(model.step, model.start, sizes)
     numbers: dict[str, Any] = {"parameters": model.parameters, "state": model.state, "memory": model.state.size}
-    step = math.nan if sample_time is None else sample_time
     start = "start" if has_start else ""
-    return Program(source=source, inputs=_LAW, output="y", start=start, sample_time=step, **numbers)
+    return Program(source=source, inputs=_LAW, output="y", start=start, sample_time=sample_time, **numbers)
 
 
-def _of_controller(controller: Controller, sample_time: float, u0: float, y0: float) -> Program:
-    step, parameters, state = begun(controller, sample_time, u0, y0)
+def _of_controller(controller: Controller, sample_time: float, u0: float | None, y0: float | None) -> Program:
+    step, parameters, state = begun(controller, sample_time, *start_of(controller, sample_time, u0, y0))
     translation = Translation()
     function = translation.function(guarded, (Known(plain(step)), *_VECTORS, Scalar.DOUBLE, Scalar.DOUBLE))
     function = function._replace(parameters=function.parameters[1:])
