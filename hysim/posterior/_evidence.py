@@ -395,9 +395,8 @@ def compare_evidence(
     if not models:
         raise ValueError("compare_evidence takes at least one model: {name: model}")
     if unknown := [name for name in priors or {} if name not in models]:
-        raise ValueError(
-            f"priors are for {unknown[0]!r}, which is no model here: there are {among(unknown[0], models)}"
-        )
+        known = among(unknown[0], models)
+        raise ValueError(f"priors are for {unknown[0]!r}, which is no model here: there are {known}")
     fits = {name: _fitted(model, records, noise, initial) for name, model in models.items()}
     evidence = partial(log_evidence, noise=noise, initial=initial, method=method, live_points=live_points, seed=seed)
     rows = list[EvidenceRow]()

@@ -282,10 +282,8 @@ def proposal_for(
     population = particles(target, rng)
     v, early = (np.concatenate([each, near]) for each in population)
     if min(_distinct(v), _distinct(early)) < _fewest(target):
-        raise ValueError(
-            f"the posterior was not found: {_distinct(v)} of {len(v)} draws from the priors agree with the "
-            "records; pass narrower priors"
-        )
+        numbers = f"{_distinct(v)} of {len(v)} draws from the priors agree with the records"
+        raise ValueError(f"the posterior was not found: {numbers}; pass narrower priors")
     reaching = even_mixture(early, target, rng)
     proposal = even_mixture(v, target, rng).beside(reaching, EARLY_SHARE)
     drawn, weights = np.empty((0, target.n_x + 1)), np.empty(0)

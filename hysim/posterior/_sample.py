@@ -247,10 +247,8 @@ class Posterior:
 
     def _head(self) -> str:
         fewest = min(self.effective_samples.values())
-        return (
-            f"Posterior of {type(self.model).__name__}: {self.log_density.size} draws, {fewest:.0f} effective ones at "
-            f"least, {self.noise} noise"
-        )
+        size = f"{self.log_density.size} draws, {fewest:.0f} effective ones at least"
+        return f"Posterior of {type(self.model).__name__}: {size}, {self.noise} noise"
 
 
 def _outputs(draws: Posterior, u: FloatArray, t: npt.ArrayLike | None, chosen: Any) -> tuple[FloatArray, Any]:
@@ -454,11 +452,8 @@ def _states(problem: Problem, q: FloatArray) -> dict[str, FloatArray]:
     if not (problem.parts[0].before and problem.own.state):
         return {}
     known = problem.parameters(q[:, : problem.n_x])
-    return {
-        name: read_only(np.broadcast_to(known[name], len(q)), finite=False)
-        for name in problem.own.state
-        if name in known
-    }
+    names = [name for name in problem.own.state if name in known]
+    return {name: read_only(np.broadcast_to(known[name], len(q)), finite=False) for name in names}
 
 
 def _warnings(effective: Mapping[str, float], rhat: Mapping[str, float], samples: int) -> tuple[str, ...]:

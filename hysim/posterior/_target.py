@@ -129,9 +129,8 @@ def _given(name: str, value: Any) -> Given:
         low, high = float(value.ppf(_TAIL)), float(value.ppf(1.0 - _TAIL))
         value.logpdf(low)
     except (AttributeError, TypeError):
-        raise TypeError(
-            f"the prior of {name!r} must be (low, high) or a frozen distribution of scipy.stats, got {value!r}"
-        ) from None
+        kinds = "(low, high) or a frozen distribution of scipy.stats"
+        raise TypeError(f"the prior of {name!r} must be {kinds}, got {value!r}") from None
     return Given(low, high, value)
 
 
@@ -408,15 +407,11 @@ class Target:
 
     def priors_in_words(self) -> dict[str, str]:
         space, (*ends, of_sigma) = self.problem.space, np.column_stack([self.v_prior.lower, self.v_prior.upper])
-        words = {
-            name: f"flat from {low:.4g} to {high:.4g} in the coordinate of the search"
-            for name, (low, high) in zip(space.coordinates, ends, strict=True)
-        }
+        boxes = [f"flat from {low:.4g} to {high:.4g} in the coordinate of the search" for low, high in ends]
+        words = dict(zip(space.coordinates, boxes, strict=True))
         flat = f"flat, within {self.b_prior.reach:g} spans of the output of what it adds to it"
-        within = [
-            f", from {low:.4g} to {high:.4g}" if np.isfinite([low, high]).any() else ""
-            for low, high in self.b_prior.box.T
-        ]
+        box = self.b_prior.box.T
+        within = [f", from {low:.4g} to {high:.4g}" if np.isfinite([low, high]).any() else "" for low, high in box]
         words |= {name: str(self.b_prior.priors.get(k, flat + within[k])) for k, name in enumerate(space.linear)}
         low, high = np.exp(of_sigma).tolist()
         words |= {SIGMA: f"flat in its logarithm from {low:.3g} to {high:.3g}"}
