@@ -22,6 +22,7 @@ The input is linear between its samples. Each record has its own initial state, 
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -97,10 +98,8 @@ def relaxations(records: Sequence[Record]) -> Yardstick:
     times = np.geomspace(shortest, longest, n)
     hats = np.array([np.interp(np.linspace(0.0, 1.0, n), _PLACES, row) for row in np.eye(_PLACES.size)])
     lags = [TransferFunction(num=(1.0,), den=(tau, 1.0), hold="foh") for tau in times.tolist()]
-    parts = [
-        np.stack([lag.response(record.u - record.u[0], record.sample_time) for lag in lags], axis=1) @ hats.T
-        for record in records
-    ]
+    lagging = ([lag.response(r.u - r.u[0], r.sample_time) for lag in lags] for r in records)
+    parts = [np.stack(each, axis=1) @ hats.T for each in lagging]
     return _yardstick(records, [_inputs(records)[:, np.newaxis], np.concatenate(parts)])
 
 
@@ -267,14 +266,8 @@ class _Affine(Subject):
         lower = np.where([name.startswith("log damping") for name in own.coordinates], own.lower, slowest)
         own = replace(own, lower=lower)
         starts = self._scanned(own) if self.start is None else _coordinates(self.start, finest.sample_time)
-        return replace(
-            own,
-            starts=np.clip(starts, lower, own.upper),
-            screened=0,
-            names=(*own.names, "offset"),
-            columns=(*own.columns, "offset"),
-            linear=(*own.linear, "offset"),
-        )
+        extended: dict[str, Any] = {name: (*vars(own)[name], "offset") for name in ("names", "columns", "linear")}
+        return replace(own, starts=np.clip(starts, lower, own.upper), screened=0, **extended)
 
     def regressors(self, parameters: Parameters, record: Record) -> FloatArray:
         columns = np.insert(self.structure.regressors(parameters, record), -1, 1.0, axis=-1)
