@@ -54,9 +54,8 @@ def law_from(candidate: Candidate[Any], records: Sequence[Record], letter: str) 
     parameters = {name: value for name, value in values.items() if name in OTHERS}
     shifts = {name: value for name, value in parameters.items() if name != "n"}
     states = tuple({f"{letter}0": float(m.memory(r.u[:1])[0])} for m, r in zip(models, records, strict=True))
-    return ModelledLaw(
-        models, terms, parameters, states, _stderr(candidate, numbers), equation(terms, letter, **shifts)
-    )
+    text = equation(terms, letter, **shifts)
+    return ModelledLaw(models, terms, parameters, states, _stderr(candidate, numbers), text)
 
 
 def coefficients(structure: Terms, unknowns: FloatArray, letter: str) -> dict[str, float]:
@@ -152,36 +151,26 @@ class _Discovered(Stored, ABC):
         """Rows of this result alone, for `summary` in full and for `str` in short."""
 
     def __str__(self) -> str:
-        scores = self.scores
         numbers = [f"{name} {value:.4g}{self._spread(name)}" for name, value in self._numbers.items()]
-        lines = [
-            f"{type(self).__name__}: {self.verdict}, fit {scores['fit_percent']:.2f} %, rmse {scores['rmse']:.4g}, "
-            f"{self.n_parameters} parameters",
-            f"  {self.equation}",
-            wrapped(numbers),
-        ]
-        rows = {
-            "initial state": self._initial_state("{:.4g}"),
-            **self._rows(full=False),
-            "warnings": " ".join(self.warnings),
-            "search": self.message,
-        }
-        return summary_text(lines, rows)
+        head = f"{type(self).__name__}: {self.verdict}, {self._fit}, {self.n_parameters} parameters"
+        rows = {"initial state": self._initial_state("{:.4g}"), **self._rows(full=False)}
+        rows |= {"warnings": " ".join(self.warnings), "search": self.message}
+        return summary_text([head, f"  {self.equation}", wrapped(numbers)], rows)
 
     def summary(self) -> str:
         """The result in a few lines."""
-        scores = self.scores
-        lines = [
-            f"{self.equation}",
-            f"  {self.verdict}; fit {scores['fit_percent']:.2f} %, rmse {scores['rmse']:.4g}, BIC {scores['bic']:.1f}, "
-            f"{self.n_parameters} parameters{self._counted}",
-        ]
+        parameters = f"{self.n_parameters} parameters{self._counted}"
+        lines = [self.equation, f"  {self.verdict}; {self._fit}, BIC {self.scores['bic']:.1f}, {parameters}"]
         lines += [f"  {name} = {value:.6g}{self._spread(name)}" for name, value in self._numbers.items()]
         lines += [f"  initial state ({self.initial}): {self._initial_state('{:.6g}')}"] * bool(self.initial_states)
         lines += [f"  {name}: {text}" for name, text in self._rows(full=True).items() if text]
         lines += [f"  {self.message}"] * bool(self.message)
         lines += ["Warnings"] * bool(self.warnings) + [f"  {warning}" for warning in self.warnings]
         return "\n".join(lines)
+
+    @property
+    def _fit(self) -> str:
+        return f"fit {self.scores['fit_percent']:.2f} %, rmse {self.scores['rmse']:.4g}"
 
     @property
     def _numbers(self) -> dict[str, float]:
@@ -207,14 +196,10 @@ class _Discovered(Stored, ABC):
 
         The columns are coefficient and stderr, nan where it is unknown. ``attrs`` has the equation and the verdict.
         """
-        return frame(
-            {
-                "coefficient": [float(value) for value in self.coefficients.values()],
-                "stderr": [float(self.stderr.get(name, math.nan)) for name in self.coefficients],
-            },
-            index=("term", [*self.coefficients]),
-            notes={"equation": self.equation, "verdict": self.verdict},
-        )
+        stderr = [float(self.stderr.get(name, math.nan)) for name in self.coefficients]
+        columns = {"coefficient": [*map(float, self.coefficients.values())], "stderr": stderr}
+        notes = {"equation": self.equation, "verdict": self.verdict}
+        return frame(columns, index=("term", [*self.coefficients]), notes=notes)
 
     def _spread(self, name: str) -> str:
         value = self.stderr.get(name, math.nan)
@@ -280,11 +265,10 @@ class Discovery(_Discovered):
 
     def _rows(self, *, full: bool) -> dict[str, str]:
         judged, rates = self.judgement, ", ".join(f"{rate:g}" for rate in self.judgement.rates)
+        errors = (f"{name} {value:.4g}" for name, value in judged.held_out.items() if not math.isnan(value))
         rows = {
             "route": self.route,
-            "held-out rmse": ", ".join(
-                f"{name} {value:.4g}" for name, value in judged.held_out.items() if not math.isnan(value)
-            ),
+            "held-out rmse": ", ".join(errors),
             "cross-validated rmse": "" if math.isnan(self.cv_rmse) else f"{self.cv_rmse:.4g}",
         }
         for name, widths in judged.widths.items() if full else ():
