@@ -42,13 +42,8 @@ from hysim.records import Record
 RIDGE = 1e-12  # of the squared columns: keeps the normal equations solvable and changes nothing else
 STEP = 1.1
 _MAX_ITERATIONS = 50
-_EXTRAS = {
-    "ConstrainedSR3": "cvxpy",
-    "StableLinearSR3": "cvxpy",
-    "TrappingSR3": "cvxpy",
-    "MIOSR": "miosr",
-    "SBR": "sbr",
-}
+_CONVEX = ("ConstrainedSR3", "StableLinearSR3", "TrappingSR3")
+_EXTRAS = {**dict.fromkeys(_CONVEX, "cvxpy"), "MIOSR": "miosr", "SBR": "sbr"}
 
 OPTIMIZERS = ("STLSQ", "SR3", "SSR", "FROLS")
 """PySINDy's optimizers that a path is made with."""
