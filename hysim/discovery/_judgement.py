@@ -460,10 +460,8 @@ def doubts(judgement: Judgement) -> tuple[str, ...]:
             "with it."
         )
     if linear < BETTER * law:
-        sentences.append(
-            f"A linear dynamic model predicts held-out samples better than the law (rmse {linear:.3g} against "
-            f"{law:.3g})."
-        )
+        rmse = f"rmse {linear:.3g} against {law:.3g}"
+        sentences.append(f"A linear dynamic model predicts held-out samples better than the law ({rmse}).")
     if judgement.verdict == HYSTERESIS and plays < BETTER * law:
         sentences.append(
             f"The law describes the hysteresis only in part: its rmse on held-out samples is {law:.3g}, that of a "

@@ -173,10 +173,8 @@ class Search(NamedTuple):
         motions = [self.response.structure.motion(record) for record in self.response.records]
         linear = linear_plant(motions[0])
         if linear is None:
-            raise ValueError(
-                "no plant with a positive mass is near: check the sign of u and y, and the time; or the motion is too "
-                "far from that of a linear spring"
-            )
+            advice = "check the sign of u and y, and the time; or the motion is too far from that of a linear spring"
+            raise ValueError(f"no plant with a positive mass is near: {advice}")
         memory = HiddenMemory(motions, linear, self.response.known)
         elastic = self._without_memory(linear)
         self.progress(1, _STEPS)
@@ -285,9 +283,8 @@ class Search(NamedTuple):
         fit = identify(response.structure, response.records, fixed={**fixed, **response.known}, bounds=bounds)
         numbers = fit.estimates
         law = dict(zip(_LAW, bouc_wen_terms(numbers["n"]), strict=True))
-        coefficients = {
-            term: numbers[name] if name == "A" else -numbers[name] for name, term in law.items() if name not in fixed
-        }
+        free = {term: name for name, term in law.items() if name not in fixed}
+        coefficients = {term: numbers[name] if name == "A" else -numbers[name] for term, name in free.items()}
         stderr = {law[name].named("z") if name in law else name: value for name, value in fit.stderr.items()}
         plant = {name: numbers[name] for name in PLANT}
         warnings: list[str] = [] if fit.success else [f"The refinement did not converge: {fit.message}."]
@@ -304,10 +301,8 @@ class Search(NamedTuple):
         J = self.response.slopes(refined, terms)
         size = np.linalg.norm(J, axis=0)
         if not (np.isfinite(residual).all() and (size > 0.0).all()):
-            raise ValueError(
-                "the oscillator nearest to the records diverges, or does not become steady: check the units, the time, "
-                "and the sign of u and y"
-            )
+            advice = "check the units, the time, and the sign of u and y"
+            raise ValueError(f"the oscillator nearest to the records diverges, or does not become steady: {advice}")
         variance = float(residual @ residual) / max(residual.size - size.size, 1)
         errors = np.sqrt(variance * np.diag(np.linalg.pinv((J / size).T @ (J / size)))) / size
         names = (*self.response.free, *(term.named("z") for term in terms))
