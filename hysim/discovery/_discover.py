@@ -141,9 +141,8 @@ def discover(
     check_choice("route", route, ("auto", "memory", "output"))
     check_choice("derivative", derivative, ("auto", *FORMS))
     check_choice("initial", initial, ("auto", "free", "rest"))
-    of_memory, *of_output = (
-        replace(each, rests=_rests(initial, each, records)) for each in _libraries(route, library, degree, symmetry)
-    )
+    libraries = _libraries(route, library, degree, symmetry)
+    of_memory, *of_output = (replace(each, rests=_rests(initial, each, records)) for each in libraries)
     others = cache(lambda: competitors(records))
     options = Options(
         signs=signs_of([term for each in (of_memory, *of_output) for term in each.terms], signs),

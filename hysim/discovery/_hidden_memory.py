@@ -232,11 +232,8 @@ class HiddenMemory:
     def __init__(self, motions: Sequence[Motion], linear: Linear, known: Mapping[str, float]) -> None:
         self.linear, self.known = linear, dict(known)
         self._along = [_along(motion, linear) for motion in motions]
-        force = self._stacked([motion.force for motion in motions], 0)
-        sides = {
-            name: self._stacked([motion.y for motion in motions], power)
-            for name, power in zip(PLANT, (2, 1, 0), strict=True)
-        }
+        force, y = self._stacked([motion.force for motion in motions], 0), [motion.y for motion in motions]
+        sides = {name: self._stacked(y, power) for name, power in zip(PLANT, (2, 1, 0), strict=True)}
         self._target = force - sum((value * sides[name] for name, value in known.items()), np.zeros_like(force))
         self._free = [name for name in PLANT if name not in known]
         self._columns = np.array([sides[name] for name in self._free]).reshape(-1, force.size).T

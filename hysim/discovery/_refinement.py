@@ -73,11 +73,8 @@ class Terms(NamedTuple):
     def run(self, u: FloatArray, numbers: FloatArray, y0: FloatArray, bound: float) -> tuple[FloatArray, int]:
         """Outputs (n_sets, n_samples) from y0 (n_sets,), inf where a law diverges, and the slopes taken."""
         feedthrough, offset = shifts(self, numbers)
-        coefficients = numbers[:, : len(self.terms)]
-        memory = y0 - offset
-        runs, work = free_runs(
-            self.terms, coefficients, feedthrough, memory, u[np.newaxis], bound, most_steps=_MOST_STEPS
-        )
+        law = self.terms, numbers[:, : len(self.terms)], feedthrough
+        runs, work = free_runs(*law, y0 - offset, u[np.newaxis], bound, most_steps=_MOST_STEPS)
         return runs + offset[:, np.newaxis], work
 
 

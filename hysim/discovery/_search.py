@@ -203,11 +203,8 @@ class Search:
     def refine(self, structure: Terms, *unknowns: FloatArray, race: bool = False) -> Candidate[Terms] | None:
         """Refine a structure once, from its regressions and these starts; in a `race` it may be given up."""
         if structure not in self.tried:
-            regressed = [
-                start.unknowns(structure, self.free_run)
-                for start in self.starts
-                if set(structure.terms) <= set(start.regression.terms)
-            ]
+            known = [start for start in self.starts if set(structure.terms) <= set(start.regression.terms)]
+            regressed = [start.unknowns(structure, self.free_run) for start in known]
             own = np.array(unknowns).reshape(-1, structure.size + len(self.free_run.records))
             starts, hopeless = np.concatenate([own, *regressed]), self._hopeless(structure) if race else math.inf
             self.tried[structure] = self.free_run.refine(structure, starts, hopeless=hopeless)
@@ -454,10 +451,9 @@ def searched(
             if thin.work.share < PATH_SHARE or not search.candidates:
                 search.refine(structure)
     if not search.candidates:
-        raise ValueError(
-            f"every law that was tried diverges on these records, whose output moves by {free_run.stroke:.3g} about "
-            f"{float(records[0].y[0]):.3g}: check the units, or subtract the offset"
-        )
+        output = f"whose output moves by {free_run.stroke:.3g} about {float(records[0].y[0]):.3g}"
+        advice = "check the units, or subtract the offset"
+        raise ValueError(f"every law that was tried diverges on these records, {output}: {advice}")
     is_short = options.enough is not None and not _least_rmse(search) <= _HOPELESS * options.enough()
     is_cut = not is_short and not search.explore(library.structure(starts[0].regression.terms))
     chosen = _on_all_samples(free_run, search, library, options.seed, restarts=0 if is_short or is_cut else _RESTARTS)
