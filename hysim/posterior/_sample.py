@@ -238,11 +238,9 @@ class Posterior:
     def __str__(self) -> str:
         ends = self.interval()
         values = [f"{name} {self.mean[name]:.4g} [{ends[name][0]:.4g}, {ends[name][1]:.4g}]" for name in self.names]
-        rows = {
-            "chains": f"{self.n_walkers} walkers, R-hat at most {max(self.rhat.values()):.3f}, "
-            f"{100.0 * self.acceptance:.0f} % of the moves accepted",
-            "warnings": "; ".join(self.warnings),
-        }
+        moves = f"{100.0 * self.acceptance:.0f} % of the moves accepted"
+        chains = f"{self.n_walkers} walkers, R-hat at most {max(self.rhat.values()):.3f}, {moves}"
+        rows = {"chains": chains, "warnings": "; ".join(self.warnings)}
         return summary_text([self._head(), wrapped(values, most=5)], rows)
 
     def _head(self) -> str:
@@ -293,7 +291,7 @@ def _interval(widths: FloatArray, tails: tuple[float, float]) -> Width | None:
 
 
 def _band(rows: FloatArray, level: float) -> tuple[FloatArray, FloatArray]:
-    low, high = np.quantile(rows, [0.5 * (1.0 - level), 0.5 * (1.0 + level)], axis=0)
+    low, high = np.quantile(rows, _tails(level), axis=0)
     return low, high
 
 
@@ -460,10 +458,8 @@ def _warnings(effective: Mapping[str, float], rhat: Mapping[str, float], samples
     sentences = []
     apart = [name for name, value in rhat.items() if not value <= LARGEST_RHAT]
     if apart:
-        sentences.append(
-            f"the walkers do not agree on {', '.join(apart)} (R-hat above {LARGEST_RHAT:g}): do not use the intervals; "
-            "pass a larger most_steps, or narrower priors"
-        )
+        advice = "do not use the intervals; pass a larger most_steps, or narrower priors"
+        sentences.append(f"the walkers do not agree on {', '.join(apart)} (R-hat above {LARGEST_RHAT:g}): {advice}")
     fewest = min(effective.values())
     if fewest < samples:
         sentences.append(f"{fewest:.0f} effective samples in place of {samples}: pass a larger most_steps")
