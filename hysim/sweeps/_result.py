@@ -110,16 +110,14 @@ class Sweep:
 
         Further axes of an output `name` are called ``name_0``, ``name_1``; values are nan where there is no row.
         """
-        own = {"seed": self.seed, "seconds": self.seconds, "error": self.error}
+        columns = {**self.outputs, **self.arrays, "seed": self.seed, "seconds": self.seconds, "error": self.error}
         if self.axes is None:
             dims: tuple[str, ...] = ("task",)
             coordinates = {"task": self.task, **{name: ("task", column) for name, column in self.parameters.items()}}
         else:
             dims, coordinates = tuple(self.axes), dict(self.axes)
-        variables = {
-            name: ((*dims, *(f"{name}_{k}" for k in range(values.ndim - 1))), self._along_axes(values))
-            for name, values in {**self.outputs, **self.arrays, **own}.items()
-        }
+        axes = {name: (*dims, *(f"{name}_{k}" for k in range(v.ndim - 1))) for name, v in columns.items()}
+        variables = {name: (axes[name], self._along_axes(values)) for name, values in columns.items()}
         return dataset(variables, coordinates, {})
 
     @property
