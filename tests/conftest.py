@@ -120,7 +120,7 @@ def pytest_collection_finish():
 
 CIRCLES = tomllib.loads((ROOT / "tests" / "circles.toml").read_text())
 purposes = {name: purpose for purpose, names in CIRCLES.items() for name in names}
-DRAWN, SHARE = ("page", "search", "slow"), 3  # of these purposes `--draw` leaves one test of so many
+DRAWN, SHARE = ("page", "digits", "search", "slow"), 3  # of these purposes `--draw` leaves one test of so many
 begun = pytest.StashKey[float]()
 
 

@@ -225,7 +225,7 @@ def of_any_family(
                     known[name], cpu = awaited(future)
                 except BrokenProcessPool:
                     ended = ", ".join([name, *(each for each, _ in waiting)])
-                    why = "maybe for its memory; workers=1 takes none"
+                    why = "maybe for its memory; one worker takes no process"
                     raise RuntimeError(f"a process was ended that searched one of {ended}, {why}") from None
                 spent += cpu
                 if progress:
