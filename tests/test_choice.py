@@ -1,6 +1,8 @@
 """`identify` without a family, and `select`: what predicts parts that are left out, and the order behind noise."""
 
+import multiprocessing
 import os
+import sys
 from dataclasses import replace
 
 import numpy as np
@@ -8,6 +10,7 @@ import pytest
 from strategies import assert_refused, rao_garnier, refused
 
 import hysim as hs
+from hysim._basics import parallel as _parallel
 from hysim._columns.turning import TOLERANCE
 from hysim.cli import main
 from hysim.identification import _choice, _search
@@ -111,7 +114,8 @@ def test_processes_choose_what_one_alone_does(few, monkeypatch):
     few(Line=hs.Line, Dahl=hs.Dahl)
     own = []
     for cores in (1, 2):
-        monkeypatch.setattr(_choice, "cores", lambda cores=cores: cores)
+        for module in (_choice, _parallel):
+            monkeypatch.setattr(module, "cores", lambda cores=cores: cores)
         own.append(replace(hs.identify(record_of(LAW)), choice=None))
         own.append(replace(hs.identify(record_of(LAW)).choice, seconds=0.0))
     assert str(own[:2]) == str(own[2:])
@@ -119,16 +123,19 @@ def test_processes_choose_what_one_alone_does(few, monkeypatch):
 
 class Dies(hs.Play):
     def search_space(self, record, freedom=None):
+        assert multiprocessing.parent_process() is not None  # never that of the tests
         os._exit(3)
 
 
+@pytest.mark.skipif(not sys.platform.startswith("linux"), reason="no process is forked elsewhere")
 def test_a_family_that_ends_its_process_is_named_and_a_record_of_an_own_class_is_taken(few, monkeypatch):
     class Own(hs.Record):
         pass
 
     record, dies = record_of(LAW), Dies()
     few(Line=hs.Line, Play=hs.Play)
-    monkeypatch.setattr(_choice, "cores", lambda: 2)
+    for module in (_choice, _parallel):
+        monkeypatch.setattr(module, "cores", lambda: 2)
     assert hs.identify(Own(u=record.u, y=record.y)).choice.family
     monkeypatch.setattr(_choice._Trials, "unknowns", lambda self, name: 0)
     few(Line=hs.Line, Dies=dies)
