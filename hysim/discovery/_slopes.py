@@ -251,7 +251,7 @@ def pieces(u: FloatArray) -> list[slice]:
 
 
 def turning(u: FloatArray) -> npt.NDArray[np.bool_]:
-    """Where the direction of an input changes; not at its ends."""
+    """The samples at which an input turns, without its ends."""
     direction = np.sign(np.diff(u))
     return np.concatenate([[False], direction[1:] != direction[:-1], [False]])
 

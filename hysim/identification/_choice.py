@@ -211,7 +211,7 @@ def of_any_family(
     _at_hand[id(trials)] = trials  # which forked processes find without pickling
 
     def results(of: Callable[[Any, str], Any], every: Sequence[str], seconds: float, done: int) -> dict[str, Any]:
-        """Of the families that are begun within so many seconds; processes are never far ahead of what is known."""
+        """Results of families by name. None is begun after so many seconds of the processor."""
         nonlocal spent
         known: dict[str, Any] = {}
         rest, waiting = deque(every), deque[tuple[str, Future[tuple[Any, float]]]]()
@@ -221,12 +221,7 @@ def of_any_family(
                 waiting.append((rest[0], pool.submit(_timed, id(trials), of, rest.popleft())))
             else:
                 name, future = waiting.popleft()
-                try:
-                    known[name], cpu = awaited(future)
-                except BrokenProcessPool:
-                    ended = ", ".join([name, *(each for each, _ in waiting)])
-                    why = "maybe for its memory; one worker takes no process"
-                    raise RuntimeError(f"a process was ended that searched one of {ended}, {why}") from None
+                known[name], cpu = _result(future, [name, *(each for each, _ in waiting)])
                 spent += cpu
                 if progress:
                     progress(done + len(known), 2 * len(names))
@@ -277,6 +272,14 @@ def _timed(trials: int, of: Callable[[Any, str], Any], name: str) -> tuple[Any, 
     """A result of the trials at hand, and its seconds of the processor."""
     begin = time.process_time()
     return of(_at_hand[trials], name), time.process_time() - begin
+
+
+def _result(future: Future[tuple[Any, float]], searched_now: Sequence[str]) -> tuple[Any, float]:
+    try:
+        return awaited(future)
+    except BrokenProcessPool:
+        why = "maybe for its memory; one worker takes no process"
+        raise RuntimeError(f"a process was ended that searched one of {', '.join(searched_now)}, {why}") from None
 
 
 class _Trials:

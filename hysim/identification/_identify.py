@@ -222,7 +222,7 @@ def identify(
 
 @dataclass(frozen=True)
 class _Asked:
-    """What the user asks of a fit; the records are as they were measured."""
+    """The user's options for a fit, and the records as they were measured."""
 
     records: Sequence[Record]
     weights: Weights
@@ -235,7 +235,7 @@ class _Asked:
 
 
 class _Assumed(NamedTuple):
-    """What a search begins with: its family on records without what has no weight, and the problems, simplest first."""
+    """The family, its setting without samples of weight zero, and the problems to search, the simplest first."""
 
     family: Any
     setting: Setting

@@ -172,13 +172,13 @@ class _Cache(FunctionCache):
 
     def _index_key(self, sig: Any, codegen: Any) -> Any:
         is_ours = Path(self._py_func.__code__.co_filename).is_relative_to(PACKAGE)
-        others = "" if is_ours else hashlib.sha256("".join(_texts(self._py_func, {})).encode()).hexdigest()
+        others = "" if is_ours else hashlib.sha256("\n".join(_texts(self._py_func, {})).encode()).hexdigest()
         kernels = [hash_of_sources(PACKAGE / room) for room in ("kernels", "laws")]
         return (*FunctionCache._index_key(self, sig, codegen), *kernels, others)
 
 
 def _texts(value: Any, known: dict[int, Any]) -> Iterator[str]:
-    """What a value puts into the code of a user's function: numbers, arrays, and the code of functions."""
+    """Numbers, arrays and functions that stand in the compiled code of a user's function, as texts."""
     plain: Any = value.py_func if isinstance(value, Dispatcher) else value
     if isinstance(plain, FunctionType):
         if id(plain) not in known:
@@ -187,7 +187,7 @@ def _texts(value: Any, known: dict[int, Any]) -> Iterator[str]:
     elif isinstance(plain, np.ndarray):
         yield f"{plain.dtype} {plain.shape} {plain.tobytes()!r}"
     elif isinstance(plain, (tuple, frozenset, EnumMeta)):
-        texts = ["".join(_texts(each, known)) for each in plain]
+        texts = ["\n".join(_texts(each, known)) for each in plain]
         yield from sorted(texts) if isinstance(plain, frozenset) else texts
     elif isinstance(plain, (int, float, complex, str, bytes, np.generic)):
         yield repr(plain)
