@@ -13,6 +13,7 @@ import hysim as hs
 from hysim._basics.frozen import read_only
 from hysim.cli import main
 from hysim.kernels.controllers import replay
+from hysim.models.protocols import needs_time
 
 H = 5e-5  # s
 N = 15_000 if COMPILED else 200
@@ -213,7 +214,16 @@ MODELS = {
     "plant": lambda: hs.TransferFunction(num=(3.0,), den=(1e-3, 1.0), delay=1.5 * H),
     "law_and_mode": lambda: hs.BoucWen(beta=0.7) >> hs.mode(**MODE),
     "actuator": lambda: STACK,
+    "oscillator_split": lambda: oscillator(hs.BoucWen(n=1.5, beta=0.7, offset=0.1)),
+    "oscillator_strang": lambda: oscillator(hs.PolynomialBoucWen(input_coefficients=(0.2, 0.0, 0.1)), method="strang"),
+    "oscillator_newmark": lambda: oscillator(hs.BoucWen(), method="newmark", excitation="base"),
+    "oscillator_runge_kutta": lambda: oscillator(hs.BoucWen(n=2.0), method="runge-kutta", hold="zoh"),
 }
+
+
+def oscillator(law, **options):
+    plant = {"mass": 2e-6, "damping": 1e-4, "stiffness": 1.0, "initial_state": (0.2, 30.0)}
+    return hs.BoucWenOscillator(**plant, law=law, **options)
 
 
 @needs_compiler
@@ -222,7 +232,7 @@ def test_the_worked_main_prints_the_response(name, tmp_path):
     """From a first input other than zero."""
     model = MODELS[name]()
     u = 0.3 + np.sin(0.05 * np.arange(200)) * np.linspace(0.5, 2.0, 200)
-    timed = name in ("plant", "law_and_mode", "actuator")
+    timed = needs_time(model)
     in_c = printed_by_main(hs.to_c(model, H if timed else None, name=name), tmp_path, u)
     law = model.startable(H).started(u[0]) if timed else None
     y = model.response(u) if law is None else np.array([law.step(law.parameters, law.state, v) for v in u])

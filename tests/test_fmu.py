@@ -402,6 +402,7 @@ MODELS = {  # functions: a plant compiles its stages, which no collection of tes
     "cascade": lambda: hs.Play(threshold=0.2) >> hs.TransferFunction(num=(2.0,), den=(0.3, 1.0)),
     "mode": lambda: hs.mode(2.0, 0.1),
     "actuator": lambda: hs.Actuator(hysteresis=LAW, creep=hs.Creep.per_decade(1.5), vibration=hs.mode(5.0, 0.1)),
+    "oscillator": lambda: hs.BoucWenOscillator(mass=1e-2, damping=0.01, stiffness=1.0, law=hs.BoucWen()),
     "rate-dependent": lambda: hs.RateDependentPrandtlIshlinskii(thresholds=(0.1, 0.4), weights=(1.0, 0.5), beta=0.1),
 }
 

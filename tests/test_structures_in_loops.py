@@ -53,6 +53,15 @@ def test_a_linear_structure_is_a_transfer_function(controller):
     assert "ClosedLoop: 500 samples" in str(ours)
 
 
+def test_an_oscillator_in_a_loop_moves_as_it_does_under_the_same_force():
+    law = hs.BoucWen(A=30.0, beta=200.0, gamma=-50.0)
+    plant = hs.BoucWenOscillator(
+        mass=2.0, damping=0.6, stiffness=20.0, law=law, hold="zoh", initial_state=(0.01, 0.1), substeps=8
+    )
+    run = hs.close_loop(plant, hs.PID(kp=40.0, ki=30.0, limits=(-60.0, 55.0)), T, STEP)
+    assert run.y == pytest.approx(plant.response(run.drive, H), abs=1e-7 * np.ptp(run.y))
+
+
 def test_two_masses_without_collocation_are_their_state_matrix():
     """The force is at the first mass, the controller reads the second one."""
     mass, stiffness = np.diag([1.0, 0.5]), np.array([[30.0, -20.0], [-20.0, 20.0]])

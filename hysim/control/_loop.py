@@ -24,6 +24,7 @@ from hysim.models.model import in_brief
 from hysim.models.protocols import Remembering, Responding, standing
 from hysim.plants.actuator import Actuator, as_actuator
 from hysim.plants.chain import Signals
+from hysim.plants.oscillator import BoucWenOscillator
 from hysim.plants.stages import Amplifier
 from hysim.plants.structures.assembly import ControlledStructure
 from hysim.plants.structures.structure import Structure
@@ -144,8 +145,9 @@ def close_loop(
     Parameters
     ----------
     plant : Actuator, law, linear plant, creep, amplifier, cascade of laws that ends with a TransferFunction, Structure
-        Or the result of a fit. At rest at `u0` before the first sample, creep included. A structure with
-        ``excitation="force"`` begins at its initial state; the controller acts by `influence` and reads `output`.
+        Or a BoucWenOscillator, or the result of a fit. At rest at `u0` before the first sample, creep included. A
+        structure with ``excitation="force"`` begins at its initial state; the controller acts by `influence` and reads
+        `output`. An oscillator is a structure of one mass.
     controller : PID, TrackingController, InverseFeedforward, or anything with their ``compiled``
         At rest too. With a method ``ahead`` it gets the reference so many samples ahead, and at the end its last value.
     t, reference : array, shape (n,)
@@ -182,6 +184,8 @@ def close_loop(
     """
     times, r, h = sampled(t, reference)
     plant = model_of(plant)
+    if isinstance(plant, BoucWenOscillator):
+        plant = plant.to_structure()
     if isinstance(plant, Structure):
         if u0 or substeps is not None:
             raise ValueError("a structure has its own initial_state and substeps: leave out u0 and substeps")

@@ -54,7 +54,8 @@ class Body:
         if isinstance(type_, Vector):
             sizes = [f" int {type_.length(c_name, axis)} = 0;" for axis in self.scope.axes(name)]
             return f"{self._constant(name)}double *{c_name} = 0;{''.join(sizes)}"
-        return f"{_c_type(type_)} {c_name} = {'0.0' if type_ is Scalar.DOUBLE else '0'};"
+        zero = "{0}" if isinstance(type_, Several) else "0.0" if type_ is Scalar.DOUBLE else "0"
+        return f"{_c_type(type_)} {c_name} = {zero};"
 
     def _constant(self, name: str) -> str:
         return "" if self.scope.is_written(name) else "const "

@@ -20,23 +20,30 @@ with a step that ends there. A reversal may be missed by a share e = 1e-6 of the
 point is then wrong by e^2. A crossing costs the order only inside the piece that is missed. Where
 the memory by the method is off the exact one, a law much sharper than the step, the step is halved.
 
-Each step also carries three integrals over time: of F y', of c y'^2 and of g z y'. The state is the tuple
+Each step also carries three integrals over time: of F y', of c y'^2 and of g z y'. The motion is the tuple
 (y, y', z, integral of F y', of c y'^2, of g z y'); the plant is (m, c, k, offset, g, A, beta, gamma, n, 1 / m).
+
+A sample's step has the last input, the motion, whether a sample has been seen, and the law's `boucwen.prepare` as its
+state. Its parameters are the number of steps, whether the input is held, the times of a sample and of a step, the force
+of an input of one, the plant, and the coefficients of y^2, y^3, ... in p. The first sample leaves the state as it is.
 """
 
 import math
-
-import numpy as np
+from collections.abc import Callable
 
 from hysim._basics.frozen import FloatArray
-from hysim.kernels._compile import inlined, inner, kernel
+from hysim.kernels._compile import inlined, inner, kernel, pasted, uncounted_kernel, unfolded
 from hysim.kernels.boucwen import advance, polynomial
 from hysim.kernels.elementary import linear_flow, power
 
-State = tuple[float, float, float, float, float, float]
+Motion = tuple[float, float, float, float, float, float]
 Plant = tuple[float, float, float, float, float, float, float, float, float, float]
 Rates = tuple[float, float]  # y'' and z'
 Branch = tuple[float, float, float]  # signs of y' and z, and C
+Move = Callable[[Motion, float, float, float, Plant, FloatArray, FloatArray], Motion]
+"""Motion after a step; from that before, the force and its slope, the length, the plant, the curve and the work."""
+
+N_HEAD, N_FRONT = 15, 8  # parameters before the coefficients or the flow, and places of the state before the work
 
 _REVERSAL = 1.0e-6  # share of the change of y' in a step by which its end may lie beyond a reversal
 _CROSSING = 1.0e-3  # likewise of z and a crossing
@@ -77,8 +84,8 @@ def rates(force: float, y: float, v: float, z: float, side: float, C: float, pla
 @inner
 def memory_slope(z: float, v: float, plant: Plant) -> float:
     """dz/dy at z on the way of v."""
-    A, beta, gamma, n = plant[5:9]
-    return float(A - power(abs(z), n) * (gamma + beta * np.sign(z * v)))
+    _, _, _, _, _, A, beta, gamma, n, _ = plant
+    return float(A - power(abs(z), n) * (gamma + beta * math.copysign(1.0, z * v)))
 
 
 @inner
@@ -124,22 +131,22 @@ def dip(v0: float, a0: float, v1: float, a1: float, length: float) -> float:
 
 
 @inner
-def branch(state: State, acceleration: float, slope: float, h: float, A: float, beta: float, gamma: float) -> Branch:
+def branch(motion: Motion, acceleration: float, slope: float, h: float, A: float, beta: float, gamma: float) -> Branch:
     """Signs of y' and z on the branch that begins here, a moment ahead, and C."""
-    ahead = state[1] + _REVERSAL * h * acceleration
+    ahead = motion[1] + _REVERSAL * h * acceleration
     forward = math.copysign(1.0, ahead if ahead != 0.0 else slope)
-    ahead = state[2] + _CROSSING * h * A * state[1]
+    ahead = motion[2] + _CROSSING * h * A * motion[1]
     side = math.copysign(1.0, ahead if ahead != 0.0 else A * forward)
     return forward, side, gamma + beta * forward * side
 
 
 @inlined
 def smooth_step(
-    state: State, F: float, dF: float, h: float, a1: float, r1: float, side: float, C: float, plant: Plant,
+    motion: Motion, F: float, dF: float, h: float, a1: float, r1: float, side: float, C: float, plant: Plant,
     curve: FloatArray,
-) -> State:  # fmt: skip
+) -> Motion:  # fmt: skip
     """Order 6 on one branch; F rises by dF over the step, a1 and r1 are y'' and z' at its begin."""
-    y, v, z = state[:3]
+    y, v, z, _, _, _ = motion
     q = h * _THIRD
     v1 = v
     y2, v2, z2 = y + q * v1, v + q * a1, z + q * r1
@@ -175,27 +182,27 @@ def smooth_step(
         y + q * (11.0 * (v1 + v7) + 81.0 * (v3 + v4) - 32.0 * (v5 + v6)),
         v + q * (11.0 * (a1 + a7) + 81.0 * (a3 + a4) - 32.0 * (a5 + a6)),
         z + q * (11.0 * (r1 + r7) + 81.0 * (r3 + r4) - 32.0 * (r5 + r6)),
-        state[3] + q * work,
-        state[4] + q * plant[1] * damped,
-        state[5] + q * plant[4] * taken,
+        motion[3] + q * work,
+        motion[4] + q * plant[1] * damped,
+        motion[5] + q * plant[4] * taken,
     )
 
 
 @inlined
 def attempt(
-    state: State, F: float, slope: float, length: float, most_trials: int, plant: Plant, curve: FloatArray
-) -> tuple[State, float, bool]:
-    """The longest smooth step up to `length`: state, length, and whether z kept its sign; z by the method itself."""
-    A, beta, gamma, n = plant[5:9]
-    y, v, z = state[:3]
+    motion: Motion, F: float, slope: float, length: float, most_trials: int, plant: Plant, curve: FloatArray
+) -> tuple[float, float, float, float, float, float, float, bool]:
+    """The longest smooth step up to `length`: motion, length, and whether z kept its sign; z by the method itself."""
+    _, _, _, _, _, A, beta, gamma, n, _ = plant
+    y, v, z, _, _, _ = motion
     h = shorter = length
     a, _ = rates(F, y, v, z, 1.0, 0.0, plant, curve)
-    forward, side, C = branch(state, a, slope, h, A, beta, gamma)
+    forward, side, C = branch(motion, a, slope, h, A, beta, gamma)
     r = v * (A - C * power(side * z, n))
-    for _ in range(most_trials):
+    for _k in range(most_trials):
         h = shorter
-        trial = smooth_step(state, F, slope * h, h, a, r, side, C, plant, curve)
-        y1, v1, z1 = trial[:3]
+        trial = smooth_step(motion, F, slope * h, h, a, r, side, C, plant, curve)
+        y1, v1, z1, _, _, _ = trial
         a1, r1 = rates(F + slope * h, y1, v1, z1, side, C, plant, curve)
         shorter = dip(v, a, v1, a1, h)
         if forward * v1 < -_REVERSAL * abs(v1 - v):
@@ -204,31 +211,64 @@ def attempt(
             shorter = sign_change(z, r, z1, r1, h)
         if not shorter < h:
             break
-    return trial, h, side * z >= 0.0 and side * z1 >= 0.0
+    same_side = side * z >= 0.0 and side * z1 >= 0.0
+    return trial[0], trial[1], trial[2], trial[3], trial[4], trial[5], h, same_side
 
 
-@inner
-def runge_kutta(state: State, F: float, slope: float, h: float, plant: Plant, curve: FloatArray) -> State:
+@unfolded
+def split(
+    motion: Motion, F: float, slope: float, length: float, plant: Plant, curve: FloatArray, work: FloatArray
+) -> Motion:
+    """A step in pieces that end at reversals and crossings, each with the exact memory."""
+    _, _, _, _, _, A, beta, gamma, n, _ = plant
+    left = reach = length
+    for piece in range(_MOST_PIECES):
+        y, z = motion[0], motion[2]
+        trials = _MOST_TRIALS if piece < _MOST_PIECES - 1 else 1
+        trial = attempt(motion, F, slope, min(reach, left), trials, plant, curve)
+        h = trial[6]
+        if n == 1.0 and trial[7]:
+            z = relaxed(z, trial[0] - y, A, beta, gamma)
+        else:
+            z = advance(z, trial[0] - y, A, beta, gamma, n, work)
+        if abs(z - trial[2]) > _DISAGREEMENT * (abs(z) + abs(motion[2])) and trials > 1:
+            reach = 0.5 * h
+            continue
+        motion = (trial[0], trial[1], z, trial[3], trial[4], trial[5])
+        if not h < left:
+            break
+        reach *= 2.0
+        F += slope * h
+        left -= h
+    return motion
+
+
+@unfolded
+def runge_kutta(
+    motion: Motion, F: float, slope: float, h: float, plant: Plant, curve: FloatArray, work: FloatArray
+) -> Motion:
     """The classical method of order 4 over one step, whatever happens inside it."""
-    y, v, z = state[:3]
-    dy, dv, dz, work, damped, taken = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+    y, v, z, _, _, _ = motion
+    dy, dv, dz, worked, damped, taken = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
     yi, vi, zi, force = y, v, z, F
     for stage in range(4):
         a, _ = rates(force, yi, vi, zi, 1.0, 0.0, plant, curve)
         r = vi * memory_slope(zi, vi, plant)
         weight = h / 6.0 if stage in (0, 3) else h / 3.0
         dy, dv, dz = dy + weight * vi, dv + weight * a, dz + weight * r
-        work, damped, taken = work + weight * force * vi, damped + weight * vi * vi, taken + weight * zi * vi
+        worked, damped, taken = worked + weight * force * vi, damped + weight * vi * vi, taken + weight * zi * vi
         reach = h if stage == 2 else 0.5 * h
         yi, vi, zi, force = y + reach * vi, v + reach * a, z + reach * r, F + slope * reach
-    return y + dy, v + dv, z + dz, state[3] + work, state[4] + plant[1] * damped, state[5] + plant[4] * taken
+    return y + dy, v + dv, z + dz, motion[3] + worked, motion[4] + plant[1] * damped, motion[5] + plant[4] * taken
 
 
-@inner
-def newmark(state: State, F: float, slope: float, h: float, plant: Plant, curve: FloatArray) -> State:
+@unfolded
+def newmark(
+    motion: Motion, F: float, slope: float, h: float, plant: Plant, curve: FloatArray, work: FloatArray
+) -> Motion:
     """Constant average acceleration and the trapezoidal rule for z: Newton's method on (y', z) at the end."""
     mass, damping, stiffness, offset, gain, A, beta, gamma, n, mobility = plant
-    y, v, z = state[:3]
+    y, v, z, _, _, _ = motion
     a = (F - damping * v - spring(y, stiffness, offset, curve) - gain * z) * mobility
     r = v * memory_slope(z, v, plant)
     end = F + slope * h
@@ -252,18 +292,18 @@ def newmark(state: State, F: float, slope: float, h: float, plant: Plant, curve:
             break
         last = moved if moved < 1.0e-6 else math.inf
     dy = 0.5 * h * (v + v1)
-    work, damped, taken = 0.5 * (F + end) * dy, damping * 0.5 * (v + v1) * dy, gain * 0.5 * (z + z1) * dy
-    return y + dy, v1, z1, state[3] + work, state[4] + damped, state[5] + taken
+    worked, damped, taken = 0.5 * (F + end) * dy, damping * 0.5 * (v + v1) * dy, gain * 0.5 * (z + z1) * dy
+    return y + dy, v1, z1, motion[3] + worked, motion[4] + damped, motion[5] + taken
 
 
-@inner
+@unfolded
 def strang(
-    state: State, F: float, slope: float, h: float, plant: Plant, curve: FloatArray, flow: FloatArray,
-    work: FloatArray,
-) -> State:  # fmt: skip
-    """Kick, flow, kick. `flow`, (2, 4), takes (y, y', F, its rise) over the step with the tangent at z = 0."""
+    motion: Motion, F: float, slope: float, h: float, plant: Plant, curve: FloatArray, work: FloatArray
+) -> Motion:
+    """Kick, flow, kick. The flow takes (y, y', F, its rise) over the step with the tangent at z = 0; curve follows."""
+    flow, curve = curve[:8].reshape((2, 4)), curve[8:]
     mass, damping, stiffness, offset, gain, A, beta, gamma, n, _ = plant
-    y, v, z = state[:3]
+    y, v, z, _, _, _ = motion
     kick = 0.5 * h / mass
     v0 = v - kick * (spring(y, 0.0, offset, curve) + gain * (z - A * y))
     y1 = flow[0, 0] * y + flow[0, 1] * v0 + flow[0, 2] * F + flow[0, 3] * slope * h
@@ -281,104 +321,46 @@ def strang(
     end = F + slope * h
     taken = 0.5 * (z + middle) * (turn - y) + 0.5 * (middle + z1) * (y1 - turn)
     done, damped = 0.5 * h * (F * v + end * v1), 0.5 * h * damping * (v * v + v1 * v1)
-    return y1, v1, z1, state[3] + done, state[4] + damped, state[5] + gain * taken
+    return y1, v1, z1, motion[3] + done, motion[4] + damped, motion[5] + gain * taken
 
 
-# ---------------------------------------------------------------------------------- paths
+# ---------------------------------------------------------------------------------- samples
 
 
-@kernel
-def split_path(
-    substeps: int, held: bool, parameters: FloatArray, curve: FloatArray, work: FloatArray, sample_time: float,
-    last_force: float, force: FloatArray, state: FloatArray, out: FloatArray,
-) -> int:  # fmt: skip
-    """States at the samples of `force` into `out`, (n_samples, 6): the first sample that is not finite, or -1.
-
-    `state` (6,) is one sample before, at `last_force`; `parameters` (9,) the plant; `work` the law's `boucwen.prepare`.
-    """
-    plant, current = unpacked(parameters, state)
-    A, beta, gamma, n = plant[5:9]
-    for k in range(force.size):
-        rise = 0.0 if held else force[k] - last_force
-        slope = rise / sample_time
-        for j in range(substeps):
-            F, left = last_force + rise * j / substeps, sample_time / substeps
-            reach = left
-            for piece in range(_MOST_PIECES):
-                y, z = current[0], current[2]
-                trials = _MOST_TRIALS if piece < _MOST_PIECES - 1 else 1
-                trial, h, same_side = attempt(current, F, slope, min(reach, left), trials, plant, curve)
-                if n == 1.0 and same_side:
-                    z = relaxed(z, trial[0] - y, A, beta, gamma)
-                else:
-                    z = advance(z, trial[0] - y, A, beta, gamma, n, work)
-                if abs(z - trial[2]) > _DISAGREEMENT * (abs(z) + abs(current[2])) and trials > 1:
-                    reach = 0.5 * h
-                    continue
-                current = (trial[0], trial[1], z, trial[3], trial[4], trial[5])
-                if not h < left:
-                    break
-                reach *= 2.0
-                F += slope * h
-                left -= h
-        last_force = force[k]
-        if not stored(current, out[k]):
-            return k
-    return -1
+@pasted
+def sampled(move: Move, parameters: FloatArray, state: FloatArray, u: float) -> float:
+    """Displacement at the next sample, nan where the motion leaves the finite numbers."""
+    if state[7] == 0.0:
+        state[0], state[7] = u, 1.0
+        return float(state[1])
+    substeps, last = int(parameters[0]), parameters[4] * state[0]
+    rise = 0.0 if parameters[1] > 0.0 else parameters[4] * u - last
+    slope, h = rise / parameters[2], parameters[3]
+    p, curve, work = parameters, parameters[N_HEAD:], state[N_FRONT:]
+    plant = (p[5], p[6], p[7], p[8], p[9], p[10], p[11], p[12], p[13], p[14])
+    motion = (state[1], state[2], state[3], state[4], state[5], state[6])
+    for j in range(substeps):
+        motion = move(motion, last + rise * j / substeps, slope, h, plant, curve, work)
+    y, v, z, worked, damped, taken = motion
+    state[0], state[1], state[2], state[3], state[4], state[5], state[6] = u, y, v, z, worked, damped, taken
+    return y if math.isfinite(y + v + z + worked + damped + taken) else math.nan
 
 
-@kernel
-def strang_path(
-    substeps: int, held: bool, parameters: FloatArray, curve: FloatArray, flow: FloatArray, work: FloatArray,
-    sample_time: float, last_force: float, force: FloatArray, state: FloatArray, out: FloatArray,
-) -> int:  # fmt: skip
-    """As `split_path`, by Strang's splitting."""
-    plant, current = unpacked(parameters, state)
-    h = sample_time / substeps
-    for k in range(force.size):
-        rise = 0.0 if held else force[k] - last_force
-        for j in range(substeps):
-            F = last_force + rise * j / substeps
-            current = strang(current, F, rise / sample_time, h, plant, curve, flow, work)
-        last_force = force[k]
-        if not stored(current, out[k]):
-            return k
-    return -1
+@uncounted_kernel
+def split_step(parameters: FloatArray, state: FloatArray, u: float) -> float:
+    return sampled(split, parameters, state, u)
 
 
-@kernel
-def whole_steps(
-    implicit: bool, substeps: int, held: bool, parameters: FloatArray, curve: FloatArray, sample_time: float,
-    last_force: float, force: FloatArray, state: FloatArray, out: FloatArray,
-) -> int:  # fmt: skip
-    """As `split_path`, by Newmark's method if `implicit`, else by that of Runge and Kutta."""
-    plant, current = unpacked(parameters, state)
-    h = sample_time / substeps
-    for k in range(force.size):
-        rise = 0.0 if held else force[k] - last_force
-        slope = rise / sample_time
-        for j in range(substeps):
-            F = last_force + rise * j / substeps
-            if implicit:
-                current = newmark(current, F, slope, h, plant, curve)
-            else:
-                current = runge_kutta(current, F, slope, h, plant, curve)
-        last_force = force[k]
-        if not stored(current, out[k]):
-            return k
-    return -1
+@uncounted_kernel
+def runge_kutta_step(parameters: FloatArray, state: FloatArray, u: float) -> float:
+    return sampled(runge_kutta, parameters, state, u)
 
 
-@inner
-def unpacked(parameters: FloatArray, state: FloatArray) -> tuple[Plant, State]:
-    """Plant and state as tuples."""
-    p, x = parameters, state
-    plant = (p[0], p[1], p[2], p[3], p[4], p[5], p[6], p[7], p[8], 1.0 / p[0])
-    return plant, (x[0], x[1], x[2], x[3], x[4], x[5])
+@uncounted_kernel
+def newmark_step(parameters: FloatArray, state: FloatArray, u: float) -> float:
+    return sampled(newmark, parameters, state, u)
 
 
-@inner
-def stored(state: State, row: FloatArray) -> bool:
-    """Write the state; whether it is finite."""
-    row[0], row[1], row[2], row[3], row[4], row[5] = state
-    return math.isfinite(state[0] + state[1] + state[2] + state[3] + state[4] + state[5])
+@uncounted_kernel
+def strang_step(parameters: FloatArray, state: FloatArray, u: float) -> float:
+    return sampled(strang, parameters, state, u)

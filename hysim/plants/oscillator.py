@@ -29,7 +29,6 @@ Source: R. Seydel, Practical Bifurcation and Stability Analysis, 3rd ed., Spring
 
 import math
 from collections.abc import Callable, Sequence
-from functools import partial
 from typing import ClassVar, Literal, NamedTuple
 
 import numpy as np
@@ -41,14 +40,19 @@ from hysim._basics.parallel import in_pieces
 from hysim._basics.progress import along
 from hysim.errors import SimulationError
 from hysim.kernels import oscillator as kernels
+from hysim.kernels import stepping
 from hysim.kernels.boucwen import prepare
 from hysim.kernels.charts import N_WORK
+from hysim.kernels.memories import drive_memory
 from hysim.laws.differential.boucwen import BoucWen
 from hysim.laws.differential.polynomial_boucwen import PolynomialBoucWen
+from hysim.models.compiled_step import pointer
 from hysim.models.model import family
-from hysim.models.protocols import needed_time, positive_time
+from hysim.models.protocols import Startable, needed_time, positive_time
 from hysim.plants.oscillator_structure import METHODS as METHODS
 from hysim.plants.oscillator_structure import Excitation, Method, OscillatorStructure
+from hysim.plants.structures.parts import Element
+from hysim.plants.structures.structure import Structure
 
 ATTEMPTS = (16, 32, 64, 128, 256)  # periods gone through before each search for a fixed point, and before giving up
 MARGIN = 1e-5  # below 1, of a multiplier that attracts: differences find it to about 1e-6
@@ -388,49 +392,70 @@ class BoucWenOscillator:
         more = whole_substeps(angle / self.substeps / _LARGEST_ANGLE) if self.method == "split" else 1
         return self.substeps * more
 
+    def to_structure(self) -> Structure:
+        """The plant as a structure of one mass, which takes any law; it has numerics of its own."""
+        return Structure(
+            mass=np.array(self.mass),
+            damping=self.damping,
+            stiffness=np.array(self.stiffness),
+            elements=(Element(self.law, between=(0, 1)),),
+            excitation=self.excitation,
+            initial_state=self.initial_state,
+        )
+
+    def startable(self, sample_time: float | None = None) -> Startable:
+        """The plant at a sample time [s], for exports: at its first sample it is in the initial state."""
+        return self._compiled(needed_time(self, sample_time))
+
     def _states(
         self, u: npt.ArrayLike, sample_time: float, state: OscillatorState | None = None
     ) -> tuple[FloatArray, FloatArray]:
-        """Inputs, and what the kernel carries at their samples, shape (n, 6)."""
+        """Inputs, and motion and energies at their samples, shape (n, 6)."""
         inputs, steps = read_only(u, "u", ndim=1), self._compiled(positive_time(sample_time))
         if not inputs.size:
             return inputs, np.empty((0, 6))
-        begin, done = state or self._start(float(inputs[0])), int(state is None)
-        forces = (1.0 if self.excitation == "force" else -self.mass) * np.append(begin.u, inputs)
-        path = np.empty((forces.size, 6))
-        path[: 1 + done] = begin[1:]
+        front, path = steps.state.copy(), np.empty((inputs.size, 6))
+        if state is not None:
+            front[: kernels.N_FRONT] = *state, 1.0
 
         def work(k: slice) -> int:
-            first, last = max(k.start, done), k.stop + 1
-            lost = steps(forces[first], forces[first + 1 : last], path[first].copy(), path[first + 1 : last])
-            return first - k.start + lost if lost >= 0 else -1
+            return int(drive_memory(pointer(steps.step), steps.parameters, front, inputs[k], path[k]))
 
         if (lost := in_pieces(work, inputs.size)) >= 0:
             raise SimulationError(
-                f"the motion leaves the finite numbers within {(lost + 1 - done) * sample_time:.6g} s from the start, "
-                f"at sample {lost}: the plant is unstable, or the method needs more substeps"
+                f"the motion leaves the finite numbers within {(lost + (state is not None)) * sample_time:.6g} s from "
+                f"the start, at sample {lost}: the plant is unstable, or the method needs more substeps"
             )
-        return inputs, path[1:]
+        return inputs, path
 
-    def _compiled(self, sample_time: float) -> Callable[[float, FloatArray, FloatArray, FloatArray], int]:
-        """The kernel with everything but the input, the state before it, and the states to come."""
+    def _compiled(self, sample_time: float) -> Startable:
         law, (slope, *curve) = self.law, self._coefficients
-        stiffness, substeps, held = self.stiffness + slope, self.steps_of(sample_time), self.hold == "zoh"
-        plant = [self.mass, self.damping, stiffness, law.offset, law.gain, law.A, law.beta, law.gamma, law.n]
-        constants = substeps, held, np.array(plant), np.array(curve)
-        if self.method in ("newmark", "runge-kutta"):
-            return partial(kernels.whole_steps, self.method == "newmark", *constants, sample_time)
-        work = np.empty(N_WORK)
-        prepare(law.A, law.beta, law.gamma, law.n, 0.0, work)
-        if self.method == "split":
-            return partial(kernels.split_path, *constants, work, sample_time)
-        flow = _linear_flow(self.mass, self.damping, stiffness + law.gain * law.A, sample_time / substeps)
-        return partial(kernels.strang_path, *constants, flow, work, sample_time)
+        stiffness, substeps = self.stiffness + slope, self.steps_of(sample_time)
+        push = 1.0 if self.excitation == "force" else -self.mass
+        springs = self.damping, stiffness, law.offset, law.gain, law.A, law.beta, law.gamma, law.n
+        flow, work = [], np.zeros(N_WORK if self.method in ("split", "strang") and law.n not in (1.0, 2.0) else 0)
+        if work.size:
+            prepare(law.A, law.beta, law.gamma, law.n, 0.0, work)
+        if self.method == "strang":
+            flow = _linear_flow(self.mass, self.damping, stiffness + law.gain * law.A, sample_time / substeps)
+        steps = substeps, self.hold == "zoh", sample_time, sample_time / substeps, push
+        parameters = read_only([*steps, self.mass, *springs, 1.0 / self.mass, *flow, *curve], finite=False)
+        state = np.concatenate([self._start(0.0), [0.0], work])
+        return Startable(_STEPS[self.method], parameters, state, stepping.complete)
 
 
-def _linear_flow(mass: float, damping: float, stiffness: float, h: float) -> FloatArray:
-    """(y, y') after h from (y, y', F, rise of F), exactly for m y'' + c y' + k y = F, shape (2, 4)."""
+_STEPS = {
+    "split": kernels.split_step,
+    "runge-kutta": kernels.runge_kutta_step,
+    "newmark": kernels.newmark_step,
+    "strang": kernels.strang_step,
+}
+
+
+def _linear_flow(mass: float, damping: float, stiffness: float, h: float) -> list[float]:
+    """(y, y') after h from (y, y', F, rise of F), exactly for m y'' + c y' + k y = F: two rows of four, flat."""
     generator = np.zeros((4, 4))
     generator[:2] = [[0.0, h, 0.0, 0.0], [-stiffness * h / mass, -damping * h / mass, h / mass, 0.0]]
     generator[2, 3] = 1.0
-    return np.ascontiguousarray(expm(generator)[:2])
+    flow: list[float] = expm(generator)[:2].ravel().tolist()
+    return flow
