@@ -90,6 +90,16 @@ def test_the_posterior_of_a_polynomial_is_the_normal_one_everywhere(cubic):
     np.testing.assert_allclose(posterior.log_posterior(q), expected, rtol=0.0, atol=1e-6)  # of sigma's narrow prior
 
 
+def test_a_flat_prior_is_told_in_terms_of_its_parameter():
+    law, rec = hs.BoucWen(beta=0.7), cubic_record(n=40)
+    bounds = {"z0": (-0.5, 0.75), "n": (0.5, 8.0)}
+    fit = hs.identify(law, hs.Record(u=rec.u, y=law.response(rec.u)), bounds=bounds, free=("z0",))
+    words = posed(fit, (hs.Record(u=rec.u, y=law.response(rec.u)),), "gaussian", given({}), None).priors_in_words()
+    assert words["z0"] == "flat from -0.5 to 0.75"
+    assert words["n"] == "flat in its logarithm from 0.5 to 8"
+    assert words["loading"].endswith("in the coordinate of the search")
+
+
 def test_the_mean_likelihood_over_the_cube_is_that_over_the_priors():
     """Brute force over a line's two parameters, against the density that the sampler has."""
     rec, fit = fitted_line(6)

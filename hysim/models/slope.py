@@ -140,7 +140,9 @@ def _tree(cls: Any, name: str, function: FunctionType, constants: Mapping[str, b
     """A function of a family as it is compiled: of a vector of parameters, and without annotations."""
     try:
         tree = _parsed(inspect.getsource(function))
-    except OSError:
+        if tree.name != function.__name__:
+            raise OSError("another text has the name of what exec has compiled")
+    except (OSError, SyntaxError):
         raise TypeError(
             f"the source of the {name} of {cls.__name__} cannot be read: define it in a file or a notebook"
         ) from None
@@ -152,11 +154,12 @@ def _tree(cls: Any, name: str, function: FunctionType, constants: Mapping[str, b
 
 
 def _parsed(text: str) -> ast.FunctionDef:
-    """The one function of a text, which may be indented."""
+    """The one function of a text, which may be indented; a SyntaxError if it begins with something else."""
     (block,) = ast.parse(f"if True:\n{text}" if text[:1].isspace() else f"if True:\n{textwrap.indent(text, ' ')}").body
     assert isinstance(block, ast.If)
     tree = block.body[0]
-    assert isinstance(tree, ast.FunctionDef)
+    if not isinstance(tree, ast.FunctionDef):
+        raise SyntaxError("the text begins with no function")
     tree.decorator_list = []
     return tree
 

@@ -407,8 +407,7 @@ class Target:
 
     def priors_in_words(self) -> dict[str, str]:
         space, (*ends, of_sigma) = self.problem.space, np.column_stack([self.v_prior.lower, self.v_prior.upper])
-        boxes = [f"flat from {low:.4g} to {high:.4g} in the coordinate of the search" for low, high in ends]
-        words = dict(zip(space.coordinates, boxes, strict=True))
+        words = {name: self._flat_in_words(k, name, *ends[k]) for k, name in enumerate(space.coordinates)}
         flat = f"flat, within {self.b_prior.reach:g} spans of the output of what it adds to it"
         box = self.b_prior.box.T
         within = [f", from {low:.4g} to {high:.4g}" if np.isfinite([low, high]).any() else "" for low, high in box]
@@ -416,6 +415,19 @@ class Target:
         low, high = np.exp(of_sigma).tolist()
         words |= {SIGMA: f"flat in its logarithm from {low:.3g} to {high:.3g}"}
         return words | {(*space.coordinates, SIGMA)[k]: str(own) for k, (own, _) in self.v_prior.own.items()}
+
+    def _flat_in_words(self, k: int, name: str, low: float, high: float) -> str:
+        """A flat prior of a coordinate in terms of its parameter, where that is the coordinate or its exponential."""
+        names, theta = self.problem.space.names, np.zeros((3, self.n_x + self.n_linear))
+        theta[:, : self.n_x] = 0.5 * (self.v_prior.lower + self.v_prior.upper)[: self.n_x]
+        theta[:, k] = low, 0.5 * (low + high), high
+        if name in names:
+            first, middle, last = self.problem.named(theta)[:, names.index(name)].tolist()
+            if math.isclose(middle, 0.5 * (first + last), rel_tol=1e-6, abs_tol=1e-9 * abs(last - first)):
+                return f"flat from {first:.4g} to {last:.4g}"
+            if first * last > 0.0 and math.isclose(middle * middle, first * last, rel_tol=1e-6):
+                return f"flat in its logarithm from {first:.4g} to {last:.4g}"
+        return f"flat from {low:.4g} to {high:.4g} in the coordinate of the search"
 
     def log_posterior(self, q: FloatArray) -> FloatArray:
         """Logarithm of likelihood times prior in the coordinates q (n_sets, n_dim), -inf outside of the priors."""
