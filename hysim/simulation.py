@@ -247,6 +247,6 @@ def _signals(plant: Responding, u: FloatArray, times: FloatArray | None) -> Mapp
     time: tuple[float, ...] = ()
     if needs_time(plant):
         if times is None:
-            raise ValueError(f"a {type(plant).__name__} needs times: pass t")
+            raise ValueError(f"a {type(plant).__name__} needs times: pass t=")
         time = (even_step(times),)
     return plant.signals(u, *time) if isinstance(plant, _HasSignals) else {"y": plant.response(u, *time)}

@@ -39,6 +39,7 @@ def peer(texts, width, line="NPTS={n:7d}, DT={step:9.5f} SEC", per_line=5, step=
     "line",
     [
         "NPTS={n:6d}, DT= .00500 SEC",
+        "NPTS={n:6d}, DT= 5.000 MSEC",
         "NPTS=   {n}, DT=   .0050 SEC,",
         "   NPTS={n},    DT=0.0050SEC",
         "{n}    0.0050    NPTS, DT",

@@ -60,7 +60,7 @@ TOP = 60
 
 _REAL = r"((?:\d+\.?\d*|\.\d+)(?:[EeDd][+-]?\d+)?)"
 _NPTS = re.compile(r"\bNPTS?\s*[=:]?\s*(\d+)", re.IGNORECASE)
-_DT = re.compile(rf"\bDT\s*[=:]?\s*{_REAL}", re.IGNORECASE)
+_DT = re.compile(rf"\bDT\s*[=:]?\s*{_REAL}\s*(ms(?:ec)?\b)?", re.IGNORECASE)
 _IN_ORDER = re.compile(
     rf"^\s*(\d+)[\s,]+{_REAL}[\s,]*NPTS\W+DT\b|\bNPTS\s*,?\s*DT\s*[=:]?\s*(\d+)[\s,]+{_REAL}", re.IGNORECASE
 )
@@ -437,7 +437,7 @@ def peer_header(lines: list[str]) -> StatedValues | None:
     for number in range(len(lines), 0, -1):
         line = lines[number - 1]
         if (n_values := _NPTS.search(line)) and (step := _DT.search(line)):
-            return StatedValues(number, int(n_values[1]), _real(step[1]))
+            return StatedValues(number, int(n_values[1]), _real(step[1]) * (1e-3 if step[2] else 1.0))
         if both := _IN_ORDER.search(line):
             return StatedValues(number, int(both[1] or both[3]), _real(both[2] or both[4]))
     return None
