@@ -659,3 +659,6 @@ def test_the_command_line_measures_and_draws_it(tmp_path, capsys):
     assert json.loads(capsys.readouterr().out)["peak"] == pytest.approx(list(by_itself(1e-3).peak))
     assert "ridge" in (tmp_path / "density.svg").read_text()
     assert main(["metrics", str(file), "--forc", "--cycles"]) != 0
+    hs.save_record(hs.Record(u=U, y=2.0 * U), file)
+    assert main(["metrics", str(file), "--forc", "--json"]) == 0
+    assert json.loads(capsys.readouterr().out)["peak"] is None

@@ -88,7 +88,8 @@ def metrics(
     measured: Any
     if forc:
         measured = hs.forc(record, tolerance=tolerance)
-        document = outputs.scalars(measured) | {"peak": list(measured.peak), "ridge": measured.ridge.tolist()}
+        peak = list(measured.peak) if measured.ridge.size else None
+        document = outputs.scalars(measured) | {"peak": peak, "ridge": measured.ridge.tolist()}
         files[plot] = lambda: outputs.on_axes(hs.plot.forc, measured, units=record.units)
     elif magnetic:
         measured = hs.magnetic_metrics(record.u, record.y, **limits)
