@@ -50,18 +50,21 @@ def affine(*names: str, unit: str = "1") -> tuple[Parameter, ...]:
 
 
 _ROUNDING = 1e-14  # of a number by way of its logarithm
-_LEAST = 1e-300  # number that a chart takes the logarithm of
 
 
 class Coordinate(NamedTuple):
-    """A parameter in its box: searched as a multiple of `scale`, or as the logarithm of one."""
+    """A number in its box: searched as a multiple of `scale`, or as the logarithm of one.
+
+    `physical` is that of a `Parameter`, and `drawn` the part of the box from which random points are drawn.
+    """
 
     name: str
-    lower: float
-    upper: float
+    lower: float = -np.inf
+    upper: float = np.inf
     scale: float = 1.0
     log: bool = False
     physical: tuple[bool, bool] = (False, False)
+    drawn: tuple[float, float] | None = None
 
     def encode(self, values: Any) -> Any:
         """Coordinates of values, those outside the box at its side."""
@@ -83,6 +86,12 @@ class Coordinate(NamedTuple):
             return self
         return self._replace(lower=min(self.lower, value), upper=max(self.upper, value))
 
+    def within(self, lower: float, upper: float) -> "Coordinate":
+        """The coordinate of a chart in the user's bounds; between finite ones it measures the parameter itself."""
+        if np.isfinite([lower, upper]).all():
+            return self._replace(lower=lower, upper=upper, physical=(False, False), drawn=None)
+        return self._replace(lower=max(self.lower, lower), upper=min(self.upper, upper), physical=(False, False))
+
     def limited(self, limits: Mapping[str, tuple[float, float]]) -> "Coordinate":
         """The coordinate in the user's bounds; ValueError if one is not finite, or not positive on a log scale."""
         lower, upper = limits.get(self.name, (self.lower, self.upper))
@@ -92,6 +101,10 @@ class Coordinate(NamedTuple):
                 f"bounds of {self.name!r} must be{positive} finite and lower < upper, got {(lower, upper)}"
             )
         return self._replace(lower=lower, upper=upper)
+
+
+def by_name(*coordinates: Coordinate) -> dict[str, Coordinate]:
+    return {each.name: each for each in coordinates}
 
 
 def declared_space(
@@ -190,7 +203,7 @@ def space_of(
     names = tuple(each.name for each in searched)
     lower = np.array([each.encode(each.lower) for each in searched])
     upper = np.array([each.encode(each.upper) for each in searched])
-    starts = [[each.encode(point.get(each.name, defaults[each.name])) for each in searched] for point in points]
+    starts = [[each.encode({**defaults, **point}[each.name]) for each in searched] for point in points]
     constants = {name: value for name, value in held.items() if name not in columns}
 
     def parameters(x: FloatArray) -> dict[str, FloatArray]:
@@ -214,44 +227,12 @@ def space_of(
         starts=np.reshape(starts, (len(points), len(names)))[: None if names else 1],
         parameters=parameters,
         physical={each.name: each.physical for each in searched if each.name not in limits},
-        encoded=encoded,
-        **{"bounds": {name: pair for name, pair in limits.items() if name in columns}, **others},
+        **{
+            "bounds": {name: pair for name, pair in limits.items() if name in columns},
+            "encoded": encoded,
+            **others,
+        },
     )
-
-
-class Scale(NamedTuple):
-    """Coordinate of a chart: a number, its logarithm (`kind` "log") or its inverse hyperbolic sine ("asinh").
-
-    `lower` and `upper` are its box, and `drawn` the part from which random points are drawn: of the coordinate, or of
-    the number that a logarithm is of. `physical` is that of a `Parameter`.
-    """
-
-    lower: float = -np.inf
-    upper: float = np.inf
-    kind: str = "plain"
-    drawn: tuple[float, float] | None = None
-    physical: tuple[bool, bool] = (False, False)
-
-    def within(self, lower: float, upper: float) -> "Scale":
-        """The coordinate in the user's bounds; between finite ones it measures the parameter itself."""
-        if np.isfinite([lower, upper]).all():
-            return Scale(lower, upper, self.kind if self.kind == "log" else "plain")
-        return self._replace(lower=max(self.lower, lower), upper=min(self.upper, upper))
-
-    def box(self, is_drawn: bool = False) -> tuple[float, float]:
-        """Lower and upper side of the coordinate's box, or of the part of it that is drawn from."""
-        low, high = (is_drawn and self.drawn) or (self.lower, self.upper)
-        return (float(np.log(low)), float(np.log(high))) if self.kind == "log" else (low, high)
-
-    def number(self, x: FloatArray) -> FloatArray:
-        if self.kind == "log":
-            return np.exp(x)
-        return np.sinh(x) if self.kind == "asinh" else x
-
-    def coordinate(self, number: FloatArray) -> float:
-        if self.kind == "log":
-            return float(np.log(np.maximum(number, _LEAST)))
-        return float(np.arcsinh(number) if self.kind == "asinh" else number)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -262,7 +243,7 @@ class Chart(ABC):
     parameter that the user bounds by finite numbers is its own coordinate.
     """
 
-    rows: Mapping[str, Scale]
+    rows: Mapping[str, Coordinate]
     defaults: Numbers
     held: Numbers
     bounds: Box  # of the user
@@ -274,7 +255,7 @@ class Chart(ABC):
 
     @abstractmethod
     def measured(self, known: dict[str, FloatArray], raw: dict[str, FloatArray]) -> dict[str, FloatArray]:
-        """All parameters: those `known`, and the others by the numbers `raw` of their coordinates."""
+        """All parameters: those `known`, and the others by the numbers `raw` of their coordinates, (n_sets,) each."""
 
     @abstractmethod
     def located(self, known: dict[str, FloatArray]) -> dict[str, Any]:
@@ -294,78 +275,51 @@ class Chart(ABC):
         return {name: pair for name, pair in self.bounds.items() if name in self.free and np.isfinite(pair).all()}
 
     @cached_property
-    def axes(self) -> Mapping[str, Scale]:
+    def axes(self) -> Mapping[str, Coordinate]:
         """The coordinates in the user's bounds."""
         axes = {name: self.rows[name] for name in (self.called.get(name, name) for name in self.free)}
         return axes | {name: axes[name].within(*self.bounds[name]) for name in axes if name in self.bounds}
 
-    def box(self, is_drawn: bool = False) -> Box:
-        """The box of the coordinates, or the part of it that random points are drawn from."""
-        return {name: each.box(is_drawn) for name, each in self.axes.items()}
-
-    def check_finite(self) -> None:
-        """Raise a ValueError for bounds that are not finite, or not positive of a parameter on a log scale."""
-        for name in self.bounds.keys() & self.rows.keys():
-            pair, is_log = self.bounds[name], self.rows[name].kind == "log"
-            if not np.isfinite(pair).all() or (is_log and pair[0] <= 0.0):
-                raise ValueError(f"bounds of {name!r} must be {'positive and ' * is_log}finite, got {pair}")
-
-    def decode(self, x: FloatArray) -> dict[str, FloatArray]:
-        """Parameters (n_sets,) by name at the coordinates (n_sets, n_x)."""
-        sets = np.atleast_2d(x)
-        raw = {name: each.number(column) for (name, each), column in zip(self.axes.items(), sets.T, strict=True)}
-        known = {name: np.full(len(sets), self.values[name]) for name in self.rows if name in self.values}
-        return self.measured(known | {name: raw.pop(name) for name in self.limits}, raw)
-
-    def encode(self, parameters: Numbers) -> FloatArray:
-        """Coordinates (n_x,) of the parameters."""
+    def numbers(self, parameters: Numbers) -> dict[str, Any]:
+        """Numbers of the coordinates by all parameters."""
         known = {name: np.array(float(parameters[name])) for name in self.rows if name in parameters}
-        raw = known | self.located(known) | {name: known[name] for name in self.limits}
-        return np.array([each.coordinate(raw[name]) for name, each in self.axes.items()])
+        return known | self.located(known) | {name: known[name] for name in self.limits}
 
 
 def space_of_chart(
-    chart: Chart, start: FloatArray, columns: tuple[str, ...], freedom: Freedom, **others: Any
+    chart: Chart, columns: tuple[str, ...], freedom: Freedom, start: Numbers | None = None, **others: Any
 ) -> SearchSpace:
-    """The search in the box of a chart from `start` (n_x,).
+    """The search in the box of a chart from the numbers `start` of its coordinates, by default those of the law.
 
     A search that begins at a law of the user's has a box that holds it, but for the user's `bounds`.
     """
-    lower, upper = sides(chart.box())
+    own, axes = chart.numbers(chart.values), [*chart.axes.values()]
+    drawn = np.array([each.encode(each.drawn or (each.lower, each.upper)) for each in axes]).reshape(-1, 2).T
     if not freedom.starts_anew:
-        own = chart.encode(chart.values)
-        free = np.array([name not in chart.bounds for name in chart.axes], dtype=bool)
-        lower, upper = np.where(free, np.minimum(lower, own), lower), np.where(free, np.maximum(upper, own), upper)
+        axes = [each if each.name in chart.bounds else each.holding(own[each.name]) for each in axes]
 
-    def decoded(x: FloatArray) -> dict[str, FloatArray]:
-        known = chart.decode(x)
-        others = (name for name in chart.held if name not in known and name not in columns)
-        return {name: np.full(len(np.atleast_2d(x)), chart.held[name]) for name in others} | known
+    def parameters(x: FloatArray) -> dict[str, FloatArray]:
+        known = space.parameters(x)
+        raw = {name: known.pop(name) for name in chart.axes if name not in chart.limits}
+        return chart.measured(known, raw)
 
     def encoded(parameters: Numbers) -> FloatArray:
-        return np.asarray(np.clip(chart.encode({**chart.values, **parameters}), lower, upper))
+        numbers = chart.numbers({**chart.values, **parameters})
+        return np.array([each.encode(numbers[each.name]) for each in axes])
 
-    return SearchSpace.of(
-        chart.values,
+    space = space_of(
+        axes,
         columns,
+        chart.values,
         chart.held,
-        coordinates=tuple(chart.axes),
-        lower=lower,
-        upper=upper,
-        starts=np.clip(start, lower, upper)[np.newaxis],
-        parameters=decoded,
-        bounds={name: pair for name, pair in chart.bounds.items() if name in columns},
-        physical={name: each.physical for name, each in chart.axes.items() if name not in chart.bounds},
+        {name: pair for name, pair in chart.bounds.items() if name in (*chart.limits, *columns)},
+        [own if start is None else start],
         encoded=encoded,
         state=("z0",),
-        drawn=sides(chart.box(is_drawn=True)) if any(each.drawn for each in chart.rows.values()) else None,
+        drawn=(drawn[0], drawn[1]) if any(each.drawn for each in chart.rows.values()) else None,
         **others,
     )
-
-
-def sides(box: Box) -> tuple[FloatArray, FloatArray]:
-    """Lower and upper sides of a box, (n_x,) each."""
-    return np.array([low for low, _ in box.values()]), np.array([high for _, high in box.values()])
+    return replace(space, parameters=parameters)
 
 
 def spans(record: Record) -> dict[str, float]:

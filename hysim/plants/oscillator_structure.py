@@ -37,7 +37,6 @@ from hysim._basics.frozen import Count, FloatArray, check_whole, checked, read_o
 from hysim._basics.parallel import in_chunks
 from hysim.errors import SimulationError
 from hysim.kernels import boucwen as kernels
-from hysim.laws.differential import _boucwen_search
 from hysim.laws.differential.boucwen import BoucWen
 from hysim.models.protocols import Subject
 from hysim.models.search_space import ALL_FREE, Freedom, Parameters, SearchSpace
@@ -484,8 +483,8 @@ class _Box(NamedTuple):
     def laws(self, values: Mapping[str, float]) -> SearchSpace:
         fixed = {name: value for name, value in self.held.items() if name in _LAW}
         bounds = {name: pair for name, pair in self.limits.items() if name in _LAW}
-        defaults = {name: values[name] for name in _LAW} | _REST_OF_LAW
-        return _boucwen_search.search_space(defaults, (), self.spring, Freedom(fixed | _REST_OF_LAW, (), bounds))
+        law = BoucWen(**{name: values[name] for name in _LAW})
+        return law.search_space(self.spring, Freedom(fixed | _REST_OF_LAW, (), bounds))
 
     def encode(self, values: Mapping[str, float]) -> FloatArray:
         """Coordinates (n_x,) inside the box."""
@@ -505,7 +504,7 @@ def _unit_laws(y: FloatArray, held: Mapping[str, float], limits: Mapping[str, tu
     """Laws with A = 1 along the displacement y; only n may be known."""
     fixed = {"A": 1.0, **_REST_OF_LAW} | {name: value for name, value in held.items() if name == "n"}
     bounds = {name: pair for name, pair in limits.items() if name == "n"}
-    return _boucwen_search.search_space(BoucWen().scalars, (), Record(u=y, y=y), Freedom(fixed, (), bounds))
+    return BoucWen().search_space(Record(u=y, y=y), Freedom(fixed, (), bounds))
 
 
 def _limits(

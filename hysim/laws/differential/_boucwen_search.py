@@ -25,64 +25,36 @@ import numpy as np
 
 from hysim._basics.frozen import FloatArray
 from hysim.models import parameters
-from hysim.models.parameters import Box, Numbers, Scale, sides, space_of_chart
+from hysim.models.parameters import Coordinate, Numbers, by_name, space_of_chart
 from hysim.models.search_space import Freedom, SearchSpace
 from hysim.records import Record, span_of
 
-Groups = tuple[tuple[str, ...], ...]
 REDUNDANT = (("A", "gain"),)
 _FURTHER = ("b2", "b3", "b4", "b5", "b6")
 _PAIR = ("loading", "unloading")
 _SHAPES = (*_PAIR, "beta", "gamma", *_FURTHER)
+_RATES = ("delta_a", "delta_nu", "delta_eta", "delta_psi")
 _LEAST_UNIT, _LARGEST_UNIT = 1e-290, 1e290  # times 1e17, the largest coefficient, still a number
 _BY_DEFAULT = {"A": 1.0, "beta": 0.5, "gamma": 0.5, "n": 1.0, "z0": 0.0}
 KNEE = float(np.arcsinh(40.0))
-_SHAPE = Scale(-KNEE, KNEE)
-ROWS = {
-    "A": Scale(-10.0, 10.0),
-    **dict.fromkeys(("loading", "unloading", "beta", "gamma"), _SHAPE),
+ROWS = by_name(
+    Coordinate("A", -10.0, 10.0),
+    *(Coordinate(name, -KNEE, KNEE) for name in (*_PAIR, "beta", "gamma")),
     # a larger exponent is a corner as sharp as that of two straight lines
-    "n": Scale(0.5, 10.0, "log", physical=(False, True)),
-    **dict.fromkeys(_FURTHER, _SHAPE),
-    "delta": Scale(-5.0, 5.0),
-    "z0": Scale(-1.0, 1.0),
-}
-
-
-def search_space(
-    defaults: Numbers, columns: tuple[str, ...], record: Record, freedom: Freedom, *, alike: Groups = ()
-) -> SearchSpace:
-    """Declare the coordinates, their box and the way back to the user's parameters for one record."""
-    at_rest = ("z0",) if freedom.starts_at_rest() else ()
-    held = freedom.held(defaults, redundant=(*REDUNDANT, *alike), at_rest=at_rest)
-    bounds = freedom.limits(defaults, held)
-    if held.get("n", 1.0) <= 0.0:
-        raise ValueError(f"n must be positive, got {held['n']}")
-    if "n" in bounds and not (bounds["n"][0] >= 0.0 and (bounds["n"][0] > 0.0 or np.isinf(bounds["n"][1]))):
-        raise ValueError(f"bounds of 'n' must be positive, got {bounds['n']}")
-    for name, pair in bounds.items():
-        if name in ROWS and not np.isfinite(pair).all() and 0.0 not in pair and pair != (-np.inf, np.inf):
-            raise ValueError(f"bounds of {name!r} must be finite, or reach from zero to infinity, got {pair}")
-    chart = Chart.over(record, float(np.abs(record.u).max()), ROWS, defaults, held, bounds)
-    known = {*columns, *("A", "beta", "gamma", "n", "z0")}
-    extended = not known.issuperset(defaults)  # what is admissible for such a law is not known
-    box = chart.box()
-    quadrant = {name: (max(low, 0.0) if name in _PAIR else low, high) for name, (low, high) in box.items()}
-    regions = {"admissible": sides(quadrant)} if set(_PAIR) <= set(box) and not extended else {}
-    return space_of_memory(chart, columns, freedom, regions=regions)
-
-
-def space_of_memory(chart: "Chart", columns: tuple[str, ...], freedom: Freedom, **others: Any) -> SearchSpace:
-    """The search of a memory in the coordinates of a chart, which begins in the units of the record by default."""
-    is_default = freedom.starts_anew and _BY_DEFAULT.items() <= chart.defaults.items()
-    start = (chart.in_own_units() if is_default else chart).encode(chart.values)
-    return space_of_chart(chart, start, columns, freedom, redundant=REDUNDANT, **others)
+    Coordinate("n", 0.5, 10.0, log=True, physical=(False, True)),
+    *(Coordinate(name, -KNEE, KNEE) for name in _FURTHER),
+    Coordinate("delta", -5.0, 5.0),
+    Coordinate("z0", -1.0, 1.0),
+)
 
 
 @dataclass(frozen=True, kw_only=True)
 class Chart(parameters.Chart):
+    """Coordinates in the scales of a record; A is measured in the output's span over the gain and the input's."""
+
     span: float
-    reach: float  # of |u|, or of its path
+    reach: float  # of |u|
+    path: float  # length of that of the input
     slope: float  # what A is measured in
 
     @property
@@ -90,23 +62,8 @@ class Chart(parameters.Chart):
         paired = {"beta", "gamma"} <= {*self.free} - {*self.bounds}
         return {"beta": "loading", "gamma": "ratio" if "ratio" in self.rows else "unloading"} if paired else {}
 
-    @classmethod
-    def over(
-        cls,
-        record: Record,
-        reach: float,
-        rows: Mapping[str, Scale],
-        defaults: Numbers,
-        held: Numbers,
-        bounds: Box,
-    ) -> Self:
-        """The chart in the scales of a record; A is measured in the output's span over the gain and the input's."""
-        span, gain = span_of(record), abs({**defaults, **held}["gain"]) or 1.0
-        slope = float(np.ptp(record.y)) / gain / span or 1.0
-        return cls(rows=rows, defaults=defaults, held=held, bounds=bounds, span=span, reach=reach, slope=slope)
-
     def in_own_units(self) -> Self:
-        return replace(self, span=1.0, reach=self.reach / self.span, slope=1.0)
+        return replace(self, span=1.0, reach=self.reach / self.span, path=self.path / self.span, slope=1.0)
 
     def measured(self, known: dict[str, FloatArray], raw: dict[str, FloatArray]) -> dict[str, FloatArray]:
         known |= {name: raw[name] * size for name, size in {"A": self.slope, "n": 1.0}.items() if name in raw}
@@ -117,6 +74,7 @@ class Chart(parameters.Chart):
             unloading = shapes.pop("unloading") if "unloading" in shapes else raw["ratio"] * np.abs(loading)
             known |= {"beta": 0.5 * (loading + unloading), "gamma": 0.5 * (loading - unloading)}
         known |= shapes
+        raw |= {name: np.sinh(raw[name]) for name in _RATES if name in raw}
         return known | {name: raw[name] * size for name, size in self.sizes(known).items() if name in raw}
 
     def located(self, known: dict[str, FloatArray]) -> dict[str, Any]:
@@ -126,12 +84,50 @@ class Chart(parameters.Chart):
         raw = {name: knee(shapes[name] / unit, known["n"]) for name in _SHAPES if name in self.axes}
         ratio = unloading / np.abs(loading) if loading != 0.0 else 0.0
         sized = {name: known[name] / size for name, size in self.sizes(known).items() if name in known}
+        sized |= {name: np.arcsinh(sized[name]) for name in _RATES if name in sized}
         return {**raw, "A": known["A"] / self.slope, "ratio": ratio, **sized}
 
     def sizes(self, known: Mapping[str, FloatArray]) -> dict[str, FloatArray]:
         """Units of the parameters that have one, by A, beta, gamma and n."""
         slope = steepness(known["A"])
         return {"delta": slope / self.reach, "z0": slope * self.span}
+
+
+def search_space(
+    law: Any, record: Record, freedom: Freedom, kind: type[Chart] = Chart, rows: Mapping[str, Coordinate] = ROWS
+) -> SearchSpace:
+    """The search of a memory in the coordinates of a chart, which begins in the units of the record by default."""
+    defaults: Numbers = law.scalars
+    at_rest = ("z0",) if freedom.starts_at_rest() else ()
+    held = freedom.held(defaults, redundant=(*REDUNDANT, *law.alike(record, freedom)), at_rest=at_rest)
+    bounds = freedom.limits(defaults, held)
+    if held.get("n", 1.0) <= 0.0:
+        raise ValueError(f"n must be positive, got {held['n']}")
+    if "n" in bounds and not (bounds["n"][0] >= 0.0 and (bounds["n"][0] > 0.0 or np.isinf(bounds["n"][1]))):
+        raise ValueError(f"bounds of 'n' must be positive, got {bounds['n']}")
+    for name, pair in bounds.items():
+        if name in rows and not np.isfinite(pair).all() and 0.0 not in pair and pair != (-np.inf, np.inf):
+            raise ValueError(f"bounds of {name!r} must be finite, or reach from zero to infinity, got {pair}")
+    span, gain = span_of(record), abs({**defaults, **held}["gain"]) or 1.0
+    chart = kind(
+        rows=rows,
+        defaults=defaults,
+        held=held,
+        bounds=bounds,
+        span=span,
+        reach=float(np.abs(record.u).max()),
+        path=float(np.abs(np.diff(record.u)).sum()),
+        slope=float(np.ptp(record.y)) / gain / span or 1.0,
+    )
+    is_default = freedom.starts_anew and _BY_DEFAULT.items() <= defaults.items()
+    start = chart.in_own_units().numbers(chart.values) if is_default else None
+    space = space_of_chart(chart, law.columns, freedom, start, redundant=REDUNDANT, screened=law.screened)
+    known = {*law.columns, *("A", "beta", "gamma", "n", "z0")}
+    extended = not known.issuperset(defaults)  # what is admissible for such a law is not known
+    if extended or not {*_PAIR} <= {*space.coordinates}:
+        return space
+    quadrant = np.where(np.isin(space.coordinates, _PAIR), np.maximum(space.lower, 0.0), space.lower)
+    return replace(space, regions={"admissible": (quadrant, space.upper)})
 
 
 def shape_unit(A: FloatArray, n: FloatArray, span: float) -> FloatArray:

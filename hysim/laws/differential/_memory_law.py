@@ -7,7 +7,7 @@ u is the input, z the memory, y the output; time has no part in it.
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, ClassVar
 
@@ -119,9 +119,7 @@ class MemoryLaw(ShapedLaw):
         return np.asarray(slope(direction, z, *further, u))
 
     def search_space(self, record: Record, freedom: Freedom = ALL_FREE) -> SearchSpace:
-        alike = self.alike(record, freedom)
-        space = _boucwen_search.search_space(self.scalars, self.columns, record, freedom, alike=alike)
-        return replace(space, screened=self.screened)
+        return _boucwen_search.search_space(self, record, freedom)
 
     def alike(self, record: Record, freedom: Freedom) -> tuple[tuple[str, ...], ...]:
         """Groups of parameters; one parameter of each group is held on this record."""

@@ -24,7 +24,7 @@ Rates are not negative: damage does not heal. A parameter that the user bounds i
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any, Self
 
 import numpy as np
@@ -40,7 +40,7 @@ from hysim.laws.differential.boucwen import bouc_wen_with
 from hysim.laws.differential.polynomial_boucwen import PolynomialBoucWen
 from hysim.models.by_structure import Holding
 from hysim.models.model import Example, family
-from hysim.models.parameters import Scale
+from hysim.models.parameters import Coordinate, by_name
 from hysim.models.search_space import ALL_FREE, Freedom, Parameters, SearchSpace
 from hysim.models.stages import Stage
 from hysim.models.tables import Tables
@@ -70,41 +70,37 @@ _LARGEST_EXPONENT = 700.0
 _WIDTHS, _BESIDE = 0.7, 4.0  # of the bell: the most that a step goes within it, and where it begins
 _LARGEST = 600.0  # knee of the loading branch; smaller yield memories are below what a record resolves
 _SAME_SIGN = 0.02  # smallest knee of a law that pinches, whose loading coefficient is positive
-_LOADING = Scale(-KNEE, float(np.arcsinh(_LARGEST)), drawn=(float(np.arcsinh(1.0 / 3.0)), float(np.arcsinh(500.0))))
-_RATE = Scale(0.0, 4.0, "asinh", physical=(True, False))  # damage does not heal
-_ROWS = {
-    "A": ROWS["A"],
-    "loading": _LOADING,
-    "ratio": Scale(-10.0, 10.0, drawn=(-1.0, 3.0)),
-    "beta": ROWS["beta"],
-    "gamma": ROWS["gamma"],
-    "n": ROWS["n"],
-    **dict.fromkeys(("delta_a", "delta_nu", "delta_eta"), _RATE),
-    "zeta_s": Scale(0.0, 0.999, physical=(True, True)),  # a slope along a branch does not change its sign
-    "q": Scale(-1.0, 1.0),
-    "p": Scale(0.05, 300.0, "log"),
-    "psi": Scale(0.02, 5.0, "log"),
-    "delta_psi": _RATE._replace(drawn=(0.0, 2.0)),
-    "lambda_": Scale(0.02, 10.0, "log"),
-    "z0": Scale(-3.0, 3.0, drawn=(-1.0, 1.0)),
-}
+_LOADING = Coordinate(
+    "loading", -KNEE, float(np.arcsinh(_LARGEST)), drawn=(float(np.arcsinh(1.0 / 3.0)), float(np.arcsinh(500.0)))
+)
+_RATE = Coordinate("", 0.0, 4.0, physical=(True, False))  # damage does not heal
+_ROWS = {name: ROWS[name] for name in ("A", "beta", "gamma", "n")} | by_name(
+    _LOADING,
+    Coordinate("ratio", -10.0, 10.0, drawn=(-1.0, 3.0)),
+    *(_RATE._replace(name=name) for name in ("delta_a", "delta_nu", "delta_eta")),
+    Coordinate("zeta_s", 0.0, 0.999, physical=(True, True)),  # a slope along a branch does not change its sign
+    Coordinate("q", -1.0, 1.0),
+    Coordinate("p", 0.05, 300.0, log=True),
+    Coordinate("psi", 0.02, 5.0, log=True),
+    _RATE._replace(name="delta_psi", drawn=(0.0, 2.0)),
+    Coordinate("lambda_", 0.02, 10.0, log=True),
+    Coordinate("z0", -3.0, 3.0, drawn=(-1.0, 1.0)),
+)
 _PINCHED = {**_ROWS, "loading": _LOADING._replace(lower=float(np.arcsinh(_SAME_SIGN)), physical=(True, False))}
 
 
 @dataclass(frozen=True, kw_only=True)
 class _Chart(_boucwen_search.Chart):
-    """Coordinates of the free parameters of the memory, with the length of the input's path as the reach."""
-
     def sizes(self, known: Mapping[str, FloatArray]) -> dict[str, FloatArray]:
         slope = _boucwen_search.steepness(known["A"])
         coefficient = (known["beta"] + known["gamma"]) / _boucwen_search.shape_unit(known["A"], known["n"], self.span)
         yielding = slope * self.span * np.maximum(coefficient, 1.0) ** (-1.0 / known["n"])
-        worn, one = yielding * self.reach, np.ones_like(slope)
+        worn, one = yielding * self.path, np.ones_like(slope)
         return {
             "delta_a": slope / worn,
             **dict.fromkeys(("delta_nu", "delta_eta", "p"), one / worn),
             "psi": yielding,
-            "delta_psi": one / self.reach,
+            "delta_psi": one / self.path,
             **dict.fromkeys(("lambda_", "zeta_s", "q"), one),
             "z0": yielding,
         }
@@ -355,19 +351,16 @@ class BoucWenBaberNoori(MemoryLaw):
 
         Held by default are the wear of A, and the pinching in a law that does not pinch.
         """
-        pinches = self.zeta_s != 0.0 or "zeta_s" in freedom.free
-        alone = ("delta_a", *(() if pinches else (*_PINCHING.names, *_PINCHING.optional, *_SPREAD.names)))
-        at_rest = ("z0",) if freedom.starts_at_rest() else ()
-        groups = (*_boucwen_search.REDUNDANT, *((name,) for name in alone))
-        held = freedom.held(self.scalars, redundant=groups, at_rest=at_rest)
+        held = freedom.held(self.scalars, redundant=self.alike(record, freedom))
         if all(held.get(name, 1.0) == 0.0 for name in _WEARING):
-            every = replace(freedom, fixed={**held, **freedom.fixed})
-            return _boucwen_search.search_space(self.scalars, self.columns, record, every)
-        bounds = freedom.limits(self.scalars, held)
-        rows, path = _ROWS if held.get("zeta_s", 1.0) == 0.0 else _PINCHED, float(np.abs(np.diff(record.u)).sum())
-        chart = _Chart.over(record, path, rows, self.scalars, held, bounds)
-        chart.check_finite()
-        return _boucwen_search.space_of_memory(chart, self.columns, freedom)
+            return super().search_space(record, freedom)
+        rows = _ROWS if held.get("zeta_s", 1.0) == 0.0 else _PINCHED
+        return _boucwen_search.search_space(self, record, freedom, _Chart, rows)
+
+    def alike(self, record: Record, freedom: Freedom) -> tuple[tuple[str, ...], ...]:
+        pinches = self.zeta_s != 0.0 or "zeta_s" in freedom.free
+        pinching = () if pinches else (*_PINCHING.names, *_PINCHING.optional, *_SPREAD.names)
+        return tuple((name,) for name in ("delta_a", *pinching))
 
     def steady(self, parameters: Parameters, record: Record) -> dict[str, FloatArray]:
         """Initial memory of a steady cycle; ValueError for a law that degrades or pinches: it has no steady cycle."""

@@ -45,7 +45,7 @@ circuit simulators is quoted for PSpice (core, level 2) and Micro-Cap; we have n
 import math
 import warnings
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, ClassVar, Self
 
 import numpy as np
@@ -58,7 +58,7 @@ from hysim.kernels import jiles_atherton_inverse as inverse
 from hysim.models.inverse_search import first_input
 from hysim.models.law import Law, Packed, State
 from hysim.models.model import Example, family
-from hysim.models.parameters import Chart, Scale, affine, sides, space_of_chart, spans
+from hysim.models.parameters import Chart, Coordinate, affine, by_name, space_of_chart, spans
 from hysim.models.protocols import UNLIMITED, CompiledLaw, Limits
 from hysim.models.search_space import ALL_FREE, Freedom, SearchSpace
 from hysim.models.tables import Tables
@@ -67,19 +67,18 @@ from hysim.records import Record
 MU0 = 4e-7 * math.pi
 """Magnetic constant [T m / A], to its nine digits."""
 
-_SHARE = Scale(0.0, 1.0, physical=(True, True))
-_ROWS = {
-    "Ms": Scale(0.9, 30.0, "log", drawn=(1.0, 4.0), physical=(True, False)),
-    "a": Scale(kind="log"),
-    "width": Scale(1e-4, 30.0, "log", drawn=(0.01, 3.0)),
-    "alpha": Scale(),
-    "stability": Scale(-6.0, 13.0, drawn=(0.0, 4.0)),
-    "k": Scale(1e-3, 30.0, "log", drawn=(0.01, 3.0)),
-    "c": _SHARE._replace(upper=0.99, drawn=(0.0, 0.8)),
-    "anisotropy": Scale(-30.0, 30.0, drawn=(-10.0, 10.0)),
-    "reversible_feedback": _SHARE,
-    "z0": _SHARE._replace(lower=-1.0),
-}
+_ROWS = by_name(
+    Coordinate("Ms", 0.9, 30.0, log=True, drawn=(1.0, 4.0), physical=(True, False)),
+    Coordinate("a", log=True),
+    Coordinate("width", 1e-4, 30.0, log=True, drawn=(0.01, 3.0)),
+    Coordinate("alpha"),
+    Coordinate("stability", -6.0, 13.0, drawn=(0.0, 4.0)),
+    Coordinate("k", 1e-3, 30.0, log=True, drawn=(0.01, 3.0)),
+    Coordinate("c", 0.0, 0.99, drawn=(0.0, 0.8), physical=(True, True)),
+    Coordinate("anisotropy", -30.0, 30.0, drawn=(-10.0, 10.0)),
+    Coordinate("reversible_feedback", 0.0, 1.0, physical=(True, True)),
+    Coordinate("z0", -1.0, 1.0, physical=(True, True)),
+)
 _HELD = ("anisotropy", "reversible_feedback")
 _COLUMNS = ("gain", "feedthrough")
 _SI = ("A/m", "T")
@@ -515,8 +514,9 @@ class JilesAtherton(Law):
         if "feedthrough" not in held:  # which may be most of the output
             rows = rows | {"Ms": rows["Ms"]._replace(physical=(False, False))}
         chart = _Chart(rows=rows, defaults=scalars, held=held, bounds=bounds, field=unit["h"], magnetisation=size)
-        chart.check_finite()
-        is_by_default = freedom.starts_anew and self.arguments == self.defaults()
-        low, high = sides(chart.box(is_drawn=True))
-        start = 0.5 * (low + high) if is_by_default else chart.encode(chart.values)
-        return space_of_chart(chart, start, self.columns, freedom, screened=_SCREENED)
+        for name in bounds.keys() & rows.keys():
+            rows[name].limited(bounds)  # which raises
+        space = space_of_chart(chart, self.columns, freedom, screened=_SCREENED)
+        if space.drawn is None or not freedom.starts_anew or self.arguments != self.defaults():
+            return space
+        return replace(space, starts=0.5 * np.sum(space.drawn, axis=0, keepdims=True))
