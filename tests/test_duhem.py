@@ -55,8 +55,7 @@ def test_coleman_hodgdon_is_its_closed_form(a, b, c):
 
 def test_dahl_is_bouc_wen_of_n_1_and_gamma_0():
     dahl = hs.Duhem.from_terms({"u'": 1.5, "|u'| y": -0.75})
-    bouc_wen = hs.BoucWen(A=1.5, beta=0.75, gamma=0.0, n=1.0)
-    assert dahl.response(PATH) == pytest.approx(bouc_wen.response(PATH), abs=1e-10)
+    assert dahl.response(PATH) == pytest.approx(hs.BoucWen(A=1.5, beta=0.75, gamma=0.0).response(PATH), abs=1e-10)
 
 
 def test_a_steep_law_is_its_closed_form():
@@ -89,10 +88,11 @@ def test_batch_is_the_path_to_the_bit():
     factors = np.linspace(0.5, 1.5, 200)
     sets = {"p": factors[:, None, None] * GENERAL.p, "q": GENERAL.q, "y0": factors}
     together = hs.Duhem.responses(sets, PATH)
-    for k in (0, 77, 199):
-        alone = hs.Duhem(p=sets["p"][k], q=GENERAL.q, y0=factors[k]).response(PATH)
-        assert np.array_equal(together[k], alone)
+    alone = [hs.Duhem(p=sets["p"][k], q=GENERAL.q, y0=factors[k]).response(PATH) for k in (0, 77, 199)]
+    assert np.array_equal(together[[0, 77, 199]], alone)
     assert np.array_equal(together, hs.Duhem.responses(sets, np.tile(PATH, (200, 1)), workers=1))
+    opposite = {"p": [[[1.0]], [[-1.0]]], "q": [[0.0]]}  # the first one ends as the second one begins
+    assert np.array_equal(*np.abs(hs.Duhem.responses(opposite, [0.0, 1.0, -1.0, 0.0], workers=1)))
 
 
 def test_the_memory_is_the_output():

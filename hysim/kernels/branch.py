@@ -61,7 +61,7 @@ _MOST_AHEAD = 1e6  # times what a further state is: no error that is allowed for
 
 def workspace(n: int) -> int:
     """Number of working places after `n` states."""
-    return _ROOM * n + 3  # and input and direction where the last stroke ended, and steps, less those allowed
+    return _ROOM * n + 3  # and input where the last stroke ended, steps, less those allowed, and its direction
 
 
 @uncounted
@@ -161,15 +161,17 @@ def follower(
         k, y, after, largest = work[: 13 * n], work[13 * n : 14 * n], work[14 * n : 15 * n], work[15 * n : 16 * n]
         ended = work[_ROOM * n :]
         s = 1.0 if u > last else -1.0
-        is_known = ended[0] == last and ended[1] == s  # the slope at the end of the last stroke is that here
+        if ended[2] == 0.0:  # no stroke of this law yet
+            ended[1] = 0.0
+        is_known = ended[0] == last and ended[2] == s  # the slope at the end of the last stroke is that here
         for i in range(n):
             is_known = is_known and x[i] == after[i]
         if not is_known:
             rates(parameters, x, last, s, x[0], k[:n])
-        ended[0], ended[1] = u, s
+        ended[0], ended[2] = u, s
         if tolerance > _COARSE:
-            ended[2] -= _EACH
-            most = min(most, int(_ALWAYS - ended[2]))
+            ended[1] -= _EACH
+            most = min(most, int(_ALWAYS - ended[1]))
         # The slope of a memory that grows without end is no measure of what the stroke adds, and a memory that decays
         # from far away goes no further than one that begins at zero.
         steepest = abs(k[0])
@@ -241,7 +243,7 @@ def follower(
                 x[0] = math.copysign(math.inf, x[0])
                 return evaluated
             if taken == left:
-                ended[2] += step
+                ended[1] += step
                 return evaluated
             left -= taken
             done += abs(taken)

@@ -28,8 +28,8 @@ import numpy.typing as npt
 
 from hysim._basics.frozen import FloatArray, check_whole, read_only
 from hysim.kernels import duhem as kernels
-from hysim.kernels.branch import LARGEST, TOLERANCE
-from hysim.laws.differential.duhem_runs import branches, free_runs, outputs, packed
+from hysim.kernels.branch import TOLERANCE
+from hysim.laws.differential.duhem_runs import SAMPLES_A_THREAD, branches, free_runs, packed
 from hysim.laws.differential.terms import (
     Polynomials,
     Term,
@@ -198,6 +198,7 @@ class Duhem(Law):
     step = staticmethod(kernels.step)
     workspace: ClassVar[int] = kernels.N_STATE - 2
     start = staticmethod(kernels.start)
+    samples_a_thread = SAMPLES_A_THREAD
     initial: ClassVar[tuple[str, ...]] = ("y0",)
 
     def __post_init__(self) -> None:
@@ -341,12 +342,6 @@ class Duhem(Law):
                 chosen[term.i, term.j] = True
                 tables[field] = np.where(chosen, column[:, np.newaxis], tables[field])
         return tables
-
-    @classmethod
-    def rows(cls, tables: Tables, u: FloatArray, y: FloatArray) -> None:
-        laws = branches(Polynomials(*(tables[name] for name in Polynomials._fields)))
-        offset, feedthrough, y0 = (tables[name][:, 0] for name in ("offset", "feedthrough", "y0"))
-        y[:] = outputs(laws, feedthrough, y0 - offset, u, LARGEST, 1)[0] + offset[:, np.newaxis]
 
     def divergence(self, sample: int, u: float, y: float) -> str:
         return f"{super().divergence(sample, u, y)}: {self.equation}"

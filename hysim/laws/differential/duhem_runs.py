@@ -14,7 +14,7 @@ from hysim.kernels import duhem as kernels
 from hysim.kernels.branch import MAX_STEPS
 from hysim.laws.differential.terms import Polynomials, Term, polynomials
 
-_SAMPLES_PER_THREAD = 20_000
+SAMPLES_A_THREAD = 20_000
 
 
 def free_runs(
@@ -35,24 +35,11 @@ def free_runs(
     steps between two samples, counts as diverging. The result does not depend on the number of `workers`.
     """
     laws = branches(polynomials(terms, np.atleast_2d(coefficients)))
-    return outputs(laws, np.asarray(feedthrough), np.asarray(y0), u, bound, workers, most_steps)
-
-
-def outputs(
-    laws: FloatArray,
-    feedthrough: FloatArray,
-    y0: FloatArray,
-    u: FloatArray,
-    bound: float,
-    workers: int | None,
-    most_steps: int = MAX_STEPS,
-) -> tuple[FloatArray, int]:
-    """As `free_runs`, of the laws (1 or n_sets, 2 or 4, rows, columns) of `branches`; all lengths may be 1."""
-    n_sets = max(len(laws), feedthrough.size, y0.size, len(u))
-    parameters = np.broadcast_to(packed(laws), (n_sets, kernels.N_HEAD + laws[0].size))
-    parameters = read_only(parameters, finite=False)
-    direct = np.broadcast_to(feedthrough, n_sets)
-    z0 = read_only(y0 - direct * (u[:, 0] if u.size else 0.0), finite=False)
+    direct, first = np.atleast_1d(feedthrough), np.atleast_1d(y0)
+    n_sets = max(len(laws), direct.size, first.size, len(u))
+    parameters = read_only(np.broadcast_to(packed(laws), (n_sets, kernels.N_HEAD + laws[0].size)), finite=False)
+    z0 = np.broadcast_to(first - direct * (u[:, 0] if u.size else 0.0), n_sets)
+    z0 = read_only(z0, finite=False)
     y, taken = np.empty((n_sets, u.shape[1])), list[int]()
 
     def work(start: int, stop: int) -> None:
@@ -61,8 +48,8 @@ def outputs(
         with np.errstate(all="ignore"):  # a memory that diverges overflows, and uncompiled kernels would warn of it
             taken.append(kernels.batch(parameters[k], z0[k], inputs, bound, most_steps, y[k]))
 
-    in_chunks(work, n_sets, workers=workers, minimum=1 + _SAMPLES_PER_THREAD // max(1, u.shape[1]))
-    if feedthrough.any():
+    in_chunks(work, n_sets, workers=workers, minimum=1 + SAMPLES_A_THREAD // max(1, u.shape[1]))
+    if direct.any():
         y += direct[:, np.newaxis] * u
     return y, sum(taken)
 
