@@ -54,7 +54,7 @@ STRUCTURES = "structures structures_static structure_studies structures_in_loops
 MAPPED = {
     "kernels/loop.py": "actuator_stages actuator_chain close_loop",
     "kernels/branch.py": "branch a_new_family baber_noori",
-    "kernels/batches.py": "composed clamp_operators own_laws",
+    "kernels/batches.py": "composed clamp_operators coleman_hodgdon own_laws",
     "kernels/boucwen.py": "boucwen asymmetric",
     "kernels/boucwen_inverse.py": "inverse_undoes_response",
     "kernels/charts.py": "boucwen",
@@ -67,7 +67,6 @@ MAPPED = {
     "kernels/memory_terms.py": "discovery_refinement",
     "kernels/inverses.py": "inverse_of_every_law composed numeric_inverse",
     "kernels/linear.py": "transfer_function actuator_stages composed",
-    "kernels/memories.py": "clamp_operators coleman_hodgdon",
     "kernels/oscillator.py": "oscillator oscillator_identification",
     "kernels/play_sums.py": "clamp_operators extended_plays",
     "kernels/preisach.py": "more_samples preisach",

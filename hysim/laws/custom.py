@@ -11,7 +11,7 @@ import numpy.typing as npt
 from hysim._basics.frozen import FloatArray, checked, read_only
 from hysim.models.batch import Reduction
 from hysim.models.compiled_step import compiled_start, compiled_step
-from hysim.models.law import Law, Packed, rows_by_step
+from hysim.models.law import Law, Packed, run_each
 from hysim.models.parameters import Parameter, declared_space
 from hysim.models.search_space import ALL_FREE, Freedom, Parameters, SearchSpace
 from hysim.models.tables import Tables
@@ -119,7 +119,7 @@ class CustomLaw(Law):
         return Packed(constants, np.concatenate(memory, axis=1))
 
     def rows(self, tables: Tables, u: FloatArray, y: FloatArray) -> None:  # type: ignore[override]
-        rows_by_step(compiled_step(self.step), compiled_start(self.start), self.pack(tables), 0, u, y)
+        run_each(compiled_step(self.step), compiled_start(self.start), self.pack(tables), 0, u, y)
 
     def responses(  # type: ignore[override]
         self,

@@ -210,7 +210,7 @@ class Law(Placed, Subject, ABC):
 
         `u` is (1, n_samples) or (n_sets, n_samples).
         """
-        rows_by_step(compiled_step(cls.step), compiled_start(cls.start), cls.pack(tables), cls.workspace, u, y)
+        run_each(compiled_step(cls.step), compiled_start(cls.start), cls.pack(tables), cls.workspace, u, y)
 
     @classmethod
     def order(cls, tables: Tables) -> npt.NDArray[np.intp] | None:
@@ -394,7 +394,7 @@ class Law(Placed, Subject, ABC):
 
     def remembered(self, u: npt.ArrayLike) -> FloatArray:
         """The state without the last input at the samples of `u`, shape (n_samples, n_memory)."""
-        from hysim.kernels.memories import drive_memory  # compiled where it is needed
+        from hysim.kernels.batches import drive_memory  # compiled where it is needed
 
         inputs = read_only(u, "u", ndim=1)
         law, start = self._begun(_first(inputs), None)
@@ -683,20 +683,16 @@ class Law(Placed, Subject, ABC):
 
     def _passes(self, parameters: Parameters, u: FloatArray) -> PassOf:
         """Functions from the memory before the input `u` to that after it, (n_sets, n_memory)."""
-        from hysim.kernels.memories import drive_to_end  # compiled where it is needed
-
         tables, inputs = tables_of(type(self).__name__, self.arguments, parameters, u)
         constants, memory = self.pack(self.completed(tables))
-        place, step, y = slice(1, 1 + len(self.initial_names)), compiled_step(self.step), np.empty(u.size)
+        place, step, y = slice(1, 1 + len(self.initial_names)), compiled_step(self.step), np.empty((1, u.size))
 
         def of(sets: npt.NDArray[np.intp]) -> Pass:
-            own, begin = read_only(constants[sets], finite=False), memory[sets]
+            laws = Packed(constants[sets], memory[sets])
 
             def passed(z: FloatArray) -> FloatArray:
-                ends = np.empty(begin.shape)
-                begin[:, place] = np.nan_to_num(z, posinf=0.0, neginf=0.0)
-                with np.errstate(all="ignore"):
-                    drive_to_end(step, own, read_only(begin, finite=False), self.workspace, inputs[0], y, ends)
+                laws.memory[:, place] = np.nan_to_num(z, posinf=0.0, neginf=0.0)
+                ends = run_each(step, stepping.complete, laws, self.workspace, inputs, y)
                 return np.where(np.isfinite(z), ends[:, place], np.nan)
 
             return passed
@@ -793,10 +789,11 @@ def _batch(law: Law | type[Law], parameters: Parameters, u: npt.ArrayLike) -> Ba
     return Batch(compute, len(next(iter(tables.values()))), inputs, law.order(tables), law.samples_a_thread)
 
 
-def rows_by_step(step: Step, start: Start, laws: Packed, workspace: int, u: FloatArray, y: FloatArray) -> None:
-    """Outputs of many laws into `y`, sample by sample; see `Law.rows`."""
+def run_each(step: Step, start: Start, laws: Packed, workspace: int, u: FloatArray, y: FloatArray) -> FloatArray:
+    """Outputs of many laws into `y`; returns their memories after the input. See `hysim.kernels.batches`."""
     from hysim.kernels.batches import drive_each  # compiled where it is needed
 
-    parameters, memory = (read_only(table, finite=False) for table in laws)
+    parameters, memory = read_only(laws.parameters, finite=False), np.array(laws.memory, dtype=float, order="C")
     with np.errstate(all="ignore"):
         drive_each(pointer(step), pointer(start, START), parameters, memory, workspace, u, y)
+    return memory

@@ -286,7 +286,7 @@ class BankStructure(SignedStructure):
 
     def _positions(self, parameters: Parameters, record: Record) -> FloatArray:
         """Positions (n_sets, n_samples, n_plays) along a record, which do not depend on the weights."""
-        from hysim.kernels.memories import drive_memory  # compiled where it is needed
+        from hysim.kernels.batches import drive_memory  # compiled where it is needed
 
         thresholds, z0 = table_of(self.law.thresholds_name, parameters), self.initial(parameters)
         tables = {"offset": np.zeros((len(z0), 1)), "thresholds": thresholds, "weights": np.zeros_like(z0)}
