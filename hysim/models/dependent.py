@@ -11,7 +11,7 @@ import numpy.typing as npt
 from hysim._basics.frozen import FloatArray, read_only
 from hysim._columns.channels import Channels, checked_channels, steady, taken, value_in
 from hysim.models.dependent_structure import DependentStructure
-from hysim.models.model import family
+from hysim.models.model import family, not_offered
 from hysim.models.parts import response_of
 from hysim.models.protocols import Numbered, Placeable, Responding, needs_time, placed
 from hysim.models.varying import ChannelPolynomial, response_along, weights
@@ -70,10 +70,7 @@ class Dependent:
         if twice := [name for name in named if named.count(name) > 1]:
             raise ValueError(f"{twice[0]!r} has two polynomials; it depends on one channel only")
 
-    @classmethod
-    def candidates(cls) -> dict[str, Any]:
-        """None for `hysim.compare`: what depends on which channel is the user's to say."""
-        return {}
+    candidates = not_offered  # what depends on which channel is the user's to say
 
     @classmethod
     def structure(cls, law: Any, depends: Mapping[str, tuple[str, int]]) -> DependentStructure:

@@ -31,6 +31,9 @@ ROOMS = ("hysim.models.", _LAWS, "hysim.plants.")  # where hysim's own families 
 
 FAMILIES: dict[str, type] = {}
 
+not_offered: Any = classmethod(lambda _: {})
+"""The `candidates` of a family that `hysim.compare` tries only where it is named."""
+
 
 class Example(NamedTuple):
     """The law that stands for its family in the gallery, on the pages and in tests.

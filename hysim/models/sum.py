@@ -25,7 +25,7 @@ from hysim.models.joint_space import (
     together,
     without_repetition,
 )
-from hysim.models.model import family
+from hysim.models.model import family, not_offered
 from hysim.models.parts import (
     check_parts,
     checked_tuple,
@@ -70,10 +70,7 @@ class Composite(ByStructure, Composable):
     def __post_init__(self) -> None:
         object.__setattr__(self, self.members_are, check_parts(self.members, self.members_are))
 
-    @classmethod
-    def candidates(cls) -> dict[str, Any]:
-        """None for `hysim.compare`: a composite has the members that it is given."""
-        return {}
+    candidates = not_offered  # a composite has the members that it is given
 
     @property
     def members(self) -> tuple[Any, ...]:

@@ -1,7 +1,7 @@
 """Dahl's law between two branches from a table: the one-state hysteresis of battery cells and robot joints."""
 
 import math
-from typing import Any, ClassVar, Self
+from typing import ClassVar, Self
 
 import numpy as np
 import numpy.typing as npt
@@ -9,7 +9,7 @@ import numpy.typing as npt
 from hysim._basics.frozen import FloatArray, check_whole, vectors
 from hysim.kernels.tellinen_table import N_HEAD, branch, interval
 from hysim.models.law import Law, Packed
-from hysim.models.model import Example, family
+from hysim.models.model import Example, family, not_offered
 from hysim.models.parameters import Parameter, affine
 from hysim.models.search_space import Parameters
 from hysim.models.tables import Tables
@@ -119,10 +119,7 @@ class TabulatedDahl(Law):
         columns[:, :, :n], columns[:, :, n:-1], columns[:, :, -1] = hats, h[:, :, np.newaxis] * hats, 0.0
         return columns
 
-    @classmethod
-    def candidates(cls) -> dict[str, Any]:
-        """None for `hysim.compare`: where its inputs stand is for the user to say."""
-        return {}
+    candidates = not_offered  # where its inputs stand is for the user to say
 
     @classmethod
     def over(cls, *records: Record, nodes: int = 12) -> Self:

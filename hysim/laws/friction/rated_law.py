@@ -20,6 +20,7 @@ from hysim.kernels.friction_rates import N_RATED
 from hysim.models.batch import Reduction
 from hysim.models.composable import Placed
 from hysim.models.law import Advanced, Law, State
+from hysim.models.model import not_offered
 from hysim.models.parameters import Parameter, declared_space, rate_spans
 from hysim.models.protocols import CompiledLaw, Startable, Subject, needed_time, positive_time
 from hysim.models.search_space import ALL_FREE, Freedom, Parameters, SearchSpace
@@ -63,10 +64,7 @@ class TimedLaw(Subject, Placed, ABC):
         """Numbers of the memory that begin at zero, after those that are fields."""
         return 0
 
-    @classmethod
-    def candidates(cls) -> dict[str, Any]:
-        """None for `hysim.compare` to try by itself, since friction is no model of an actuator."""
-        return {}
+    candidates = not_offered  # friction is no model of an actuator
 
     @classmethod
     def defaults(cls) -> dict[str, Any]:

@@ -1,7 +1,7 @@
 """Tellinen's law between two tabulated branches."""
 
 import math
-from typing import Any, ClassVar, Self
+from typing import ClassVar, Self
 
 import numpy as np
 
@@ -9,7 +9,7 @@ from hysim._basics.frozen import check_whole
 from hysim.kernels import tellinen_table as kernels
 from hysim.metrics import loop_metrics
 from hysim.models.law import Law
-from hysim.models.model import Example, family
+from hysim.models.model import Example, family, not_offered
 from hysim.models.parameters import Parameter
 from hysim.models.tables import Tables
 from hysim.records import Record
@@ -95,10 +95,7 @@ class TellinenTable(Law):
         if (lower > upper).any():
             raise ValueError("the branch upper must not lie below the branch lower")
 
-    @classmethod
-    def candidates(cls) -> dict[str, Any]:
-        """None for `hysim.compare`: its branches are those of a loop, which `from_loop` takes from a record."""
-        return {}
+    candidates = not_offered  # its branches are those of a loop, which `from_loop` takes from a record
 
     @property
     def known_slopes(self) -> tuple[float, float]:

@@ -7,14 +7,11 @@ The output v follows the input's running extreme and turns only once it has retr
 below half the threshold makes no reversal. This is the causal turning-point (rainflow) filter of fatigue analysis.
 """
 
-from typing import Any, ClassVar
-
-import numpy as np
+from typing import ClassVar
 
 from hysim.kernels import clamps as kernels
-from hysim.models.law import Law, Packed
-from hysim.models.model import Example, family
-from hysim.models.tables import Tables
+from hysim.models.law import Law
+from hysim.models.model import Example, family, not_offered
 
 
 @family
@@ -51,15 +48,7 @@ class ReversalFilter(Law):
     step = staticmethod(kernels.extreme)
     start = staticmethod(kernels.start_extreme)
     initial: ClassVar[tuple[str, ...]] = ()
+    further_memory = 2  # the extreme and the direction
     filters_input: ClassVar[bool] = True
     memory = inverse_response = None  # type: ignore[assignment]  # it says nothing that its output does not
-
-    @classmethod
-    def pack(cls, tables: Tables) -> Packed:
-        """The threshold, and the memory (u, v, direction)."""
-        return Packed(np.asarray(tables["threshold"]), cls.initial_memory(tables, further=2))
-
-    @classmethod
-    def candidates(cls) -> dict[str, Any]:
-        """None for `hysim.compare`: it is no model of a device by itself."""
-        return {}
+    candidates = not_offered  # it is no model of a device by itself

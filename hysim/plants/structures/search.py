@@ -26,6 +26,7 @@ from hysim._basics.frozen import FloatArray, checked, read_only, whole_substeps
 from hysim._basics.parallel import in_chunks
 from hysim._basics.printing import frozen_result, summary_text
 from hysim.errors import SimulationError
+from hysim.models.model import not_offered
 from hysim.models.parameters import Coordinate, free_coordinate, space_of
 from hysim.models.protocols import Subject
 from hysim.models.search_space import ALL_FREE, Freedom, Parameters, SearchSpace
@@ -192,10 +193,7 @@ class SearchedStructure(MovingStructure, Subject):
         """Every number by name, such as ``"damping"`` and ``"elements.0.beta"``; see `assemble`."""
         return scalars_of(self)
 
-    @classmethod
-    def candidates(cls) -> dict[str, Any]:
-        """None for `hysim.compare`: a structure begins with its own numbers."""
-        return {}
+    candidates = not_offered  # a structure begins with its own numbers
 
     def search_space(self, record: Record, freedom: Freedom = ALL_FREE) -> SearchSpace:
         """The box around the free numbers, and starts from parts of the record; ValueError without free numbers."""
