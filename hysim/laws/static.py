@@ -17,7 +17,7 @@ f; T. Hastie, J. R. Stat. Soc. B 58 (1996) 379 for fewer knots than groups; D. R
 
 import math
 from collections.abc import Sequence
-from typing import ClassVar, NamedTuple, Self
+from typing import Any, ClassVar, NamedTuple, Self
 
 import numpy as np
 import numpy.typing as npt
@@ -64,10 +64,9 @@ def smoothing_spline(u: FloatArray, y: FloatArray, weights: FloatArray) -> Smoot
     splines = _Splines.on(x.size)
     rows = splines.at(x)
     bands, moments = _normal_equations(rows, share, means, np.zeros(x.size, dtype=np.intp), 1, splines.size)
-    lower = sum((np.diag(bands[0][k, : splines.size - k], -k) for k in range(1, 4)), np.diag(bands[0][0]))
-    gram = lower + np.tril(lower, -1).T
     penalised = bands[0] + _strength(splines, rows, share, means) * splines.penalty
     inverse = solveh_banded(penalised, np.eye(splines.size), lower=True)
+    gram, reach = (rows.T @ rows.multiply(share[:, np.newaxis])).toarray(), rows @ inverse
     coefficients = inverse @ moments[0]
     low, high = float(u.min()), float(u.max())
     knots = np.concatenate([[0.0], x, [1.0]])
@@ -75,9 +74,9 @@ def smoothing_spline(u: FloatArray, y: FloatArray, weights: FloatArray) -> Smoot
     inputs, remaining = np.unique(np.clip(low + (high - low) * knots, low, high), return_index=True)
     return Smooth(
         u=inputs,
-        y=splines.at(knots[remaining]).combined(coefficients),
+        y=splines.at(knots[remaining]) @ coefficients,
         degrees_of_freedom=float(np.sum(gram * inverse)),
-        spread=np.sqrt(_quadratic_form(bands[0], rows.combined(inverse)) / total)[place],
+        spread=np.sqrt(np.maximum(np.sum((reach @ gram) * reach, axis=1), 0.0) / total)[place],
     )
 
 
@@ -98,18 +97,6 @@ def _groups(u: FloatArray) -> tuple[npt.NDArray[np.intp], FloatArray]:
         cells = np.minimum(scaled * _MOST_GROUPS, _MOST_GROUPS - 1).astype(np.intp)
         place = np.unique(cells, return_inverse=True)[1]
     return place, scaled
-
-
-class _Rows(NamedTuple):
-    """The splines that are not zero at some inputs: the number of the first of them (m,), and the values of four."""
-
-    first: npt.NDArray[np.intp]
-    values: FloatArray
-
-    def combined(self, coefficients: FloatArray) -> FloatArray:
-        """Sums of the splines times `coefficients` (count, ...), shape (m, ...)."""
-        columns = np.moveaxis(coefficients, 0, -1)
-        return np.moveaxis(np.sum([self.values[:, k] * columns[..., self.first + k] for k in range(4)], axis=0), -1, 0)
 
 
 class _Splines(NamedTuple):
@@ -142,15 +129,14 @@ class _Splines(NamedTuple):
         """Number of splines."""
         return self.knots.size - 4
 
-    def at(self, x: FloatArray) -> _Rows:
-        """The splines at `x` (m,)."""
+    def at(self, x: FloatArray) -> Any:
+        """The splines at `x` (m,) as a sparse table (m, size), with four elements a row."""
         from scipy.interpolate import BSpline
 
-        table = BSpline.design_matrix(x, self.knots, 3)
-        return _Rows(table.indices[::4].astype(np.intp), table.data.reshape(-1, 4))
+        return BSpline.design_matrix(x, self.knots, 3)
 
 
-def _strength(splines: _Splines, rows: _Rows, share: FloatArray, y: FloatArray) -> float:
+def _strength(splines: _Splines, rows: Any, share: FloatArray, y: FloatArray) -> float:
     """The strength that predicts left-out blocks best; of equal ones the greatest."""
     block, n_blocks = _blocks(share.size)
     if not n_blocks:
@@ -159,9 +145,8 @@ def _strength(splines: _Splines, rows: _Rows, share: FloatArray, y: FloatArray) 
     remaining, goals = bands.sum(axis=0) - bands[:-1], moments.sum(axis=0) - moments[:-1]
     coefficients = _solved(remaining, goals, splines.penalty)
     inside = np.flatnonzero(block < n_blocks)
-    predicted = np.zeros((inside.size, _STRENGTHS.size))
-    for k in range(4):
-        predicted += rows.values[inside, k, np.newaxis] * coefficients[block[inside], :, rows.first[inside] + k]
+    places, values = (each.reshape(-1, 4)[inside] for each in (rows.indices, rows.data))
+    predicted = np.einsum("ik,iks->is", values, coefficients[block[inside, np.newaxis], :, places])
     errors = share[inside] @ (y[inside, np.newaxis] - predicted) ** 2
     return float(_STRENGTHS[errors <= errors.min() * (1.0 + 1e-9) + _ROUNDING * (share @ y**2)].max())
 
@@ -176,16 +161,17 @@ def _blocks(n_groups: int) -> tuple[npt.NDArray[np.intp], int]:
 
 
 def _normal_equations(
-    rows: _Rows, share: FloatArray, y: FloatArray, block: npt.NDArray[np.intp], n_blocks: int, count: int
+    rows: Any, share: FloatArray, y: FloatArray, block: npt.NDArray[np.intp], n_blocks: int, count: int
 ) -> tuple[FloatArray, FloatArray]:
     """B^T W B by diagonals, (n_blocks, 4, count), and B^T W y, (n_blocks, count), of each block's groups."""
     bands, moments = np.zeros((n_blocks, 4, count)), np.zeros((n_blocks, count))
+    places, values = (each.reshape(-1, 4) for each in (rows.indices, rows.data))
     for a in range(4):
-        weighted = share * rows.values[:, a]
-        place = block * count + rows.first + a
+        weighted = share * values[:, a]
+        place = block * count + places[:, a]
         moments += np.bincount(place, weighted * y, moments.size).reshape(moments.shape)
         for b in range(a, 4):
-            products = weighted * rows.values[:, b]
+            products = weighted * values[:, b]
             bands[:, b - a] += np.bincount(place, products, moments.size).reshape(moments.shape)
     return bands, moments
 
@@ -199,14 +185,6 @@ def _solved(bands: FloatArray, goals: FloatArray, penalty: FloatArray) -> FloatA
     return np.asarray(
         solveh_banded(np.moveaxis(systems, 2, 0).reshape(4, -1), right.ravel(), lower=True).reshape(right.shape)
     )
-
-
-def _quadratic_form(bands: FloatArray, z: FloatArray) -> FloatArray:
-    """z^T M z for each row of `z` (m, count), M symmetric with these lower diagonals."""
-    total = z**2 @ bands[0]
-    for k in range(1, 4):
-        total += 2.0 * (z[:, k:] * z[:, :-k]) @ bands[k, :-k]
-    return np.asarray(np.maximum(total, 0.0))
 
 
 @family
