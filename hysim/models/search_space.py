@@ -133,14 +133,6 @@ class SearchSpace:
         names, linear = (tuple(name for name in each if name not in held) for each in (every, columns))
         return cls(names=names, columns=columns, linear=linear, held=held, **others)
 
-    @classmethod
-    def without_coordinates(cls, names: tuple[str, ...]) -> "SearchSpace":
-        """The space of parameters that are all linear."""
-        none = np.empty(0)
-        return cls.of(
-            names, names, {}, coordinates=(), lower=none, upper=none, starts=none[np.newaxis], parameters=lambda x: {}
-        )
-
 
 @dataclass(frozen=True)
 class Freedom:

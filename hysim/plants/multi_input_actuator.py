@@ -24,6 +24,7 @@ from hysim.models.by_structure import searched
 from hysim.models.dependent import AlongRecord
 from hysim.models.joint_space import columns_beside, declared, together, without_repetition
 from hysim.models.model import family
+from hysim.models.parameters import space_of
 from hysim.models.parts import check_parts, own, response_of
 from hysim.models.protocols import Containing, Identifiable, Placeable, Subject, law_at, needs_time, placed, with_law
 from hysim.models.search_space import ALL_FREE, Freedom, Parameters, SearchSpace
@@ -202,7 +203,7 @@ class ModalGains(Subject):
 
     def search_space(self, record: Record, freedom: Freedom = ALL_FREE) -> SearchSpace:
         columns = (*(self._name(k, name) for k in range(max(self.modes, 1)) for name in self.inputs), "offset")
-        return SearchSpace.without_coordinates(columns)
+        return space_of((), columns, dict.fromkeys(columns, 0.0), {}, {})
 
     def shares(self, gains: Mapping[str, float]) -> dict[str, float]:
         """The gains of each input but in the first mode, relative to their sum, by mode and input."""
@@ -260,7 +261,7 @@ class Scaled(Subject):
     law: Any
 
     def search_space(self, record: Record, freedom: Freedom = ALL_FREE) -> SearchSpace:
-        return SearchSpace.without_coordinates(("gain", "offset"))
+        return space_of((), ("gain", "offset"), {"gain": 0.0, "offset": 0.0}, {}, {})
 
     def regressors(self, parameters: Parameters, record: Record) -> FloatArray:
         """The law's output, one, and zero, (1, n_samples, 3)."""
