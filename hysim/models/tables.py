@@ -60,6 +60,21 @@ def check_within(tables: Tables, within: Mapping[str, tuple[str, float]]) -> Non
             raise ValueError(f"{name} must be {word} {bound:g}, got {tables[name][is_wrong][0]}")
 
 
+def check_increasing(name: str, table: FloatArray) -> None:
+    """Refuse a table (n_sets, n) with a row that does not increase."""
+    if not (np.diff(table) > 0.0).all():
+        raise ValueError(f"{name} must increase, got {table[0].tolist() if len(table) == 1 else table}")
+
+
+def check_points(tables: Tables, *names: str) -> None:
+    """Refuse fields over inputs, the first of them, that are not equally long, or hold less than two points."""
+    sizes = [tables[name].shape[1] for name in names]
+    if len({*sizes}) > 1 or sizes[0] < 2:
+        fields = f"{', '.join(names[:-1])} and {names[-1]}"
+        raise ValueError(f"{fields} must be equally long and hold two points or more, got {sizes}")
+    check_increasing(names[0], tables[names[0]])
+
+
 def tables_of(
     family: str, defaults: Mapping[str, Any], parameters: Parameters, u: npt.ArrayLike
 ) -> tuple[dict[str, FloatArray], FloatArray]:

@@ -12,7 +12,7 @@ from hysim.models.law import Law, Packed
 from hysim.models.model import Example, family, not_offered
 from hysim.models.parameters import Parameter, affine
 from hysim.models.search_space import Parameters
-from hysim.models.tables import Tables
+from hysim.models.tables import Tables, check_points
 from hysim.records import Record, span_of
 
 
@@ -94,13 +94,7 @@ class TabulatedDahl(Law):
     @classmethod
     def check(cls, tables: Tables) -> None:
         super().check(tables)
-        sizes = [tables[name].shape[1] for name in ("inputs", "centre", "amplitude")]
-        if len({*sizes}) > 1 or sizes[0] < 2:
-            raise ValueError(
-                f"inputs, centre and amplitude must be equally long and hold two points or more, got {sizes}"
-            )
-        if not (np.diff(tables["inputs"]) > 0.0).all():
-            raise ValueError("inputs must increase")
+        check_points(tables, "inputs", "centre", "amplitude")
 
     @classmethod
     def pack(cls, tables: Tables) -> Packed:

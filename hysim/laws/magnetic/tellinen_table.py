@@ -11,7 +11,7 @@ from hysim.metrics import loop_metrics
 from hysim.models.law import Law
 from hysim.models.model import Example, family, not_offered
 from hysim.models.parameters import Parameter
-from hysim.models.tables import Tables
+from hysim.models.tables import Tables, check_points
 from hysim.records import Record
 
 
@@ -83,12 +83,8 @@ class TellinenTable(Law):
     def check(cls, tables: Tables) -> None:
         """Refuse what is no pair of branches, or no place between them."""
         super().check(tables)
-        inputs, lower, upper = (tables[name] for name in ("inputs", "lower", "upper"))
-        if not inputs.shape[1] == lower.shape[1] == upper.shape[1] >= 2:
-            sizes = f"{inputs.shape[1]}, {lower.shape[1]} and {upper.shape[1]}"
-            raise ValueError(f"inputs, lower and upper must be equally long and hold two points or more, got {sizes}")
-        if not (np.diff(inputs) > 0.0).all():
-            raise ValueError("inputs must increase")
+        check_points(tables, "inputs", "lower", "upper")
+        lower, upper = tables["lower"], tables["upper"]
         for name, side in (("lower", lower), ("upper", upper)):
             if (np.diff(side) < 0.0).any():
                 raise ValueError(f"the branch {name} must not fall")

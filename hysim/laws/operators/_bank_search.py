@@ -46,7 +46,7 @@ from hysim.models.composable import Composable
 from hysim.models.parameters import Coordinate, Parameter, rate_spans, space_of, spans, unit_of
 from hysim.models.protocols import Subject, Variant
 from hysim.models.search_space import ALL_FREE, Freedom, Parameters, SearchSpace
-from hysim.models.tables import Tables
+from hysim.models.tables import Tables, check_increasing
 from hysim.records import Record
 
 IDENTITY = (0.0, 0.0, 0.0, 0.0, 1.0)
@@ -367,12 +367,6 @@ def check_dead_zones(thresholds: FloatArray, weights: FloatArray) -> None:
             f"and {weights.shape[1]}"
         )
     check_increasing("dead_zones", thresholds)
-
-
-def check_increasing(name: str, table: FloatArray) -> None:
-    """Refuse a table (n_sets, n) with a row that does not increase."""
-    if not (np.diff(table) > 0.0).all():
-        raise ValueError(f"{name} must increase, got {table[0].tolist() if len(table) == 1 else table}")
 
 
 def conditioned(u: FloatArray) -> tuple[float, float]:

@@ -37,14 +37,14 @@ from hysim._basics.frozen import FloatArray, check_whole, checked, read_only
 from hysim._basics.parallel import in_pieces
 from hysim.errors import warn_beyond
 from hysim.kernels import preisach as kernels
-from hysim.laws.operators._bank_search import TURN, SignedStructure, check_increasing, named, table_of, with_offset
+from hysim.laws.operators._bank_search import TURN, SignedStructure, named, table_of, with_offset
 from hysim.laws.operators._densities import Parts, check_strength, parts_of, smooth
 from hysim.models.by_structure import ByStructure
 from hysim.models.law import Advanced, Law, Packed, State
 from hysim.models.parameters import Coordinate, space_of, spans
 from hysim.models.protocols import DirectFit
 from hysim.models.search_space import ALL_FREE, Freedom, Parameters, SearchSpace
-from hysim.models.tables import Tables
+from hysim.models.tables import Tables, check_increasing
 from hysim.records import Record
 
 _STARTS = 9  # former turning points from which the search begins
