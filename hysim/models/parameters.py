@@ -20,6 +20,7 @@ from hysim.records import Record, span_of
 
 Numbers = Mapping[str, float]
 Box = Mapping[str, tuple[float, float]]
+_OPEN = (-np.inf, np.inf)
 
 
 @dataclass(frozen=True)
@@ -30,8 +31,8 @@ class Parameter:
     ``"h"`` is half the span of the input. A quotient of two other parameters stands for their values in the law: the
     box of ``"breakaway/sigma0"`` moves with both. The box of a parameter with `from_first` stands about the first
     input, and one with `log` is searched on a log scale. The output is affine in an `affine` parameter, which needs no
-    box. `physical` says whether the lower and the upper side of the box is a limit of physics or of the law: the search
-    is not stopped there, as it is at other sides.
+    box; its sides, where it has some, are numbers of its own unit. `physical` says whether the lower and the upper side
+    of the box is a limit of physics or of the law: the search is not stopped there, as it is at other sides.
     """
 
     name: str
@@ -159,7 +160,9 @@ def declared_space(
     own = {name: value for name, value in usual if name in values and scalars[name] == value}
     points = [{name: values[name][0] + start[name] * values[name][1] for name in start} for start in (own, *starts)]
     columns = tuple(name for name, each in of.items() if each is not None and each.affine)
-    limits, shown = freedom.limits(scalars, held), scalars | _as_shares(scalars, shares)
+    free = {name: each for name, each in of.items() if each is not None and each.affine and name not in held}
+    sides = {name: (each.lower, each.upper) for name, each in free.items() if (each.lower, each.upper) != _OPEN}
+    limits, shown = sides | freedom.limits(scalars, held), scalars | _as_shares(scalars, shares)
     if not freedom.starts_anew:
         coordinates = [each.holding(shown[each.name]) for each in coordinates]
     space = space_of(coordinates, columns, shown, held, limits, points, state=resting, screened=law.screened)

@@ -9,7 +9,7 @@ Both branches go from -saturation to saturation; the upper one has the remanence
 import math
 from abc import abstractmethod
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import ClassVar, Self
 
 import numpy as np
@@ -18,7 +18,6 @@ from hysim.kernels import tellinen as kernels
 from hysim.models.law import Law, Packed
 from hysim.models.model import Example, family
 from hysim.models.parameters import Parameter, affine
-from hysim.models.search_space import ALL_FREE, Freedom, SearchSpace
 from hysim.models.tables import Tables
 from hysim.records import Record
 
@@ -26,7 +25,6 @@ VACUUM = 1.25663706212e-6
 """Magnetic constant of 2018 [T m / A]."""
 
 _SHAPES = ((0.03, 0.1), (0.1, 0.5), (0.3, 0.5), (0.3, 0.9))  # coercivity in half spans of the input, squareness
-_SIDES = {"feedthrough": (0.0, np.inf)}  # of affine parameters: no core falls at saturation
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -54,7 +52,7 @@ class BranchLaw(Branches):
         *affine("saturation", "offset", unit="y"),
         Parameter("coercivity", 1e-3, 3.0, unit="h", log=True),
         Parameter("squareness", 1e-3, 0.999, physical=(True, True)),
-        Parameter("feedthrough", unit="y/u", affine=True),
+        Parameter("feedthrough", 0.0, unit="y/u", affine=True),  # no core falls at saturation
         Parameter("z0", -1.0, 1.0, physical=(True, True)),
     )
     starts = tuple(
@@ -94,12 +92,6 @@ class BranchLaw(Branches):
         """The saturation on both sides of the offset; no limit with a feedthrough."""
         size = abs(self.saturation) if self.feedthrough == 0.0 else math.inf
         return self.offset - size, self.offset + size
-
-    def search_space(self, record: Record, freedom: Freedom = ALL_FREE) -> SearchSpace:
-        """The declared box, with a feedthrough that is not negative unless the user's bounds say so."""
-        space = super().search_space(record, freedom)
-        sides = {name: side for name, side in _SIDES.items() if name in space.linear}
-        return replace(space, bounds={**sides, **space.bounds})
 
     def assumed_states(self, record: Record) -> tuple[str, ...]:
         """Demagnetised, in the steady cycle, or anywhere between the branches: the record decides."""
