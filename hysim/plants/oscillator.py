@@ -41,9 +41,9 @@ from hysim._basics.progress import along
 from hysim.errors import SimulationError
 from hysim.kernels import oscillator as kernels
 from hysim.kernels import stepping
+from hysim.kernels.batches import drive_memory
 from hysim.kernels.boucwen import prepare
 from hysim.kernels.charts import N_WORK
-from hysim.kernels.memories import drive_memory
 from hysim.laws.differential.boucwen import BoucWen
 from hysim.laws.differential.polynomial_boucwen import PolynomialBoucWen
 from hysim.models.compiled_step import pointer
