@@ -3,7 +3,7 @@
 import dataclasses
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import field
+from dataclasses import field, replace
 from itertools import pairwise
 from types import MappingProxyType
 from typing import Any, Self, TypeVar
@@ -29,6 +29,7 @@ _EVEN = 1e-4  # of a step: largest error of an even time
 _COARSEST = 0.1  # of a step: largest last digit of times that may have been rounded
 _ROUNDED = 0.75  # of the last digit: half of it, and as much of the line's own
 _MOST_DIGITS = 8  # of a time that was written down
+_LEAST_NOISE = 1e-6  # of the size of a signal: its residual is not taken for smaller, however exact the fit
 _LARGEST = 1e40  # of a record to identify: the squares of quotients of such numbers, and of their inverses, are numbers
 
 
@@ -352,6 +353,31 @@ class Record:
         if isinstance(place, (float, np.floating)) and 0.0 < place < 1.0:
             return round(place * len(self))
         raise TypeError(f"a place must be a sample's number or a fraction between 0 and 1, got {place!r}")
+
+
+@checked
+class SensorRecord(Record):
+    """Outputs of several sensors one after the other, each divided by its scale; the input as often."""
+
+    sensors: Any = ()
+    scales: tuple[float, ...] = ()
+    sizes: tuple[float, ...] = field(default_factory=tuple)  # rms of each output
+
+    @property
+    def input(self) -> FloatArray:
+        """The input once, which all of them share."""
+        return self.u[: self.u.size // len(self.sensors)]
+
+    def noise(self, residual: FloatArray) -> FloatArray:
+        """Size of this residual (n,) at each sensor in its present units, shape (n_sensors,)."""
+        errors = np.sqrt(np.mean(residual.reshape(len(self.sensors), -1) ** 2, axis=1))
+        return np.asarray(np.maximum(errors, _LEAST_NOISE * np.array(self.sizes) / np.array(self.scales)))
+
+    def rescaled(self, residual: FloatArray) -> "SensorRecord":
+        """The record in units of the noise that this residual (n,) shows of each sensor."""
+        ratios = self.noise(residual)
+        scales = tuple((np.array(self.scales) * ratios).tolist())
+        return replace(self, y=self.y / np.repeat(ratios, self.input.size), scales=scales)
 
 
 def signed_charge(capacity: npt.ArrayLike, current: npt.ArrayLike) -> FloatArray:

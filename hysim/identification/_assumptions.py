@@ -28,9 +28,9 @@ from hysim.laws.operators.reversal_filter import ReversalFilter
 from hysim.metrics.criteria import information
 from hysim.models.by_structure import searched
 from hysim.models.dependent_structure import DependentStructure
-from hysim.models.protocols import PartByPart, Rescalable, Variant
+from hysim.models.protocols import Variant
 from hysim.models.search_space import SearchSpace
-from hysim.records import Record
+from hysim.records import Record, SensorRecord
 from hysim.simulation import free_run
 
 # Difference of two BIC: "very strong" evidence. Discovery takes 2 to find the simplest of nearly equal laws; here a
@@ -102,7 +102,7 @@ def treated(family: Any, setting: Setting, how: str) -> Treated:
     if how == "raw" or not is_plain or isinstance(family, DependentStructure):  # which no stage can stand in front of
         return Treated(records)
     # creep is read from what a law does not explain, to which few false reversals are much
-    many = {"many": 1.0} if isinstance(family, PartByPart) else {}
+    many = {"many": 1.0} if family.is_parted else {}
     noises = tuple(input_noise(record.u, **many) for record in records)
     if not any(noises):
         if how == "filtered":
@@ -113,7 +113,7 @@ def treated(family: Any, setting: Setting, how: str) -> Treated:
     pairs = zip(records, noises, strict=True)
     quiet = [replace(record, u=quiet_path(record.u, noise)) if noise else record for record, noise in pairs]
     behind = Treated(filtered, front, noises, quiet)
-    if how == "filtered" or isinstance(family, PartByPart):
+    if how == "filtered" or family.is_parted:
         return behind
     alone, in_front = (_left_out(family, setting, each, quiet) for each in (records, filtered))
     if alone <= _AS_GOOD**2 * in_front:
@@ -142,7 +142,7 @@ def _left_out(family: Any, setting: Setting, paths: Sequence[Record], quiet: Seq
 
 def quiet_rmse(family: Any, setting: Setting, treatment: Treated) -> float:
     """Error of a short fit along the quiet paths, with what noise adds through the record's slope; else infinite."""
-    if not treatment.noises or isinstance(family, PartByPart):
+    if not treatment.noises or family.is_parted:
         return math.inf
     try:
         attempt = problem(family, treatment.quiet, setting.freedom, setting.initial)
@@ -159,18 +159,18 @@ def in_units_of_noise(problem: Problem, seed: int) -> Problem:
     Sensors are weighed anew until a search was made with weights that were nearly right; the search of the problem that
     is returned only polishes what this one has found.
     """
-    if not all(isinstance(part.record, Rescalable) for part in problem.parts):
+    measured = [part.record for part in problem.parts if isinstance(part.record, SensorRecord)]
+    if not measured:
         return problem
     for _ in range(_WEIGHINGS):
         if not (reached := optima(problem, seed=seed)):
             break
         ends = np.array([each.x for each in reached])
         residual = problem.y - problem.model(problem.completed(ends[:1]))[0]
-        measured = [part.record for part in problem.parts if isinstance(part.record, Rescalable)]
         own = list(zip(measured, np.split(residual, problem.cuts[1:-1]), strict=True))
         noise = np.concatenate([record.noise(rest) for record, rest in own])
-        rescaled = (record.rescaled(rest) for record, rest in own)
-        parts = (replace(part, record=record) for part, record in zip(problem.parts, rescaled, strict=True))
+        measured = [record.rescaled(rest) for record, rest in own]
+        parts = (replace(part, record=record) for part, record in zip(problem.parts, measured, strict=True))
         problem = replace(problem, parts=tuple(parts), ends=ends)
         if noise.max() <= _EVEN * noise.min():
             break

@@ -43,9 +43,7 @@ from hysim.models.protocols import (
     Direct,
     Identifiable,
     Offering,
-    PartByPart,
     Placeable,
-    Recorded,
     needs_time,
     placed,
     with_law,
@@ -186,9 +184,8 @@ def identify(
     if isinstance(model_or_class, str):
         model_or_class = family_named(model_or_class)
     model_or_class = results.model_or_class(model_or_class)
-    if isinstance(model_or_class, Recorded):
-        record_or_records = model_or_class.as_records(record_or_records)
-    records: Sequence[Record] = several(record_or_records, "identify")
+    subject = searched(model_or_class)
+    records: Sequence[Record] = several(subject.as_records(record_or_records), "identify")
     options = _freedom(fixed or {}, free, bounds or {})
     check_choice("intervals", intervals, ("linear", "profile", "bootstrap"))
     check_choice("input", input, ("auto", "raw", "filtered"))
@@ -201,7 +198,7 @@ def identify(
         check_choice("weights", weights, ("energy",))
         if noise not in (None, "gaussian") or intervals != "linear" or cross_validate is not None:
             raise ValueError('weights="energy" goes with normal noise, linear intervals and no cross_validate')
-        if isinstance(model_or_class, Recorded):
+        if not (subject.may_depend or subject.is_parted):
             raise ValueError('weights="energy" is for models whose output times input is a work, not for a structure')
     shares = None if energy else _weights(weights, records)
     if max_evaluations is not None:
@@ -212,7 +209,7 @@ def identify(
         if isinstance(model_or_class, Direct) and depends is None:
             fit = _without_search(model_or_class, options, asked, seed)
         else:
-            family = placed(_family(model_or_class, depends), None)
+            family = searched(placed(_family(model_or_class, depends), None))
             setting = Setting(_without_left_out(records, shares), options, initial, shares, max_evaluations, seed)
             assumed = _assumed(family, setting, input, asked)
             fit = _described(_searched(assumed, asked), assumed, asked)
@@ -267,7 +264,7 @@ def _assumed(family: Any, setting: Setting, how: str, asked: _Asked) -> _Assumed
         family = begun(family.over(setting.records), setting)
     treatment = treated(family, setting, how)
     along, noise, ends, is_cut = replace(setting, records=treatment.records), asked.noise, None, False
-    if isinstance(family, PartByPart):
+    if family.is_parted:
         family, paths, ends, is_cut = begun_by_parts(family, along)
         along, noise = replace(along, records=paths), noise or family.noise
     problems, sentence = decided(family, along)

@@ -24,10 +24,10 @@ from hysim._columns.input_noise import repeated_cycle
 from hysim.identification.marquardt import Settled, least_squares, triangle
 from hysim.metrics.criteria import information
 from hysim.models.by_structure import searched
-from hysim.models.protocols import Identifiable, Rescalable, placed
+from hysim.models.protocols import Identifiable, placed
 from hysim.models.search_space import STATES, STATES_IN_WORDS, Freedom, SearchSpace
 from hysim.models.stages import BASE, Stage
-from hysim.records import Record, few_places
+from hysim.records import Record, SensorRecord, few_places
 
 _LEAST = 64  # sets that are always compared
 _SHARE = 0.5  # of what remains, for one stage of the search
@@ -418,7 +418,7 @@ class Problem:
 
 def samples_of_sensor(record: Any) -> int:
     """Samples of each sensor of a record, which follow those of the one before."""
-    return record.input.size if isinstance(record, Rescalable) else len(record)
+    return record.input.size if isinstance(record, SensorRecord) else len(record)
 
 
 def _beginning(part: Part, samples: int) -> Part:

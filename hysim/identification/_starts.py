@@ -37,7 +37,7 @@ from hysim.identification._search import apart, brief_optimum, chosen, descended
 from hysim.identification._uncertainty import uncertainty
 from hysim.models.dependent_structure import DependentStructure
 from hysim.models.parts import share_of
-from hysim.models.protocols import Identifiable, PartByPart
+from hysim.models.protocols import Identifiable
 from hysim.models.search_space import Freedom
 from hysim.models.varying import weights
 from hysim.records import Record
@@ -259,7 +259,7 @@ def _parts_only(attempt: Problem, ends: FloatArray) -> list[Numbers]:
     names, plant = attempt.space.coordinates, attempt.family
     own = [(k, name) for k, name in enumerate(names) if not name.startswith("hysteresis.")]
     known: list[Numbers] = [{name: row[k] for k, name in own} for row in ends.tolist()]
-    if not isinstance(plant, PartByPart) or len(plant.inputs) == 1:
+    if len(plant.inputs) == 1:
         return known
     solved = [plant.solved(attempt.estimates(theta)) for theta in attempt.completed(ends)]
     return [{**each, **gains} for each, gains in zip(known, solved, strict=True)]

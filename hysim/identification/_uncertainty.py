@@ -33,9 +33,8 @@ from hysim.identification._problem import Problem, samples_of_sensor
 from hysim.identification.marquardt import pieces
 from hysim.metrics.rows import LoopRows
 from hysim.models.law import Law
-from hysim.models.protocols import Rescalable
 from hysim.models.search_space import Flags
-from hysim.records import Record
+from hysim.records import Record, SensorRecord
 
 Samples = npt.NDArray[np.intp]
 Folds = Sequence[Samples]
@@ -304,7 +303,7 @@ def whiteness(residual: FloatArray, n_parameters: int) -> float:
 
 def loop_widths(descent: Descent, theta: FloatArray) -> FloatArray:
     record = descent.problem.parts[0].record
-    if isinstance(record, Rescalable):  # of sensors, in units of their noise
+    if isinstance(record, SensorRecord):  # of sensors, in units of their noise
         return np.empty(0)
     outputs = descent.problem.model(theta)[:, : len(record)]
     finite = outputs[np.isfinite(outputs).all(axis=1)]

@@ -21,7 +21,8 @@ import numpy.typing as npt
 from hysim._basics.frozen import FloatArray, checked
 from hysim._basics.names import among
 from hysim._columns.channels import value_in
-from hysim.models.protocols import Identifiable, Numbered, PartByPart, Recorded, Subject, Variant
+from hysim.models.by_structure import searched
+from hysim.models.protocols import Identifiable, Numbered, Subject, Variant
 from hysim.models.search_space import ALL_FREE, Freedom, Parameters, SearchSpace
 from hysim.models.stages import Simpler, Stage
 from hysim.models.varying import ChannelPolynomial, check_memory_is_its_own, columns_along, names_of, places, weights
@@ -146,7 +147,7 @@ class DependentStructure(Subject):
 
     def __post_init__(self) -> None:
         law, depends = self.law, self.depends
-        if not isinstance(law, Identifiable) or isinstance(law, type | Recorded | PartByPart):
+        if isinstance(law, type) or not isinstance(law, Identifiable) or not searched(law).may_depend:
             raise TypeError(f"depends is for laws and sums of them, got {law!r}")
         if not depends:
             raise ValueError('depends names no parameter: give a mapping such as {"gain": ("T", 1)}')

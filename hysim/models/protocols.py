@@ -6,7 +6,7 @@ method and does not offer it sets it to None, which `isinstance` sees.
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from typing import Any, ClassVar, NamedTuple, Protocol, Self, TypeGuard, runtime_checkable
+from typing import Any, ClassVar, NamedTuple, Protocol, TypeGuard, runtime_checkable
 
 import numpy as np
 import numpy.typing as npt
@@ -315,7 +315,23 @@ class Identifiable(Protocol):
 
 
 class Searched:
-    """The choices in a search that a subject of `identify` may leave open; by default nothing is open."""
+    """The choices in a search that a subject of `identify` may leave open; by default nothing is open.
+
+    Attributes
+    ----------
+    may_depend : bool
+        Whether its parameters may depend on channels.
+    is_parted : bool
+        Whether it has a law, and parts before and after it that move in time and are searched in turn; what such a
+        search asks of it is said by `hysim.plants.actuator_structure`.
+    """
+
+    may_depend: ClassVar[bool] = True
+    is_parted: ClassVar[bool] = False
+
+    def as_records(self, records: Any) -> Any:
+        """Records of a kind of its own as records of one output; other objects are returned unchanged."""
+        return records
 
     def freed_in_turn(self) -> tuple[Stage, ...]:
         """Parameters that a search frees in turn; see `hysim.models.stages`."""
@@ -355,29 +371,6 @@ class Searched:
 
 class Subject(Searched, Identifiable):
     """Base class of what is made for `identify`: it has the methods that have a body."""
-
-
-@runtime_checkable
-class Recorded(Protocol):
-    """A subject of `identify` with records of its own kind in addition to `Record`."""
-
-    def as_records(self, records: Any) -> Any:
-        """Such records as records of one output; other objects are returned unchanged."""
-
-
-@runtime_checkable
-class Rescalable(Protocol):
-    """A record whose outputs are of several sensors, one after the other, in units of their noise."""
-
-    @property
-    def input(self) -> FloatArray:
-        """The input once, which all of them share."""
-
-    def noise(self, residual: FloatArray) -> FloatArray:
-        """Size of this residual (n,) at each sensor, shape (n_sensors,)."""
-
-    def rescaled(self, residual: FloatArray) -> Any:
-        """The record in units of that noise."""
 
 
 @runtime_checkable
@@ -515,24 +508,3 @@ class Doubt(NamedTuple):
     name: str
     largest: float
     without: Any
-
-
-@runtime_checkable
-class PartByPart(Protocol):
-    """A subject of `identify` with a law, and parts before and after it that move in time and are searched in turn.
-
-    What such a search asks of it is said by `hysim.plants.actuator_structure`.
-    """
-
-    inputs: tuple[str, ...]
-    """Names of its inputs, each with a law."""
-
-    @property
-    def noise(self) -> str:
-        """The noise that its sensor makes, as `identify` names it."""
-
-    def growing(self) -> Sequence[Self]:
-        """The plant with more and more of its parts but for slow ones; each contains the one before."""
-
-    def solved(self, estimates: Mapping[str, float]) -> Mapping[str, float]:
-        """Coordinates by name that are solved for without laws, and are searched with laws."""

@@ -27,7 +27,7 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import field, replace
 from functools import lru_cache, partial
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 import numpy.typing as npt
@@ -185,6 +185,9 @@ class ActuatorStructure(Subject):
     starting: Any = ()  # coordinates by name
     start: Any = None  # an actuator from whose vibration the search begins
     inputs: tuple[str, ...] = (MAIN,)
+
+    may_depend: ClassVar[bool] = False
+    is_parted: ClassVar[bool] = True
 
     def __post_init__(self) -> None:
         if self.law is None:

@@ -17,12 +17,12 @@ its noise; the input is repeated for each of them.
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import field, replace
-from typing import Any
+from dataclasses import replace
+from typing import Any, ClassVar
 
 import numpy as np
 
-from hysim._basics.frozen import FloatArray, checked, read_only, whole_substeps
+from hysim._basics.frozen import FloatArray, read_only, whole_substeps
 from hysim._basics.parallel import in_chunks
 from hysim._basics.printing import frozen_result, summary_text
 from hysim.errors import SimulationError
@@ -32,9 +32,7 @@ from hysim.models.protocols import Subject
 from hysim.models.search_space import ALL_FREE, Freedom, Parameters, SearchSpace
 from hysim.plants.structures.assembly import MovingStructure
 from hysim.plants.structures.parts import OF_ELEMENTS, OF_NODES, expanded, is_shared, scalars_of, sharing, unknown
-from hysim.records import Record, check_increasing, even_step, span_of
-
-_LEAST = 1e-6  # of the size of a signal: its residual is not taken for smaller, however exact the fit
+from hysim.records import Record, SensorRecord, check_increasing, even_step, span_of
 
 Sensor = tuple[str, int]
 """Name of a signal, and its column."""
@@ -134,30 +132,6 @@ class StructureRecord:
         return even_step(self.t)
 
 
-@checked
-class SensorRecord(Record):
-    """Outputs of several sensors one after the other, each divided by its scale; the input as often."""
-
-    sensors: Any = ()
-    scales: tuple[float, ...] = ()
-    sizes: tuple[float, ...] = field(default_factory=tuple)  # rms of each output
-
-    @property
-    def input(self) -> FloatArray:
-        return self.u[: self.u.size // len(self.sensors)]
-
-    def noise(self, residual: FloatArray) -> FloatArray:
-        """Size of this residual (n,) at each sensor in its present units, shape (n_sensors,)."""
-        errors = np.sqrt(np.mean(residual.reshape(len(self.sensors), -1) ** 2, axis=1))
-        return np.asarray(np.maximum(errors, _LEAST * np.array(self.sizes) / np.array(self.scales)))
-
-    def rescaled(self, residual: FloatArray) -> "SensorRecord":
-        """The record in units of the noise that this residual (n,) shows of each sensor."""
-        ratios = self.noise(residual)
-        scales = tuple((np.array(self.scales) * ratios).tolist())
-        return replace(self, y=self.y / np.repeat(ratios, self.input.size), scales=scales)
-
-
 def laid(record: Record | StructureRecord, widths: Mapping[str, int], output: Sensor) -> SensorRecord:
     """One output of all sensors, each in units of its rms; ValueError unless signals have `widths` columns."""
     if isinstance(record, Record):
@@ -187,6 +161,8 @@ def laid(record: Record | StructureRecord, widths: Mapping[str, int], output: Se
 
 class SearchedStructure(MovingStructure, Subject):
     """Base class of a structure whose named numbers `hysim.identify` searches, beginning with its own."""
+
+    may_depend: ClassVar[bool] = False
 
     @property
     def scalars(self) -> dict[str, float]:
