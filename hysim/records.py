@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import field, replace
 from itertools import pairwise
 from types import MappingProxyType
-from typing import Any, Self, TypeVar
+from typing import Any, Protocol, Self, TypeVar, runtime_checkable
 
 import numpy as np
 import numpy.typing as npt
@@ -378,6 +378,16 @@ class SensorRecord(Record):
         ratios = self.noise(residual)
         scales = tuple((np.array(self.scales) * ratios).tolist())
         return replace(self, y=self.y / np.repeat(ratios, self.input.size), scales=scales)
+
+
+@runtime_checkable
+class InputOutput(Protocol):
+    """A Record, a Simulation or anything with `u` and `y`, and perhaps `units`, `name`, times `t` and memory `z`."""
+
+    @property
+    def u(self) -> FloatArray: ...
+    @property
+    def y(self) -> FloatArray: ...
 
 
 def signed_charge(capacity: npt.ArrayLike, current: npt.ArrayLike) -> FloatArray:

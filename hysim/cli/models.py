@@ -8,7 +8,7 @@ import sys
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, fields
 from pathlib import Path
-from typing import Annotated, Any, Literal, Protocol, runtime_checkable
+from typing import Annotated, Any, Literal
 
 import hysim as hs
 from hysim._basics.names import MODULE_OF
@@ -19,11 +19,6 @@ _OPTIONS = {
     "elements": "plays", "intervals": "relay_intervals", "hysteresis": "law", "amplifier": "first_order_amplifier",
 }  # fmt: skip
 """Arguments of a structure whose option has another name, and that name."""
-
-
-@runtime_checkable
-class _Structured(Protocol):
-    structure: Any
 
 
 _NEEDED = ("poles", "zeros", "degree")
@@ -307,7 +302,9 @@ def to_identify(chosen: FitOptions) -> Any:
 
 def _arguments(model: Any) -> dict[str, str]:
     """Arguments of a family's structure, if it has one, by the options that stand for them."""
-    if not (isinstance(model, type) and isinstance(model, _Structured)):
+    from hysim.models.protocols import Structured
+
+    if not (isinstance(model, type) and isinstance(model, Structured)):
         return {}
     own = {_OPTIONS.get(name, name): name for name in inspect.signature(model.structure).parameters}
     return own | ({"creep_elements": "creep"} if model is hs.Actuator else {})

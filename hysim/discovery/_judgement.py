@@ -27,7 +27,7 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
-from typing import NamedTuple, Protocol, TypeVar
+from typing import NamedTuple, TypeVar
 
 import numpy as np
 import numpy.typing as npt
@@ -39,6 +39,7 @@ from hysim._columns.turning import TOLERANCE, complete_cycles
 from hysim.discovery._competitors import FLOOR, Rival, curve, means, plays, relaxations, rival, steady_width, trend
 from hysim.errors import SimulationError
 from hysim.identification import folds as blocks
+from hysim.models.protocols import Responding
 from hysim.plants.transfer_function import TransferFunction
 from hysim.records import Record
 
@@ -265,13 +266,7 @@ class Judgement:
     explained_by: tuple[str, ...] = ()
 
 
-class Law(Protocol):
-    """A model that is judged: an output at the samples of an input, without time."""
-
-    def response(self, u: npt.ArrayLike, /) -> FloatArray: ...
-
-
-Refit = Callable[[Sequence[Record], Sequence[FloatArray]], Sequence[Law]]
+Refit = Callable[[Sequence[Record], Sequence[FloatArray]], Sequence[Responding]]
 """Laws, one for each record, fitted again where the weights (n_samples,) are not zero."""
 
 
@@ -373,7 +368,9 @@ def competitors(records: Sequence[Record]) -> Trial:
     return Trial(records, linear, spread, by, left_out, scores, together)
 
 
-def judge(records: Sequence[Record], laws: Sequence[Law], refit: Refit, others: Trial | None = None) -> Judgement:
+def judge(
+    records: Sequence[Record], laws: Sequence[Responding], refit: Refit, others: Trial | None = None
+) -> Judgement:
     """Judge laws fitted to records, one for each; `refit(records, weights)` fits where the weights are not zero."""
     others = others or competitors(records)
     records, linear = others.records, others.linear
@@ -415,14 +412,14 @@ def judge(records: Sequence[Record], laws: Sequence[Law], refit: Refit, others: 
     )
 
 
-def _response(law: Law, u: FloatArray) -> FloatArray | None:
+def _response(law: Responding, u: FloatArray) -> FloatArray | None:
     try:
         return law.response(u)
     except SimulationError:
         return None
 
 
-def _loops(law: Law, u: FloatArray) -> list[metrics.LoopMetrics | None]:
+def _loops(law: Responding, u: FloatArray) -> list[metrics.LoopMetrics | None]:
     middle, reach = 0.5 * (u.max() + u.min()), 0.5 * float(np.ptp(u))
     loops: list[metrics.LoopMetrics | None] = []
     for share in _AMPLITUDES:

@@ -9,7 +9,7 @@ The model that is returned has the filter of its input, the start of its record,
 import inspect
 from collections.abc import Mapping, Sequence
 from dataclasses import MISSING, dataclass, fields, replace
-from typing import Any, Literal, NamedTuple, Protocol, runtime_checkable
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -33,21 +33,13 @@ from hysim.identification._starts import begun, begun_by_parts
 from hysim.identification._uncertainty import Folds, left_out, left_out_errors, rms_of_known
 from hysim.identification.doubts import offset_for, rate_noise_warning, swapped_columns, swapped_for
 from hysim.laws.operators.reversal_filter import ReversalFilter
+from hysim.models import protocols as roles
 from hysim.models.by_structure import searched
 from hysim.models.cascade import Cascade
 from hysim.models.dependent import Dependent, on_record
 from hysim.models.dependent_structure import DependentStructure
 from hysim.models.model import family_named, is_identifiable
-from hysim.models.protocols import (
-    Containing,
-    Direct,
-    Identifiable,
-    Offering,
-    Placeable,
-    needs_time,
-    placed,
-    with_law,
-)
+from hysim.models.protocols import needs_time, placed, with_law
 from hysim.models.search_space import Freedom
 from hysim.records import Record, several
 from hysim.simulation import free_run
@@ -206,7 +198,7 @@ def identify(
     folds = left_out(cross_validate, records)
     asked = _Asked(records, shares, folds, noise, intervals, admissible, progress or None, energy)
     with at_most(workers), one_blas_thread(), sharing():
-        if isinstance(model_or_class, Direct) and depends is None:
+        if isinstance(model_or_class, roles.Direct) and depends is None:
             fit = _without_search(model_or_class, options, asked, seed)
         else:
             family = searched(placed(_family(model_or_class, depends), None))
@@ -243,14 +235,14 @@ class _Assumed(NamedTuple):
     is_cut: bool
 
 
-def _without_search(family: Direct, options: Freedom, asked: _Asked, seed: int) -> Identification:
+def _without_search(family: roles.Direct, options: Freedom, asked: _Asked, seed: int) -> Identification:
     records = asked.records
     if asked.energy:
         raise ValueError('weights="energy" is for models that are searched for')
     refuse(family, options, asked.noise or "gaussian", asked.intervals)
     fit = in_one_step(family, records, asked.weights, asked.folds, seed, asked.admissible)
     doubts = [swapped_columns(records)]
-    if isinstance(fit.model, Placeable):
+    if isinstance(fit.model, roles.Placeable):
         fit = as_measured(fit, records, asked.weights, Treated(records))
         off = excursion(fit.models, records)
         doubts.append(implausible(off))
@@ -394,17 +386,17 @@ def _freedom(fixed: Mapping[str, float], free: Sequence[str], bounds: Mapping[st
     return Freedom(fixed, (free,) if isinstance(free, str) else tuple(free), bounds, starts_anew=True)
 
 
-def _family(model_or_class: Any, depends: Mapping[str, tuple[str, int]] | None) -> Identifiable:
+def _family(model_or_class: Any, depends: Mapping[str, tuple[str, int]] | None) -> roles.Identifiable:
     """The object that declares the search; a class stands for its defaults, or for the last that it offers."""
     family: Any = model_or_class
-    if isinstance(family, Direct) and depends is not None:
+    if isinstance(family, roles.Direct) and depends is not None:
         raise TypeError(f"depends is for laws and sums of them, got {family!r}")
-    if not isinstance(family, Identifiable):
+    if not isinstance(family, roles.Identifiable):
         raise TypeError(f"identify takes a model, a model class or a structure, got {_in_words(model_or_class)}")
     belongs_to_the_class = inspect.ismethod(family.search_space)
     if isinstance(model_or_class, type) and not belongs_to_the_class:
         required = [f.name for f in fields(model_or_class) if f.default is MISSING and f.default_factory is MISSING]
-        offered = [*family.candidates().values()] if required and isinstance(family, Offering) else []
+        offered = [*family.candidates().values()] if required and isinstance(family, roles.Offering) else []
         if offered:
             return _family(offered[-1], depends)
         if required:
@@ -416,16 +408,9 @@ def _family(model_or_class: Any, depends: Mapping[str, tuple[str, int]] | None) 
     return family if depends is None else Dependent.structure(searched(family), depends)
 
 
-@runtime_checkable
-class _Structured(Protocol):
-    """A class whose models are identified by their structure."""
-
-    def structure(self) -> Any: ...
-
-
 def _in_words(subject: Any) -> str:
     kind = subject if isinstance(subject, type) else type(subject)
-    if isinstance(kind, _Structured):
+    if isinstance(kind, roles.Structured):
         what = "the class" if kind is subject else "a finished"
         return f"{what} {kind.__name__}: pass its structure, hs.{kind.__name__}.structure(...)"
     return repr(subject)
@@ -506,7 +491,7 @@ def _behind(front: ReversalFilter | None, model: Any) -> Any:
     """A model after a filter of its input; in an actuator the filter of the voltage stands in front of the law."""
     if front is None:
         return model
-    if isinstance(model, Containing):
+    if isinstance(model, roles.Containing):
         front = ReversalFilter(threshold=abs(model.input_gain) * front.threshold)
     return with_law(model, lambda law: front >> law)
 

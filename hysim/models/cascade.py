@@ -19,6 +19,7 @@ import numpy.typing as npt
 
 from hysim._basics.frozen import FloatArray, checked
 from hysim.kernels.stepping import one_behind_the_other
+from hysim.models import protocols as roles
 from hysim.models.compiled_step import startable
 from hysim.models.composable import Composable
 from hysim.models.inverse_search import searched_inverse
@@ -35,23 +36,7 @@ from hysim.models.parts import (
     self_started,
     startable_pair,
 )
-from hysim.models.protocols import (
-    UNLIMITED,
-    CompiledLaw,
-    Identifiable,
-    InputFilter,
-    Limits,
-    LinearStage,
-    LinearStructure,
-    Placeable,
-    Startable,
-    StepwiseInvertible,
-    Subject,
-    UnitGainStructure,
-    Variant,
-    needs_time,
-    placed,
-)
+from hysim.models.protocols import UNLIMITED, CompiledLaw, Limits, Startable, Subject, Variant, needs_time, placed
 from hysim.models.search_space import ALL_FREE, Freedom, Parameters, SearchSpace
 from hysim.models.sum import Composite, Driven, assembled, known_slopes, started, time_of
 from hysim.records import Record
@@ -66,18 +51,18 @@ class CascadeStructure(Subject, Composable):
     def __post_init__(self) -> None:
         stages = started(self.stages, "stages")
         for stage in stages:
-            if isinstance(stage, LinearStage) and stage.initial_state:
+            if isinstance(stage, roles.LinearStage) and stage.initial_state:
                 raise ValueError("a transfer function that is given must not hold an initial state")
         object.__setattr__(self, "stages", stages)
-        if not isinstance(stages[self.carrier], Identifiable):
+        if not isinstance(stages[self.carrier], roles.Identifiable):
             raise TypeError(f"no stage can be identified: a {type(stages[self.carrier]).__name__} carries the gain")
 
     @property
     def carrier(self) -> int:
-        linear = [isinstance(stage, LinearStage | LinearStructure) for stage in self.stages]
+        linear = [isinstance(stage, roles.LinearStage | roles.LinearStructure) for stage in self.stages]
         if not all(linear):
             return len(linear) - 1 - linear[::-1].index(False)
-        return next((k for k, stage in enumerate(self.stages) if isinstance(stage, LinearStructure)), 0)
+        return next((k for k, stage in enumerate(self.stages) if isinstance(stage, roles.LinearStructure)), 0)
 
     def search_space(self, record: Record, freedom: Freedom = ALL_FREE) -> SearchSpace:
         names = labels(self.stages)
@@ -106,7 +91,7 @@ class CascadeStructure(Subject, Composable):
         for name in names[self.carrier + 1 :]:
             stage, its = stages[name], own(parameters, name)
             passed = _through(stage, its, columns.transpose(0, 2, 1), record).transpose(0, 2, 1)
-            added = stage.free_responses(its, record) if isinstance(stage, UnitGainStructure) else passed[..., :0]
+            added = stage.free_responses(its, record) if isinstance(stage, roles.UnitGainStructure) else passed[..., :0]
             n_sets = max(len(passed), len(added))
             blocks = (passed[..., :-1], added, passed[..., -1:])
             columns = np.concatenate([np.broadcast_to(block, (n_sets, *block.shape[1:])) for block in blocks], axis=-1)
@@ -124,7 +109,7 @@ class CascadeStructure(Subject, Composable):
     def assumed_states(self, record: Record) -> tuple[str, ...]:
         """The states that the stages from the carrier on leave to the record; a cascade has no cycle ahead of it."""
         stages = [*labelled(self.stages).items()][self.carrier :]
-        with_state = {label: stage for label, stage in stages if isinstance(stage, Identifiable)}
+        with_state = {label: stage for label, stage in stages if isinstance(stage, roles.Identifiable)}
         states = common_states(with_state, self._record_at(stages[0][0], record))
         return tuple(state for state in states if state != "periodic")
 
@@ -136,7 +121,7 @@ class CascadeStructure(Subject, Composable):
     def _by_label(self) -> dict[str, Any]:
         """The stages; structures of transfer functions other than the carrier have the gain one."""
         return {
-            label: stage.with_unit_gain() if isinstance(stage, LinearStructure) and k != self.carrier else stage
+            label: stage.with_unit_gain() if isinstance(stage, roles.LinearStructure) and k != self.carrier else stage
             for k, (label, stage) in enumerate(labelled(self.stages).items())
         }
 
@@ -146,19 +131,19 @@ class CascadeStructure(Subject, Composable):
         return {
             label: stage
             for label, stage in self._by_label.items()
-            if label == carrier or isinstance(stage, UnitGainStructure)
+            if label == carrier or isinstance(stage, roles.UnitGainStructure)
         }
 
     def _record_at(self, label: str, record: Record) -> Record:
         """The record for one stage; the input of the carrier passes the stages before it, whose gain is about one."""
         if label != labels(self.stages)[self.carrier]:
             return record
-        known = [stage for stage in self.stages[: self.carrier] if not isinstance(stage, LinearStructure)]
+        known = [stage for stage in self.stages[: self.carrier] if not isinstance(stage, roles.LinearStructure)]
         u = reduce(lambda v, stage: response_of(stage, v, time_of(stage, record)), known, record.u)
         return Record(u=u, y=record.y, t=record.t)
 
 
-def _at_rest(stage: UnitGainStructure, record: Record, freedom: Freedom) -> SearchSpace:
+def _at_rest(stage: roles.UnitGainStructure, record: Record, freedom: Freedom) -> SearchSpace:
     """The space of a stage in front of the carrier, in whose initial state nothing is linear."""
     space = stage.search_space(record, replace(freedom, initial="rest"))
     if space.linear:
@@ -168,10 +153,10 @@ def _at_rest(stage: UnitGainStructure, record: Record, freedom: Freedom) -> Sear
 
 def _through(stage: Any, parameters: Parameters, signals: FloatArray, record: Record) -> FloatArray:
     """Outputs (n_sets, n_signals, n_samples) of a stage for the inputs `signals`, of this shape or (1, ...)."""
-    if isinstance(stage, UnitGainStructure):
+    if isinstance(stage, roles.UnitGainStructure):
         return stage.filtered_sets(parameters, signals, record.sample_time)
     each = signals.reshape(-1, signals.shape[-1])
-    if isinstance(stage, LinearStage):
+    if isinstance(stage, roles.LinearStage):
         return stage.filtered(each, record.sample_time).reshape(signals.shape)
     return np.reshape([response_of(stage, u, time_of(stage, record)) for u in each], signals.shape)
 
@@ -237,7 +222,7 @@ class Cascade(Composite):
     def behind_filter(self) -> Any:
         """The cascade without the filters of a noisy input at its front, which inverses leave out."""
         first, *others = self.stages
-        if not isinstance(first, InputFilter) or not others:
+        if not (isinstance(first, Composable) and first.filters_input and others):
             return self
         return others[0] if len(others) == 1 else Cascade(stages=tuple(others)).behind_filter
 
@@ -249,7 +234,7 @@ class Cascade(Composite):
     def compiled_inverse(self, u0: float, limits: Limits = UNLIMITED, sample_time: float = math.inf) -> CompiledLaw:
         """The inverse at rest at `u0`, stepped; see `hysim.Law.compiled_inverse`."""
         model = self.behind_filter
-        if isinstance(model, StepwiseInvertible) and model is not self:
+        if isinstance(model, roles.StepwiseInvertible) and model is not self:
             return model.compiled_inverse(u0, limits, sample_time)
         return searched_inverse(model, CompiledLaw(*model.compiled(u0)), limits=limits)
 
@@ -257,9 +242,10 @@ class Cascade(Composite):
         stages, level = [], u0
         for stage in self.stages:
             stages.append(placed(stage, level, u_range))
-            known = level is not None and isinstance(stage, Placeable) and not needs_time(stage)
+            known = level is not None and isinstance(stage, roles.Placeable) and not needs_time(stage)
             level = float(stages[-1].response([level])[0]) if known else None
-            u_range = u_range if isinstance(stage, InputFilter) else None  # what passes a filter keeps its range
+            is_filter = isinstance(stage, Composable) and stage.filters_input
+            u_range = u_range if is_filter else None  # what passes a filter keeps its range
         return Cascade(stages=tuple(stages))
 
     def _driven(self, u: FloatArray, members: Sequence[Driven]) -> tuple[FloatArray, list[FloatArray]]:

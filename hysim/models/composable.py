@@ -42,11 +42,14 @@ class Composable:
     units : mapping
         Units of fields in those of u and y, such as ``"y/u"``, beside those of parameters that are searched; ``"1"``
         is dimensionless. A number whose unit depends on a choice is not listed.
+    filters_input : bool
+        Whether it is a stage in front of a law for noisy inputs; a command has no noise, so that inverses leave it out.
     """
 
     example: ClassVar[Example | None] = None
     short: ClassVar[str] = ""
     units: ClassVar[Mapping[str, str]] = MappingProxyType({})
+    filters_input: ClassVar[bool] = False
 
     def __add__(self, other: "Composable") -> Any:
         return _joined(self, other, _KINDS["+"])

@@ -13,7 +13,7 @@ from hysim._columns.channels import Channels, checked_channels, steady, taken, v
 from hysim.models.dependent_structure import DependentStructure
 from hysim.models.model import family, not_offered
 from hysim.models.parts import response_of
-from hysim.models.protocols import Numbered, Placeable, Responding, needs_time, placed
+from hysim.models.protocols import Numbered, Responding, first_input, input_range, needs_time, placed
 from hysim.models.varying import ChannelPolynomial, response_along, weights
 from hysim.records import Record
 
@@ -111,12 +111,12 @@ class Dependent:
     @property
     def u0(self) -> float | None:
         """Input at which the initial memory holds; None for the first sample of any input."""
-        return self.law.u0 if isinstance(self.law, Placeable) else None
+        return first_input(self.law)
 
     @property
     def u_range(self) -> tuple[float, ...] | None:
         """Lowest and highest input of the record that the law was identified on; None if unknown."""
-        return self.law.u_range if isinstance(self.law, Placeable) else None
+        return input_range(self.law)
 
     def placed(self, u0: float | None, u_range: tuple[float, ...] | None = None) -> "Dependent":
         """This model with the memory of its law at the input `u0`."""

@@ -12,7 +12,7 @@ from hysim._basics.parallel import in_pieces
 from hysim.errors import SimulationError
 from hysim.kernels import inverses as kernels
 from hysim.kernels.stepping import drive
-from hysim.models.protocols import UNLIMITED, CompiledLaw, Limits, Saturating, StepwiseInvertible, Stretched
+from hysim.models.protocols import UNLIMITED, CompiledLaw, Limits, StepwiseInvertible, Stretched
 
 _REACH, _WIDER = 1e-6, 16.0  # how far at most the output is looked at to either side of the first input; the ratio
 _SHORTEST = 2.0**-46  # of the first input, or this number
@@ -48,7 +48,7 @@ def searched_inverse(
 
     with np.errstate(all="ignore"):
         reached, slope = output(u), _slope(output, u)
-    if slope == 0.0 and isinstance(law, Saturating):
+    if slope == 0.0 and isinstance(law, Stretched):
         slope = _steepest(law)
     if slope == 0.0:
         raise ValueError(f"the law has no inverse: its output does not rise or fall through u = {u:g}")
@@ -69,7 +69,7 @@ def one_signed(slopes: tuple[float, float]) -> bool:
     return slopes[0] * slopes[1] > 0.0 and _FLAT * most < least and most < np.inf
 
 
-def _steepest(law: Saturating) -> float:
+def _steepest(law: Stretched) -> float:
     """Steepest slope of a law that saturates and so stands still somewhere, zero if it may rise and fall."""
     low, high = law.known_slopes
     return max(low, high, key=abs) if low * high >= 0.0 and max(map(abs, law.output_bounds)) < math.inf else 0.0

@@ -14,7 +14,7 @@ import importlib
 from collections.abc import Mapping
 from dataclasses import field, fields
 from types import MappingProxyType
-from typing import Any, NamedTuple, Protocol, TypeVar, dataclass_transform, runtime_checkable
+from typing import Any, NamedTuple, TypeVar, dataclass_transform
 
 import numpy as np
 
@@ -51,13 +51,6 @@ class Example(NamedTuple):
     units: Mapping[str, str] = MappingProxyType({})
     kind: str = "triangle"
     stack: bool = False
-
-
-@runtime_checkable
-class _Short(Protocol):
-    """A family with a short name."""
-
-    short: str
 
 
 @dataclass_transform(kw_only_default=True, frozen_default=True, field_specifiers=(field,))
@@ -191,7 +184,7 @@ def short_names() -> dict[str, str]:
     >>> short_names()["zhu-wang"]
     'ZhuWangBoucWen'
     """
-    return {each.short: name for name, each in every_family().items() if isinstance(each, _Short) and each.short}
+    return {short: name for name, each in every_family().items() if (short := vars(each).get("short"))}
 
 
 def candidates_named(name: str) -> dict[str, Any]:

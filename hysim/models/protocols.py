@@ -116,18 +116,6 @@ class Stepwise(Protocol):
 
 
 @runtime_checkable
-class Rated(Protocol):
-    """A law that depends on the rate of its input, as an element of a structure takes it."""
-
-    def rated(self) -> Startable:
-        """The step for strokes of known durations and rates, without a dashpot; see `hysim.kernels.friction_rates`."""
-
-    @property
-    def viscosity(self) -> float:
-        """Coefficient of that dashpot, which the structure takes into its damping."""
-
-
-@runtime_checkable
 class Numbered(Protocol):
     """A model whose numbers have names."""
 
@@ -141,7 +129,7 @@ class Numbered(Protocol):
 
 @runtime_checkable
 class Stretched(Protocol):
-    """A `Steppable` law that says where in its state the memory is, and between which bounds its slope lies."""
+    """A `Steppable` law that says where in its state the memory is, and between which bounds slope and output lie."""
 
     @property
     def memory_places(self) -> tuple[tuple[int, int], ...]:
@@ -150,11 +138,6 @@ class Stretched(Protocol):
     @property
     def known_slopes(self) -> tuple[float, float]:
         """Lowest and highest slope dy/du over every input, infinite where they are not known."""
-
-
-@runtime_checkable
-class Saturating(Stretched, Protocol):
-    """A law that also says between which outputs it stays."""
 
     @property
     def output_bounds(self) -> tuple[float, float]:
@@ -205,11 +188,14 @@ def standing(thing: Any, u0: float | None = None) -> float:
     return 0.0 if own is None else own
 
 
-@runtime_checkable
-class InputFilter(Protocol):
-    """A stage in front of a law for noisy inputs; a command has no noise, so that inverses leave it out."""
+def first_input(model: Any) -> float | None:
+    """Input at which the memory of a model holds; None for the first sample of any input, or without such a memory."""
+    return model.u0 if isinstance(model, Placeable) else None
 
-    filters_input: ClassVar[bool]
+
+def input_range(model: Any) -> tuple[float, ...] | None:
+    """Lowest and highest input of the record that a model was identified on; None if unknown."""
+    return model.u_range if isinstance(model, Placeable) else None
 
 
 def placed(model: Any, u0: float | None, u_range: tuple[float, ...] | None = None) -> Any:
@@ -263,6 +249,13 @@ class OfFamily(Protocol):
     """A structure whose `law` is the family that it makes models of."""
 
     law: type
+
+
+@runtime_checkable
+class Structured(Protocol):
+    """A class whose models may be identified by a structure."""
+
+    structure: Any
 
 
 @runtime_checkable

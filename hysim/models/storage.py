@@ -9,7 +9,7 @@ from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import fields, is_dataclass
 from pathlib import Path
-from typing import Any, ClassVar, Protocol, Self, runtime_checkable
+from typing import Any, ClassVar, Self
 
 import numpy as np
 
@@ -19,6 +19,7 @@ from hysim._basics.names import MODULE_OF
 from hysim._basics.release import __version__
 from hysim._basics.results import model_of
 from hysim.models.model import FAMILIES, every_family, is_model
+from hysim.records import InputOutput
 
 _DEEPEST = 100  # lists and mappings in each other: a chain of chains takes three for a model
 _MOST_DIGITS = 4_300  # which Python converts by default
@@ -57,23 +58,13 @@ def save(model: Any, path: str | Path, *, units: Mapping[str, str] | None = None
 def to_json(model: Any, *, units: Mapping[str, str] | None = None) -> str:
     model = model_of(model)
     if not is_model(model):
-        advice = ": hs.save_record(record, path) writes a record" if isinstance(model, _InputOutput) else ""
+        advice = ": hs.save_record(record, path) writes a record" if isinstance(model, InputOutput) else ""
         if type(model).__name__ in FAMILIES:
             advice = ", of a class that was defined anew since: make the model again"
         raise TypeError(f"save takes a model of hysim, got {type(model).__name__}{advice}")
     document = {"hysim": __version__, **to_document(model), "units": dict(units or {})}
     _check_depth(document)
     return json.dumps(document, indent=2, allow_nan=False) + "\n"
-
-
-@runtime_checkable
-class _InputOutput(Protocol):
-    """A record, a simulation."""
-
-    @property
-    def u(self) -> Any: ...
-    @property
-    def y(self) -> Any: ...
 
 
 def load_model(path: str | Path) -> Any:

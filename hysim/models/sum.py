@@ -13,6 +13,7 @@ import numpy.typing as npt
 from hysim._basics.frozen import FloatArray, checked, items, read_only
 from hysim.errors import warn_beyond
 from hysim.kernels.stepping import side_by_side
+from hysim.models import protocols as roles
 from hysim.models.by_structure import ByStructure
 from hysim.models.compiled_step import startable
 from hysim.models.composable import Composable
@@ -40,15 +41,11 @@ from hysim.models.parts import (
 )
 from hysim.models.protocols import (
     CompiledLaw,
-    Continuable,
-    Identifiable,
-    Numbered,
-    Placeable,
-    Responding,
     Startable,
-    Stretched,
     Subject,
     Variant,
+    first_input,
+    input_range,
     needs_time,
     placed,
 )
@@ -130,12 +127,12 @@ class Composite(ByStructure, Composable):
     @property
     def u0(self) -> float | None:
         """Input at which the initial memories hold, that of the first member; None for the first sample."""
-        return self.members[0].u0 if isinstance(self.members[0], Placeable) else None
+        return first_input(self.members[0])
 
     @property
     def u_range(self) -> tuple[float, ...] | None:
         """Lowest and highest input of the record that the composite was identified on; None if unknown."""
-        return self.members[0].u_range if isinstance(self.members[0], Placeable) else None
+        return input_range(self.members[0])
 
     @abstractmethod
     def placed(self, u0: float | None, u_range: tuple[float, ...] | None = None) -> Any:
@@ -153,7 +150,7 @@ class Composite(ByStructure, Composable):
         end = 0
         for member in self.members:
             size = compiled_law(member, 0.0, None).state.size
-            own = member.memory_places if isinstance(member, Stretched) else ((0, size),)
+            own = member.memory_places if isinstance(member, roles.Stretched) else ((0, size),)
             for first, count in own:
                 if places and sum(places[-1]) == end + first:
                     places[-1] = places[-1][0], places[-1][1] + count
@@ -168,7 +165,7 @@ class Composite(ByStructure, Composable):
         return {
             f"{label}.{name}": value
             for label, member in labelled(self.members).items()
-            if isinstance(member, Numbered)
+            if isinstance(member, roles.Numbered)
             for name, value in member.scalars.items()
         }
 
@@ -177,7 +174,7 @@ class Composite(ByStructure, Composable):
         numbered = {
             label: member.with_scalars(others)
             for label, member in labelled(self.members).items()
-            if isinstance(member, Numbered) and (others := own(scalars, label))
+            if isinstance(member, roles.Numbered) and (others := own(scalars, label))
         }
         family: Any = type(self)
         return family(**{self.members_are: exchanged(self.members, numbered)})
@@ -186,6 +183,11 @@ class Composite(ByStructure, Composable):
     @abstractmethod
     def known_slopes(self) -> tuple[float, float]:
         """Lowest and highest slope dy/du over every input, as far as the members know theirs; else infinite."""
+
+    @property
+    def output_bounds(self) -> tuple[float, float]:
+        """Lowest and highest output, which are not known."""
+        return -math.inf, math.inf
 
     def inverse_response(self, y: npt.ArrayLike, u0: float | None = None) -> FloatArray:
         """Input that gives the output `y`, monotone between the samples; see `hysim.Law.inverse_response`.
@@ -205,7 +207,7 @@ class Composite(ByStructure, Composable):
 
 def continued(part: Any, u: FloatArray, sample_time: float | None, state: Any) -> tuple[FloatArray, Any]:
     """Output of a part from `state` on, None for its first sample, and the state after it."""
-    if not isinstance(part, Continuable):
+    if not isinstance(part, roles.Continuable):
         raise TypeError(f"a {type(part).__name__} cannot be continued")
     time = {"sample_time": sample_time} if isinstance(part, Composite) or needs_time(part) else {}
     y, end = part.advance(u, state, **time)
@@ -214,14 +216,14 @@ def continued(part: Any, u: FloatArray, sample_time: float | None, state: Any) -
 
 def known_slopes(members: tuple[Any, ...]) -> list[tuple[float, float]]:
     """Lowest and highest slope of each member, infinite where they are not known."""
-    return [member.known_slopes if isinstance(member, Stretched) else (-math.inf, math.inf) for member in members]
+    return [member.known_slopes if isinstance(member, roles.Stretched) else (-math.inf, math.inf) for member in members]
 
 
 def started(parts: Any, what: str) -> tuple[Any, ...]:
     """Models and structures as a tuple, of a class the model with its defaults."""
     members = tuple(part() if isinstance(part, type) else part for part in checked_tuple(parts, what))
     for member in members:
-        if not isinstance(member, Identifiable | Responding):
+        if not isinstance(member, roles.Identifiable | roles.Responding):
             raise TypeError(f"{what} must hold models or structures, got {type(member).__name__}")
     return members
 
@@ -263,7 +265,7 @@ class SumStructure(Subject, Composable):
 
     def regressors(self, parameters: Parameters, record: Record) -> FloatArray:
         identified = self._identified
-        known = [part for part in self.parts if not isinstance(part, Identifiable)]
+        known = [part for part in self.parts if not isinstance(part, roles.Identifiable)]
         fixed = sum((response_of(part, record.u, time_of(part, record)) for part in known), np.zeros(len(record)))
         blocks = [part.regressors(own(parameters, label), record) for label, part in identified.items()]
         return columns_beside(blocks, fixed[np.newaxis, :, np.newaxis])
@@ -287,7 +289,7 @@ class SumStructure(Subject, Composable):
         return tuple(
             f"{label}: {note}"
             for label, part, fitted in zip(labels(self.parts), self.parts, model.parts, strict=True)
-            if isinstance(part, Identifiable) and not needs_time(fitted)
+            if isinstance(part, roles.Identifiable) and not needs_time(fitted)
             for note in part.notes(record, fitted)
         )
 
@@ -298,8 +300,8 @@ class SumStructure(Subject, Composable):
         return combined_variants(self._identified, lambda others: replace(self, parts=exchanged(self.parts, others)))
 
     @property
-    def _identified(self) -> dict[str, Identifiable]:
-        return {label: part for label, part in labelled(self.parts).items() if isinstance(part, Identifiable)}
+    def _identified(self) -> dict[str, roles.Identifiable]:
+        return {label: part for label, part in labelled(self.parts).items() if isinstance(part, roles.Identifiable)}
 
     def _values(self, columns: Sequence[str]) -> dict[str, float]:
         return {

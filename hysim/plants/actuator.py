@@ -95,14 +95,13 @@ class Actuator:
     @property
     def u0(self) -> float | None:
         """Command at which the memory of the law holds; None for the first one."""
-        if not isinstance(self.hysteresis, roles.Placeable) or self.hysteresis.u0 is None:
-            return None
-        return self.hysteresis.u0 if self.amplifier is None else self.amplifier.command(self.hysteresis.u0)
+        u0 = roles.first_input(self.hysteresis)
+        return u0 if u0 is None or self.amplifier is None else self.amplifier.command(u0)
 
     @property
     def u_range(self) -> tuple[float, ...] | None:
         """Lowest and highest voltage of the record that the law was identified on; None if unknown."""
-        return self.hysteresis.u_range if isinstance(self.hysteresis, roles.Placeable) else None
+        return roles.input_range(self.hysteresis)
 
     def placed(self, u0: float | None, u_range: tuple[float, ...] | None = None) -> "Actuator":
         """The actuator with the memory of its law at the command `u0`, and its range from one of commands."""

@@ -20,13 +20,14 @@ import numpy.typing as npt
 from hysim._basics.frozen import FloatArray, read_only
 from hysim._columns.channels import Channels, checked_channels, value_in
 from hysim.laws.static import Line
+from hysim.models import protocols as roles
 from hysim.models.by_structure import searched
 from hysim.models.dependent import AlongRecord
 from hysim.models.joint_space import columns_beside, declared, together, without_repetition
 from hysim.models.model import family
 from hysim.models.parameters import space_of
 from hysim.models.parts import check_parts, own, response_of
-from hysim.models.protocols import Containing, Identifiable, Placeable, Subject, law_at, needs_time, placed, with_law
+from hysim.models.protocols import Subject, first_input, input_range, law_at, needs_time, placed, with_law
 from hysim.models.search_space import ALL_FREE, Freedom, Parameters, SearchSpace
 from hysim.records import Record
 
@@ -80,14 +81,12 @@ class MultiInputActuator:
     @property
     def u0(self) -> float | None:
         """Input ``"u"`` at which the memory of its law holds; None for the first sample."""
-        main = self._main
-        return main.u0 if isinstance(main, Placeable) else None
+        return first_input(self._main)
 
     @property
     def u_range(self) -> tuple[float, ...] | None:
         """Lowest and highest input ``"u"`` of the identified record; None if unknown."""
-        main = self._main
-        return main.u_range if isinstance(main, Placeable) else None
+        return input_range(self._main)
 
     def placed(self, u0: float | None, u_range: tuple[float, ...] | None = None) -> "MultiInputActuator":
         """This model with the memory of the law of ``"u"`` at the input `u0`."""
@@ -96,7 +95,7 @@ class MultiInputActuator:
     @property
     def input_gain(self) -> float:
         """That of the actuator of ``"u"``."""
-        return self._main.input_gain if isinstance(self._main, Containing) else 1.0
+        return self._main.input_gain if isinstance(self._main, roles.Containing) else 1.0
 
     def with_law(self, changed: Callable[[Any], Any]) -> "MultiInputActuator":
         """This model with the law of ``"u"`` changed by a function."""
@@ -235,7 +234,7 @@ def checked_laws(laws: Mapping[str, Any]) -> InputSum:
         )
     begun = {name: law() if isinstance(law, type) else law for name, law in laws.items()}
     for name, law in begun.items():
-        if not isinstance(law, Identifiable):
+        if not isinstance(law, roles.Identifiable):
             raise TypeError(f"hysteresis[{name!r}] must be a law that can be identified, got {type(law).__name__}")
     return InputSum({name: _widest(law) for name, law in begun.items()})
 

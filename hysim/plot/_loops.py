@@ -16,9 +16,9 @@ from hysim._basics.frozen import FloatArray
 from hysim._basics.prefixes import in_unit, label
 from hysim._columns.turning import TOLERANCE, turns
 from hysim.metrics import LoopMetrics, loop_metrics
-from hysim.plot._records import InputOutput, drawable, names_of, times_of, units_of
+from hysim.plot._records import drawable, names_of, times_of, units_of
 from hysim.plot._style import GUIDE, MANY, MARKERS, MEASURED, POINTS, SEQUENTIAL, grid_of, line, one
-from hysim.records import Record
+from hysim.records import InputOutput, Record
 
 
 def minor_loops(result: InputOutput, ax: Axes | None = None, *, tolerance: float = TOLERANCE) -> Axes:

@@ -13,7 +13,7 @@ from hysim.control import ClosedLoop
 from hysim.models.protocols import Responding
 from hysim.plants.structures.structure import ResponseSpectrum
 from hysim.plot._style import MANY, MEASURED, POINTS, AxesArray, AxesLike, joined, line, one, several, upright
-from hysim.records import Record, as_record
+from hysim.records import InputOutput, Record, as_record
 from hysim.simulation import Simulation, columns_of, free_run, has_elements
 
 _DRAWN = {"zoh": "steps-post", "foh": "default"}
@@ -25,15 +25,6 @@ _TABLES = {
     "pseudo_acceleration": "Pseudo-acceleration", "displacement": "Peak displacement", "ductility": "Ductility",
     "reduction_factor": "Reduction factor", "elastic_acceleration": "Elastic pseudo-acceleration",
 }  # fmt: skip
-
-
-class InputOutput(Protocol):
-    """A Record, a Simulation or anything with `u` and `y`, and perhaps `units`, `name`, times `t` and memory `z`."""
-
-    @property
-    def u(self) -> FloatArray: ...
-    @property
-    def y(self) -> FloatArray: ...
 
 
 @runtime_checkable

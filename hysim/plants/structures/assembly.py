@@ -24,8 +24,9 @@ from hysim.kernels.structure_loop import close
 from hysim.kernels.structure_path import follow
 from hysim.kernels.structure_pointers import FOLLOW, addresses
 from hysim.kernels.structure_sweeps import LEAST_DRIFT
+from hysim.laws.friction.rated_law import RatedLaw
 from hysim.models.compiled_step import startable
-from hysim.models.protocols import CompiledController, Rated, Startable, Stretched, needed_time, positive_time
+from hysim.models.protocols import CompiledController, Startable, Stretched, needed_time, positive_time
 from hysim.plants.chain import Signals
 from hysim.plants.stages import Amplifier, Sensor
 from hysim.plants.structures.parts import OF_ELEMENTS, OF_NODES, ModalDamping, Rayleigh, dissipates, parted
@@ -99,8 +100,8 @@ class Matrices(NamedTuple):
 
 
 def laws_of(models: Sequence[Any]) -> Laws:
-    rated = tuple(isinstance(model, Rated) for model in models)
-    steppers = tuple(model.rated() if isinstance(model, Rated) else startable(model) for model in models)
+    rated = tuple(isinstance(model, RatedLaw) for model in models)
+    steppers = tuple(model.rated() if isinstance(model, RatedLaw) else startable(model) for model in models)
     stretches = tuple(
         model.memory_places if isinstance(model, Stretched) else ((0, each.state.size),)
         for model, each in zip(models, steppers, strict=True)

@@ -21,10 +21,11 @@ from hysim._basics.frozen import FloatArray, check_not_negative, check_positive,
 from hysim._basics.results import model_of
 from hysim.errors import SimulationError
 from hysim.laws.dashpot import Dashpot
+from hysim.laws.friction.rated_law import RatedLaw
 from hysim.laws.static import Line
 from hysim.models.model import family
 from hysim.models.parts import own
-from hysim.models.protocols import Numbered, Rated, Sampled, Stepwise, needs_time
+from hysim.models.protocols import Numbered, Sampled, Stepwise, needs_time
 from hysim.models.sum import Sum
 from hysim.signals import triangle
 
@@ -119,13 +120,13 @@ class Parted(NamedTuple):
 
 def parted(law: Any) -> Parted:
     """The dashpots of a law apart from the rest; TypeError if anything else in it depends on time."""
-    if isinstance(law, Rated):
+    if isinstance(law, RatedLaw):
         return Parted(law, law.viscosity)
     if isinstance(law, Dashpot):
         return Parted(Line(slope=0.0), law.c)
     if isinstance(law, Sum) and law.dynamic:
         parts = [parted(part) for part in law.parts]
-        if rated := [type(part.law).__name__ for part in parts if isinstance(part.law, Rated)]:
+        if rated := [type(part.law).__name__ for part in parts if isinstance(part.law, RatedLaw)]:
             raise TypeError(f"an element takes a {rated[0]} by itself: put the other parts into a parallel element")
         rests = tuple(each.law for part, each in zip(law.parts, parts, strict=True) if not isinstance(part, Dashpot))
         rest = Line(slope=0.0) if not rests else rests[0] if len(rests) == 1 else Sum(parts=rests)
