@@ -19,7 +19,9 @@ class Sets(NamedTuple):
     """Structures that differ in numbers, one a row.
 
     `A` is (n_sets, m, m), `loads` (n_sets, 1 + n_elements, m), `rates` (n_sets,), `slopes` and `viscosities`
-    (n_sets, n_elements), `parameters` and `states` those of the laws; `scales` (n_sets,) multiply the input.
+    (n_sets, n_elements), `parameters` and `states` those of the laws, `starts` the addresses of their starts; `scales`
+    (n_sets,) multiply the input `u`, (1, n_samples) or (n_sets, n_samples), from the state `x` on. Base steps without a
+    number are as many as have at most the `phase` of the fastest mode.
     """
 
     A: FloatArray
@@ -29,7 +31,11 @@ class Sets(NamedTuple):
     viscosities: FloatArray
     parameters: FloatArray
     states: FloatArray
+    starts: IntArray
     scales: FloatArray
+    u: FloatArray
+    x: FloatArray
+    phase: float
 
 
 class Results(NamedTuple):
@@ -164,15 +170,15 @@ def fill_structure(
 
 @kernel
 def follow_each(
-    follow: Any, elements: Elements, starts: IntArray, sets: Sets, plant: Plant, steps: Steps, phase: float,
-    x: FloatArray, u: FloatArray, E: FloatArray, P: FloatArray, flows: Flows, motion: Motion, room: Room,
-    tracks: Tracks, results: Results,
+    follow: Any, elements: Elements, sets: Sets, plant: Plant, steps: Steps,
+    parts: tuple[FloatArray, FloatArray, Flows], motion: Motion, room: Room, tracks: Tracks, results: Results,
 ) -> None:  # fmt: skip
     """Results of every set; inf where the motion diverges.
 
-    `follow` is the address of `path.follow`. `u` is (1, n_samples) or (n_sets, n_samples). Base steps without a number,
-    ``steps.base`` 0, are as many as have at most the given phase of the fastest mode.
+    `follow` is the address of `path.follow`, and `parts` are as of `fill_structure`.
     """
+    E, P, flows = parts
+    u = sets.u
     n, walk = elements.k0.size, follow_at(follow)
     loads = np.empty((u.shape[1], 1))
     for i in range(sets.A.shape[0]):
@@ -184,13 +190,13 @@ def follow_each(
         A, rate = sets.A[i], sets.rates[i]
         base = steps.base
         if base == 0:
-            base = max(1, math.ceil(steps.sample_time * rate / phase))
+            base = max(1, math.ceil(steps.sample_time * rate / sets.phase))
         if i == 0 or not (same(A, sets.A[i - 1]) and same(sets.loads[i], sets.loads[i - 1])):
             fill_structure(one, A, sets.loads[i], rate, steps.sample_time / base, E, P, flows)
         row = u[min(i, u.shape[0] - 1)]
         for k in range(row.size):
             loads[k, 0] = sets.scales[i] * row[k]
-        start_motion(one, starts, sets.states[i], x, motion)
+        start_motion(one, sets.starts, sets.states[i], sets.x, motion)
         own = Plant(A, sets.loads[i], plant.damping, plant.directions, plant.pushing)
         divided = Steps(steps.sample_time, rate, base, steps.halvings, steps.tolerance)
         lost = walk(one, flows, own, divided, True, loads, motion, room, tracks)

@@ -17,19 +17,23 @@ from hysim.kernels.controllers import LARGEST, guarded
 from hysim.kernels.structure_layout import Elements, Flows, Motion, Plant, Room, Steps, Tracks
 from hysim.kernels.structure_pointers import controller_at, follow_at
 
+Controller = tuple[Any, FloatArray, FloatArray]
+"""Address of its step, see `pointers`, parameters, and state."""
+
 
 @kernel
 def close(
-    controller: Any, parameters: FloatArray, state: FloatArray, follow: Any, elements: Elements, flows: Flows,
-    plant: Plant, steps: Steps, is_first: bool, weights: FloatArray, inputs: FloatArray, motion: Motion, room: Room,
-    samples: FloatArray, tracks: Tracks,
+    controller: Controller, follow: Any, structure: tuple[Elements, Flows, Plant, Steps], is_first: bool,
+    weights: FloatArray, inputs: FloatArray, motion: Motion, room: Room, samples: FloatArray, tracks: Tracks,
 ) -> int:  # fmt: skip
     """Run the samples of `inputs`, (n, n_loads): the first one that is not finite, or -1.
 
-    `controller` and `follow` are addresses, see `pointers`; the controller's `state` moves along, as `motion` does. The
-    first column of `inputs` is the reference, the others are loads. `samples`, (n, 3), is for command, drive and y.
+    `follow` is an address, see `pointers`; the controller's state moves along, as `motion` does. The first column of
+    `inputs` is the reference, the others are loads. `samples`, (n, 3), is for command, drive and y.
     """
-    step, walk = controller_at(controller), follow_at(follow)
+    address, parameters, state = controller
+    elements, flows, plant, steps = structure
+    step, walk = controller_at(address), follow_at(follow)
     m, n_elements, n_loads = motion.x.size, elements.k0.size, inputs.shape[1]
     loads = np.empty((1, n_loads))
     for k in range(inputs.shape[0]):

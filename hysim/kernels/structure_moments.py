@@ -51,8 +51,11 @@ _NARROWEST = 2.0**-26  # share of a step: the smallest part that is divided
 UNSEEN = 0.05  # share of a stretch behind its last node, halved: a kink there is seen at the end alone
 _MOST_PARTS = 1000  # that are tried on one stretch
 
-Memory = tuple[IntArray, int, int, FloatArray]
-"""Stretches of the states that are memory, first places and lengths; which of them are one law's; and all states."""
+Member = tuple[FloatArray, FloatArray, float]
+"""Parameters and state of a law, and the duration of a step if it depends on the rate, else zero."""
+Memory = tuple[IntArray, int, int, FloatArray, FloatArray, FloatArray]
+"""Stretches of the states that are memory, first places and lengths; which of them are one law's; all states, those
+before the step, and room for some."""
 Path = tuple[float, float, float, float, float, float]
 """Coefficients of a drift, a quintic of the share of a step."""
 Integrals = tuple[float, float, float, float, float, float, float, float]
@@ -150,10 +153,10 @@ def set_clock(state: FloatArray, duration: float, share: float, rate: float) -> 
 
 @uncounted
 def along(
-    step: Step, parameters: FloatArray, state: FloatArray, duration: float, rule: FloatArray, begin: float,
-    end: float, r: float, k0: float, path: Path,
-) -> Integrals:  # fmt: skip
+    step: Step, member: Member, rule: FloatArray, begin: float, end: float, r: float, k0: float, path: Path
+) -> Integrals:
     """Integrals over a monotone part, and the last r; `r` is that at its begin, where the rule has a node."""
+    parameters, state, duration = member
     place = begin
     m0 = m1 = m2 = m3 = m4 = work = ahead = 0.0
     length = end - begin
@@ -189,19 +192,20 @@ def together(one: Integrals, two: Integrals) -> Integrals:
 
 @uncounted
 def divided(
-    step: Step, parameters: FloatArray, state: FloatArray, duration: float, memory: Memory, spare: FloatArray,
-    begin: float, end: float, r: float, allowed: float, k0: float, path: Path,
+    step: Step, member: Member, memory: Memory, begin: float, end: float, r: float, allowed: float, k0: float,
+    path: Path,
 ) -> Integrals:  # fmt: skip
     """Integrals over a monotone stretch that begins with `r`, which is divided until its parts agree."""
+    states, spare = memory[3], memory[5]
     total = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
     low, length, tried = begin, end - begin, 0
-    copy(memory, memory[3], spare)
-    whole = along(step, parameters, state, duration, _LOBATTO, low, end, r, k0, path)
+    copy(memory, states, spare)
+    whole = along(step, member, _LOBATTO, low, end, r, k0, path)
     while True:
         middle, high = low + 0.5 * length, low + length
-        copy(memory, spare, memory[3])
-        one = along(step, parameters, state, duration, _LOBATTO, low, middle, r, k0, path)
-        two = along(step, parameters, state, duration, _LOBATTO, middle, high, one[6], k0, path)
+        copy(memory, spare, states)
+        one = along(step, member, _LOBATTO, low, middle, r, k0, path)
+        two = along(step, member, _LOBATTO, middle, high, one[6], k0, path)
         tried += 1
         agree = abs(one[0] + two[0] - whole[0]) <= allowed or not math.isfinite(one[0] + two[0])
         if not agree and length > _NARROWEST and tried < _MOST_PARTS:
@@ -212,81 +216,79 @@ def divided(
         if not low < end:
             break
         length = min(2.0 * length, end - low)
-        copy(memory, memory[3], spare)
-        whole = along(step, parameters, state, duration, _LOBATTO, low, low + length, r, k0, path)
+        copy(memory, states, spare)
+        whole = along(step, member, _LOBATTO, low, low + length, r, k0, path)
     return total
 
 
 @inlined
 def copy(memory: Memory, source: FloatArray, target: FloatArray) -> None:
     """A law's memory from one row of states into another."""
-    stretches, first, last, _ = memory
-    for i in range(first, last):
+    stretches = memory[0]
+    for i in range(memory[1], memory[2]):
         for q in range(stretches[i, 0], stretches[i, 0] + stretches[i, 1]):
             target[q] = source[q]
 
 
 @unfolded
 def fit_rest(
-    step: Step, parameters: FloatArray, state: FloatArray, duration: float, memory: Memory, saved: FloatArray,
-    spare: FloatArray, is_fine: bool, allowed: float, k0: float, f0: float, path: Path, middle: float, last: float,
-    e: int, rest: FloatArray, sums: FloatArray,
+    step: Step, member: Member, memory: Memory, is_fine: bool, allowed: float, begins: tuple[float, float], path: Path,
+    rates: tuple[float, float], rest: FloatArray, sums: FloatArray,
 ) -> bool:  # fmt: skip
     """One sweep of an element: whether its stretches were divided.
 
-    `duration` is that of the step for a law that depends on the rate, else zero; `middle` and `last` are the rates
-    there. Row e of `rest`, (c0, c1, c2, c3), and of `sums` is overwritten: m0, the work of r, the largest drift at a
-    turn, r at the last node, the place of that node, what the fit misses of the fifth moment, what the rule may have
-    missed behind its nodes, in a first sweep without the last of them, the r to which its last nodes lead, and the
-    place of the memory. The m0 before is that of the sweep before. The law's memory is at the last node, or at
-    the end, afterwards; before a division it is taken from `saved`.
+    It `begins` with the slope k0 and the force; `rates` are those in the middle and at the end. Its rows of `rest`,
+    (c0, c1, c2, c3), and of `sums` are overwritten: m0, the work of r, the largest drift at a turn, r at the last node,
+    the place of that node, what the fit misses of the fifth moment, what the rule may have missed behind its nodes, in
+    a first sweep without the last of them, the r to which its last nodes lead, and the place of the memory. The m0
+    before is that of the sweep before. The law's memory is at the last node, or at the end, afterwards; before a
+    division it is that before the step.
     """
-    one, two, three, four = turns(path, middle, last)
+    parameters, state, duration = member
+    k0, f0 = begins
+    one, two, three, four = turns(path, rates[0], rates[1])
     rule = _RADAU_4 if is_fine else _RADAU_3
     total = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, k0 * path[0] - f0, 0.0)
     begin = peak = missed = 0.0
     for part in range(5):
         end = one if part == 0 else two if part == 1 else three if part == 2 else four if part == 3 else 1.0
-        total = together(total, along(step, parameters, state, duration, rule, begin, end, total[6], k0, path))
-        sums[e, 3], sums[e, 4], sums[e, 7] = total[6], begin + (end - begin) * rule[rule.shape[0] - 1, 0], total[7]
+        total = together(total, along(step, member, rule, begin, end, total[6], k0, path))
+        sums[3], sums[4], sums[7] = total[6], begin + (end - begin) * rule[rule.shape[0] - 1, 0], total[7]
         if end == 1.0 and not is_fine:
             break
         d = drift_at(end, path)
-        set_clock(state, duration, end - sums[e, 4], rate_at(end, path))
+        set_clock(state, duration, end - sums[4], rate_at(end, path))
         r = k0 * d - step(parameters, state, d)
         missed += UNSEEN * (end - begin) * abs(r - total[7])
         total = total[0], total[1], total[2], total[3], total[4], total[5], r, 0.0
         if end == 1.0:
             break
         begin, peak = end, max(peak, abs(d))
-    is_divided = is_fine and not max(abs(total[0] - sums[e, 0]), missed) <= allowed
+    is_divided = is_fine and not max(abs(total[0] - sums[0]), missed) <= allowed
     if is_divided:
-        copy(memory, saved, memory[3])
+        copy(memory, memory[4], memory[3])
         total = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, k0 * path[0] - f0, 0.0)
         begin = 0.0
         for part in range(5):
             end = one if part == 0 else two if part == 1 else three if part == 2 else four if part == 3 else 1.0
-            part_of_it = divided(
-                step, parameters, state, duration, memory, spare, begin, end, total[6], allowed, k0, path
-            )
-            total = together(total, part_of_it)
+            total = together(total, divided(step, member, memory, begin, end, total[6], allowed, k0, path))
             if end == 1.0:
                 break
             begin = end
     m0, m1, m2, m3, m4, work, _, _ = total
     if is_fine:
-        rest[4 * e + 0] = 16.0 * m0 - 120.0 * m1 + 240.0 * m2 - 140.0 * m3
-        rest[4 * e + 1] = -120.0 * m0 + 1200.0 * m1 - 2700.0 * m2 + 1680.0 * m3
-        rest[4 * e + 2] = 240.0 * m0 - 2700.0 * m1 + 6480.0 * m2 - 4200.0 * m3
-        rest[4 * e + 3] = -140.0 * m0 + 1680.0 * m1 - 4200.0 * m2 + 2800.0 * m3
+        rest[0] = 16.0 * m0 - 120.0 * m1 + 240.0 * m2 - 140.0 * m3
+        rest[1] = -120.0 * m0 + 1200.0 * m1 - 2700.0 * m2 + 1680.0 * m3
+        rest[2] = 240.0 * m0 - 2700.0 * m1 + 6480.0 * m2 - 4200.0 * m3
+        rest[3] = -140.0 * m0 + 1680.0 * m1 - 4200.0 * m2 + 2800.0 * m3
     else:
-        rest[4 * e + 0] = 9.0 * m0 - 36.0 * m1 + 30.0 * m2
-        rest[4 * e + 1] = -36.0 * m0 + 192.0 * m1 - 180.0 * m2
-        rest[4 * e + 2] = 30.0 * m0 - 180.0 * m1 + 180.0 * m2
-        rest[4 * e + 3] = 0.0
-    fitted = rest[4 * e + 0] / 5.0 + rest[4 * e + 1] / 6.0 + rest[4 * e + 2] / 7.0 + rest[4 * e + 3] / 8.0
-    sums[e, 0], sums[e, 1], sums[e, 2], sums[e, 5], sums[e, 6] = m0, work, peak, abs(m4 - fitted), missed
-    sums[e, 8] = 1.0 if is_fine else sums[e, 4]
+        rest[0] = 9.0 * m0 - 36.0 * m1 + 30.0 * m2
+        rest[1] = -36.0 * m0 + 192.0 * m1 - 180.0 * m2
+        rest[2] = 30.0 * m0 - 180.0 * m1 + 180.0 * m2
+        rest[3] = 0.0
+    fitted = rest[0] / 5.0 + rest[1] / 6.0 + rest[2] / 7.0 + rest[3] / 8.0
+    sums[0], sums[1], sums[2], sums[5], sums[6] = m0, work, peak, abs(m4 - fitted), missed
+    sums[8] = 1.0 if is_fine else sums[4]
     return is_divided
 
 

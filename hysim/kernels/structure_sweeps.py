@@ -43,15 +43,17 @@ def sweep(elements: Elements, h: float, is_fine: bool, motion: Motion, room: Roo
     any_divided = False
     keep(elements.stretches, room.saved, motion.laws)
     for e in range(n):
-        memory = elements.stretches, elements.stretch_ends[e], elements.stretch_ends[e + 1], motion.laws
+        first, end = elements.stretch_ends[e], elements.stretch_ends[e + 1]
+        memory = elements.stretches, first, end, motion.laws, room.saved, room.spare
         state = motion.laws[elements.state_ends[e] : elements.state_ends[e + 1]]
         parameters = elements.parameters[elements.parameter_ends[e] : elements.parameter_ends[e + 1]]
         middle, last = h * room.middle[n + e], h * room.drifts[n + e]
         path = quintic(carry[2, e], h * carry[3, e], room.middle[e], middle, room.drifts[e], last)
+        member = parameters, state, h * elements.rated[e]
+        begins, rates = (elements.k0[e], carry[0, e]), (middle, last)
         is_divided = fit_rest(
-            step_at(elements.steps[e]), parameters, state, h * elements.rated[e], memory, room.saved, room.spare,
-            is_fine, room.allowed[e],
-            elements.k0[e], carry[0, e], path, middle, last, e, room.rest, room.sums,
+            step_at(elements.steps[e]), member, memory, is_fine, room.allowed[e], begins, path, rates,
+            room.rest[4 * e : 4 * e + 4], room.sums[e],
         )  # fmt: skip
         any_divided = any_divided or is_divided
     return any_divided

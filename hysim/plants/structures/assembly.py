@@ -562,15 +562,15 @@ class ControlledStructure:
         """As `Chain.run`; the signals are those just before each new command."""
         n, motion = reference.size, Motion(*(part.copy() for part in state.motion))
         (address,), follow = addresses([controller.step], CONTROLLER), follow_address()
+        stepped = address, controller.parameters, controller.state
         inputs = np.column_stack([reference] if self.ground is None else [reference, self.ground])
         samples, room = np.empty((n, 3)), room_for(motion)
 
         def run(k: slice, rows: Tracks) -> int:
-            lost = close(
-                address, controller.parameters, controller.state, follow, *self.arguments,
-                k.start == 0, self.weights, inputs[k], motion, room, samples[k], rows,
-            )  # fmt: skip
-            return int(lost)
+            begins = k.start == 0
+            return int(
+                close(stepped, follow, self.arguments, begins, self.weights, inputs[k], motion, room, samples[k], rows)
+            )
 
         lost, tracks = moved(run, n, motion)
         command, drive, y = samples.T.copy()

@@ -49,21 +49,20 @@ def reduced(
     steps = Steps(float(sample_time), 0.0, structure.substeps or 0, halvings, structure.tolerance)
     with_accelerations = reduce == "peak_acceleration"
     motion = assembly.empty_motion(2 * n, states.shape[1], n_elements, with_accelerations=with_accelerations)
-    E, P, flows = assembly.empty_flows(halvings, 2 * n, 1, n_elements)
+    parts = assembly.empty_flows(halvings, 2 * n, 1, n_elements)
     results = Results(np.empty((n_sets, motion.peaks.size)), *(np.empty((n_sets, n_elements)) for _ in range(3)))
     sets = Sets(
-        A, loads, np.ascontiguousarray(rates), slopes, read_only(matrices.viscosities), parameters, states,
-        np.array(np.broadcast_to(values.get("scale", np.ones(1)), n_sets)),
+        A, loads, np.ascontiguousarray(rates), slopes, read_only(matrices.viscosities), parameters, states, laws.starts,
+        np.array(np.broadcast_to(values.get("scale", np.ones(1)), n_sets)), np.ascontiguousarray(u),
+        read_only(structure.initial_state or np.zeros(2 * n)), assembly.PHASE,
     )  # fmt: skip
     pushing = np.array([float(structure.excitation == "force")])
     n_worked = int(reduce == "energy" and bool(matrices.viscosities.any()))  # work of dashpots comes with that of loads
     plant = Plant(A[0], loads[0], np.zeros((n, n)), np.zeros((n_worked, n)), pushing)
-    x = read_only(structure.initial_state or np.zeros(2 * n))
     with np.errstate(all="ignore"):
         follow_each(
-            assembly.follow_address(), elements, laws.starts, sets, plant, steps, assembly.PHASE, x,
-            np.ascontiguousarray(u), E, P, flows, motion, assembly.room_for(motion), assembly.empty_tracks(0, motion),
-            results,
+            assembly.follow_address(), elements, sets, plant, steps, parts, motion, assembly.room_for(motion),
+            assembly.empty_tracks(0, motion), results,
         )  # fmt: skip
     peaks = assembly.peaks_by_name(results.peaks, n_elements, n)
     unresolved = assembly.uncertainty(results.errors, peaks["peak_drift"]) > assembly.LEAST_CERTAIN
