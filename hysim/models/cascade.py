@@ -91,7 +91,7 @@ class CascadeStructure(Subject, Composable):
         for name in names[self.carrier + 1 :]:
             stage, its = stages[name], own(parameters, name)
             passed = _through(stage, its, columns.transpose(0, 2, 1), record).transpose(0, 2, 1)
-            added = stage.free_responses(its, record) if isinstance(stage, roles.UnitGainStructure) else passed[..., :0]
+            added = stage.free_responses(its, record)
             n_sets = max(len(passed), len(added))
             blocks = (passed[..., :-1], added, passed[..., -1:])
             columns = np.concatenate([np.broadcast_to(block, (n_sets, *block.shape[1:])) for block in blocks], axis=-1)
@@ -128,11 +128,8 @@ class CascadeStructure(Subject, Composable):
     @property
     def _searched(self) -> dict[str, Any]:
         carrier = labels(self.stages)[self.carrier]
-        return {
-            label: stage
-            for label, stage in self._by_label.items()
-            if label == carrier or isinstance(stage, roles.UnitGainStructure)
-        }
+        named = zip(self._by_label.items(), self.stages, strict=True)
+        return {label: stage for (label, stage), own in named if label == carrier or stage is not own}
 
     def _record_at(self, label: str, record: Record) -> Record:
         """The record for one stage; the input of the carrier passes the stages before it, whose gain is about one."""
@@ -143,9 +140,9 @@ class CascadeStructure(Subject, Composable):
         return Record(u=u, y=record.y, t=record.t)
 
 
-def _at_rest(stage: roles.UnitGainStructure, record: Record, freedom: Freedom) -> SearchSpace:
+def _at_rest(stage: Any, record: Record, freedom: Freedom) -> SearchSpace:
     """The space of a stage in front of the carrier, in whose initial state nothing is linear."""
-    space = stage.search_space(record, replace(freedom, initial="rest"))
+    space: SearchSpace = stage.search_space(record, replace(freedom, initial="rest"))
     if space.linear:
         raise ValueError(f"{space.linear[0]!r} cannot be free in front of the stage that carries the gain")
     return replace(space, columns=(), state=())
@@ -153,11 +150,9 @@ def _at_rest(stage: roles.UnitGainStructure, record: Record, freedom: Freedom) -
 
 def _through(stage: Any, parameters: Parameters, signals: FloatArray, record: Record) -> FloatArray:
     """Outputs (n_sets, n_signals, n_samples) of a stage for the inputs `signals`, of this shape or (1, ...)."""
-    if isinstance(stage, roles.UnitGainStructure):
+    if isinstance(stage, roles.LinearStage):
         return stage.filtered_sets(parameters, signals, record.sample_time)
     each = signals.reshape(-1, signals.shape[-1])
-    if isinstance(stage, roles.LinearStage):
-        return stage.filtered(each, record.sample_time).reshape(signals.shape)
     return np.reshape([response_of(stage, u, time_of(stage, record)) for u in each], signals.shape)
 
 

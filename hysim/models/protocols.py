@@ -368,23 +368,12 @@ class Subject(Searched, Identifiable):
 
 @runtime_checkable
 class LinearStage(Protocol):
-    """A linear plant through which many inputs pass at once."""
+    """A linear plant through which many inputs pass at once: one that is known, or one whose gain at rest is one."""
 
     initial_state: tuple[float, ...]
 
-    def filtered(self, signals: FloatArray, sample_time: float) -> FloatArray:
-        """Outputs from rest, of the shape of the inputs (n_signals, n_samples)."""
-
-
-@runtime_checkable
-class UnitGainStructure(Protocol):
-    """A linear structure whose gain at rest is one, since another stage carries the gain."""
-
-    def search_space(self, record: Record, freedom: Freedom = ALL_FREE) -> SearchSpace:
-        """Declare the box for `record`."""
-
     def filtered_sets(self, parameters: Parameters, signals: FloatArray, sample_time: float) -> FloatArray:
-        """Outputs (n_sets, n_signals, n_samples) for inputs of this shape, or (1, n_signals, n_samples)."""
+        """Outputs (n_sets, n_signals, n_samples) from rest for inputs of this shape, or (1, n_signals, n_samples)."""
 
     def free_responses(self, parameters: Parameters, record: Record) -> FloatArray:
         """Columns of the initial state, shape (n_sets, n_samples, n_states)."""
@@ -394,8 +383,8 @@ class UnitGainStructure(Protocol):
 class LinearStructure(Identifiable, Protocol):
     """A linear plant to be identified, whose gain another stage of a cascade may carry."""
 
-    def with_unit_gain(self) -> UnitGainStructure:
-        """The structure with the gain at rest one."""
+    def with_unit_gain(self) -> Any:
+        """The structure with the gain at rest one, as a `LinearStage` with a `search_space`."""
 
 
 class Smoother(NamedTuple):

@@ -33,7 +33,7 @@ The lag of a transfer function that was fitted to a record may be hysteresis:
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
-from typing import Any, NamedTuple
+from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 from numpy.polynomial import chebyshev
@@ -165,6 +165,7 @@ class UnitGain:
     """A structure whose numerator ends with ``den[n]``."""
 
     structure: Any  # of a transfer function, which makes this
+    initial_state: ClassVar[tuple[float, ...]] = ()
 
     @property
     def shape(self) -> tuple[str, ...]:

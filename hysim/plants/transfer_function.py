@@ -168,10 +168,14 @@ class TransferFunction(Composable):
             plant.rest_at(u0, level, law.state)
         return law
 
-    def filtered(self, signals: FloatArray, sample_time: float) -> FloatArray:
-        """Outputs (n_signals, n_samples) from rest for several inputs at once; they may be infinite or nan."""
-        plant = self._plant(sample_time)
-        return np.asarray(plant.filtered(signals[np.newaxis], hold=self.hold, sample=self.sample)[0])
+    def filtered_sets(self, parameters: Parameters, signals: FloatArray, sample_time: float) -> FloatArray:
+        """Outputs from rest for inputs (n_sets, n_signals, n_samples); they may be infinite or nan."""
+        each = signals.reshape(1, -1, signals.shape[-1])
+        return self._plant(sample_time).filtered(each, hold=self.hold, sample=self.sample).reshape(signals.shape)
+
+    def free_responses(self, parameters: Parameters, record: Record) -> FloatArray:
+        """No column: the initial state is known."""
+        return np.empty((1, len(record), 0))
 
     @classmethod
     def structure(
