@@ -565,10 +565,6 @@ def _together(
     linear += [(name, k) for k in with_own for name in own.linear if name in states]
 
     searched = [(own.coordinates[place], k) for place, k in order]
-
-    def box(values: FloatArray) -> FloatArray:
-        return values[..., [place for place, _ in order]]
-
     parts = tuple(
         Part(
             record=record,
@@ -580,16 +576,11 @@ def _together(
         for k, record in enumerate(records)
     )
     free_states = tuple(f"{name}[{k}]" for k in with_own for name in states)
-    space = replace(
-        own,
+    space = own.at(
+        [place for place, _ in order],
         coordinates=tuple(_called(name, k) for name, k in searched),
-        lower=box(own.lower),
-        upper=box(own.upper),
-        starts=box(own.starts) if own.starts.size else np.empty((len(own.starts), len(order))),
         names=(*(name for name in own.names if name not in states), *free_states),
         linear=tuple(_called(name, k) for name, k in linear),
-        drawn=own.drawn and (box(own.drawn[0]), box(own.drawn[1])),
-        regions={name: (box(lower), box(upper)) for name, (lower, upper) in own.regions.items()},
         bounds={_called(name, k): own.bounds[name] for name, k in linear if name in own.bounds},
         physical={_called(name, k): own.physical[name] for name, k in searched if name in own.physical},
         by_user={_called(name, k): own.by_user[name] for name, k in (*searched, *linear) if name in own.by_user},

@@ -106,7 +106,7 @@ def _gone_on(end: _End) -> _End:
 
 def _with_law(plant: Any, setting: Setting) -> tuple[Any, Any, Numbers, bool]:
     """The plant whose law begins where the law alone is best, that law, its shape, and whether it is enough."""
-    k, law, freedom = plant.slowest, plant.law, setting.freedom
+    k, law, freedom = plant.survey.law, plant.law, setting.freedom
     record = plant.static(setting.records[k])
     share = replace(share_of(freedom, "hysteresis"), starts_anew=False)
     alone = replace(setting.only([k]), records=[record], freedom=share, max_evaluations=None)
@@ -125,7 +125,7 @@ def _with_law(plant: Any, setting: Setting) -> tuple[Any, Any, Numbers, bool]:
     shape = {f"hysteresis.{name}": estimates[name] for name in searched}
     error = math.sqrt(optima[0].cost / best.n_samples)
     is_enough = error <= _ENOUGH * float(np.ptp(record.y)) + (record.resolution or 0.0)
-    return plant.with_law(start), model, shape, is_enough
+    return replace(plant, law=start), model, shape, is_enough
 
 
 def _behind_inputs(plant: Any, law: Any, setting: Setting) -> tuple[Any, list[Numbers]]:
@@ -160,7 +160,7 @@ def _grown(plant: Any, law: Any, setting: Setting) -> tuple[Any, list[Numbers]]:
     before = math.inf
     for each in plant.growing():
         known_law = each.behind(law)
-        attempt = setting.only([plant.fastest]).about(known_law.names).problem(known_law)
+        attempt = setting.only([plant.survey.fastest]).about(known_law.names).problem(known_law)
         ends = _found(attempt, each, known) if attempt.n_x else np.empty((1, 0))
         criterion = _criterion(attempt, ends)
         if not criterion < before - _STRONG and (smaller := _left_out(plant, each, setting.freedom)) is not None:

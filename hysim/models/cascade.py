@@ -10,7 +10,7 @@ is, and so is a transfer function that is given. Of transfer functions alone the
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from functools import reduce
+from functools import partial, reduce
 from itertools import accumulate
 from typing import Any, ClassVar
 
@@ -67,18 +67,13 @@ class CascadeStructure(Subject, Composable):
     def search_space(self, record: Record, freedom: Freedom = ALL_FREE) -> SearchSpace:
         names = labels(self.stages)
         before = names[: self.carrier]
-        spaces = declared(
-            {
-                label: lambda free, label=label, stage=stage: (  # type: ignore[misc]
-                    _at_rest(stage, record, free)
-                    if label in before
-                    else stage.search_space(self._record_at(label, record), free)
-                )
-                for label, stage in self._searched.items()
-            },
-            freedom,
-        )
-        return together(spaces)
+        spaces = {
+            label: partial(_at_rest, stage, record)
+            if label in before
+            else partial(stage.search_space, self._record_at(label, record))
+            for label, stage in self._searched.items()
+        }
+        return together(declared(spaces, freedom))
 
     def regressors(self, parameters: Parameters, record: Record) -> FloatArray:
         """The columns of the carrier and of the initial states after it, through the following stages."""

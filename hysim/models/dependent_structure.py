@@ -48,9 +48,6 @@ def expanded(
     several = {each: [j for j, (k, _) in enumerate(own) if space.coordinates[k] == each] for each in names}
     several = {each: columns for each, columns in several.items() if columns}
 
-    def laid(side: FloatArray) -> FloatArray:
-        return side[..., places]
-
     def base(x: FloatArray) -> FloatArray:
         """The law's own coordinates, the mean where there are several values."""
         columns = [x[:, np.equal(places, i)].mean(axis=1) for i in range(len(space.coordinates))]
@@ -75,23 +72,19 @@ def expanded(
     further = [
         [float(encode(_at_place(start, names, name))[k]) for k, name in own] for start in starts if space.coordinates
     ]
-    return replace(
-        space,
+    known = space.at(
+        places,
         coordinates=tuple(name for _, name in own),
-        lower=laid(space.lower),
-        upper=laid(space.upper),
-        starts=np.concatenate([np.reshape(further, (len(further), len(own))), laid(space.starts)]),
         names=expanded_names(space.names),
         columns=expanded_names(space.columns),
         linear=expanded_names(space.linear),
         parameters=parameters,
-        regions={each: (laid(low), laid(high)) for each, (low, high) in space.regions.items()},
         bounds={name: pair for each, pair in space.bounds.items() for name in names.get(each, (each,))},
         physical={name: pair for each, pair in space.physical.items() for name in names.get(each, (each,))},
-        drawn=space.drawn and (laid(space.drawn[0]), laid(space.drawn[1])),
         encoded=None,
         screened=_SCREENED if starts else space.screened,
     )
+    return replace(known, starts=np.concatenate([np.reshape(further, (len(further), len(own))), known.starts]))
 
 
 def _at_place(start: Mapping[str, float], names: Mapping[str, tuple[str, ...]], chosen: str) -> dict[str, float]:

@@ -5,7 +5,7 @@ of order one. The family turns coordinates into the user's parameters. Parameter
 affine are not searched: for given others, the best ones are the solution of a linear regression.
 """
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any, Self
 
@@ -126,6 +126,20 @@ class SearchSpace:
         }
         outer = None if self.outer is None else (np.minimum(self.outer[0], lower), np.maximum(self.outer[1], upper))
         return replace(self, lower=lower, upper=upper, regions=regions, outer=outer)
+
+    def at(self, places: Sequence[int], **others: Any) -> "SearchSpace":
+        """The space with coordinates at some places of its own, maybe several at one; `others` are its further fields.
+
+        ``coordinates``, with the new names, are among them.
+        """
+
+        def laid(side: FloatArray) -> FloatArray:
+            return side[..., [*places]] if places else np.empty((*side.shape[:-1], 0))
+
+        drawn = self.drawn and (laid(self.drawn[0]), laid(self.drawn[1]))
+        regions = {name: (laid(low), laid(high)) for name, (low, high) in self.regions.items()}
+        box: dict[str, Any] = {name: laid(vars(self)[name]) for name in ("lower", "upper", "starts")}
+        return replace(self, **box, drawn=drawn, regions=regions, **others)
 
     @classmethod
     def of(cls, every: Iterable[str], columns: tuple[str, ...], held: Mapping[str, float], **others: Any) -> Self:

@@ -250,17 +250,11 @@ class SumStructure(Subject, Composable):
 
     def search_space(self, record: Record, freedom: Freedom = ALL_FREE) -> SearchSpace:
         """The parts' spaces side by side; of columns that repeat each other one is free."""
-        identified = self._identified
-        spaces = declared(
-            {label: lambda free, part=part: part.search_space(record, free) for label, part in identified.items()},  # type: ignore[misc]
-            freedom,
-        )
-        joint = together(spaces)
+        spaces = {label: partial(part.search_space, record) for label, part in self._identified.items()}
+        joint = together(declared(spaces, freedom))
+        values = self._values(joint.columns)
         return without_repetition(
-            joint,
-            lambda x: self.regressors(joint.parameters(x), record)[..., :-1],
-            self._values(joint.columns),
-            freedom,
+            joint, lambda x: self.regressors(joint.parameters(x), record)[..., :-1], values, freedom
         )
 
     def regressors(self, parameters: Parameters, record: Record) -> FloatArray:

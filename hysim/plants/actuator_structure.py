@@ -238,12 +238,12 @@ class ActuatorStructure(Subject):
         known = {name: value for name, value in self.known.items() if name not in freedom.free}
         wished = replace(freedom, fixed={**known, **freedom.fixed})
         scaling = self.static(record) if self.scaled_on is None else self.scaled_on
-        own_spaces = {name: lambda free, name=name: parts.spaces({name: free})[name] for name in parts.boxes()}
-        spaces = declared({_LAW: lambda free: self.law.search_space(scaling, free), **own_spaces}, wished)
-        space = together(spaces)
-        state = (*space.state, *self._offsets(space.linear)) if self.offsets == "own" else space.state
+        own_spaces = {name: partial(parts.space, name) for name in parts.boxes()}
+        space = together(declared({_LAW: partial(self.law.search_space, scaling), **own_spaces}, wished))
+        offsets = [_OFFSET] if len(self.inputs) == 1 else [f"{_LAW}.{name}.offset" for name in self.inputs]
+        offsets = [name for name in offsets if self.offsets == "own" and name in space.linear]
         points = np.clip(as_points(space, self.starting), space.lower, space.upper)
-        return replace(space, starts=points, screened=0, regions={}, state=state)
+        return replace(space, starts=points, screened=0, regions={}, state=(*space.state, *offsets))
 
     def regressors(self, parameters: Parameters, record: Record) -> FloatArray:
         late = 0.0 if self.sensor is None else self.sensor.delay
@@ -300,26 +300,12 @@ class ActuatorStructure(Subject):
         """The noise that its sensor makes, as `identify` names it."""
         return "quantised" if self.sensor is not None and self.sensor.quantum else "gaussian"
 
-    @property
-    def slowest(self) -> int:
-        """The record of the slowest input among those with a wide one."""
-        return 0 if self.survey is None else int(self.survey.law)
-
-    @property
-    def fastest(self) -> int:
-        """The record on which the parts that grow are searched."""
-        return 0 if self.survey is None else int(self.survey.fastest)
-
     def static(self, record: Record) -> Record:
         """The record with the voltages that a known amplifier makes of its commands."""
         if not isinstance(self.amplifier, Amplifier):
             return record
         others = {name: self.amplifier.voltage(seen_by(record, name).u) for name in self.inputs if name != MAIN}
         return replace(record, u=self.amplifier.voltage(record.u), channels={**record.channels, **others})
-
-    def with_law(self, law: Any) -> "ActuatorStructure":
-        """The structure with another law, or another start of it."""
-        return replace(self, law=law)
 
     def behind(self, law: Any) -> "ActuatorStructure":
         """The structure after a law that is known except for its gain, or directly after several inputs."""
@@ -340,8 +326,7 @@ class ActuatorStructure(Subject):
     @property
     def names(self) -> frozenset[str]:
         """Names of the parameters of the parts other than the law."""
-        boxes = {} if self.survey is None else self.parts([]).boxes()
-        return frozenset(f"{part}.{each.name}" for part, (box, _) in boxes.items() for each in box)
+        return frozenset(self.parts([]).coordinates)
 
     def growing(self) -> Sequence["ActuatorStructure"]:
         """The structure without modes, with the first one, and so on; a creep that is searched is left out."""
@@ -405,7 +390,7 @@ class ActuatorStructure(Subject):
         mine = {f"vibration.{name}" for name in (f"{FREQUENCY}[{k}]", f"{DAMPING}[{k}]", *gains)}
         if k < 0 or self.start is not None or mine & {*freedom.fixed, *freedom.free, *freedom.bounds}:
             return None
-        box = {each.name: each for each in self.parts([]).boxes()["vibration"][0]}[f"{FREQUENCY}[{k}]"]
+        box = self.parts([]).coordinates[f"vibration.{FREQUENCY}[{k}]"]
         low, high = box.lower / (2.0 * math.pi), box.upper / (2.0 * math.pi)
         which = "mode" if not k else "further mode"
         unit = self.survey.rate_unit
@@ -417,13 +402,11 @@ class ActuatorStructure(Subject):
         """The parameters of the other parts than the law that the user does not name; at a bound only some of them."""
         named = {*freedom.fixed, *freedom.free, *freedom.bounds, *self.known}
         doubts = []
-        for part, (box, _) in self.parts([]).boxes().items():
-            for each in box:
-                name = f"{part}.{each.name}"
-                value = estimates[name]
-                at_end = value <= each.lower * (1.0 + _AT_BOUND) or value >= each.upper * (1.0 - _AT_BOUND)
-                if name not in named and (not at_end or FREQUENCY in name or value == 0.0):
-                    doubts.append(self._doubt(name, value, freedom))
+        for name, each in self.parts([]).coordinates.items():
+            value = estimates[name]
+            at_end = value <= each.lower * (1.0 + _AT_BOUND) or value >= each.upper * (1.0 - _AT_BOUND)
+            if name not in named and (not at_end or FREQUENCY in name or value == 0.0):
+                doubts.append(self._doubt(name, value, freedom))
         return [doubt for doubt in doubts if doubt is not None]
 
     def _doubt(self, name: str, value: float, freedom: Freedom) -> Doubt | None:
@@ -486,10 +469,6 @@ class ActuatorStructure(Subject):
         n_sets = max(len(block) for block in blocks)
         blocks = [np.broadcast_to(block, (n_sets, *block.shape[1:])) for block in blocks]
         return np.concatenate([*(block[..., :1] for block in blocks), blocks[0][..., 1:]], axis=-1)
-
-    def _offsets(self, linear: Sequence[str]) -> list[str]:
-        names = [_OFFSET] if len(self.inputs) == 1 else [f"{_LAW}.{name}.offset" for name in self.inputs]
-        return [name for name in names if name in linear]
 
     def _delayed(self, k: int, step: float) -> "ActuatorStructure":
         delay = 0.0 if not k else (k - 0.5) * step

@@ -200,13 +200,15 @@ class LinearParts:
     inputs: tuple[str, ...] = (MAIN,)
     gains: bool = True  # whether gains of modes are coordinates
 
-    def spaces(self, freedom: Mapping[str, Freedom]) -> dict[str, SearchSpace]:
-        spaces = {}
-        for name, (box, defaults) in self.boxes().items():
-            wish = freedom.get(name, Freedom())
-            held = wish.held(defaults)
-            spaces[name] = space_of(box, (), defaults, held, wish.limits(defaults, held))
-        return spaces
+    def space(self, name: str, freedom: Freedom) -> SearchSpace:
+        """The space of the part of this name."""
+        box, defaults = self.boxes()[name]
+        held = freedom.held(defaults)
+        return space_of(box, (), defaults, held, freedom.limits(defaults, held))
+
+    @property
+    def coordinates(self) -> dict[str, Coordinate]:
+        return {f"{part}.{each.name}": each for part, (box, _) in self.boxes().items() for each in box}
 
     def boxes(self) -> dict[str, tuple[tuple[Coordinate, ...], dict[str, float]]]:
         survey = self.survey

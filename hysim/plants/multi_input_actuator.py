@@ -12,6 +12,7 @@ and little beside it. Of one input `Scaled` does, a law that is known but for it
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -171,8 +172,7 @@ class InputSum(Subject):
 
     def search_space(self, record: Record, freedom: Freedom = ALL_FREE) -> SearchSpace:
         """The laws' spaces side by side; of offsets only the last is free."""
-        records = {name: seen_by(record, name) for name in self.laws}
-        spaces = {name: lambda free, name=name: self.laws[name].search_space(records[name], free) for name in self.laws}
+        spaces = {name: partial(law.search_space, seen_by(record, name)) for name, law in self.laws.items()}
         joint = together(declared(spaces, freedom))
         return without_repetition(joint, lambda x: self.regressors(joint.parameters(x), record)[..., :-1], {}, freedom)
 
