@@ -30,7 +30,7 @@ from hysim.models.joint_space import columns_beside
 from hysim.models.law import Law
 from hysim.models.model import family
 from hysim.models.parts import labelled, own, response_of
-from hysim.models.protocols import Identifiable, Sampled, Timed, needed_time
+from hysim.models.protocols import Identifiable, Timed, needed_time
 from hysim.models.search_space import Parameters
 from hysim.models.sum import Sum, SumStructure
 from hysim.models.tables import tables_of
@@ -159,7 +159,7 @@ def columns_along(
         return columns_beside(blocks, replace(subject, parts=known).regressors({}, record) if known else 0.0)
     law = subject() if isinstance(subject, type) else subject
     law = law.at_sample_time(record.sample_time) if isinstance(law, Timed) else law
-    if not isinstance(law, Law) or isinstance(law, Sampled):
+    if not isinstance(law, Law):
         raise _cannot_vary(varying, law)
     n_sets = len(next(iter(varying.values())))
     sets = {name: np.broadcast_to(np.asarray(value, dtype=float), (n_sets,)) for name, value in parameters.items()}
@@ -177,7 +177,7 @@ def response_along(
         parts = [response_along(part, own(series, name), u, sample_time) for name, part in named]
         return np.asarray(np.sum(parts, axis=0))
     law = model.at_sample_time(needed_time(model, sample_time)) if isinstance(model, Timed) else model
-    if isinstance(law, Law) and not isinstance(law, Sampled):
+    if isinstance(law, Law):
         y = paths(law, {**law.scalars, **{name: each[np.newaxis] for name, each in series.items()}}, u)[0]
         if not np.isfinite(y).all():
             raise SimulationError("the output diverges where the parameters vary along the input")

@@ -14,16 +14,9 @@ from hysim._basics.parallel import in_pieces
 from hysim.kernels import controllers
 from hysim.kernels import loop as kernels
 from hysim.laws.static import Line
+from hysim.models import protocols as roles
 from hysim.models.compiled_step import startable
-from hysim.models.protocols import (
-    CompiledController,
-    CompiledLaw,
-    Startable,
-    check_continued,
-    law_at,
-    needs_time,
-    positive_time,
-)
+from hysim.models.protocols import check_continued, law_at, needs_time, positive_time
 from hysim.plants import stages as linear
 from hysim.plants.stages import Amplifier, Creep, Sensor, Stage, Vibration
 
@@ -54,7 +47,7 @@ class ChainState(NamedTuple):
 
     samples: int
     voltages: FloatArray
-    law: CompiledLaw
+    law: roles.CompiledLaw
     x: FloatArray
     past: FloatArray
     readings: FloatArray
@@ -117,7 +110,7 @@ class Chain:
                 x[: self.stage.rest.size] = self.stage.rest * level
         if not np.isfinite(x).all():
             raise ValueError(f"the vibration integrates: it cannot rest at the law's output {level:g}")
-        law = CompiledLaw(*self.hysteresis.compiled(float(voltages[1])))
+        law = roles.CompiledLaw(*self.hysteresis.compiled(float(voltages[1])))
         past, readings = np.full(self.stage.lag + 3, level), np.empty(self.samples_late + 2)
         state = ChainState(0, voltages, law, x, past, readings, self.step)
         state.readings[:] = self.displacement(state)
@@ -142,7 +135,7 @@ class Chain:
         return signals.y + self.linear.D * np.diff(w)[1 : 1 + signals.y.size]
 
     def run(
-        self, controller: CompiledController, state: ChainState, reference: FloatArray
+        self, controller: roles.CompiledController, state: ChainState, reference: FloatArray
     ) -> tuple[Signals, ChainState]:
         """Run a controller, whose state moves along, from a state of the chain; the state at the end with it."""
         n = reference.size
@@ -169,7 +162,7 @@ class Chain:
         return Signals(command, drive, u, v, w, y, measurement, lost), end
 
     def run_each(
-        self, controllers: Sequence[CompiledController], state: ChainState, reference: FloatArray
+        self, controllers: Sequence[roles.CompiledController], state: ChainState, reference: FloatArray
     ) -> tuple[FloatArray, npt.NDArray[np.int64]]:
         """Displacements (m, n) of controllers of one kind from `state`, and the first sample that diverges, or -1."""
         n, m = reference.size, len(controllers)
@@ -188,9 +181,9 @@ class Chain:
         return read_only(np.stack([reference, noise]), finite=False)
 
     def driven(self, u: FloatArray, state: ChainState) -> tuple[Signals, ChainState]:
-        return self.run(CompiledController(controllers.through, read_only([]), np.zeros(1)), state, u)
+        return self.run(roles.CompiledController(controllers.through, read_only([]), np.zeros(1)), state, u)
 
-    def startable(self, *, at_end: bool = False) -> Startable:
+    def startable(self, *, at_end: bool = False) -> roles.Startable:
         """A step from the command to the reading after it, or before the next, without noise and the sensor's delay."""
         law, stage = startable(self.hysteresis), self.stage
         row = stage.output if at_end else self.output_row
@@ -202,7 +195,7 @@ class Chain:
         ]  # fmt: skip
         state = [np.zeros(kernels.N_PLACE + 2), law.state, np.zeros(2 * order + stage.lag + 3)]
         step, start = _chain_step(law.step), _chain_start(law.step, law.start)
-        return Startable(step, read_only(np.concatenate(parts), finite=False), np.concatenate(state), start)
+        return roles.Startable(step, read_only(np.concatenate(parts), finite=False), np.concatenate(state), start)
 
     @property
     def output_row(self) -> FloatArray:

@@ -86,8 +86,8 @@ def response_task(
     check_choice("measure", measure, get_args(Measure))
     law = model_or_class(law)
     family = law if isinstance(law, type) else type(law)
-    reduces = isinstance(family, _ComputesMany) and "reduce" in inspect.signature(family.responses).parameters
-    if not (isinstance(family, _ComputesMany) and (reduces or measure == "response")):
+    options = inspect.signature(family.responses).parameters if isinstance(family, _ComputesMany) else {}
+    if not ("reduce" in options or (options and measure == "response")):
         raise TypeError(f"{family.__name__} cannot compute many laws at once with the measure {measure!r}")
     if (measure in _WITH_TARGET) != (y is not None):
         raise ValueError(f"y is needed for the measures {' and '.join(_WITH_TARGET)}, and for no other")

@@ -233,19 +233,35 @@ class SearchedStructure(MovingStructure, Subject):
 
     def _begun(self, record: Record, space: SearchSpace) -> dict[str, float]:
         """Numbers at which the parts of the record, one longer than the other, leave the least error."""
-        from scipy.optimize import least_squares
-
         x = space.starts[0]
         energy = np.cumsum(_input(record) ** 2)
         for part in _PARTS:
-            n = max(_FEWEST, int(np.searchsorted(energy, part * energy[-1])) + 1)
-            error = _PartError(self, record, space, n)
-            if not np.isfinite(error(x)).all():
-                continue
-            inside = np.clip(x, space.lower + _INSIDE, space.upper - _INSIDE)
-            box = (space.lower, space.upper)
-            x = least_squares(error, inside, error.slopes, bounds=box, ftol=1e-3, xtol=1e-4, max_nfev=_STEPS).x
+            x = self._on_part(record, space, x, max(_FEWEST, int(np.searchsorted(energy, part * energy[-1])) + 1))
         return {name: float(np.ravel(value)[0]) for name, value in space.parameters(x[np.newaxis]).items()}
+
+    def _on_part(self, record: Record, space: SearchSpace, x: FloatArray, n: int) -> FloatArray:
+        """Coordinates (n_x,) of the least error on the first `n` samples, together with the distance from the start."""
+        from scipy.optimize import least_squares
+
+        start, measured = space.starts[0], record.y.reshape(len(_sensors(record)[0]), -1)[:, :n]
+        unit = _MISFIT * float(np.sqrt(np.mean(measured**2) * measured.size)) or 1.0
+
+        def errors(x: FloatArray) -> FloatArray:
+            misfit = (self._outputs(space.parameters(x), record, n) - measured).reshape(len(x), -1) / unit
+            return np.concatenate([np.nan_to_num(misfit, posinf=1e6, neginf=-1e6), (x - start) / _NEAR], axis=1)
+
+        def slopes(x: FloatArray) -> FloatArray:
+            steps = np.where(x + _DIFFERENCE > space.upper, -_DIFFERENCE, _DIFFERENCE)
+            rows = errors(np.concatenate([x[np.newaxis], x + np.diag(steps)]))
+            return np.asarray(((rows[1:] - rows[0]) / steps[:, np.newaxis]).T)
+
+        if not np.isfinite(errors(x[np.newaxis])).all():
+            return x
+        inside, box = np.clip(x, space.lower + _INSIDE, space.upper - _INSIDE), (space.lower, space.upper)
+        fit = least_squares(
+            lambda x: errors(x[np.newaxis])[0], inside, slopes, bounds=box, ftol=1e-3, xtol=1e-4, max_nfev=_STEPS
+        )
+        return np.asarray(fit.x)
 
     def regressors(self, parameters: Parameters, record: Record) -> FloatArray:
         """The output itself, shape (n_sets, n_samples, 1), sets on threads; inf for a set that diverges."""
@@ -300,31 +316,6 @@ class SearchedStructure(MovingStructure, Subject):
         names = (_in_words(name, column) for name, column in sensors)
         levels = ", ".join(f"{scale:.2g} of {name}" for name, scale in zip(names, scales, strict=True))
         return (f"residuals are in units of the noise of each sensor, {levels}", *steps)
-
-
-class _PartError:
-    """Error on the first samples of a record, and distances from the start."""
-
-    def __init__(self, structure: SearchedStructure, record: Record, space: SearchSpace, n: int) -> None:
-        self.structure, self.record, self.space, self.start, self.n = structure, record, space, space.starts[0], n
-        n_sensors = len(_sensors(record)[0])
-        self.measured = record.y.reshape(n_sensors, -1)[:, :n]
-        self.unit = _MISFIT * float(np.sqrt(np.mean(self.measured**2) * self.measured.size)) or 1.0
-
-    def errors(self, x: FloatArray) -> FloatArray:
-        """Errors (n_sets, n_errors) at points (n_sets, n_x)."""
-        outputs = self.structure._outputs(self.space.parameters(x), self.record, self.n)
-        misfit = (outputs - self.measured).reshape(len(x), -1) / self.unit
-        return np.concatenate([np.nan_to_num(misfit, posinf=1e6, neginf=-1e6), (x - self.start) / _NEAR], axis=1)
-
-    def __call__(self, x: FloatArray) -> FloatArray:
-        return np.asarray(self.errors(x[np.newaxis])[0])
-
-    def slopes(self, x: FloatArray) -> FloatArray:
-        """Slopes (n_errors, n_x) at one point (n_x,), by one-sided differences."""
-        steps = np.where(x + _DIFFERENCE > self.space.upper, -_DIFFERENCE, _DIFFERENCE)
-        errors = self.errors(np.concatenate([x[np.newaxis], x + np.diag(steps)]))
-        return np.asarray(((errors[1:] - errors[0]) / steps[:, np.newaxis]).T)
 
 
 def _input(record: Record) -> FloatArray:
