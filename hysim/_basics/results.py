@@ -13,6 +13,11 @@ class Result(Protocol):
     def n_parameters(self) -> int: ...
 
 
+@runtime_checkable
+class Named(Protocol):
+    name: Any
+
+
 def model_of(thing: Any) -> Any:
     """The model of a result, or another value as it is; ValueError if a result has no model, TypeError for a class."""
     if isinstance(thing, type):

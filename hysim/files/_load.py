@@ -18,6 +18,7 @@ import numpy.typing as npt
 
 from hysim._basics.frozen import FloatArray, check_choice
 from hysim._basics.progress import Progress, Reports, reports
+from hysim._basics.results import Named
 from hysim._columns.resolution import output_quantum
 from hysim.files._arrays import NUMBERS, Arrays, mat, micromag, npy, npz
 from hysim.files._delimited import DECIMALS, THOUSANDS, Delimited, Text, delimited
@@ -221,11 +222,6 @@ class _Readable(Protocol):
     def read(self, size: int, /) -> Any: ...
 
 
-@runtime_checkable
-class _Named(Protocol):
-    name: Any
-
-
 @contextmanager
 def opened(source: Source) -> Iterator[Opened]:
     """Open a source to read from, and begin every message about it with its name; OSError, TypeError or ValueError."""
@@ -238,7 +234,7 @@ def opened(source: Source) -> Iterator[Opened]:
             if not path.is_file():  # a pipe or a device
                 path, (file, encoding) = None, _content(file)
         elif isinstance(source, _Readable):
-            name = Path(str(source.name)).name if isinstance(source, _Named) else "stream"
+            name = Path(str(source.name)).name if isinstance(source, Named) else "stream"
             file, encoding = _content(source)
         elif (table := table_in(source)) is not None:
             name, file = f"the {table.kind}", BytesIO()

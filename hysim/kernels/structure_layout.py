@@ -147,15 +147,16 @@ class Steps(NamedTuple):
     tolerance: float
 
 
-def make_room(n_elements: int, m: int, n_state: int, n_loads: int = 1) -> Room:
-    """Room for a structure."""
+def room_for(motion: Motion) -> Room:
+    """Room for the work on a structure."""
+    m, n_elements, n_loads = motion.x.size, motion.carry.shape[1], motion.loads.size
     shapes = {
         "inputs": m + 2 * n_loads,
         **dict.fromkeys(("free_drifts", "free_middle", "drifts", "middle", "before"), 2 * n_elements),
         **dict.fromkeys(("scales", "own", "allowed", "errors", "forces"), n_elements),
         **dict.fromkeys(("rest", "half"), N_POWERS * n_elements),
         "sums": (n_elements, 9),
-        **dict.fromkeys(("saved", "spare"), n_state),
+        **dict.fromkeys(("saved", "spare"), motion.laws.size),
         **dict.fromkeys(("end", "point", "now"), m),
         "speeds": (2, m // 2),
         "loads": (2, n_loads),

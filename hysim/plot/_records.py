@@ -8,7 +8,7 @@ from matplotlib.axes import Axes
 
 from hysim._basics.frozen import FloatArray, check_choice
 from hysim._basics.prefixes import in_unit, label, printed
-from hysim._basics.results import model_of
+from hysim._basics.results import Named, model_of
 from hysim.control import ClosedLoop
 from hysim.models.protocols import Responding
 from hysim.plants.structures.structure import ResponseSpectrum
@@ -25,11 +25,6 @@ _TABLES = {
     "pseudo_acceleration": "Pseudo-acceleration", "displacement": "Peak displacement", "ductility": "Ductility",
     "reduction_factor": "Reduction factor", "elastic_acceleration": "Elastic pseudo-acceleration",
 }  # fmt: skip
-
-
-@runtime_checkable
-class _Named(Protocol):
-    name: str
 
 
 @runtime_checkable
@@ -53,7 +48,7 @@ def times_of(result: InputOutput) -> FloatArray | None:
 
 def names_of(results: Sequence[Any]) -> list[str]:
     """Own names of results, or the names of their classes; the same names are numbered."""
-    own = [result.name if isinstance(result, _Named) else "" for result in results]
+    own = [result.name if isinstance(result, Named) else "" for result in results]
     names = [name or type(result).__name__.lower() for name, result in zip(own, results, strict=True)]
     return [name if names.count(name) == 1 else f"{name} {names[:k].count(name) + 1}" for k, name in enumerate(names)]
 

@@ -19,7 +19,7 @@ from hysim.kernels.controllers import CONTROLLER
 from hysim.kernels.stepping import START
 from hysim.kernels.structure_ensembles import fill_slopes, fill_structure, start_motion
 from hysim.kernels.structure_flows import N_POWERS
-from hysim.kernels.structure_layout import Elements, Flows, Motion, Plant, Room, Steps, Tracks, make_room
+from hysim.kernels.structure_layout import Elements, Flows, Motion, Plant, Steps, Tracks, room_for
 from hysim.kernels.structure_loop import close
 from hysim.kernels.structure_path import follow
 from hysim.kernels.structure_pointers import FOLLOW, addresses
@@ -190,10 +190,6 @@ def empty_motion(m: int, n_state: int, n_elements: int, n_loads: int = 1, *, wit
 def empty_tracks(n: int, motion: Motion, *, with_laws: bool = False) -> Tracks:
     x, carry, peaks, work = (np.empty((n, *part.shape)) for part in (motion.x, motion.carry, motion.peaks, motion.work))
     return Tracks(x, carry, peaks, work, np.empty((n if with_laws else 0, motion.laws.size)))
-
-
-def room_for(motion: Motion) -> Room:
-    return make_room(motion.carry.shape[1], motion.x.size, motion.laws.size, motion.loads.size)
 
 
 def peaks_by_name(peaks: FloatArray, n_elements: int, n_nodes: int) -> dict[str, FloatArray]:

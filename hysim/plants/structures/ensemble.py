@@ -8,7 +8,7 @@ import numpy.typing as npt
 
 from hysim._basics.frozen import FloatArray, check_not_negative, check_positive, read_only
 from hysim.kernels.structure_ensembles import Results, Sets, follow_each
-from hysim.kernels.structure_layout import Plant, Steps
+from hysim.kernels.structure_layout import Plant, Steps, room_for
 from hysim.models.compiled_step import compiled_start, compiled_step
 from hysim.models.law import Law
 from hysim.models.parts import own
@@ -61,7 +61,7 @@ def reduced(
     plant = Plant(A[0], loads[0], np.zeros((n, n)), np.zeros((n_worked, n)), pushing)
     with np.errstate(all="ignore"):
         follow_each(
-            assembly.follow_address(), elements, sets, plant, steps, parts, motion, assembly.room_for(motion),
+            assembly.follow_address(), elements, sets, plant, steps, parts, motion, room_for(motion),
             assembly.empty_tracks(0, motion), results,
         )  # fmt: skip
     peaks = assembly.peaks_by_name(results.peaks, n_elements, n)
@@ -161,10 +161,8 @@ def _one_by_one(structure: Any, numbers: Mapping[str, FloatArray], n_sets: int) 
         raise ValueError(f"{', '.join(numbers)} change the form of a law: compute the sets one after the other")
     if any(each.initial_state != structure.initial_state for each in made):
         raise ValueError("all sets begin with the same initial_state")
-    mass, damping, stiffness = (np.concatenate([each.matrices[k] for each in made]) for k in (0, 1, 2))
-    directions, viscosities = (np.concatenate([each.matrices[k] for each in made]) for k in (4, 5))
+    matrices = assembly.Matrices(*map(np.concatenate, zip(*(each.matrices for each in made), strict=True)))
     constants = read_only(np.stack([each.laws.parameters for each in made]), finite=False)
     memories = read_only(np.stack([each.laws.states for each in made]), finite=False)
     slopes = read_only(np.stack([each.elastic_slopes for each in made]))
-    matrices = assembly.Matrices(mass, damping, stiffness, first.drift_matrix, directions, viscosities)
-    return first.laws, constants, memories, slopes, matrices
+    return first.laws, constants, memories, slopes, matrices._replace(rows=first.drift_matrix)
