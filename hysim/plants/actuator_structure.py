@@ -42,7 +42,7 @@ from hysim.models.search_space import ALL_FREE, Freedom, Parameters, SearchSpace
 from hysim.plants import linear_parts
 from hysim.plants import multi_input_actuator as several
 from hysim.plants.chain import Chain, Stages
-from hysim.plants.linear_parts import DAMPING, FREQUENCY, GAIN, CreepBank, LinearParts, Survey
+from hysim.plants.linear_parts import DAMPING, FREQUENCY, GAIN, LinearParts, Survey
 from hysim.plants.multi_input_actuator import MAIN, InputSum, ModalGains, MultiInputActuator, seen_by
 from hysim.plants.stages import Amplifier, Creep, Sensor
 from hysim.records import Record
@@ -287,9 +287,9 @@ class ActuatorStructure(Subject):
         if quantum:
             records = [replace(each, resolution=quantum) if each.resolution is None else each for each in records]
         bank = linear_parts.creep_bank(self.creep, survey)
-        idle = {f"creep.weights[{k}]": 0.0 for k in bank.idle} if isinstance(bank, CreepBank) else {}
-        idle = {name: value for name, value in idle.items() if name not in {*freedom.free, *freedom.bounds}}
-        remarks = (bank.remark,) if isinstance(bank, CreepBank) and idle else ()
+        names = [f"creep.weights[{k}]" for k in bank.idle]
+        idle = {name: 0.0 for name in names if name not in {*freedom.free, *freedom.bounds}}
+        remarks = (bank.remark,) if idle else ()
         scaled_on = self.static(records[survey.law])
         structure = replace(self, survey=survey, scaled_on=scaled_on, known=idle, remarks=remarks)
         structure.parts([]).check(freedom)
@@ -442,10 +442,7 @@ class ActuatorStructure(Subject):
 
     def parts(self, records: Sequence[Record]) -> LinearParts:
         survey = self.survey if self.survey is not None or not records else Survey.of(records)
-        bank: Any = self.creep
-        if survey is not None:
-            bank = linear_parts.creep_bank(bank, survey)
-        gains = not isinstance(self.law, ModalGains)
+        bank, gains = linear_parts.creep_bank(self.creep, survey), not isinstance(self.law, ModalGains)
         return LinearParts(self.amplifier, bank, self.modes, self.delay, survey, self.inputs, gains)
 
     @property

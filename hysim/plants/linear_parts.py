@@ -56,13 +56,17 @@ _TIME_CONSTANT = (0.05, 0.1)  # of its sample time, and of its duration
 
 @dataclass(frozen=True)
 class CreepBank:
-    """Elements at these time constants; `unit` are their weights for a growth of 1 % a decade, None if each is free."""
+    """Elements at these time constants; `unit` are their weights for a growth of 1 % a decade, None if each is free.
+
+    Without elements that are searched it is the `known` creep, or none.
+    """
 
     time_constants: tuple[float, ...]
     unit: tuple[float, ...] | None
     reference: float = _REFERENCE
     sloped: bool = False
     idle: tuple[int, ...] = ()  # elements that the records cannot show
+    known: Creep | None = None
 
     @property
     def coordinates(self) -> tuple[Coordinate, ...]:
@@ -77,7 +81,9 @@ class CreepBank:
             return {each.name: _START_OF_WEIGHTS for each in self.coordinates} | idle
         return {each.name: value for each, value in zip(self.coordinates, (_START, 0.0), strict=False)}
 
-    def made(self, values: Mapping[str, float]) -> Creep:
+    def made(self, values: Mapping[str, float]) -> Creep | None:
+        if not self.time_constants:
+            return self.known
         taus = np.array(self.time_constants)
         if self.unit is None:
             weights = np.array([values[each.name] for each in self.coordinates])
@@ -96,11 +102,11 @@ class CreepBank:
         return f"the records are too short or too coarse for creep at {times} s: its weights are held at 0"
 
 
-def creep_bank(creep: Any, survey: "Survey") -> CreepBank | Creep | None:
-    """The bank for these records, or a creep that is known; ValueError where times are not in s, as the bank's are."""
+def creep_bank(creep: Any, survey: "Survey | None") -> CreepBank:
+    """The bank for these records; ValueError where times are not in s, as the bank's are."""
+    if survey is None or creep is False or creep is None or isinstance(creep, Creep):
+        return CreepBank((), None, known=creep or None)
     shortest, longest = survey.shortest, survey.longest
-    if creep is False or creep is None or isinstance(creep, Creep):
-        return creep or None
     if survey.unit != "s" and isinstance(creep, int):
         raise ValueError(
             f'creep is searched on times in s, and these are in {survey.unit}: take record.convert({{"t": "s"}})'
@@ -193,7 +199,7 @@ class LinearParts:
     """The parts that are searched, and those that are known."""
 
     amplifier: Any  # an Amplifier that is known, "first-order", or None
-    creep: CreepBank | Creep | None
+    creep: CreepBank
     modes: int
     delay: bool
     survey: Survey
@@ -217,7 +223,7 @@ class LinearParts:
             low, high = _TIME_CONSTANT[0] * survey.shortest, _TIME_CONSTANT[1] * survey.duration
             box = Coordinate("time_constant", low, max(high, 2.0 * low), log=True)
             boxes["amplifier"] = (box,), {"time_constant": min(survey.shortest, box.upper)}
-        if isinstance(self.creep, CreepBank):
+        if self.creep.coordinates:
             boxes["creep"] = self.creep.coordinates, self.creep.defaults
         if self.modes or self.delay:
             boxes["vibration"] = self._vibration()
@@ -228,9 +234,7 @@ class LinearParts:
         amplifier = self.amplifier
         if amplifier == "first-order":
             amplifier = Amplifier(time_constant=values["amplifier.time_constant"])
-        creep = self.creep
-        if isinstance(creep, CreepBank):
-            creep = creep.made({name[6:]: value for name, value in values.items() if name.startswith("creep.")})
+        creep = self.creep.made({name[6:]: value for name, value in values.items() if name.startswith("creep.")})
         delay = late + (values["vibration.delay"] if self.delay else 0.0)
         if not self.modes:
             through = TransferFunction(num=(1.0,), den=(1.0,), delay=delay) if self.delay or delay else None
