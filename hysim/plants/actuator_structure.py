@@ -411,31 +411,27 @@ class ActuatorStructure(Subject):
 
     def _doubt(self, name: str, value: float, freedom: Freedom) -> Doubt | None:
         """A reason to doubt one parameter, and the structure without it."""
-        if name == "creep.percent":
-            return Doubt(name, max(_PERCENT, 0.5 * abs(value)), self._held(name, 0.0, "creep from the law"))
-        if name == "creep.slope":
-            return Doubt(name, _SLOPE, self._held(name, 0.0, "how the creep changes from decade to decade"))
-        if name.startswith("creep.weights"):
-            without = self._held(name, 0.0, "this element from the others and the law")
-            return Doubt(name, max(_WEIGHT, abs(value)), without)
-        if name == "vibration.delay":
-            largest = max(_SAMPLES * self.survey.shortest, value)
-            return Doubt(name, largest, self._held(name, 0.0, "a delay from a mode", f" {self.survey.unit}"))
-        if name == "amplifier.time_constant":
+        held = {  # largest standard error, the value at which it is held, and what the records do not tell then
+            "percent": (max(_PERCENT, 0.5 * abs(value)), 0.0, "creep from the law"),
+            "slope": (_SLOPE, 0.0, "how the creep changes from decade to decade"),
+            "weights": (max(_WEIGHT, abs(value)), 0.0, "this element from the others and the law"),
+            "delay": (max(_SAMPLES * self.survey.shortest, value), 0.0, "a delay from a mode"),
+            DAMPING: (value + _USUAL_DAMPING, _USUAL_DAMPING, "the damping of a mode"),
+        }
+        kind = name.partition(".")[2].partition("[")[0]
+        if kind in held:
+            largest, at, why = held[kind]
+            unit = f" {self.survey.unit}" * (kind == "delay")
+            remark = f"the records do not tell {why}: {name} is held at {at:g}{unit}"
+            return Doubt(name, largest, self._remarked(remark, known={**self.known, name: at}))
+        if kind == "time_constant":
             remark = "the records do not show the time constant of the amplifier: it is left out"
             return Doubt(name, value, self._remarked(remark, amplifier=None))
-        if DAMPING in name:
-            without = self._held(name, _USUAL_DAMPING, "the damping of a mode")
-            return Doubt(name, value + _USUAL_DAMPING, without)
         if GAIN in name and len(self.inputs) > 1:  # an input may well leave a mode at rest
             return None
         less = self.smaller(freedom)
         largest = _SHARE_OF_FREQUENCY * value if FREQUENCY in name else _GAIN
         return None if less is None else Doubt(name, largest, less[0])
-
-    def _held(self, name: str, at: float, why: str, unit: str = "") -> "ActuatorStructure":
-        remark = f"the records do not tell {why}: {name} is held at {at:g}{unit}"
-        return self._remarked(remark, known={**self.known, name: at})
 
     def _remarked(self, remark: str, **changes: Any) -> "ActuatorStructure":
         return replace(self, remarks=(*self.remarks, remark), **changes)
