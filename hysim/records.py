@@ -21,6 +21,7 @@ from hysim._columns.turning import TOLERANCE, complete_cycles, drift, turns
 from hysim.interop import channels_of, frame, table_in, told_by
 
 T = TypeVar("T", float, FloatArray)
+V = TypeVar("V", bound=np.generic)
 
 _MOST_SAMPLES = 100_000_000  # of a resampled record: 2.4 GB
 _ROUNDING = 1e-9  # of a number of steps
@@ -424,6 +425,11 @@ def signed_charge(capacity: npt.ArrayLike, current: npt.ArrayLike) -> FloatArray
     if (q < 0.0).any() or (steps[again] > np.minimum(usual, 0.5 * q[:-1][again])).any():
         raise ValueError("capacity must count up from zero in each half cycle; a charge with a sign needs no more")
     return np.append(0.0, np.cumsum(np.sign(i[1:]) * steps))
+
+
+def by_record(values: npt.NDArray[V], records: Sequence[Record]) -> list[npt.NDArray[V]]:
+    """The parts of values (n_samples,) of records that follow each other, one for each record."""
+    return np.split(values, np.cumsum([len(record) for record in records])[:-1])
 
 
 def few_places(record: Record, most: int) -> npt.NDArray[np.intp]:

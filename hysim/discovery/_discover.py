@@ -18,7 +18,7 @@ from hysim import metrics
 from hysim._basics.blas import one_blas_thread
 from hysim._basics.frozen import FloatArray, check_choice
 from hysim._basics.progress import Progress, Reports, reports
-from hysim.discovery._judgement import HYSTERESIS, LAG, NO_STRUCTURE, Trial, competitors, doubts, judge, of_each
+from hysim.discovery._judgement import HYSTERESIS, LAG, NO_STRUCTURE, Trial, competitors, doubts, judge
 from hysim.discovery._refinement import DIVERGED, AnyExponent, Candidate, FreeRun, Samples, Work
 from hysim.discovery._result import Discovery, coefficients, law_from
 from hysim.discovery._search import MOST_WORK, Library, Options, Outcome, or_any_exponent, searched
@@ -26,7 +26,7 @@ from hysim.discovery._slopes import FORMS, check, signs_of
 from hysim.identification import folds
 from hysim.identification.doubts import swapped_columns
 from hysim.laws.differential.terms import duhem_terms, memory_terms, named_terms, symmetric
-from hysim.records import Record, several
+from hysim.records import Record, by_record, several
 
 _POOR = 80.0  # fit of a law without dynamics [%] below which the records may be an oscillator's
 _SHORT = "only the optimizer's path was searched, since no law on it is nearly as good as the best model without a law"
@@ -321,7 +321,7 @@ def left_out_rmse(
     for done, samples in enumerate(left_out, 1):
         mask = np.ones(free_run.n_samples, dtype=bool)
         mask[samples] = False
-        law = search(tuple(of_each(mask, records)))
+        law = search(tuple(by_record(mask, records)))
         errors[samples] = free_run.residuals(law.structure, law.unknowns[np.newaxis])[0, samples]
         progress(done, len(left_out))
     if np.abs(errors).max() >= DIVERGED:

@@ -32,7 +32,6 @@ import scipy
 
 from hysim._basics.frozen import FloatArray
 from hysim._basics.parallel import in_chunks
-from hysim.discovery._judgement import of_each
 from hysim.discovery._search import best_subsets
 from hysim.discovery._slopes import independent, sparse_path
 from hysim.errors import SimulationError
@@ -43,7 +42,7 @@ from hysim.laws.differential.terms import RELAXATION, Term, bouc_wen_terms, memo
 from hysim.metrics.criteria import information
 from hysim.plants.oscillator import ATTEMPTS, attracting_state
 from hysim.plants.oscillator_structure import Filter, Linear, Motion, OscillatorStructure, filtering, interpolated
-from hysim.records import Record
+from hysim.records import Record, by_record
 
 FLOOR = 1e-5  # of the rms output: smaller residuals are no evidence of a term
 BLOCKS = 4  # that are held out in turn, where there are no periods
@@ -377,7 +376,7 @@ class Response:
 
         def work(start: int, stop: int) -> None:
             for row, oscillator in zip(outputs[start:stop], oscillators[start:stop], strict=True):
-                for y, force_and_step in zip(of_each(row, self.records), self._inputs, strict=True):
+                for y, force_and_step in zip(by_record(row, self.records), self._inputs, strict=True):
                     run = self._run(oscillator, *force_and_step)
                     if run is not None:
                         y[:] = np.resize(self.structure.sampled(run[0]), y.size)
@@ -495,7 +494,7 @@ class Response:
     @cached_property
     def _blocks(self) -> list[npt.NDArray[np.intp]]:
         blocks, period = [], self.structure.period
-        for samples in of_each(np.arange(self.measured.size), self.records):
+        for samples in by_record(np.arange(self.measured.size), self.records):
             n = samples.size // period if period is not None and samples.size >= 2 * period else BLOCKS
             blocks += [samples[block] for block in folds(n, samples.size)]
         return blocks

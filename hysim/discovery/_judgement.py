@@ -27,7 +27,7 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
-from typing import NamedTuple, TypeVar
+from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -41,7 +41,7 @@ from hysim.errors import SimulationError
 from hysim.identification import folds as blocks
 from hysim.models.protocols import Responding
 from hysim.plants.transfer_function import TransferFunction
-from hysim.records import Record
+from hysim.records import Record, by_record
 
 HYSTERESIS = "rate-independent hysteresis"
 LAG = "linear lag"
@@ -72,7 +72,6 @@ _TAILS = (0.05, 0.95)
 _AMPLITUDES = (0.25, 0.5, 0.75, 1.0)
 _CYCLES = 10
 
-T = TypeVar("T", bound=np.generic)
 Samples = npt.NDArray[np.intp]
 
 Model = Callable[[FloatArray], FloatArray]
@@ -105,7 +104,7 @@ def scores_of(model: Model, records: Sequence[Record], y: FloatArray, left_out: 
 def about_trends(residual: FloatArray, records: Sequence[Record]) -> list[FloatArray]:
     """Residual of each record about its own trend; nan where it is nan or has too few samples."""
     residuals = []
-    for own, record in zip(of_each(residual, records), records, strict=True):
+    for own, record in zip(by_record(residual, records), records, strict=True):
         counts = ~np.isnan(own)
         slow = trend(record)[counts]
         if np.count_nonzero(counts) <= slow.shape[1]:
@@ -116,13 +115,9 @@ def about_trends(residual: FloatArray, records: Sequence[Record]) -> list[FloatA
     return residuals
 
 
-def of_each(values: npt.NDArray[T], records: Sequence[Record]) -> list[npt.NDArray[T]]:
-    return np.split(values, np.cumsum([len(record) for record in records])[:-1])
-
-
 def folds(records: Sequence[Record]) -> tuple[str, list[Samples]]:
     u = np.concatenate([record.u for record in records])
-    by, parts = "record", of_each(np.arange(u.size), records)
+    by, parts = "record", by_record(np.arange(u.size), records)
     counted = np.ones(u.size, dtype=bool)
     for samples in parts:
         counted[samples[: math.ceil(_START * samples.size)]] = False
@@ -357,7 +352,7 @@ def competitors(records: Sequence[Record]) -> Trial:
     if linear is not None:
         models[RELAXATIONS] = partial(relaxations(records).outputs, y)
         models[RIVAL] = lambda weights: np.concatenate(
-            linear.refitted(records, of_each(weights, records)).outputs(records)
+            linear.refitted(records, by_record(weights, records)).outputs(records)
         )
     by, left_out = folds(records)
     scores = dict.fromkeys((LAW, RIVAL, RELAXATIONS, PLAYS, CURVE), Scores())
@@ -378,7 +373,7 @@ def judge(
 
     def fitted(weights: FloatArray) -> FloatArray:
         try:
-            again = refit(records, of_each(weights, records))
+            again = refit(records, by_record(weights, records))
             return np.concatenate([law.response(record.u) for law, record in zip(again, records, strict=True)])
         except (SimulationError, ValueError):
             return np.full(y.size, math.inf)

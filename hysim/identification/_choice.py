@@ -51,7 +51,7 @@ from hysim.models.by_structure import searched
 from hysim.models.model import candidates
 from hysim.models.protocols import Direct, DirectFit, placed
 from hysim.models.search_space import Freedom
-from hysim.records import Record, few_places
+from hysim.records import Record, by_record, few_places
 from hysim.simulation import free_run
 
 _CLEARLY = 0.9  # of the left-out error of the search: a law without names and standard errors must gain more than that
@@ -325,12 +325,11 @@ class _Trials:
             return float(self._fit(subject, self.whole.records, None).bic)
 
     def _left_out(self, subject: Any, sampled: "_Sampled", which: slice) -> float:
-        begins = np.cumsum([0, *(len(record) for record in sampled.records)])
         errors = []
         for fold in _folds(sampled.records)[which]:
-            weights = np.ones(begins[-1])
+            weights = np.ones(sum(map(len, sampled.records)))
             weights[fold] = 0.0
-            errors.append(self._fit(subject, sampled.records, np.split(weights, begins[1:-1])).residual[fold])
+            errors.append(self._fit(subject, sampled.records, by_record(weights, sampled.records)).residual[fold])
         return _rms(errors)
 
     def _continued(self, subject: Any, sampled: "_Sampled", which: slice) -> tuple[float, float]:

@@ -34,7 +34,7 @@ from hysim.identification.marquardt import pieces
 from hysim.metrics.rows import LoopRows
 from hysim.models.law import Law
 from hysim.models.search_space import Flags
-from hysim.records import Record, SensorRecord
+from hysim.records import Record, SensorRecord, by_record
 
 Samples = npt.NDArray[np.intp]
 Folds = Sequence[Samples]
@@ -341,30 +341,29 @@ def left_out(cross_validate: str | int | None, records: Sequence[Record]) -> lis
     """Samples of each fold of records that follow each other, by `cross_validate` of `identify`; else a ValueError."""
     if cross_validate is None:
         return []
-    cuts = [0, *np.cumsum([len(record) for record in records]).tolist()]
+    samples = by_record(np.arange(sum(map(len, records))), records)
     if cross_validate == "records":
         if len(records) < 2:
             raise ValueError('cross_validate="records" needs at least 2 records')
-        return np.split(np.arange(cuts[-1]), cuts[1:-1])
+        return samples
     if cross_validate == "cycles":
-        return _cycles(records, cuts)
-    parts = folds(cross_validate, cuts[-1], name="cross_validate")
+        return _cycles(records, samples)
+    parts = folds(cross_validate, sum(map(len, records)), name="cross_validate")
     if cross_validate == "loo":
         return parts
     # The beginning of a record says what the state was there: without it errors are those of a guess.
     kept: list[Samples] = []
-    for record, begin, end in zip(records, cuts, cuts[1:], strict=False):
-        n = samples_of_sensor(record)
-        kept += [first + np.arange(math.ceil(n / len(parts))) for first in range(begin, end, n)]
+    for record, own in zip(records, samples, strict=True):
+        sensors = own.reshape(-1, samples_of_sensor(record))
+        kept.append(sensors[:, : math.ceil(sensors.shape[1] / len(parts))].ravel())
     others = [np.setdiff1d(part, np.concatenate(kept)) for part in parts]
     return [part for part in others if part.size]
 
 
-def _cycles(records: Sequence[Record], cuts: Sequence[int]) -> list[Samples]:
+def _cycles(records: Sequence[Record], samples: Sequence[Samples]) -> list[Samples]:
     cycles = []
-    for record, begin in zip(records, cuts, strict=False):
-        turns = record.reversals(TOLERANCE)[1::2]
-        cycles += [begin + samples for samples in np.split(np.arange(len(record)), turns)[1:]]
+    for record, own in zip(records, samples, strict=True):
+        cycles += np.split(own, record.reversals(TOLERANCE)[1::2])[1:]
     if not cycles:
         raise ValueError('cross_validate="cycles" needs at least 2 cycles of the input')
     return cycles

@@ -17,7 +17,7 @@ from hysim.comparison import Comparison, ComparisonRow
 from hysim.identification import Identification
 from hysim.plot import _style as house
 from hysim.plot._style import GUIDE, MANY, MEASURED, POINTS, AxesArray, AxesLike, line, one, scattered, several
-from hysim.records import Record
+from hysim.records import Record, by_record
 from hysim.simulation import free_run, models_on
 from hysim.sweeps import LossMap
 
@@ -194,8 +194,7 @@ def identification(fit: Identification, record: Record | Sequence[Record], axes:
     ):
         raise ValueError(f"the result is of another record: its fit is {fit.fit_percent:g} %, not {percent:g} %")
     residual = (y - model) / (fit.resolution or 1.0)
-    ends = np.cumsum([len(each) for each in records])[:-1]
-    parts = np.split(np.arange(u.size), ends)
+    parts = by_record(np.arange(u.size), records)
     with several(axes, 3 if fit.profiles else 2, height=3.0, sharex=False) as panels:
         _draw_fit(panels[0], u, y, model, fit.response_stderr, parts)
         panels[0].set(xlabel=label(records[0].units, "u"), ylabel=label(records[0].units, "y"))

@@ -27,7 +27,7 @@ from hysim.models.protocols import DirectFit
 from hysim.models.tables import Tables
 from hysim.models.varying import ChannelPolynomial, places
 from hysim.models.varying import weights as weights_at
-from hysim.records import Record, as_record, span_of
+from hysim.records import Record, as_record, by_record, span_of
 
 _STRENGTHS = np.logspace(-12.0, 0.0, 25)  # of the ridge, in rows: from rounding of the terms to a prior of noise's size
 _SPREADS = np.append(0.0, np.logspace(-3.0, 0.0, 7))  # of the weights, in standard deviations of the noise
@@ -274,10 +274,10 @@ class CoreFieldStructure:
         Raises ValueError if a record has no even time or not the channel, or the flux density is constant.
         """
         law, at = self._begun(records), self._places(records)
-        cuts = np.cumsum([len(record) for record in records])
-        shares = np.split(np.ones(cuts[-1]) if weights is None else weights, cuts[:-1])
-        if np.count_nonzero(np.concatenate(shares)) < len(law.weights):
-            raise ValueError(f"{cuts[-1]} samples tell too little of {len(law.weights)} weights: take fewer stops")
+        every = np.ones(sum(map(len, records))) if weights is None else weights
+        shares = by_record(every, records)
+        if np.count_nonzero(every) < len(law.weights):
+            raise ValueError(f"{every.size} samples tell too little of {len(law.weights)} weights: take fewer stops")
         folds = _folds([len(record) for record in records])
         of_records = zip(records, shares, folds, strict=True)
         normal = _Normal.of(

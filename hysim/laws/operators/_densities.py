@@ -37,7 +37,7 @@ from hysim._basics.frozen import FloatArray
 from hysim._columns.turning import TOLERANCE
 from hysim.models.protocols import DirectFit, Smoother
 from hysim.models.tables import Tables
-from hysim.records import Record, few_places
+from hysim.records import Record, by_record, few_places
 
 STRENGTHS = np.logspace(-10.0, 4.0, 43)
 _SMALLEST = 1e-280  # a smaller incomplete gamma function is its first term
@@ -209,8 +209,7 @@ def _supported(span: float, records: Sequence[Record]) -> int:
 
 def parts_of(records: Sequence[Record]) -> list[Parts]:
     """Samples to leave out at a time, of each kind that these records have."""
-    cuts = np.cumsum([0, *(len(record) for record in records)])
-    samples = np.split(np.arange(cuts[-1]), cuts[1:-1])
+    samples = by_record(np.arange(sum(map(len, records))), records)
     quarters = [part for each in samples for part in np.array_split(each, 4)]
     if len(records) > 1:
         reached = [_covered(record.u, [*records[:k], *records[k + 1 :]]) for k, record in enumerate(records)]
