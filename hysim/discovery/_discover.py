@@ -26,6 +26,7 @@ from hysim.discovery._slopes import FORMS, check, signs_of
 from hysim.identification import folds
 from hysim.identification.doubts import swapped_columns
 from hysim.laws.differential.terms import duhem_terms, memory_terms, named_terms, symmetric
+from hysim.metrics.criteria import rms_of_known
 from hysim.records import Record, by_record, several
 
 _POOR = 80.0  # fit of a law without dynamics [%] below which the records may be an oscillator's
@@ -324,6 +325,4 @@ def left_out_rmse(
         law = search(tuple(by_record(mask, records)))
         errors[samples] = free_run.residuals(law.structure, law.unknowns[np.newaxis])[0, samples]
         progress(done, len(left_out))
-    if np.abs(errors).max() >= DIVERGED:
-        return float("inf")
-    return float(np.sqrt(np.mean(errors**2))) * free_run.stroke
+    return math.inf if np.abs(errors).max() >= DIVERGED else rms_of_known(errors) * free_run.stroke

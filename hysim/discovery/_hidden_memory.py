@@ -39,7 +39,7 @@ from hysim.identification import folds
 from hysim.identification.marquardt import Schedule, SumOfSquares, descend
 from hysim.kernels import memory_terms as kernels
 from hysim.laws.differential.terms import RELAXATION, Term, bouc_wen_terms, memory_terms, symmetric
-from hysim.metrics.criteria import information
+from hysim.metrics.criteria import information, rms_of_known
 from hysim.plants.oscillator import ATTEMPTS, attracting_state
 from hysim.plants.oscillator_structure import Filter, Linear, Motion, OscillatorStructure, filtering, interpolated
 from hysim.records import Record, by_record
@@ -120,12 +120,11 @@ class TermRegression:
 
 def held_out_rmse(columns: FloatArray, target: FloatArray, blocks: Sequence[npt.NDArray[np.intp]]) -> float:
     """Rmse on each block of a regression on the other blocks."""
-    total = 0.0
+    errors = []
     for block in blocks:
         others = np.delete(columns, block, axis=0), np.delete(target, block)
-        error = target[block] - columns[block] @ np.linalg.lstsq(*others, rcond=None)[0]
-        total += float(np.sum(error**2))
-    return float(np.sqrt(total / target.size))
+        errors.append(target[block] - columns[block] @ np.linalg.lstsq(*others, rcond=None)[0])
+    return rms_of_known(*errors)
 
 
 def term_regression(

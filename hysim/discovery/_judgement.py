@@ -39,6 +39,7 @@ from hysim._columns.turning import TOLERANCE, complete_cycles
 from hysim.discovery._competitors import FLOOR, Rival, curve, means, plays, relaxations, rival, steady_width, trend
 from hysim.errors import SimulationError
 from hysim.identification import folds as blocks
+from hysim.metrics.criteria import rms_of_known
 from hysim.models.protocols import Responding
 from hysim.plants.transfer_function import TransferFunction
 from hysim.records import Record, by_record
@@ -97,8 +98,8 @@ def scores_of(model: Model, records: Sequence[Record], y: FloatArray, left_out: 
         fitted.extend(about_trends(np.where(weights > 0.0, remaining, math.nan), records))
     detrended = about_trends(residual, records)
     pieces = [piece for each in detrended for piece in np.array_split(each, _PARTS)]
-    parts = [rms([piece]) for piece in pieces if np.count_nonzero(~np.isnan(piece)) > 1]
-    return Scores(rms(detrended), rms(fitted), np.array(parts))
+    parts = [rms_of_known(piece) for piece in pieces if np.count_nonzero(~np.isnan(piece)) > 1]
+    return Scores(rms_of_known(*detrended), rms_of_known(*fitted), np.array(parts))
 
 
 def about_trends(residual: FloatArray, records: Sequence[Record]) -> list[FloatArray]:
@@ -149,12 +150,6 @@ def _covers(training: FloatArray, other: FloatArray) -> bool:
 
 def _is_inside(training: FloatArray, other: FloatArray) -> npt.NDArray[np.bool_]:
     return np.asarray((other >= training.min()) & (other <= training.max()))
-
-
-def rms(parts: Sequence[FloatArray]) -> float:
-    values = np.concatenate(parts) if parts else np.empty(0)
-    counts = values[~np.isnan(values)]
-    return float(np.sqrt(np.mean(counts**2))) if counts.size else math.nan
 
 
 def rate_spread(records: Sequence[Record]) -> float:
@@ -293,7 +288,7 @@ class Trial:
         """Whether a model predicts held-out samples nearly as well as fitted ones; plays may also be fitted to all."""
         own, curve = self.scores[name], self.scores[CURVE]
         # third differences show white noise: those of smooth outputs are small
-        noise = rms([np.diff(record.y, 3) for record in self.records]) / math.sqrt(20.0)
+        noise = rms_of_known(*(np.diff(record.y, 3) for record in self.records)) / math.sqrt(20.0)
         usual = own.fitted if self.by in ("record", "rate") else noise
         error = min(own.error, self.together) if name == PLAYS else own.error
         return error <= max(FACTOR * usual, UNEXPLAINED * curve.error) + self.floor
@@ -359,7 +354,7 @@ def competitors(records: Sequence[Record]) -> Trial:
     scores |= {name: scores_of(model, records, y, left_out) for name, model in models.items()}
     steps = scores_of(partial(means, u, y), records, y, left_out)  # another curve; the better one counts
     scores[CURVE] = min(scores[CURVE], steps, key=lambda each: each.error)
-    together = rms(about_trends(y - by_plays(np.ones(y.size)), records))
+    together = rms_of_known(*about_trends(y - by_plays(np.ones(y.size)), records))
     return Trial(records, linear, spread, by, left_out, scores, together)
 
 

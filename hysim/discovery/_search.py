@@ -51,10 +51,11 @@ import numpy as np
 import numpy.typing as npt
 
 from hysim._basics.frozen import FloatArray
-from hysim.discovery._judgement import about_trends, rms
+from hysim.discovery._judgement import about_trends
 from hysim.discovery._refinement import POLISH, AnyExponent, Candidate, FreeRun, Samples, Structure, Terms, Work, shifts
 from hysim.discovery._slopes import FORMS, Regression, Slopes, inclusion, ridge, slopes, sparse_path, turning
 from hysim.laws.differential.terms import Term, bouc_wen_exponent, symmetric
+from hysim.metrics.criteria import rms_of_known
 from hysim.records import Record
 
 WIDTH = 924  # the subsets of 6 of 12 columns
@@ -466,7 +467,7 @@ def searched(
 def _least_rmse(search: Search) -> float:
     """Smallest rmse of the laws about a slow trend of each record [unit of y], as the judgement takes it."""
     free_run = search.free_run
-    errors = (rms(about_trends(candidate.residual, free_run.visible)) for candidate in search.candidates)
+    errors = (rms_of_known(*about_trends(candidate.residual, free_run.visible)) for candidate in search.candidates)
     return min(errors, default=math.inf) * free_run.stroke
 
 

@@ -44,8 +44,9 @@ from hysim.identification._admissible import excursion
 from hysim.identification._problem import Weights
 from hysim.identification._result import Choice, Identification, Width
 from hysim.identification._searched import Search
-from hysim.identification._uncertainty import Folds, Samples, fit_measures, left_out, left_out_errors, rms_of_known
+from hysim.identification._uncertainty import Folds, Samples, fit_measures, left_out, left_out_errors
 from hysim.identification.doubts import CONSTANT
+from hysim.metrics.criteria import rms_of_known
 from hysim.metrics.rows import LoopRows
 from hysim.models.by_structure import searched
 from hysim.models.model import candidates
@@ -330,11 +331,11 @@ class _Trials:
             weights = np.ones(sum(map(len, sampled.records)))
             weights[fold] = 0.0
             errors.append(self._fit(subject, sampled.records, by_record(weights, sampled.records)).residual[fold])
-        return _rms(errors)
+        return rms_of_known(*errors)
 
     def _continued(self, subject: Any, sampled: "_Sampled", which: slice) -> tuple[float, float]:
         record, kept = sampled.records[0], sampled.kept[0]
-        within, beyond = [np.empty(0)], [np.empty(0)]
+        within, beyond = list[FloatArray](), list[FloatArray]()
         for cut in np.searchsorted(kept, self.cuts[which]).tolist():
             model = placed(self._fit(subject, [record[:cut]], None).model, float(record.u[0]))
             rest, u, begin = (record.y - free_run(model, record).y)[cut:], record.u[cut:], record.u[:cut]
@@ -342,7 +343,7 @@ class _Trials:
             leaves = np.flatnonzero((u < begin.min() - slack) | (u > begin.max() + slack))
             end = leaves[0] if leaves.size else u.size
             within, beyond = [*within, rest[:end]], [*beyond, rest[end:]]
-        return _rms(within), _rms(beyond)
+        return rms_of_known(*within), rms_of_known(*beyond)
 
     def _fit(self, subject: Any, records: Sequence[Record], weights: Any) -> Identification:
         return self.identify(subject, records, weights=weights, max_evaluations=_EVALUATIONS, **self.options)
@@ -369,12 +370,6 @@ def _folds(records: Sequence[Record]) -> list[Samples]:
         samples = np.arange(sum(map(len, records)))
         return [samples[k::_EVERY] for k in range(_EVERY)]
     return [np.concatenate(cycles[k::_FOLDS]) for k in range(min(_FOLDS, len(cycles)))]
-
-
-def _rms(errors: Sequence[FloatArray]) -> float:
-    every = np.concatenate(errors)
-    with np.errstate(over="ignore"):
-        return float(np.sqrt(np.mean(every**2))) if every.size else math.nan
 
 
 def _scores(errors: Mapping[str, FloatArray], size: float) -> dict[str, float]:

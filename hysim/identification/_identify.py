@@ -30,9 +30,10 @@ from hysim.identification._result import Candidate, Identification
 from hysim.identification._search import PERFECT, chosen, sharing, stages_in_words, widened
 from hysim.identification._searched import Search
 from hysim.identification._starts import begun, begun_by_parts
-from hysim.identification._uncertainty import Folds, left_out, left_out_errors, rms_of_known
+from hysim.identification._uncertainty import Folds, left_out, left_out_errors
 from hysim.identification.doubts import offset_for, rate_noise_warning, swapped_columns, swapped_for
 from hysim.laws.operators.reversal_filter import ReversalFilter
+from hysim.metrics.criteria import rms_of_known
 from hysim.models import protocols as roles
 from hysim.models.by_structure import searched
 from hysim.models.cascade import Cascade

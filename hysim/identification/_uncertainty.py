@@ -386,13 +386,6 @@ def left_out_errors(problem: Problem, noise: Noise, optima: FloatArray, every_fo
     return errors_of_all
 
 
-def rms_of_known(errors: FloatArray) -> float:
-    known = errors[~np.isnan(errors)]
-    if not np.isfinite(known).all():
-        return float("inf")
-    return float(np.sqrt(np.mean(known**2))) if known.size else float("nan")
-
-
 def _left_out_errors(problem: Problem, noise: Noise, starts: FloatArray, every_fold: Folds) -> FloatArray:
     weights = np.ones((len(every_fold), problem.y.size))
     for fold, samples in enumerate(every_fold):

@@ -116,6 +116,15 @@ def bic(residual: npt.ArrayLike, n_parameters: int, *, floor: float = 0.0) -> fl
     return information(v, n, d, floor=floor) if d < n else math.nan
 
 
+def rms_of_known(*parts: FloatArray) -> float:
+    """Root mean square of errors that are known, thus not nan; inf if one is infinite, nan without any."""
+    errors = np.concatenate([np.empty(0), *parts])
+    known = errors[~np.isnan(errors)]
+    if not np.isfinite(known).all():
+        return math.inf
+    return _rms(known) if known.size else math.nan
+
+
 def _measured_and_model(y: npt.ArrayLike, y_model: npt.ArrayLike) -> tuple[FloatArray, FloatArray]:
     measured, model = vectors(y=y, y_model=y_model)
     if measured.size == 0:
