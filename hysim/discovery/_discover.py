@@ -6,6 +6,7 @@ Regression of the slope along the loading length, and PySINDy's optimizers from 
 by simulation error (`_refinement`), choice of one structure (`_search`), and the verdict (`_judgement`).
 """
 
+import itertools
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
@@ -23,7 +24,7 @@ from hysim.discovery._refinement import DIVERGED, AnyExponent, Candidate, FreeRu
 from hysim.discovery._result import Discovery, coefficients, law_from
 from hysim.discovery._search import MOST_WORK, Library, Options, Outcome, or_any_exponent, searched
 from hysim.discovery._slopes import FORMS, check, signs_of
-from hysim.identification import folds
+from hysim.identification import errors_of_refits, folds
 from hysim.identification.doubts import swapped_columns
 from hysim.laws.differential.terms import duhem_terms, memory_terms, named_terms, symmetric
 from hysim.metrics.criteria import rms_of_known
@@ -318,11 +319,12 @@ def left_out_rmse(
     """Rmse on samples left out of the search, repeated for each fold [unit of y]; inf where a law diverges."""
     free_run = FreeRun(tuple(records))
     left_out = folds(count, free_run.n_samples)
-    errors = np.empty(free_run.n_samples)
-    for done, samples in enumerate(left_out, 1):
-        mask = np.ones(free_run.n_samples, dtype=bool)
-        mask[samples] = False
-        law = search(tuple(by_record(mask, records)))
-        errors[samples] = free_run.residuals(law.structure, law.unknowns[np.newaxis])[0, samples]
-        progress(done, len(left_out))
+    done = itertools.count(1)
+
+    def residual(weights: FloatArray) -> FloatArray:
+        law = search(tuple(by_record(weights > 0.0, records)))
+        progress(next(done), len(left_out))
+        return free_run.residuals(law.structure, law.unknowns[np.newaxis])[0]
+
+    errors = errors_of_refits(residual, free_run.n_samples, left_out)
     return math.inf if np.abs(errors).max() >= DIVERGED else rms_of_known(errors) * free_run.stroke

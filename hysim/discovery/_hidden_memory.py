@@ -35,7 +35,7 @@ from hysim._basics.parallel import in_chunks
 from hysim.discovery._search import best_subsets
 from hysim.discovery._slopes import independent, sparse_path
 from hysim.errors import SimulationError
-from hysim.identification import folds
+from hysim.identification import errors_of_refits, folds
 from hysim.identification.marquardt import Schedule, SumOfSquares, descend
 from hysim.kernels import memory_terms as kernels
 from hysim.laws.differential.terms import RELAXATION, Term, bouc_wen_terms, memory_terms, symmetric
@@ -120,11 +120,12 @@ class TermRegression:
 
 def held_out_rmse(columns: FloatArray, target: FloatArray, blocks: Sequence[npt.NDArray[np.intp]]) -> float:
     """Rmse on each block of a regression on the other blocks."""
-    errors = []
-    for block in blocks:
-        others = np.delete(columns, block, axis=0), np.delete(target, block)
-        errors.append(target[block] - columns[block] @ np.linalg.lstsq(*others, rcond=None)[0])
-    return rms_of_known(*errors)
+
+    def residual(weights: FloatArray) -> FloatArray:
+        rows = columns * weights[:, np.newaxis]
+        return np.asarray(target - columns @ np.linalg.lstsq(rows, target * weights, rcond=None)[0])
+
+    return rms_of_known(errors_of_refits(residual, target.size, blocks))
 
 
 def term_regression(

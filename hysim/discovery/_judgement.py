@@ -38,6 +38,7 @@ from hysim._basics.frozen import FloatArray, frozen
 from hysim._columns.turning import TOLERANCE, complete_cycles
 from hysim.discovery._competitors import FLOOR, Rival, curve, means, plays, relaxations, rival, steady_width, trend
 from hysim.errors import SimulationError
+from hysim.identification import errors_of_refits
 from hysim.identification import folds as blocks
 from hysim.metrics.criteria import rms_of_known
 from hysim.models.protocols import Responding
@@ -89,14 +90,14 @@ class Scores(NamedTuple):
 
 def scores_of(model: Model, records: Sequence[Record], y: FloatArray, left_out: Sequence[Samples]) -> Scores:
     """Fit a model again without each group of samples of the outputs `y`, and predict these."""
-    residual, fitted = np.full(y.size, math.nan), []
-    for samples in left_out:
-        weights = np.ones(y.size)
-        weights[samples] = 0.0
+    fitted: list[FloatArray] = []
+
+    def residual(weights: FloatArray) -> FloatArray:
         remaining = y - model(weights)
-        residual[samples] = remaining[samples]
         fitted.extend(about_trends(np.where(weights > 0.0, remaining, math.nan), records))
-    detrended = about_trends(residual, records)
+        return remaining
+
+    detrended = about_trends(errors_of_refits(residual, y.size, left_out), records)
     pieces = [piece for each in detrended for piece in np.array_split(each, _PARTS)]
     parts = [rms_of_known(piece) for piece in pieces if np.count_nonzero(~np.isnan(piece)) > 1]
     return Scores(rms_of_known(*detrended), rms_of_known(*fitted), np.array(parts))

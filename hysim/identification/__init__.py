@@ -11,4 +11,5 @@ from hysim.identification._result import Width as Width
 from hysim.identification._search import sharing as sharing
 from hysim.identification._select import Selection as Selection
 from hysim.identification._select import select as select
+from hysim.identification._uncertainty import errors_of_refits as errors_of_refits
 from hysim.identification._uncertainty import folds as folds

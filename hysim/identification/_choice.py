@@ -44,7 +44,7 @@ from hysim.identification._admissible import excursion
 from hysim.identification._problem import Weights
 from hysim.identification._result import Choice, Identification, Width
 from hysim.identification._searched import Search
-from hysim.identification._uncertainty import Folds, Samples, fit_measures, left_out, left_out_errors
+from hysim.identification._uncertainty import Folds, Samples, errors_of_refits, fit_measures, left_out, left_out_errors
 from hysim.identification.doubts import CONSTANT
 from hysim.metrics.criteria import rms_of_known
 from hysim.metrics.rows import LoopRows
@@ -173,12 +173,7 @@ def _residual(fit: DirectFit, records: Sequence[Record]) -> FloatArray:
 def _fitted_again(family: Direct, records: Sequence[Record], weights: Weights, folds: Folds) -> FloatArray:
     """Errors at samples that are left out, by fits to the rest; nan elsewhere."""
     shares = np.ones(sum(map(len, records))) if weights is None else np.concatenate(weights)
-    errors = np.full(shares.size, np.nan)
-    for fold in folds:
-        rest = shares.copy()
-        rest[fold] = 0.0
-        errors[fold] = _residual(family.fitted(records, rest), records)[fold]
-    return errors
+    return errors_of_refits(lambda kept: _residual(family.fitted(records, kept * shares), records), shares.size, folds)
 
 
 def _width(fit: DirectFit, record: Record, sigma: float) -> Width | None:
@@ -326,12 +321,12 @@ class _Trials:
             return float(self._fit(subject, self.whole.records, None).bic)
 
     def _left_out(self, subject: Any, sampled: "_Sampled", which: slice) -> float:
-        errors = []
-        for fold in _folds(sampled.records)[which]:
-            weights = np.ones(sum(map(len, sampled.records)))
-            weights[fold] = 0.0
-            errors.append(self._fit(subject, sampled.records, by_record(weights, sampled.records)).residual[fold])
-        return rms_of_known(*errors)
+        records = sampled.records
+
+        def residual(weights: FloatArray) -> FloatArray:
+            return self._fit(subject, records, by_record(weights, records)).residual
+
+        return rms_of_known(errors_of_refits(residual, sum(map(len, records)), _folds(records)[which]))
 
     def _continued(self, subject: Any, sampled: "_Sampled", which: slice) -> tuple[float, float]:
         record, kept = sampled.records[0], sampled.kept[0]

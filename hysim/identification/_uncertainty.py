@@ -16,7 +16,7 @@ the output bends within the step, as at a stiff optimum in a wide box: there the
 """
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -367,6 +367,16 @@ def _cycles(records: Sequence[Record], samples: Sequence[Samples]) -> list[Sampl
     if not cycles:
         raise ValueError('cross_validate="cycles" needs at least 2 cycles of the input')
     return cycles
+
+
+def errors_of_refits(residual: Callable[[FloatArray], FloatArray], n: int, every_fold: Folds) -> FloatArray:
+    """Errors (n,) in the `residual(weights)` (n,) of fits without the samples of weight zero, nan of others."""
+    errors = np.full(n, np.nan)
+    for samples in every_fold:
+        weights = np.ones(n)
+        weights[samples] = 0.0
+        errors[samples] = residual(weights)[samples]
+    return errors
 
 
 def left_out_errors(problem: Problem, noise: Noise, optima: FloatArray, every_fold: Folds) -> FloatArray:
