@@ -8,7 +8,7 @@ from discovered import COLEMAN_HODGDON, CYCLES, DAHL, LAW, QUADRATIC, TRUTH, duh
 
 import hysim as hs
 from hysim.discovery import _search
-from hysim.discovery._refinement import FreeRun, Terms
+from hysim.discovery._refinement import FreeRun, Structure
 from hysim.laws.differential.terms import Term
 
 # Clean records: a descent ends where the cost stands still to rounding, and the error is its square root.
@@ -231,7 +231,7 @@ def test_it_is_printed_with_its_equation_and_its_verdict(found):
 def test_a_likelier_law_that_comes_to_no_steady_loop_is_not_taken(table1, found):
     """Six complete terms have a BIC of -347.2 on these points; on further cycles that law drifts away without end."""
     names = ("u'", "u' u", "u' y", "u' y^2", "|u'|", "|u'| u")
-    structure = Terms(tuple(Term.parse(name) for name in names), rest=True)
+    structure = Structure(tuple(Term.parse(name) for name in names), rest=True)
     start = np.array([[2.2053e-2, 9.2044e-4, -3.1229e-2, -5.3016e-3, -7.6017e-3, 7.1662e-5, 0.0]])
     drifting = FreeRun((table1,)).refine(structure, start, tolerance=1e-12)
     model = hs.Duhem.from_terms(dict(zip(names, drifting.unknowns.tolist(), strict=False)))

@@ -14,7 +14,7 @@ import hysim as hs
 from hysim.discovery import _result
 from hysim.discovery._discover import left_out_rmse
 from hysim.discovery._hidden_memory import cases, memory_arrays
-from hysim.discovery._refinement import _SCHEDULE, AnyExponent, FreeRun, Terms
+from hysim.discovery._refinement import _SCHEDULE, FreeRun, Structure
 from hysim.discovery._search import INDISTINCT, Library, Options, Search, pruned, searched
 from hysim.identification.marquardt import SumOfSquares, descend, differences
 from hysim.kernels import memory_terms
@@ -134,7 +134,7 @@ def test_the_scale_of_a_memory_is_a_convention(n, A, offset):
     """With a feedthrough the law is written with A = 1 and a gain: the response is the same."""
     names = bouc_wen_terms(n)
     numbers = np.array([A, -0.3, -0.2, 5.0, offset])[[0, 1, 2, 3] + [4] * bool(offset)]
-    structure = Terms(tuple(sorted(names)), True, bool(offset))
+    structure = Structure(tuple(sorted(names)), True, bool(offset))
     numbers[:3] = numbers[:3][[names.index(term) for term in structure.terms]]
     record = record_of(lambda u: u)
     found, expected = law_and_free_run(structure, numbers, record)
@@ -148,7 +148,7 @@ def test_the_scale_of_a_memory_is_a_convention(n, A, offset):
 @pytest.mark.parametrize("n", [0.5, 1.7])
 @pytest.mark.parametrize("shifts", [(False, False), (True, False), (True, True)])
 def test_a_law_of_any_exponent_is_the_model_that_it_becomes(n, shifts):
-    structure = AnyExponent(*shifts)
+    structure = Structure(bouc_wen_terms(1.0), *shifts, any_exponent=True)
     numbers = np.array([-1.5, -0.3, -0.1, n, 5.0, 2.0])[: structure.size]
     record = record_of(lambda u: u)
     found, expected = law_and_free_run(structure, numbers, record)
@@ -159,7 +159,7 @@ def test_a_law_of_any_exponent_is_the_model_that_it_becomes(n, shifts):
 
 def test_standard_errors_are_carried_to_the_gain():
     """gain = A, and beta n = 1 stays: errors of numbers under A = 1 are those of a ratio."""
-    structure = Terms(terms(["u'", "u' |z|", "|u'| z"]), True)
+    structure = Structure(terms(["u'", "u' |z|", "|u'| z"]), True)
     covariance = np.diag([0.01, 0.04, 0.09, 0.25, 1.0])
     candidate = SimpleNamespace(
         structure=structure, unknowns=np.array([-2.0, -0.3, -0.6, 5.0, 0.0]), covariance=covariance
@@ -175,7 +175,7 @@ def test_refinement_does_not_look_at_samples_that_are_not_seen():
     seen[[0, 100]] = False
     start = 0.9 * np.array([[*COLEMAN_HODGDON.values(), 0.0]])
     free_run = FreeRun((hs.Record(u=record.u, y=np.where(seen, record.y, 1e3)),), (seen,))
-    found = free_run.refine(Terms(terms(COLEMAN_HODGDON)), start, tolerance=1e-12)
+    found = free_run.refine(Structure(terms(COLEMAN_HODGDON)), start, tolerance=1e-12)
     assert found.unknowns == pytest.approx([*COLEMAN_HODGDON.values(), 0.0], abs=1e-7)  # the root of rounding
     assert found.residual.size == free_run.n_samples == len(record) - 2
     assert free_run.stroke == pytest.approx(np.ptp(record.y))
@@ -184,7 +184,7 @@ def test_refinement_does_not_look_at_samples_that_are_not_seen():
 def test_a_memory_at_rest_is_one_number_less_and_begins_at_zero():
     law = hs.BoucWen(A=1.0, beta=0.6, gamma=0.3)
     record = record_of(lambda u: 7.0 + 40.0 * u + 60.0 * law.memory(u), multisine() + 3.0, noise=0.01)
-    free = Terms(terms(["u'", "u' |z|", "|u'| z"]), feedthrough=True, offset=True)
+    free = Structure(terms(["u'", "u' |z|", "|u'| z"]), feedthrough=True, offset=True)
     rest, start = free._replace(rest=True), np.array([[60.0, -0.3, -0.6, 40.0, 7.0, record.y[0]]])
     free_run = FreeRun((record,))
     of_free, of_rest = (free_run.refine(structure, start, tolerance=1e-12) for structure in (free, rest))
@@ -205,7 +205,7 @@ def test_the_left_out_error_is_that_of_laws_that_have_not_seen_the_sample():
 
     def search(seen):
         unseen.append(np.flatnonzero(~seen[0]).tolist())
-        return FreeRun((record,), seen).refine(Terms(terms(DAHL)), start, tolerance=1e-12)
+        return FreeRun((record,), seen).refine(Structure(terms(DAHL)), start, tolerance=1e-12)
 
     candidate = search((np.ones(len(record), dtype=bool),))
     noise = np.sqrt(candidate.cost / len(record)) * np.ptp(record.y)
@@ -218,7 +218,7 @@ def test_the_left_out_error_is_that_of_laws_that_have_not_seen_the_sample():
     assert (
         left_out_rmse(
             [record],
-            lambda seen: SimpleNamespace(structure=Terms(terms(["|u'| y"])), unknowns=np.array([50.0, 1.0])),
+            lambda seen: SimpleNamespace(structure=Structure(terms(["|u'| y"])), unknowns=np.array([50.0, 1.0])),
             2,
             lambda done, total: None,
         )
@@ -231,7 +231,7 @@ NAMES = ["u'", "u' z", "u' |z|", "|u'| z"]
 
 def searched_about_the_truth(record, names, **options):
     search = Search(FreeRun((record,), **options), (), rests=(False, True))
-    whole = Terms(terms(names))
+    whole = Structure(terms(names))
     truth = {"u'": 1.0, "u' |z|": -0.3, "|u'| z": -0.6}
     search.tried[whole] = search.free_run.refine(
         whole, np.array([[*(truth.get(name, 0.0) for name in names), 0.0]]), tolerance=1e-12
@@ -244,8 +244,8 @@ def test_the_linearised_free_run_predicts_what_smaller_structures_reach():
     search, whole = searched_about_the_truth(record, NAMES)
     predicted = search.predicted(search.tried[whole], whole)
     assert [each.structure for each in predicted[:2]] == [
-        Terms(terms(["u'", "u' |z|", "|u'| z"]), rest=True),
-        Terms(terms(NAMES), rest=True),
+        Structure(terms(["u'", "u' |z|", "|u'| z"]), rest=True),
+        Structure(terms(NAMES), rest=True),
     ]
     for each in predicted[:4]:
         refined = search.free_run.refine(each.structure, each.unknowns[np.newaxis], tolerance=1e-12)
@@ -268,7 +268,7 @@ def test_a_number_within_two_standard_errors_of_zero_is_taken_out():
     record = record_of(LAW.memory, multisine(150), noise=0.05)
     free_run = FreeRun((record,))
     names = ["u'", "u' z", "u' |z|", "|u'|", "|u'| z"]
-    whole = free_run.refine(Terms(terms(names), rest=True), np.array([[1.0, 0.0, -0.3, 0.0, -0.6, 0.0]]))
+    whole = free_run.refine(Structure(terms(names), rest=True), np.array([[1.0, 0.0, -0.3, 0.0, -0.6, 0.0]]))
     assert (np.sort(whole.significance)[:2] < 2.0).all()
     small = pruned(free_run, whole, frozenset())
     assert small.structure.terms == terms(["u'", "u' |z|", "|u'| z"])
@@ -281,7 +281,7 @@ def test_a_structure_could_win_if_its_bic_with_the_starts_of_all_records_may_be_
     """At rest the records have no starts to fit."""
     records = record_of(LAW.memory, CYCLES, noise=0.05), record_of(LAW.memory, multisine(150), noise=0.05)
     search = Search(FreeRun(records), (), rests=rests)
-    found = search.refine(Terms(terms(["u'", "|u'| z", "u' |z|"])), np.array([1.0, -0.6, -0.3, 0.0, 0.0]))
+    found = search.refine(Structure(terms(["u'", "|u'| z", "u' |z|"])), np.array([1.0, -0.6, -0.3, 0.0, 0.0]))
     bound = search.free_run.bic_of(found.cost, 2 + starts)
     assert bound < found.bic
     assert search.could_win(2, bound - INDISTINCT + 1e-6)

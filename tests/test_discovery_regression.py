@@ -14,7 +14,7 @@ from discovered import COLEMAN_HODGDON, CYCLES, DAHL, QUADRATIC, duhem, record_o
 import hysim as hs
 from hysim.discovery import _slopes
 from hysim.discovery._hidden_memory import TermRegression
-from hysim.discovery._refinement import Terms
+from hysim.discovery._refinement import Structure
 from hysim.discovery._search import best_subsets, is_complete, preferred, thinning
 from hysim.discovery._slopes import branches, feature, signs_of, slopes, smoothed, weak_rows
 from hysim.laws.differential.terms import Term, duhem_terms, memory_terms, named_terms, power_term, symmetric
@@ -141,7 +141,7 @@ def test_a_complete_structure_keeps_its_form_where_the_origin_is_shifted(names, 
 
 def test_among_laws_that_are_as_likely_the_fewest_numbers_then_the_plain_form_then_bic_decide():
     def candidate(terms, bic, cost=1e-3):
-        parsed = Terms(tuple(Term.parse(name) for name in terms))
+        parsed = Structure(tuple(Term.parse(name) for name in terms))
         return SimpleNamespace(structure=parsed, bic=bic, cost=cost, residual=np.zeros(100), n_parameters=len(terms))
 
     sparse, complete = candidate(["u'", "|u'| u"], 1.9), candidate(["u'", "|u'|", "|u'| u"], 0.0, 0.0)

@@ -20,7 +20,7 @@ from hysim._basics.blas import one_blas_thread
 from hysim._basics.frozen import FloatArray, check_choice
 from hysim._basics.progress import Progress, Reports, reports
 from hysim.discovery._judgement import HYSTERESIS, LAG, NO_STRUCTURE, Trial, competitors, doubts, judge
-from hysim.discovery._refinement import DIVERGED, AnyExponent, Candidate, FreeRun, Samples, Work
+from hysim.discovery._refinement import DIVERGED, Candidate, FreeRun, Samples, Work
 from hysim.discovery._result import Discovery, coefficients, law_from
 from hysim.discovery._search import MOST_WORK, Library, Options, Outcome, or_any_exponent, searched
 from hysim.discovery._slopes import FORMS, check, signs_of
@@ -161,7 +161,7 @@ def discover(
     def report_search(k: int, done: float) -> None:
         report(share * (k + done))
 
-    def search(masks: tuple[Samples, ...] | None = None) -> tuple[Outcome, Outcome, Candidate[Any]]:
+    def search(masks: tuple[Samples, ...] | None = None) -> tuple[Outcome, Outcome, Candidate]:
         """The outcome of the first library, the best outcome, and the law that is taken."""
         outcomes = list[Outcome]()
         for k, each in enumerate((of_memory, *of_output)):
@@ -245,10 +245,10 @@ def _libraries(
 
 
 def _discovery(
-    records: tuple[Record, ...], outcome: Outcome, candidate: Candidate[Any], others: Trial, seed: int
+    records: tuple[Record, ...], outcome: Outcome, candidate: Candidate, others: Trial, seed: int
 ) -> Discovery:
     letter, structure = outcome.library.letter, candidate.structure
-    law = law_from(candidate, records, "z" if isinstance(structure, AnyExponent) else letter)
+    law = law_from(candidate, records, "z" if structure.any_exponent else letter)
 
     def refit(some: Sequence[Record], weights: Sequence[FloatArray]) -> Sequence[Any]:
         masks = tuple(each > 0.0 for each in weights)
@@ -298,7 +298,7 @@ def _regressed(outcome: Outcome) -> dict[str, float]:
     return coefficients(structure, numbers, outcome.library.letter)
 
 
-def _scores(candidate: Candidate[Any] | None, records: Sequence[Record]) -> dict[str, float]:
+def _scores(candidate: Candidate | None, records: Sequence[Record]) -> dict[str, float]:
     if candidate is None:
         return {"fit_percent": -math.inf, "rmse": math.inf, "bic": math.inf}
     y = np.concatenate([record.y for record in records])
@@ -312,7 +312,7 @@ def _scores(candidate: Candidate[Any] | None, records: Sequence[Record]) -> dict
 
 def left_out_rmse(
     records: Sequence[Record],
-    search: Callable[[tuple[Samples, ...]], Candidate[Any]],
+    search: Callable[[tuple[Samples, ...]], Candidate],
     count: str | int,
     progress: Progress,
 ) -> float:

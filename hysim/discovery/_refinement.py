@@ -20,7 +20,7 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cache, cached_property
-from typing import Generic, NamedTuple, Self, TypeVar
+from typing import NamedTuple, Self
 
 import numpy as np
 import numpy.typing as npt
@@ -35,21 +35,25 @@ from hysim.records import Record
 
 Bounds = tuple[FloatArray, FloatArray]
 
+EXPONENTS = (0.3, 10.0)  # lowest and highest n
 _MOST_STEPS = 150  # by hand: between two samples; a law that needs more is stiff
 
 
 Name = Term | str
 
 
-class Terms(NamedTuple):
+class Structure(NamedTuple):
+    """Terms, and the shifts; with `any_exponent` the terms are those of n = 1, and n comes after their numbers."""
+
     terms: tuple[Term, ...]
     feedthrough: bool = False
     offset: bool = False
     rest: bool = False
+    any_exponent: bool = False
 
     @property
     def size(self) -> int:
-        return len(self.terms) + self.feedthrough + self.offset
+        return len(self.terms) + self.any_exponent + self.feedthrough + self.offset
 
     @property
     def names(self) -> list[Name]:
@@ -63,66 +67,38 @@ class Terms(NamedTuple):
 
     def units(self, record: Record, stroke: float) -> FloatArray:
         """Changes of the numbers (size,) that move the output by about a stroke."""
-        of_terms = coefficient_units(record.u, record.y, self.terms)
-        return np.concatenate([of_terms, _shift_units(self, record, stroke)])
+        span = float(np.ptp(record.u))
+        of_law = coefficient_units(record.u, record.y, self.terms)
+        if self.any_exponent:
+            of_law = np.array([stroke / span, 1.0 / span, 1.0 / span, 1.0])
+        return np.array([*of_law, *[stroke / span] * self.feedthrough, *[stroke] * self.offset])
 
     def bounds(self, signs: Mapping[Term, int]) -> Bounds:
-        wanted = np.array([signs.get(term, 0) for term in self.terms] + [0] * (self.feedthrough + self.offset))
-        return np.where(wanted > 0, 0.0, -np.inf), np.where(wanted < 0, 0.0, np.inf)
+        wanted = np.zeros(self.size)
+        wanted[: len(self.terms)] = [signs.get(term, 0) for term in self.terms]
+        lower, upper = np.where(wanted > 0, 0.0, -np.inf), np.where(wanted < 0, 0.0, np.inf)
+        if self.any_exponent:
+            lower[len(self.terms)], upper[len(self.terms)] = EXPONENTS
+        return lower, upper
 
     def run(self, u: FloatArray, numbers: FloatArray, y0: FloatArray, bound: float) -> tuple[FloatArray, int]:
         """Outputs (n_sets, n_samples) from y0 (n_sets,), inf where a law diverges, and the slopes taken."""
         feedthrough, offset = shifts(self, numbers)
-        law = self.terms, numbers[:, : len(self.terms)], feedthrough
-        runs, work = free_runs(*law, y0 - offset, u[np.newaxis], bound, most_steps=_MOST_STEPS)
+        if self.any_exponent:
+            A, dissipative, conservative, n = numbers[:, :4].T
+            law = {"A": A, "beta": -dissipative, "gamma": -conservative, "n": n, "z0": y0 - offset - feedthrough * u[0]}
+            y = BoucWen.responses({**law, "feedthrough": feedthrough, "offset": offset}, u)
+            y[~(np.abs(y) <= bound).all(axis=1)] = np.inf
+            return y, 0  # not counted: no law of this form takes long
+        laws = self.terms, numbers[:, : len(self.terms)], feedthrough
+        runs, work = free_runs(*laws, y0 - offset, u[np.newaxis], bound, most_steps=_MOST_STEPS)
         return runs + offset[:, np.newaxis], work
-
-
-@dataclass(frozen=True)
-class AnyExponent:
-    """z' = A u' - beta |u'| |z|^(n-1) z - gamma u' |z|^n; its numbers are A, -beta, -gamma and n, then the shifts."""
-
-    feedthrough: bool = False
-    offset: bool = False
-    rest: bool = False
-
-    LOWEST, HIGHEST = 0.3, 10.0
-
-    @property
-    def size(self) -> int:
-        return 4 + self.feedthrough + self.offset
-
-    def units(self, record: Record, stroke: float) -> FloatArray:
-        span = float(np.ptp(record.u))
-        return np.concatenate([[stroke / span, 1.0 / span, 1.0 / span, 1.0], _shift_units(self, record, stroke)])
-
-    def bounds(self, signs: Mapping[Term, int]) -> Bounds:
-        lower, upper = np.full(self.size, -np.inf), np.full(self.size, np.inf)
-        lower[3], upper[3] = self.LOWEST, self.HIGHEST
-        return lower, upper
-
-    def run(self, u: FloatArray, numbers: FloatArray, y0: FloatArray, bound: float) -> tuple[FloatArray, int]:
-        """As of `Terms`, whose work is not counted: no law of this form takes long."""
-        feedthrough, offset = shifts(self, numbers)
-        A, dissipative, conservative, n = numbers[:, :4].T
-        laws = {"A": A, "beta": -dissipative, "gamma": -conservative, "n": n}
-        shift = {"feedthrough": feedthrough, "offset": offset, "z0": y0 - offset - feedthrough * u[0]}
-        y = BoucWen.responses({**laws, **shift}, u)
-        y[~(np.abs(y) <= bound).all(axis=1)] = np.inf
-        return y, 0
-
-
-Structure = Terms | AnyExponent
 
 
 def shifts(structure: Structure, numbers: FloatArray) -> tuple[FloatArray, FloatArray]:
     zero, first = np.zeros(len(numbers)), structure.size - structure.feedthrough - structure.offset
     feedthrough = numbers[:, first] if structure.feedthrough else zero
     return feedthrough, numbers[:, first + structure.feedthrough] if structure.offset else zero
-
-
-def _shift_units(structure: Structure, record: Record, stroke: float) -> FloatArray:
-    return np.array([stroke / float(np.ptp(record.u))] * structure.feedthrough + [stroke] * structure.offset)
 
 
 BOUND = 30.0
@@ -142,18 +118,16 @@ _STEADY = 1e-2  # strokes by which the last two may differ
 
 Samples = npt.NDArray[np.bool_]
 
-S = TypeVar("S", Terms, AnyExponent)
-
 
 @dataclass(frozen=True)
-class Candidate(Generic[S]):
+class Candidate:
     """A refined structure.
 
     `unknowns` (size + n_records,) are its numbers and each record's y0, `residual` (n_samples,) is in strokes,
     `jacobian()` (n_samples, size + n_records) is its derivative. `settles()`: whether cycles end in a steady loop.
     """
 
-    structure: S
+    structure: Structure
     unknowns: FloatArray
     jacobian: Callable[[], FloatArray]  # it and the next are computed where they are asked for
     residual: FloatArray
@@ -265,8 +239,8 @@ class FreeRun:
         return np.concatenate([self._residual(structure, unknowns, k) for k in range(len(self.records))], axis=1)
 
     def refine(
-        self, structure: S, starts: FloatArray, *, tolerance: float = RANKING, hopeless: float = math.inf
-    ) -> Candidate[S] | None:
+        self, structure: Structure, starts: FloatArray, *, tolerance: float = RANKING, hopeless: float = math.inf
+    ) -> Candidate | None:
         """Optimum from the best of `starts` (n_starts, size + n_records); None if all diverge. See `descend`."""
         units, free = self.units(structure), np.full(len(self.records), np.inf)
         sides = zip(structure.bounds(self.signs), (-free, free), strict=True)

@@ -17,7 +17,7 @@ import numpy as np
 from hysim._basics.frozen import FloatArray, frozen
 from hysim._basics.printing import frozen_result, summary_text, wrapped
 from hysim.discovery._judgement import Judgement
-from hysim.discovery._refinement import AnyExponent, Candidate, Structure, Terms
+from hysim.discovery._refinement import Candidate, Structure
 from hysim.interop import frame
 from hysim.laws.differential.boucwen import BoucWen
 from hysim.laws.differential.duhem import Duhem
@@ -44,7 +44,7 @@ class ModelledLaw(NamedTuple):
     equation: str
 
 
-def law_from(candidate: Candidate[Any], records: Sequence[Record], letter: str) -> ModelledLaw:
+def law_from(candidate: Candidate, records: Sequence[Record], letter: str) -> ModelledLaw:
     structure, unknowns = candidate.structure, candidate.unknowns
     numbers = partial(_numbers, structure, letter)
     values = numbers(unknowns[: structure.size])
@@ -58,14 +58,14 @@ def law_from(candidate: Candidate[Any], records: Sequence[Record], letter: str) 
     return ModelledLaw(models, terms, parameters, states, _stderr(candidate, numbers), text)
 
 
-def coefficients(structure: Terms, unknowns: FloatArray, letter: str) -> dict[str, float]:
+def coefficients(structure: Structure, unknowns: FloatArray, letter: str) -> dict[str, float]:
     return _coefficients(_numbers(structure, letter, unknowns[: structure.size]))
 
 
 def _numbers(structure: Structure, letter: str, unknowns: FloatArray) -> dict[str, float]:
     """The numbers that a user reads (size,): a Bouc-Wen law with a feedthrough has A = 1."""
     shifts = ["feedthrough"] * structure.feedthrough + ["offset"] * structure.offset
-    if isinstance(structure, AnyExponent):
+    if structure.any_exponent:
         A, dissipative, conservative, n, *others = unknowns.tolist()
         _, rectified, plain = bouc_wen_terms(n)
         terms = {_A: A, plain.named("z"): conservative, rectified.named("z"): dissipative}
@@ -87,7 +87,7 @@ def _coefficients(values: dict[str, float]) -> dict[str, float]:
     return {name: value for name, value in values.items() if name not in OTHERS}
 
 
-def _stderr(candidate: Candidate[Any], numbers: Callable[[FloatArray], dict[str, float]]) -> dict[str, float]:
+def _stderr(candidate: Candidate, numbers: Callable[[FloatArray], dict[str, float]]) -> dict[str, float]:
     size = candidate.structure.size
     unknowns, covariance = candidate.unknowns[:size], candidate.covariance[:size, :size]
     steps = _STEP * np.diag(np.where(unknowns == 0.0, 1.0, unknowns))
@@ -100,8 +100,8 @@ def _stderr(candidate: Candidate[Any], numbers: Callable[[FloatArray], dict[str,
 
 def _model(structure: Structure, values: dict[str, float], letter: str, y0: float, u0: float) -> Any:
     feedthrough, offset, gain = values.get("feedthrough", 0.0), values.get("offset", 0.0), values.get("gain", 1.0)
-    n = values["n"] if isinstance(structure, AnyExponent) else bouc_wen_exponent(structure.terms)
-    if isinstance(structure, Terms) and (letter == "y" or n is None):
+    n = values["n"] if structure.any_exponent else bouc_wen_exponent(structure.terms)
+    if not structure.any_exponent and (letter == "y" or n is None):
         return Duhem.from_terms(_coefficients(values), feedthrough=feedthrough, offset=offset, y0=y0)
     terms = {name: value for name, value in _coefficients(values).items() if name != _A}
     return BoucWen(

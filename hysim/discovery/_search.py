@@ -45,16 +45,16 @@ import math
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import partial
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
 from hysim._basics.frozen import FloatArray
 from hysim.discovery._judgement import about_trends
-from hysim.discovery._refinement import POLISH, AnyExponent, Candidate, FreeRun, Samples, Structure, Terms, Work, shifts
+from hysim.discovery._refinement import POLISH, Candidate, FreeRun, Samples, Structure, Work, shifts
 from hysim.discovery._slopes import FORMS, Regression, Slopes, inclusion, ridge, slopes, sparse_path, turning
-from hysim.laws.differential.terms import Term, bouc_wen_exponent, symmetric
+from hysim.laws.differential.terms import Term, bouc_wen_exponent, bouc_wen_terms, symmetric
 from hysim.metrics.criteria import rms_of_known
 from hysim.records import Record
 
@@ -147,7 +147,7 @@ class Start(NamedTuple):
     def shift(self, structure: Structure) -> list[float]:
         return [self.feedthrough] * structure.feedthrough + [self.offset] * structure.offset
 
-    def unknowns(self, structure: Terms, free_run: FreeRun) -> FloatArray:
+    def unknowns(self, structure: Structure, free_run: FreeRun) -> FloatArray:
         """Starts (n_ridges, size + n_records) from ridge regressions of increasing weight."""
         ends = [*self.shift(structure), *free_run.measured_starts]
         return np.array([[*self.regression.ridge(structure.terms, weight), *ends] for weight in _RIDGES])
@@ -157,7 +157,7 @@ class Prediction(NamedTuple):
     """A structure, its BIC and its unknowns as a linearised free run predicts them."""
 
     bic: float
-    structure: Terms
+    structure: Structure
     unknowns: FloatArray
 
 
@@ -181,7 +181,7 @@ def is_complete(terms: Iterable[Term]) -> bool:
     return all(term.divisors() <= present for term in present)
 
 
-def is_plain(structure: Terms, letter: str) -> bool:
+def is_plain(structure: Structure, letter: str) -> bool:
     """Whether a structure in u and y is complete, or one in z a Bouc-Wen law."""
     return is_complete(structure.terms) if letter == "y" else bouc_wen_exponent(structure.terms) is not None
 
@@ -190,18 +190,18 @@ def is_plain(structure: Terms, letter: str) -> bool:
 class Search:
     """Structures tried on some records, with their refinements: None where every free run diverged.
 
-    `required` are numbers that no structure may lose; `rests` the values of `Terms.rest` to try. After each structure
-    `report` is called with the share of the search that is done, about.
+    `required` are numbers that no structure may lose; `rests` the values of `Structure.rest` to try.
+    `report` is called with the share that is done, about, after each structure.
     """
 
     free_run: FreeRun
     starts: tuple[Start, ...]
     required: frozenset[str] = frozenset()
     rests: tuple[bool, ...] = (False,)
-    tried: dict[Terms, Candidate[Terms] | None] = field(default_factory=dict)
+    tried: dict[Structure, Candidate | None] = field(default_factory=dict)
     report: Callable[[float], None] = lambda share: None
 
-    def refine(self, structure: Terms, *unknowns: FloatArray, race: bool = False) -> Candidate[Terms] | None:
+    def refine(self, structure: Structure, *unknowns: FloatArray, race: bool = False) -> Candidate | None:
         """Refine a structure once, from its regressions and these starts; in a `race` it may be given up."""
         if structure not in self.tried:
             known = [start for start in self.starts if set(structure.terms) <= set(start.regression.terms)]
@@ -213,30 +213,30 @@ class Search:
         return self.tried[structure]
 
     @property
-    def candidates(self) -> list[Candidate[Terms]]:
+    def candidates(self) -> list[Candidate]:
         return sorted((c for c in self.tried.values() if c is not None), key=lambda c: (c.bic, c.structure))
 
-    def sound(self, most: int = 1) -> list[Candidate[Terms]]:
+    def sound(self, most: int = 1) -> list[Candidate]:
         """The best candidates that come to a steady loop; the best of all if no candidate does."""
         refined = self.candidates
         return list(itertools.islice((each for each in refined if each.settles()), most)) or refined[:most]
 
     @property
-    def followed(self) -> list[Candidate[Terms]]:
+    def followed(self) -> list[Candidate]:
         best = self.sound()[0]
         near = [c for c in self.candidates if c.bic < best.bic + HOPELESS or gap(c, best) < ALIKE]
         return [candidate for candidate in near if candidate.settles()] or near
 
-    def _hopeless(self, structure: Terms) -> float:
+    def _hopeless(self, structure: Structure) -> float:
         sound, n = self.sound(), self.free_run.n_samples
         if not sound:
             return math.inf
         best, d = sound[0], structure.size + (0 if structure.rest else len(self.free_run.records))
         return max(self.free_run.cost_of(best.bic + HOPELESS, d), best.cost + n * ALIKE**2)
 
-    def explore(self, largest: Terms) -> bool:
+    def explore(self, largest: Structure) -> bool:
         """Steps 2 and 3 about structures inside `largest`; whether all of them were tried before the work was done."""
-        done: set[Terms] = set()
+        done: set[Structure] = set()
         for _ in range(ROUNDS):
             points = [c for c in self.sound(_POINTS) if c.structure not in done]
             points += [c for c in [self.tried.get(largest)] if c is not None and not done]
@@ -252,7 +252,7 @@ class Search:
                 self.refine(candidate.structure._replace(rest=rest), candidate.unknowns)
         return True
 
-    def predicted(self, candidate: Candidate[Terms], largest: Terms) -> list[Prediction]:
+    def predicted(self, candidate: Candidate, largest: Structure) -> list[Prediction]:
         """The MET structures inside `largest` of lowest BIC, in the free run linearised about a candidate."""
         likely = [each for rest in self.rests for each in self._linearly(candidate, largest, rest)]
         lowest = min((each.bic for each in likely), default=0.0)
@@ -266,7 +266,7 @@ class Search:
         bound = self.free_run.bic_of(least, size + starts)
         return not sound or bound <= min(sound[0].bic, best) + INDISTINCT
 
-    def _linearly(self, candidate: Candidate[Terms], largest: Terms, rest: bool) -> Iterator[Prediction]:
+    def _linearly(self, candidate: Candidate, largest: Structure, rest: bool) -> Iterator[Prediction]:
         """Predictions with or without rest; the unknowns are the numbers of `largest` and each record's first z."""
         free_run, size = self.free_run, largest.size
         u0 = np.array([record.u[0] for record in free_run.records])
@@ -294,21 +294,21 @@ class Search:
                 structure = largest.of(list(itertools.compress(largest.names, included)))._replace(rest=rest)
                 yield Prediction(bic, structure, np.concatenate([numbers, starts]))
 
-    def _worth_refining(self, subsets: Subsets, largest: Terms) -> list[int]:
+    def _worth_refining(self, subsets: Subsets, largest: Structure) -> list[int]:
         n_terms = len(largest.terms)
         wanted = np.array([self.free_run.signs.get(term, 0) for term in largest.terms])
         allowed = (subsets.x[:, :n_terms] * wanted >= 0.0).all(axis=1) & subsets.included[:, :n_terms].any(axis=1)
         return [int(k) for k in np.flatnonzero(allowed)[:MET]]
 
 
-def preferred(candidates: Sequence[Candidate[Terms]], letter: str) -> Candidate[Terms]:
+def preferred(candidates: Sequence[Candidate], letter: str) -> Candidate:
     best = min(candidates, key=lambda candidate: candidate.bic)
     smaller = [c for c in candidates if c.n_parameters < best.n_parameters and gap(c, best) < ALIKE]
     rivals = [*(c for c in candidates if c.bic <= best.bic + INDISTINCT), *smaller]
     return min(rivals, key=lambda c: (c.n_parameters, not is_plain(c.structure, letter), c.bic))
 
 
-def pruned(free_run: FreeRun, candidate: Candidate[Terms], required: frozenset[str]) -> Candidate[Terms]:
+def pruned(free_run: FreeRun, candidate: Candidate, required: frozenset[str]) -> Candidate:
     structure = candidate.structure
     for k in np.argsort(candidate.significance).tolist():
         smaller = structure.of(structure.names[:k] + structure.names[k + 1 :])
@@ -325,12 +325,12 @@ def pruned(free_run: FreeRun, candidate: Candidate[Terms], required: frozenset[s
     return candidate
 
 
-def gap(candidate: Candidate[Any], best: Candidate[Any]) -> float:
+def gap(candidate: Candidate, best: Candidate) -> float:
     """Rms difference in strokes between two free runs."""
     return math.sqrt(max(candidate.cost - best.cost, 0.0) / best.residual.size)
 
 
-LINE = Terms((Term(False, 0, 0),))
+LINE = Structure((Term(False, 0, 0),))
 _FINALISTS = 6
 _RESTARTS = 4
 _HOPELESS = 2.0  # times the rmse that is enough: the descent of a large law may end so far above its least rmse
@@ -350,7 +350,7 @@ _WEIGHTS = (1e-9, 1e-4, 1e-2)
 class Library:
     """Terms of laws; whether these have an offset, and a `feedthrough`: "no", "may" or "must".
 
-    `letter` is "y" where the memory is the output, else "z"; `rests` are the values of `Terms.rest` to try.
+    `letter` is "y" where the memory is the output, else "z"; `rests` are the values of `Structure.rest` to try.
     """
 
     terms: tuple[Term, ...]
@@ -359,8 +359,8 @@ class Library:
     offset: bool = False
     rests: tuple[bool, ...] = (False,)
 
-    def structure(self, terms: Sequence[Term]) -> Terms:
-        return Terms(tuple(terms), self.feedthrough != "no", self.offset, all(self.rests))
+    def structure(self, terms: Sequence[Term]) -> Structure:
+        return Structure(tuple(terms), self.feedthrough != "no", self.offset, all(self.rests))
 
 
 @dataclass(frozen=True)
@@ -380,16 +380,16 @@ class Outcome:
     """Law of one library and its search: `is_short` on the optimizer's path alone, `is_cut` at the limit of work."""
 
     library: Library
-    candidate: Candidate[Terms]
+    candidate: Candidate
     search: Search
     start: Start
     slopes: Slopes
-    path: list[tuple[float, Terms]]
+    path: list[tuple[float, Structure]]
     is_short: bool = False
     is_cut: bool = False
 
     @property
-    def searched(self) -> Candidate[Terms]:
+    def searched(self) -> Candidate:
         """The law as it is refined on the samples of the search, from its numbers on all samples."""
         free_run = self.search.free_run
         if free_run.n_samples == self.candidate.residual.size:
@@ -471,7 +471,7 @@ def _least_rmse(search: Search) -> float:
     return min(errors, default=math.inf) * free_run.stroke
 
 
-def _path(start: Start, library: Library, optimizer: str) -> list[tuple[float, Terms]]:
+def _path(start: Start, library: Library, optimizer: str) -> list[tuple[float, Structure]]:
     regression = start.regression
     path = sparse_path(regression.features, regression.slope, optimizer)
     return [(threshold, library.structure(regression.included(coefficients))) for threshold, coefficients in path]
@@ -498,7 +498,7 @@ def _better_form(records: Sequence[Record], library: Library, optimizer: str) ->
     return min(errors, key=lambda form: errors[form], default="smoothed")
 
 
-def _on_all_samples(free_run: FreeRun, search: Search, library: Library, seed: int, restarts: int) -> Candidate[Terms]:
+def _on_all_samples(free_run: FreeRun, search: Search, library: Library, seed: int, restarts: int) -> Candidate:
     """Steps 4 and 5 of the selection on all samples, and the best of descending again from random starts."""
     finalists = search.followed
     if free_run.n_samples > search.free_run.n_samples:
@@ -513,7 +513,7 @@ def _on_all_samples(free_run: FreeRun, search: Search, library: Library, seed: i
     return pruned(free_run, polished, search.required)
 
 
-def _restarted(free_run: FreeRun, chosen: Candidate[Terms], seed: int, restarts: int) -> Candidate[Terms]:
+def _restarted(free_run: FreeRun, chosen: Candidate, seed: int, restarts: int) -> Candidate:
     random = np.random.default_rng(seed)
     spread = _SPREAD * free_run.units(chosen.structure)
     best = chosen
@@ -541,7 +541,7 @@ def shifted(slopes: Slopes, terms: tuple[Term, ...], *, feedthrough: bool, offse
     return tuple(Start(slopes.regression(terms, *place), *place) for place in dict.fromkeys(chosen))
 
 
-def or_any_exponent(free_run: FreeRun, of_memory: Outcome, chosen: Outcome) -> Candidate[Any]:
+def or_any_exponent(free_run: FreeRun, of_memory: Outcome, chosen: Outcome) -> Candidate:
     """The chosen law, or the Bouc-Wen law of any exponent where its BIC is lower; `of_memory` is the outcome for z."""
     thin, best = of_memory.search.free_run, chosen.searched
     if chosen.candidate.cost < free_run.n_samples * ALIKE**2:
@@ -549,7 +549,8 @@ def or_any_exponent(free_run: FreeRun, of_memory: Outcome, chosen: Outcome) -> C
     library = of_memory.library
     feedthroughs = {"no": (False,), "may": (True, False), "must": (True,)}[library.feedthrough]
     offsets = (True, False) if library.offset else (False,)
-    largest, *others = itertools.starmap(AnyExponent, itertools.product(feedthroughs, offsets, library.rests))
+    any_power = partial(Structure, bouc_wen_terms(1.0), any_exponent=True)
+    largest, *others = itertools.starmap(any_power, itertools.product(feedthroughs, offsets, library.rests))
     candidates = [_refined(thin, of_memory, largest)]
     least = math.inf if candidates[0] is None else candidates[0].cost
     smallest = [largest, *others][-1]
@@ -564,7 +565,7 @@ def or_any_exponent(free_run: FreeRun, of_memory: Outcome, chosen: Outcome) -> C
     return free_run.refine(lowest.structure, lowest.unknowns[np.newaxis], tolerance=POLISH) or chosen.candidate
 
 
-def _refined(free_run: FreeRun, of_memory: Outcome, structure: AnyExponent) -> Candidate[AnyExponent] | None:
+def _refined(free_run: FreeRun, of_memory: Outcome, structure: Structure) -> Candidate | None:
     starts = []
     for start in of_memory.search.starts:
         for n in _EXPONENTS.tolist():
