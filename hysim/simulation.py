@@ -243,6 +243,12 @@ def free_run(thing: Any, record: Record, units: Mapping[str, str] | None = None)
     return replace(run, name=type(model).__name__)
 
 
+def residual_of(models: Sequence[Any], records: Sequence[Record]) -> FloatArray:
+    """Measured minus modelled output (n_samples,) of free runs, one model for each record [unit of y]."""
+    pairs = zip(models, records, strict=True)
+    return np.concatenate([record.y - free_run(model, record).y for model, record in pairs])
+
+
 def _signals(plant: Responding, u: FloatArray, times: FloatArray | None) -> Mapping[str, FloatArray]:
     time: tuple[float, ...] = ()
     if needs_time(plant):

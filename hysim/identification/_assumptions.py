@@ -31,7 +31,7 @@ from hysim.models.dependent_structure import DependentStructure
 from hysim.models.protocols import Variant
 from hysim.models.search_space import SearchSpace
 from hysim.records import Record, SensorRecord
-from hysim.simulation import free_run
+from hysim.simulation import residual_of
 
 # Difference of two BIC: "very strong" evidence. Discovery takes 2 to find the simplest of nearly equal laws; here a
 # choice adds numbers to a model that is not exact, whose correlated residuals make smaller differences by chance.
@@ -133,7 +133,7 @@ def _left_out(family: Any, setting: Setting, paths: Sequence[Record], quiet: Seq
         for k, half in enumerate(halves):
             model = attempt.family.assemble(attempt.estimates(theta, k))
             for record in (paths[k], quiet[k]):
-                rest = (record.y - free_run(model, record).y)[len(half) % len(record) :]
+                rest = residual_of([model], [record])[len(half) % len(record) :]
                 total += float(rest @ rest)
     except (ValueError, ArithmeticError, SimulationError):
         return math.inf

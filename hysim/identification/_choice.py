@@ -53,7 +53,7 @@ from hysim.models.model import candidates
 from hysim.models.protocols import Direct, DirectFit, placed
 from hysim.models.search_space import Freedom
 from hysim.records import Record, by_record, few_places
-from hysim.simulation import free_run
+from hysim.simulation import free_run, residual_of
 
 _CLEARLY = 0.9  # of the left-out error of the search: a law without names and standard errors must gain more than that
 _NORMAL = 1.959964  # standard errors on either side of an interval at 95 %
@@ -105,7 +105,7 @@ def better(
     smooth = _fitted(rival, records, shares, admissible)
     if (smoother := smooth.smoother) is None:
         raise TypeError(f"{rival!r} does not say how its fit depends on the outputs")
-    samples, residual = smoother.samples, _residual(smooth, records)
+    samples, residual = smoother.samples, residual_of(smooth.models, records)
     short = search.problem.at(samples)
     kinds = rival.parts([part.record for part in short.parts])
     own = np.concatenate([left_out_errors(short, search.noise, optima, kind) for kind in kinds])
@@ -134,15 +134,18 @@ def _fitted(family: Direct, records: Sequence[Record], weights: Weights, admissi
 def _described(
     family: Direct, fit: DirectFit, records: Sequence[Record], weights: Weights, folds: Folds, seed: int
 ) -> Identification:
-    y, residual = np.concatenate([record.y for record in records]), _residual(fit, records)
-    kept = np.ones(y.size, dtype=bool) if weights is None else np.concatenate(weights) > 0.0
+    y, residual = np.concatenate([record.y for record in records]), residual_of(fit.models, records)
+    shares = np.ones(y.size) if weights is None else np.concatenate(weights)
+    kept = shares > 0.0
+
+    def refitted(others: FloatArray) -> FloatArray:
+        return residual_of(family.fitted(records, others * shares).models, records)
+
     n_parameters = max(1, round(fit.degrees_of_freedom))
     freedom = np.count_nonzero(kept) - fit.degrees_of_freedom
     sigma = float(np.sqrt(np.sum(residual[kept] ** 2) / freedom)) if freedom > 0.5 else float("nan")
-    if fit.smoother is None:
-        errors = _fitted_again(family, records, weights, folds)
-    else:
-        errors = fit.smoother.left_out(residual, folds)
+    smoother = fit.smoother
+    errors = errors_of_refits(refitted, y.size, folds) if smoother is None else smoother.left_out(residual, folds)
     errors = np.where(kept, errors, np.nan)
     measures = fit_measures(y[kept], residual[kept], n_parameters)
     return Identification(
@@ -163,17 +166,6 @@ def _described(
         seed=seed,
         warnings=() if np.ptp(y) else (CONSTANT,),
     )
-
-
-def _residual(fit: DirectFit, records: Sequence[Record]) -> FloatArray:
-    pairs = zip(fit.models, records, strict=True)
-    return np.concatenate([record.y - free_run(model, record).y for model, record in pairs])
-
-
-def _fitted_again(family: Direct, records: Sequence[Record], weights: Weights, folds: Folds) -> FloatArray:
-    """Errors at samples that are left out, by fits to the rest; nan elsewhere."""
-    shares = np.ones(sum(map(len, records))) if weights is None else np.concatenate(weights)
-    return errors_of_refits(lambda kept: _residual(family.fitted(records, kept * shares), records), shares.size, folds)
 
 
 def _width(fit: DirectFit, record: Record, sigma: float) -> Width | None:
@@ -333,7 +325,7 @@ class _Trials:
         within, beyond = list[FloatArray](), list[FloatArray]()
         for cut in np.searchsorted(kept, self.cuts[which]).tolist():
             model = placed(self._fit(subject, [record[:cut]], None).model, float(record.u[0]))
-            rest, u, begin = (record.y - free_run(model, record).y)[cut:], record.u[cut:], record.u[:cut]
+            rest, u, begin = residual_of([model], [record])[cut:], record.u[cut:], record.u[:cut]
             slack = _BEYOND * float(np.ptp(begin))
             leaves = np.flatnonzero((u < begin.min() - slack) | (u > begin.max() + slack))
             end = leaves[0] if leaves.size else u.size

@@ -43,7 +43,7 @@ from hysim.models.model import family_named, is_identifiable
 from hysim.models.protocols import needs_time, placed, with_law
 from hysim.models.search_space import Freedom
 from hysim.records import Record, several
-from hysim.simulation import free_run
+from hysim.simulation import residual_of
 
 _APART = 0.01  # of the outputs' range, by which the returned model may differ from what was searched
 _UNUSABLE = 2.0  # times the error along a quiet path: beyond, the noise of the input decides what the model does
@@ -429,7 +429,7 @@ def as_measured(fit: Identification, records: Sequence[Record], weights: Weights
 
     models = tuple(returned(model, record) for model, record in zip(fit.models, records, strict=True))
     y = np.concatenate([record.y for record in records])
-    residual = y - np.concatenate([free_run(model, record).y for model, record in zip(models, records, strict=True)])
+    residual = residual_of(models, records)
     kept = np.ones(y.size, dtype=bool) if weights is None else np.concatenate([*weights]) > 0.0
     if (off := metrics.rmse(fit.residual[kept], residual[kept])) > _APART * float(np.ptp(y)):
         said = f"the model's run is {off:.3g} rms off what was searched: is the output affine as `searched` says?"
@@ -482,10 +482,10 @@ def said_of_noise(
 
 def _alone_in_words(models: Sequence[Any], records: Sequence[Record], spread: float) -> str:
     try:
-        residual = [record.y - free_run(model, record).y for model, record in zip(models, records, strict=True)]
+        residual = residual_of(models, records)
     except SimulationError:
         return "and it diverges"
-    return f"{100.0 * float(np.sqrt(np.mean(np.concatenate(residual) ** 2))) / spread:.3g} %"
+    return f"{100.0 * rms_of_known(residual) / spread:.3g} %"
 
 
 def _behind(front: ReversalFilter | None, model: Any) -> Any:
