@@ -57,11 +57,11 @@ def test_the_features_are_those_of_the_law(form):
     rows = slopes([record_of(duhem(QUADRATIC), CYCLES)], form)
     problem = rows.regression(duhem_terms(2))
     exact = np.array([QUADRATIC.get(term.named("y"), 0.0) for term in problem.terms])
-    predicted = problem.features @ (exact * problem.sizes / problem.slope_size)
+    predicted = problem.features @ (exact * problem.sizes / problem.size)
     # Truncation of the branch polynomials, degree 12 at most, or of the windows' midpoint rule.
-    assert np.abs(predicted - problem.slope).max() < {"smoothed": 1e-4, "weak": 2e-2}[form]
+    assert np.abs(predicted - problem.target).max() < {"smoothed": 1e-4, "weak": 2e-2}[form]
     assert np.sqrt(np.mean(problem.features**2, axis=0)) == pytest.approx(1.0, rel=1e-12)
-    assert rows.misfit(duhem_terms(2), 0.0, 0.0) < 1e-2 * problem.slope_size
+    assert rows.misfit(duhem_terms(2), 0.0, 0.0) < 1e-2 * problem.size
 
 
 @pytest.mark.parametrize("terms", [duhem_terms(3), memory_terms(4)], ids=["Duhem", "Bouc-Wen"])
@@ -88,19 +88,18 @@ def test_libraries_have_their_sizes_and_one_order():
 
 def test_every_threshold_on_the_path_changes_the_structure():
     problem = slopes([record_of(duhem(COLEMAN_HODGDON), CYCLES)], "smoothed").regression(duhem_terms(2))
-    path = _slopes.sparse_path(problem.features, problem.slope)
-    structures = [problem.included(coefficients) for _, coefficients in path]
+    path = _slopes.sparse_path(*problem.triangle)
+    structures = [terms for _, terms in problem.path()]
     assert len(set(structures)) == len(structures)
     for threshold, coefficients in path:
         assert (np.abs(coefficients[coefficients != 0.0]) >= threshold).all()
-    assert not _slopes.sparse_fit(problem.features, problem.slope, 1e6).any()
+    assert not _slopes.sparse_fit(problem.features, problem.target, 1e6).any()
 
 
 @pytest.mark.parametrize("optimizer", ["SR3", "SSR", "FROLS"])
 def test_other_optimizers_have_paths_too(optimizer):
     problem = slopes([record_of(duhem(DAHL), CYCLES)], "smoothed").regression(duhem_terms(1))
-    path = _slopes.sparse_path(problem.features, problem.slope, optimizer)
-    structures = [problem.included(coefficients) for _, coefficients in path]
+    structures = [terms for _, terms in problem.path(optimizer)]
     assert len(set(structures)) == len(structures)
     assert tuple(Term.parse(name) for name in DAHL) in structures
 
@@ -232,7 +231,7 @@ TERMS = tuple(power_term(False, power, even=False) for power in range(4))
 
 
 def regression(features, target):
-    return TermRegression(TERMS, (), features, target, 1.0, 1e-9, 0, [np.arange(len(target))])
+    return TermRegression(TERMS, (), features, target, np.ones(len(TERMS)), 1.0, 1e-9, 0, [np.arange(len(target))])
 
 
 def losses(features, target, kept):

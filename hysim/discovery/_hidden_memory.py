@@ -33,7 +33,7 @@ import scipy
 from hysim._basics.frozen import FloatArray
 from hysim._basics.parallel import in_chunks
 from hysim.discovery._search import best_subsets
-from hysim.discovery._slopes import independent, sparse_path
+from hysim.discovery._slopes import Regression, independent
 from hysim.errors import SimulationError
 from hysim.identification import errors_of_refits, folds
 from hysim.identification.marquardt import Schedule, SumOfSquares, descend
@@ -50,39 +50,27 @@ DEPENDENT = 1e-5  # share of a slope that those before it do not explain, below 
 
 
 @dataclass(frozen=True)
-class TermRegression:
-    """target = plant @ ... + features @ coefficients + noise of one, all about an oscillator.
+class TermRegression(Regression):
+    """A regression with noise of one, of `size` [unit of y], about an oscillator whose plant is projected out.
 
-    `features` (n_samples, n_terms) and `target` have the plant projected out. `dependent` are terms left out as
-    combinations of others, `blocks` the samples held out in turn; `n_others` counts other fitted numbers.
+    `blocks` are the samples held out in turn; `n_others` counts other fitted numbers than those of plant and terms.
     """
 
-    terms: tuple[Term, ...]
-    dependent: tuple[Term, ...]
-    features: FloatArray
-    target: FloatArray
-    sigma: float
     floor: float
     n_plant: int
     blocks: Sequence[npt.NDArray[np.intp]]
     n_others: int = 0
 
-    @cached_property
-    def triangle(self) -> FloatArray:
-        return np.asarray(np.linalg.qr(np.column_stack([self.features, self.target]), mode="r"))
-
-    def path(self) -> set[tuple[Term, ...]]:
+    def structures(self) -> set[tuple[Term, ...]]:
         """Structures of STLSQ's thresholds, and of plain elimination."""
-        path = sparse_path(self.features, self.target) if self.terms else []
-        thresholded = (tuple(itertools.compress(self.terms, values != 0.0)) for _, values in path)
-        return {*thresholded, *self.eliminated()}
+        return {*(terms for _, terms in self.path()), *self.eliminated()}
 
     def eliminated(self) -> list[tuple[Term, ...]]:
         """Structures from dense to sparse, each without the term whose removal costs least."""
         if not self.terms:
             return []
-        R, every = self.triangle, np.ones(len(self.terms), dtype=bool)
-        levels = best_subsets(R[:, :-1], -R[:, -1], np.zeros(every.size), every, width=1)
+        (R, goal), every = self.triangle, np.ones(len(self.terms), dtype=bool)
+        levels = best_subsets(R, -goal, np.zeros(every.size), every, width=1)
         return [tuple(itertools.compress(self.terms, level.included[0])) for level in levels][:-1]
 
     def best(self, structures: Sequence[tuple[Term, ...]]) -> tuple[Term, ...]:
@@ -98,24 +86,16 @@ class TermRegression:
                 counts[term] += 1
         return {term: count / n_draws for term, count in counts.items()}
 
-    @cached_property
-    def condition(self) -> float:
-        R = self.triangle[:, :-1]
-        return float(np.linalg.cond(R / np.linalg.norm(R, axis=0))) if R.shape[1] else 1.0
-
     def bic(self, terms: Sequence[Term]) -> float:
-        R, n = self.triangle, self.target.size
-        included, goal = R[:, self._places(terms)], R[:, -1]
+        (R, goal), n = self.triangle, self.target.size
+        included = R[:, self.places(terms)]
         rest = goal - included @ np.linalg.lstsq(included, goal, rcond=None)[0]
         n_parameters = self.n_plant + self.n_others + len(terms)
-        return information(float(rest @ rest) / n * self.sigma**2, n, n_parameters, floor=self.floor)
+        return information(float(rest @ rest) / n * self.size**2, n, n_parameters, floor=self.floor)
 
     def held_out_rmse(self, terms: Sequence[Term]) -> float:
         """Rmse on each block of a structure that the other blocks have fitted [unit of y]."""
-        return self.sigma * held_out_rmse(self.features[:, self._places(terms)], self.target, self.blocks)
-
-    def _places(self, terms: Sequence[Term]) -> list[int]:
-        return [self.terms.index(term) for term in terms]
+        return self.size * held_out_rmse(self.features[:, self.places(terms)], self.target, self.blocks)
 
 
 def held_out_rmse(columns: FloatArray, target: FloatArray, blocks: Sequence[npt.NDArray[np.intp]]) -> float:
@@ -154,7 +134,8 @@ def term_regression(
         dependent=tuple(term for k, term in enumerate(terms) if k not in included),
         features=features * units / sigma,
         target=goal / sigma,
-        sigma=sigma,
+        sizes=sigma / units,
+        size=sigma,
         floor=floor,
         n_plant=n_plant,
         blocks=blocks,

@@ -372,7 +372,7 @@ class Search(NamedTuple):
 
 def _tried(fitted: _Fitted, regression: TermRegression) -> _Tried:
     law = tuple(term for term in regression.terms if term in fitted.terms)
-    tried = (regression.path() | {law}) - {()}
+    tried = (regression.structures() | {law}) - {()}
     structures = sorted(tried, key=lambda terms: (-len(terms), regression.bic(terms), terms))
     return _Tried(fitted, regression, structures, regression.best(structures))
 

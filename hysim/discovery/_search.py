@@ -53,7 +53,7 @@ import numpy.typing as npt
 from hysim._basics.frozen import FloatArray
 from hysim.discovery._judgement import about_trends
 from hysim.discovery._refinement import POLISH, Candidate, FreeRun, Samples, Structure, Work, shifts
-from hysim.discovery._slopes import FORMS, Regression, Slopes, inclusion, ridge, slopes, sparse_path, turning
+from hysim.discovery._slopes import FORMS, Regression, Slopes, inclusion, ridge, slopes, turning
 from hysim.laws.differential.terms import Term, bouc_wen_exponent, bouc_wen_terms, symmetric
 from hysim.metrics.criteria import rms_of_known
 from hysim.records import Record
@@ -410,10 +410,10 @@ class Outcome:
     def inclusion(self, seed: int) -> dict[str, float]:
         """Share of an ensemble of sparse regressions that keeps each term, where the path is as sparse as the law."""
         regression = self.start.regression
-        stride = max(1, -(-len(regression.slope) // _ENSEMBLE_ROWS))
+        stride = max(1, -(-len(regression.target) // _ENSEMBLE_ROWS))
         n_terms = len(self.candidate.structure.terms)
         threshold = max((t for t, structure in self.path if len(structure.terms) >= n_terms), default=0.0)
-        features, slope = regression.features[::stride], regression.slope[::stride]
+        features, slope = regression.features[::stride], regression.target[::stride]
         shares = inclusion(features, slope, threshold, n_models=_ENSEMBLE, seed=seed)
         names = (term.named(self.library.letter) for term in regression.terms)
         return dict(zip(names, shares.tolist(), strict=True))
@@ -472,9 +472,7 @@ def _least_rmse(search: Search) -> float:
 
 
 def _path(start: Start, library: Library, optimizer: str) -> list[tuple[float, Structure]]:
-    regression = start.regression
-    path = sparse_path(regression.features, regression.slope, optimizer)
-    return [(threshold, library.structure(regression.included(coefficients))) for threshold, coefficients in path]
+    return [(threshold, library.structure(terms)) for threshold, terms in start.regression.path(optimizer)]
 
 
 def _better_form(records: Sequence[Record], library: Library, optimizer: str) -> str:

@@ -27,7 +27,7 @@ import math
 import warnings
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from functools import partial
+from functools import cached_property, partial
 from typing import Any
 
 import numpy as np
@@ -50,13 +50,12 @@ OPTIMIZERS = ("STLSQ", "SR3", "SSR", "FROLS")
 
 
 def sparse_path(features: FloatArray, slope: FloatArray, optimizer: str = "STLSQ") -> list[tuple[float, FloatArray]]:
-    """Thresholds from zero up, and the coefficients (n_terms,) that the optimizer finds at each.
+    """Thresholds from zero up, and the coefficients (n_terms,) that the optimizer finds at each; rows are `compressed`.
 
     The next threshold is just above the smallest coefficient of the last result, so that none that matters is missed;
     SR3, whose coefficients may be smaller than its threshold, goes on in steps of STEP. SSR and FROLS have no
     threshold: their own sequence of structures is the path, each with its smallest coefficient.
     """
-    features, slope = compressed(features, slope)
     if optimizer in ("SSR", "FROLS"):
         return _greedy_path(features, slope, optimizer)
     path: list[tuple[float, FloatArray]] = []
@@ -292,27 +291,37 @@ def signs_of(terms: Sequence[Term], signs: Mapping[str, int] | None) -> dict[Ter
 
 @dataclass(frozen=True)
 class Regression:
-    """slope = features @ coefficients in units of `sizes` and `slope_size`; collinear terms are `dependent`."""
+    """target = features @ coefficients in units of `size` / `sizes` (n_terms,); collinear terms are `dependent`."""
 
     terms: tuple[Term, ...]
     dependent: tuple[Term, ...]
     features: FloatArray
-    slope: FloatArray
+    target: FloatArray
     sizes: FloatArray
-    slope_size: float
+    size: float
 
-    @property
+    @cached_property
+    def triangle(self) -> tuple[FloatArray, FloatArray]:
+        return compressed(self.features, self.target)
+
+    @cached_property
     def condition(self) -> float:
-        return float(np.linalg.cond(self.features))
+        rows = self.triangle[0]
+        return float(np.linalg.cond(rows / np.linalg.norm(rows, axis=0))) if self.terms else 1.0
 
-    def included(self, coefficients: FloatArray) -> tuple[Term, ...]:
-        return tuple(term for term, value in zip(self.terms, coefficients, strict=True) if value != 0.0)
+    def path(self, optimizer: str = "STLSQ") -> list[tuple[float, tuple[Term, ...]]]:
+        """Thresholds of an optimizer from dense to sparse, each with the terms that it keeps."""
+        path = sparse_path(*self.triangle, optimizer) if self.terms else []
+        return [(threshold, tuple(itertools.compress(self.terms, values != 0.0))) for threshold, values in path]
+
+    def places(self, terms: Sequence[Term]) -> list[int]:
+        return [self.terms.index(term) for term in terms]
 
     def ridge(self, terms: Sequence[Term], weight: float) -> FloatArray:
         """Coefficients (n_terms,) of a law with these terms alone, by ridge regression."""
-        included = [self.terms.index(term) for term in terms]
-        scaled = ridge(self.features[:, included], self.slope, weight)
-        return np.asarray(scaled * self.slope_size / self.sizes[included])
+        included = self.places(terms)
+        scaled = ridge(self.features[:, included], self.target, weight)
+        return np.asarray(scaled * self.size / self.sizes[included])
 
 
 @dataclass(frozen=True)
@@ -334,7 +343,7 @@ class Slopes:
     def regression(self, terms: Sequence[Term], feedthrough: float = 0.0, offset: float = 0.0) -> Regression:
         """Regression on the independent ones of the terms, for z = y - feedthrough u - offset."""
         raw, slope = self.equations(partial(_features, terms), feedthrough, offset)
-        sizes, slope_size = np.sqrt(np.mean(raw**2, axis=0)), float(np.sqrt(np.mean(slope**2))) or 1.0
+        sizes, size = np.sqrt(np.mean(raw**2, axis=0)), float(np.sqrt(np.mean(slope**2))) or 1.0
         scaled = raw / np.where(sizes > 0.0, sizes, 1.0)
         by_degree = sorted(range(len(terms)), key=lambda k: (terms[k].degree, k))
         included = sorted(independent(scaled, np.empty((len(slope), 0)), by_degree, DEPENDENT))
@@ -342,9 +351,9 @@ class Slopes:
             terms=tuple(terms[k] for k in included),
             dependent=tuple(term for k, term in enumerate(terms) if k not in included),
             features=scaled[:, included],
-            slope=slope / slope_size,
+            target=slope / size,
             sizes=sizes[included],
-            slope_size=slope_size,
+            size=size,
         )
 
 
