@@ -37,7 +37,6 @@ from hysim.errors import SimulationError
 from hysim.identification import identify
 from hysim.laws.operators.prandtl_ishlinskii import PrandtlIshlinskii
 from hysim.laws.static import SingleValued
-from hysim.metrics.criteria import information
 from hysim.models.protocols import Subject
 from hysim.models.search_space import ALL_FREE, Freedom, Parameters, SearchSpace
 from hysim.plants.transfer_function import FREQUENCY, TransferFunction, TransferFunctionStructure
@@ -321,4 +320,4 @@ def _line(records: Sequence[Record], weights: Sequence[FloatArray]) -> Rival:
 
 def _information(records: Sequence[Record], residual: FloatArray, n_parameters: int) -> float:
     stroke = max(float(np.ptp(record.y)) for record in records)
-    return information(float(np.mean(residual**2)), residual.size, n_parameters, floor=FLOOR * stroke)
+    return metrics.bic(residual, n_parameters, floor=FLOOR * stroke)

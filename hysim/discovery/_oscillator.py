@@ -36,7 +36,6 @@ from hysim.errors import SimulationError
 from hysim.identification import identify
 from hysim.laws.differential.boucwen import BoucWen
 from hysim.laws.differential.terms import RELAXATION, Term, bouc_wen_exponent, bouc_wen_terms, law_text
-from hysim.metrics.criteria import information
 from hysim.plants.oscillator import BoucWenOscillator
 from hysim.plants.oscillator_structure import Linear, OscillatorStructure, linear_plant
 from hysim.plants.transfer_function import TransferFunction
@@ -134,8 +133,7 @@ class _Fitted(NamedTuple):
 
     @property
     def bic(self) -> float:
-        n, floor = self.residual.size, self.search.response.floor
-        return information(float(np.mean(self.residual**2)), n, len(self.stderr), floor=floor)
+        return metrics.bic(self.residual, len(self.stderr), floor=self.search.response.floor)
 
     @property
     def diverges(self) -> bool:
