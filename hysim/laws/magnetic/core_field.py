@@ -274,10 +274,10 @@ class CoreFieldStructure:
         Raises ValueError if a record has no even time or not the channel, or the flux density is constant.
         """
         law, at = self._begun(records), self._places(records)
-        every = np.ones(sum(map(len, records))) if weights is None else weights
-        shares = by_record(every, records)
-        if np.count_nonzero(every) < len(law.weights):
-            raise ValueError(f"{every.size} samples tell too little of {len(law.weights)} weights: take fewer stops")
+        n = sum(map(len, records))
+        shares = by_record(np.ones(n) if weights is None else weights, records)
+        if np.count_nonzero(np.concatenate(shares)) < len(law.weights):
+            raise ValueError(f"{n} samples tell too little of {len(law.weights)} weights: take fewer stops")
         folds = _folds([len(record) for record in records])
         of_records = zip(records, shares, folds, strict=True)
         normal = _Normal.of(
