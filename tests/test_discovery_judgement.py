@@ -87,7 +87,7 @@ def judged(records, refit):
     if not COMPILED and sum(map(len, records)) > 200:
         pytest.skip("identifies on hundreds of samples, which takes minutes uncompiled")
     laws = refit(records, [np.ones(len(record)) for record in records])
-    return judge(records, laws, refit, tried(*records))
+    return judge(tried(*records), laws, refit)
 
 
 def test_a_lag_under_sines_of_two_rates_is_a_linear_lag_whose_widths_are_those_of_its_closed_form():
@@ -327,7 +327,7 @@ def test_a_law_that_diverges_on_steady_cycles_is_no_structure():
     growing = hs.Duhem.from_terms({"u'": 1.0, "|u'| y^2": 0.1}, y0=0.1)
     record = hs.Record(u=u, y=growing.response(u), t=times(100, 1.0, cycles=1.49))
     refit = refit_of(growing, tuple(growing.terms))
-    found = judge([record], [growing], refit)
+    found = judge(competitors([record]), [growing], refit)
     assert found.verdict == "no structure found"
     assert not found.stable
     assert "diverges in free run" in doubts(found)[0]
@@ -341,7 +341,7 @@ def test_a_fold_that_cannot_be_fitted_counts_as_a_miss():
     def refit(records, weights):
         raise ValueError("the law diverges on this record")
 
-    found = judge(records, laws, refit, tried(*records))
+    found = judge(tried(*records), laws, refit)
     assert found.held_out["law"] == np.inf
     assert found.verdict == "linear lag"
 
@@ -356,7 +356,7 @@ def test_a_long_record_is_judged_on_fewer_samples():
 
     t = times(5000, 1.0, cycles=4)
     u = np.sin(2.0 * np.pi * t)
-    judge([measured(u, LAW.response(u), t)], [LAW], refit)
+    judge(competitors([measured(u, LAW.response(u), t)]), [LAW], refit)
     assert set(lengths) == {1001}  # every 20th of 20 001
 
 

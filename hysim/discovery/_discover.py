@@ -257,7 +257,7 @@ def _discovery(
             raise ValueError("the law diverges")
         return law_from(refined, some, letter).models
 
-    judgement = judge(records, law.models, refit, others)
+    judgement = judge(others, law.models, refit)
     message = [f"{letter} is held at zero at the first sample"] * structure.rest
     message += [_SHORT] * outcome.is_short + [_CUT] * outcome.is_cut
     path = [(threshold, outcome.search.refine(each)) for threshold, each in outcome.path]

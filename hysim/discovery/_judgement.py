@@ -359,11 +359,8 @@ def competitors(records: Sequence[Record]) -> Trial:
     return Trial(records, linear, spread, by, left_out, scores, together)
 
 
-def judge(
-    records: Sequence[Record], laws: Sequence[Responding], refit: Refit, others: Trial | None = None
-) -> Judgement:
-    """Judge laws fitted to records, one for each; `refit(records, weights)` fits where the weights are not zero."""
-    others = others or competitors(records)
+def judge(others: Trial, laws: Sequence[Responding], refit: Refit) -> Judgement:
+    """Judge laws, one for each record; `refit(records, weights)` fits where the weights (n_samples,) are not zero."""
     records, linear = others.records, others.linear
     y = np.concatenate([record.y for record in records])
 
