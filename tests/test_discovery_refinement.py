@@ -16,6 +16,7 @@ from hysim.discovery._discover import left_out_rmse
 from hysim.discovery._hidden_memory import cases, memory_arrays
 from hysim.discovery._refinement import _SCHEDULE, FreeRun, Structure
 from hysim.discovery._search import INDISTINCT, Library, Options, Search, pruned, searched
+from hysim.identification import folds
 from hysim.identification.marquardt import SumOfSquares, descend, differences
 from hysim.kernels import memory_terms
 from hysim.laws.differential.terms import RELAXATION, Term, bouc_wen_terms
@@ -210,7 +211,7 @@ def test_the_left_out_error_is_that_of_laws_that_have_not_seen_the_sample():
     candidate = search((np.ones(len(record), dtype=bool),))
     noise = np.sqrt(candidate.cost / len(record)) * np.ptp(record.y)
     counted = []
-    error = left_out_rmse([record], search, 10, lambda done, total: counted.append((done, total)))
+    error = left_out_rmse([record], search, folds(10, len(record)), lambda done, total: counted.append((done, total)))
     # Theory for 3 numbers from 204 samples: 1 + 3/204 of the noise; this draw may differ by as much again.
     assert error == pytest.approx(noise, rel=0.05)
     assert sorted(np.concatenate(unseen[1:]).tolist()) == list(range(len(record)))
@@ -219,7 +220,7 @@ def test_the_left_out_error_is_that_of_laws_that_have_not_seen_the_sample():
         left_out_rmse(
             [record],
             lambda seen: SimpleNamespace(structure=Structure(terms(["|u'| y"])), unknowns=np.array([50.0, 1.0])),
-            2,
+            folds(2, len(record)),
             lambda done, total: None,
         )
         == np.inf

@@ -14,6 +14,7 @@ from functools import cache, partial
 from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 
 from hysim import metrics
 from hysim._basics.blas import one_blas_thread
@@ -136,7 +137,7 @@ def discover(
     """
     records = _checked(record_or_records)
     n_samples = sum(map(len, records))
-    n_folds = 0 if cross_validate is None else len(folds(cross_validate, n_samples, name="cross_validate"))
+    left_out = [] if cross_validate is None else folds(cross_validate, n_samples, name="cross_validate")
     check(optimizer)
     if route == "oscillator":
         raise ValueError("an oscillator has its own verb: hs.discover_oscillator(record)")
@@ -152,9 +153,9 @@ def discover(
         derivative=derivative,
         seed=seed,
         # the folds of a cross-validation repeat the search without knowing what the competitors know
-        enough=None if n_folds else lambda: others().enough,
+        enough=None if left_out else lambda: others().enough,
     )
-    report = _in_steps(progress or (lambda done, total: None), _REPORTS, 1 + n_folds)
+    report = _in_steps(progress or (lambda done, total: None), _REPORTS, 1 + len(left_out))
     share = _SEARCHES / (1 + len(of_output))
     any_exponent = library is None and symmetry is None and not signs
 
@@ -179,9 +180,7 @@ def discover(
     first, outcome, candidate = search()
     result = _discovery(records, outcome, candidate, others(), seed)
     report(1.0)
-    error = math.nan
-    if cross_validate is not None:
-        error = left_out_rmse(records, lambda masks: search(masks)[2], cross_validate, lambda k, _: report(1.0 + k))
+    error = left_out_rmse(records, lambda masks: search(masks)[2], left_out, lambda k, _: report(1.0 + k))
     warnings = [*result.warnings, swapped_columns(records)]
     is_even = all(r.t is not None and np.ptp(np.diff(r.t)) < 1e-6 * np.ptp(r.t) for r in records)
     is_poor = _scores(first.candidate, records)["fit_percent"] <= _POOR
@@ -313,18 +312,16 @@ def _scores(candidate: Candidate | None, records: Sequence[Record]) -> dict[str,
 def left_out_rmse(
     records: Sequence[Record],
     search: Callable[[tuple[Samples, ...]], Candidate],
-    count: str | int,
+    left_out: Sequence[npt.NDArray[np.intp]],
     progress: Progress,
 ) -> float:
     """Rmse on samples left out of the search, repeated for each fold [unit of y]; inf where a law diverges."""
-    free_run = FreeRun(tuple(records))
-    left_out = folds(count, free_run.n_samples)
-    done = itertools.count(1)
+    free_run, done = FreeRun(tuple(records)), itertools.count(1)
 
     def residual(weights: FloatArray) -> FloatArray:
         law = search(tuple(by_record(weights > 0.0, records)))
         progress(next(done), len(left_out))
-        return free_run.residuals(law.structure, law.unknowns[np.newaxis])[0]
+        return np.asarray(free_run.residuals(law.structure, law.unknowns[np.newaxis])[0])
 
     errors = errors_of_refits(residual, free_run.n_samples, left_out)
     return math.inf if np.abs(errors).max() >= DIVERGED else rms_of_known(errors) * free_run.stroke
