@@ -125,12 +125,12 @@ def folds(records: Sequence[Record]) -> tuple[str, list[Samples]]:
         counted[samples[: math.ceil(_START * samples.size)]] = False
     if len(records) == 1:
         by, parts = _folds_of(records[0])
-    elif not all(_covers(np.delete(u, samples), u[samples]) for samples in parts):
+    elif not all(_inside(u, samples, _INSIDE).all() for samples in parts):
         by, parts = "block", blocks(min(2 * _FOLDS * len(records), u.size), u.size)
     groups = [np.unique(np.concatenate(parts[k::_FOLDS])) for k in range(min(_FOLDS, len(parts)))]
     left_out = [group[counted[group]] for group in groups if counted[group].any()]
-    left_out = [samples for samples in left_out if _covers(np.delete(u, samples), u[samples])] or left_out
-    inside = [samples[_is_inside(np.delete(u, samples), u[samples])] for samples in left_out]
+    left_out = [samples for samples in left_out if _inside(u, samples, _INSIDE).all()] or left_out
+    inside = [samples[_inside(u, samples)] for samples in left_out]
     return by, [samples for samples in inside if samples.size] or left_out
 
 
@@ -144,13 +144,10 @@ def _folds_of(record: Record) -> tuple[str, list[Samples]]:
     return "block", blocks(min(2 * _FOLDS, len(record)), len(record))
 
 
-def _covers(training: FloatArray, other: FloatArray) -> bool:
-    beyond = _INSIDE * float(np.ptp(np.append(training, other)))
-    return bool(other.min() >= training.min() - beyond and other.max() <= training.max() + beyond)
-
-
-def _is_inside(training: FloatArray, other: FloatArray) -> npt.NDArray[np.bool_]:
-    return np.asarray((other >= training.min()) & (other <= training.max()))
+def _inside(u: FloatArray, samples: Samples, slack: float = 0.0) -> npt.NDArray[np.bool_]:
+    """Whether each of the samples of an input is within the range of the others, or nearly so."""
+    others, beyond = np.delete(u, samples), slack * float(np.ptp(u))
+    return np.asarray((u[samples] >= others.min() - beyond) & (u[samples] <= others.max() + beyond))
 
 
 def rate_spread(records: Sequence[Record]) -> float:
