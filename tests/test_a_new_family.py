@@ -283,6 +283,31 @@ def test_an_output_that_is_not_affine_as_said_is_no_success():
     assert any("is the output affine as `searched` says?" in each for each in fit.warnings)
 
 
+def test_of_an_affine_parameter_only_a_side_that_is_physical_counts():
+    """In units of the output's span."""
+
+    def fitted(*sides, **others):
+        class Bare(hs.Law):
+            offset: float = 0.0
+            z0: float = 0.0
+            searched = (hs.Parameter("offset", *sides, unit="y", affine=True, **others),)
+
+            @staticmethod
+            def slope(p, z, u, s):
+                return 1.0
+
+            @staticmethod
+            def output(p, z, u):
+                return p.offset + z
+
+        fit = hs.identify(hs.family(Bare), hs.Record(u=U, y=30.0 + U - U[0]), initial="rest")
+        return fit.estimates["offset"] / np.ptp(U)
+
+    assert fitted(-1.0, 1.0) == pytest.approx(30.0 / np.ptp(U))
+    assert fitted(1.0, 3.0, physical=(True, False)) == pytest.approx(30.0 / np.ptp(U))
+    assert fitted(1.0, 3.0, physical=(False, True)) == pytest.approx(3.0)
+
+
 def test_a_model_of_a_class_that_is_defined_anew_says_so():
     before = own(gain=1.0, z0=0.0)()
     own(gain=1.0, z0=0.0)

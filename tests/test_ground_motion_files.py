@@ -40,6 +40,8 @@ def peer(texts, width, line="NPTS={n:7d}, DT={step:9.5f} SEC", per_line=5, step=
     [
         "NPTS={n:6d}, DT= .00500 SEC",
         "NPTS={n:6d}, DT= 5.000 MSEC",
+        "NPTS, DT: {n}, 5 milliseconds",
+        "    {n}  5.0 NPTS, DT (MSEC)",
         "NPTS=   {n}, DT=   .0050 SEC,",
         "   NPTS={n},    DT=0.0050SEC",
         "{n}    0.0050    NPTS, DT",

@@ -54,7 +54,7 @@ def test_a_linear_structure_is_a_transfer_function(controller):
 
 
 def test_an_oscillator_in_a_loop_moves_as_it_does_under_the_same_force():
-    law = hs.BoucWen(A=30.0, beta=200.0, gamma=-50.0)
+    law = hs.BoucWen(A=30.0, beta=200.0, gamma=-50.0, u0=0.02)  # which is no place of the oscillator
     plant = hs.BoucWenOscillator(
         mass=2.0, damping=0.6, stiffness=20.0, law=law, hold="zoh", initial_state=(0.01, 0.1), substeps=8
     )

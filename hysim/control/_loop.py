@@ -188,7 +188,7 @@ def close_loop(
         plant = plant.to_structure()
     if isinstance(plant, Structure):
         if u0 or substeps is not None:
-            raise ValueError("a structure has its own initial_state and substeps: leave out u0 and substeps")
+            raise ValueError("such a plant has its own initial_state and substeps: leave out u0 and substeps")
         quake = None if ground_acceleration is None else vectors(ground_acceleration=ground_acceleration, t=times)[0]
         resting = RestingPlant(plant, h, chain=ControlledStructure(plant, h, quake))
         return around(resting, controller, times, r, units, progress)

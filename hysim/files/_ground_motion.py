@@ -60,9 +60,11 @@ TOP = 60
 
 _REAL = r"((?:\d+\.?\d*|\.\d+)(?:[EeDd][+-]?\d+)?)"
 _NPTS = re.compile(r"\bNPTS?\s*[=:]?\s*(\d+)", re.IGNORECASE)
-_DT = re.compile(rf"\bDT\s*[=:]?\s*{_REAL}\s*(ms(?:ec)?\b)?", re.IGNORECASE)
+_MILLI = r"\W*(m(?:illi)?s(?:ec\w*)?\b)?"
+_DT = re.compile(rf"\bDT\s*[=:]?\s*{_REAL}{_MILLI}", re.IGNORECASE)
 _IN_ORDER = re.compile(
-    rf"^\s*(\d+)[\s,]+{_REAL}[\s,]*NPTS\W+DT\b|\bNPTS\s*,?\s*DT\s*[=:]?\s*(\d+)[\s,]+{_REAL}", re.IGNORECASE
+    rf"^\s*(\d+)[\s,]+{_REAL}[\s,]*NPTS\W+DT\b{_MILLI}|\bNPTS\s*,?\s*DT\s*[=:]?\s*(\d+)[\s,]+{_REAL}{_MILLI}",
+    re.IGNORECASE,
 )
 _BLOCK = re.compile(
     rf"[ \t]*(\d+)\s+points\s+of\s+acc\w*\s+data\s+equally\s+spaced\s+at\s+{_REAL}\s*sec", re.IGNORECASE
@@ -437,10 +439,15 @@ def peer_header(lines: list[str]) -> StatedValues | None:
     for number in range(len(lines), 0, -1):
         line = lines[number - 1]
         if (n_values := _NPTS.search(line)) and (step := _DT.search(line)):
-            return StatedValues(number, int(n_values[1]), _real(step[1]) * (1e-3 if step[2] else 1.0))
+            return StatedValues(number, int(n_values[1]), _seconds(*step.groups()))
         if both := _IN_ORDER.search(line):
-            return StatedValues(number, int(both[1] or both[3]), _real(both[2] or both[4]))
+            n, length, milli = both.groups()[:3] if both[1] else both.groups()[3:]
+            return StatedValues(number, int(n), _seconds(length, milli))
     return None
+
+
+def _seconds(text: str, milli: str | None) -> float:
+    return _real(text) / (1000.0 if milli else 1.0)
 
 
 def cosmos_blocks(lines: list[str], skip: int) -> list[StatedValues]:

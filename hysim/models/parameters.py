@@ -20,7 +20,6 @@ from hysim.records import Record, span_of
 
 Numbers = Mapping[str, float]
 Box = Mapping[str, tuple[float, float]]
-_OPEN = (-np.inf, np.inf)
 
 
 @dataclass(frozen=True)
@@ -31,8 +30,8 @@ class Parameter:
     ``"h"`` is half the span of the input. A quotient of two other parameters stands for their values in the law: the
     box of ``"breakaway/sigma0"`` moves with both. The box of a parameter with `from_first` stands about the first
     input, and one with `log` is searched on a log scale. The output is affine in an `affine` parameter, which needs no
-    box; its sides, where it has some, are numbers of its own unit. `physical` says whether the lower and the upper side
-    of the box is a limit of physics or of the law: the search is not stopped there, as it is at other sides.
+    box. `physical` says whether the lower and the upper side of the box is a limit of physics or of the law: the search
+    is not stopped there, as it is at other sides. Of an affine parameter only such a side counts.
     """
 
     name: str
@@ -43,6 +42,11 @@ class Parameter:
     from_first: bool = False
     affine: bool = False
     physical: tuple[bool, bool] = (False, False)
+
+    def physical_sides(self, units: Mapping[str, float]) -> tuple[float, float]:
+        """Lower and upper side in these units, infinite where it is no limit of physics."""
+        (lower, upper), unit = self.physical, unit_of(self.unit, units)
+        return self.lower * unit if lower else -np.inf, self.upper * unit if upper else np.inf
 
 
 def affine(*names: str, unit: str = "1") -> tuple[Parameter, ...]:
@@ -91,7 +95,10 @@ class Coordinate(NamedTuple):
         """The coordinate of a chart in the user's bounds; between finite ones it measures the parameter itself."""
         if np.isfinite([lower, upper]).all():
             return self._replace(lower=lower, upper=upper, physical=(False, False), drawn=None)
-        return self._replace(lower=max(self.lower, lower), upper=min(self.upper, upper), physical=(False, False))
+        low, high = max(self.lower, lower), min(self.upper, upper)
+        if not low < high:
+            raise ValueError(f"bounds of {self.name!r} leave nothing to search, got {(lower, upper)}")
+        return self._replace(lower=low, upper=high, physical=(False, False))
 
     def limited(self, limits: Mapping[str, tuple[float, float]]) -> "Coordinate":
         """The coordinate in the user's bounds; ValueError if one is not finite, or not positive on a log scale."""
@@ -160,9 +167,9 @@ def declared_space(
     own = {name: value for name, value in usual if name in values and scalars[name] == value}
     points = [{name: values[name][0] + start[name] * values[name][1] for name in start} for start in (own, *starts)]
     columns = tuple(name for name, each in of.items() if each is not None and each.affine)
-    free = {name: each for name, each in of.items() if each is not None and each.affine and name not in held}
-    sides = {name: (each.lower, each.upper) for name, each in free.items() if (each.lower, each.upper) != _OPEN}
-    limits, shown = sides | freedom.limits(scalars, held), scalars | _as_shares(scalars, shares)
+    sides = {name: each.physical_sides(units) for name, each in of.items() if each and each.affine and name not in held}
+    limits = {name: pair for name, pair in sides.items() if np.isfinite(pair).any()} | freedom.limits(scalars, held)
+    shown = scalars | _as_shares(scalars, shares)
     if not freedom.starts_anew:
         coordinates = [each.holding(shown[each.name]) for each in coordinates]
     space = space_of(coordinates, columns, shown, held, limits, points, state=resting, screened=law.screened)
@@ -304,7 +311,8 @@ def space_of_chart(
     def parameters(x: FloatArray) -> dict[str, FloatArray]:
         known = space.parameters(x)
         raw = {name: known.pop(name) for name in chart.axes if name not in chart.limits}
-        return chart.measured(known, raw)
+        values = chart.measured(known, raw)
+        return {name: values[name] for name in chart.values if name in values}
 
     def encoded(parameters: Numbers) -> FloatArray:
         numbers = chart.numbers({**chart.values, **parameters})

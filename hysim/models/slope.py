@@ -140,7 +140,7 @@ def _tree(cls: Any, name: str, function: FunctionType, constants: Mapping[str, b
     """A function of a family as it is compiled: of a vector of parameters, and without annotations."""
     try:
         tree = _parsed(inspect.getsource(function))
-        if tree.name != function.__name__:
+        if tree.name != function.__code__.co_name:
             raise OSError("another text has the name of what exec has compiled")
     except (OSError, SyntaxError):
         raise TypeError(

@@ -393,12 +393,16 @@ class BoucWenOscillator:
         return self.substeps * more
 
     def to_structure(self) -> Structure:
-        """The plant as a structure of one mass, which takes any law; it has numerics of its own."""
+        """The plant as a structure of one mass, which takes any law.
+
+        It has numerics of its own, and an input that is linear between samples. As here the memory is that of the
+        initial state, whatever the law's `u0`.
+        """
         return Structure(
             mass=np.array(self.mass),
             damping=self.damping,
             stiffness=np.array(self.stiffness),
-            elements=(Element(self.law, between=(0, 1)),),
+            elements=(Element(self.law.placed(None, self.law.u_range), between=(0, 1)),),
             excitation=self.excitation,
             initial_state=self.initial_state,
         )
@@ -416,6 +420,8 @@ class BoucWenOscillator:
             return inputs, np.empty((0, 6))
         front, path = steps.state.copy(), np.empty((inputs.size, 6))
         if state is not None:
+            if len(state) != len(OscillatorState._fields):
+                raise ValueError(f"the state must hold {len(OscillatorState._fields)} numbers, got {len(state)}")
             front[: kernels.N_FRONT] = *state, 1.0
 
         def work(k: slice) -> int:

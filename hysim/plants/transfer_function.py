@@ -168,6 +168,10 @@ class TransferFunction(Composable):
             plant.rest_at(u0, level, law.state)
         return law
 
+    def filtered(self, signals: FloatArray, sample_time: float) -> FloatArray:
+        """Outputs (n_signals, n_samples) from rest for several inputs at once; they may be infinite or nan."""
+        return self.filtered_sets({}, signals, sample_time)
+
     def filtered_sets(self, parameters: Parameters, signals: FloatArray, sample_time: float) -> FloatArray:
         """Outputs from rest for inputs (n_sets, n_signals, n_samples); they may be infinite or nan."""
         each = signals.reshape(1, -1, signals.shape[-1])

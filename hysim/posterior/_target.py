@@ -417,15 +417,21 @@ class Target:
         return words | {(*space.coordinates, SIGMA)[k]: str(own) for k, (own, _) in self.v_prior.own.items()}
 
     def _flat_in_words(self, k: int, name: str, low: float, high: float) -> str:
-        """A flat prior of a coordinate in terms of its parameter, where that is the coordinate or its exponential."""
-        names, theta = self.problem.space.names, np.zeros((3, self.n_x + self.n_linear))
-        theta[:, : self.n_x] = 0.5 * (self.v_prior.lower + self.v_prior.upper)[: self.n_x]
-        theta[:, k] = low, 0.5 * (low + high), high
+        """A flat prior of a coordinate in terms of its parameter, where that is the coordinate or its exponential.
+
+        It is so in the middle of the box of the others and half way to its corners.
+        """
+        names, shares = self.problem.space.names, np.linspace(0.0, 1.0, 9)
+        sides = self.v_prior.lower[: self.n_x], self.v_prior.upper[: self.n_x]
+        for_others = [np.tile(sides[0] + share * (sides[1] - sides[0]), (9, 1)) for share in (0.25, 0.5, 0.75)]
+        theta = np.concatenate([np.concatenate(for_others), np.zeros((27, self.n_linear))], axis=1)
+        theta[:, k] = np.tile(low + shares * (high - low), 3)
         if name in names:
-            first, middle, last = self.problem.named(theta)[:, names.index(name)].tolist()
-            if math.isclose(middle, 0.5 * (first + last), rel_tol=1e-6, abs_tol=1e-9 * abs(last - first)):
+            values = self.problem.named(theta)[:, names.index(name)].reshape(3, 9)
+            first, last = values[0, 0], values[0, -1]
+            if np.allclose(values, first + shares * (last - first), rtol=1e-6, atol=1e-9 * abs(last - first)):
                 return f"flat from {first:.4g} to {last:.4g}"
-            if first * last > 0.0 and math.isclose(middle * middle, first * last, rel_tol=1e-6):
+            if first * last > 0.0 and np.allclose(values / first, (last / first) ** shares, rtol=1e-6):
                 return f"flat in its logarithm from {first:.4g} to {last:.4g}"
         return f"flat from {low:.4g} to {high:.4g} in the coordinate of the search"
 

@@ -52,7 +52,7 @@ class BranchLaw(Branches):
         *affine("saturation", "offset", unit="y"),
         Parameter("coercivity", 1e-3, 3.0, unit="h", log=True),
         Parameter("squareness", 1e-3, 0.999, physical=(True, True)),
-        Parameter("feedthrough", 0.0, unit="y/u", affine=True),  # no core falls at saturation
+        Parameter("feedthrough", 0.0, unit="y/u", affine=True, physical=(True, False)),  # no core falls at saturation
         Parameter("z0", -1.0, 1.0, physical=(True, True)),
     )
     starts = tuple(
