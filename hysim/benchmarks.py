@@ -156,7 +156,8 @@ def simulate_official(
         A multisine is periodic: of three periods from rest the second is returned. A sweep is computed from its
         formula, which agrees with its published samples to 1e-10.
     plant : BoucWenOscillator, optional
-        Another plant, such as an identified one, to simulate by the same recipe; its method and steps are ignored.
+        Another plant, such as an identified one, to simulate by the same recipe, from rest; its method, steps and
+        initial state are ignored.
 
     Returns
     -------
@@ -188,7 +189,8 @@ def simulate_official(
         if inputs.size < 32 or inputs.size % 2:
             raise ValueError(f"u must hold one period, an even number of samples from 32 on, got {inputs.size}")
         force, begin = np.tile(interpolated(inputs, _OVERSAMPLING), 3), inputs.size
-    recipe = replace(plant or noel_schoukens_plant(), method="newmark", substeps=1)
+    plant = plant or noel_schoukens_plant()
+    recipe = replace(plant, method="newmark", substeps=1, initial_state=(), law=replace(plant.law, z0=0.0))
     y = recipe.response(force, 1.0 / (SAMPLE_RATE * _OVERSAMPLING))
     return decimated(y, _STAGES[kind])[begin : begin + inputs.size]
 

@@ -274,6 +274,27 @@ def stiff(p, z, u, s):
     return p.gain * (1.0 - s * z / p.limit)
 
 
+def jumping(p, z, u, s):
+    return (p.rising if z >= 0.0 else p.falling) * (1.0 - s * z)
+
+
+def jumping_at_zero(p, z, u, s):
+    return (p.rising if z > 0.0 else p.falling) * (1.0 - s * z)
+
+
+def test_a_slope_may_jump_where_the_first_state_is_zero():
+    numbers = {"rising": 1.2, "falling": 2.7, "z0": 0.0}
+    z1 = 1.0 - np.exp(-1.2)
+    crossed = 1.0 - np.log(1.0 + z1) / 1.2
+    expected = [0.0, z1, np.exp(2.7 * (-1.0 - crossed)) - 1.0]
+    searched = hs.Parameter("rising", 0.01, 100.0, log=True), hs.Parameter("falling", 0.01, 100.0, log=True)
+    for slope in (jumping, jumping_at_zero):
+        law = own(slope=staticmethod(slope), searched=searched, **numbers)()
+        np.testing.assert_allclose(law.response([0.0, 1.0, -1.0]), expected, rtol=0.0, atol=1e-10)
+        fit = hs.identify(law, hs.Record(u=U, y=law.response(U)))
+        assert dict(fit.estimates) == pytest.approx(numbers, rel=1e-8)
+
+
 def test_an_output_that_is_not_affine_as_said_is_no_success():
     searched = hs.Parameter("gain", affine=True), hs.Parameter("limit", 0.05, 10.0, log=True)
     family = own(gain=1.0, limit=0.5, z0=0.0, slope=staticmethod(stiff), searched=searched)

@@ -58,6 +58,7 @@ def test_all_seven_parameters_come_back_without_a_guess(made):
     given = {} if made == "from rest" else {"initial": "periodic", "period": len(rec) // 2}
     fit = hs.identify(structure(**given), rec)
     assert fit.success
+    assert fit.fit_percent > 99.9999  # of the returned model, which begins as the record does
     assert fit.free_names == tuple(TRUTH)
     assert worst(fit) < 1e-6  # the search ends when a step lowers the sum of squares by less than 1e-10 of it
 

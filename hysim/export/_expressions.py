@@ -5,7 +5,7 @@ import builtins
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import partial, reduce
-from types import BuiltinFunctionType, MappingProxyType, ModuleType
+from types import BuiltinFunctionType, FunctionType, MappingProxyType, ModuleType
 from typing import Any
 
 import numpy as np
@@ -333,9 +333,8 @@ class Expressions:
 
     def _translated(self, node: ast.Call, called: Any) -> Value:
         types = tuple(self._type(each) for each in node.args)
-        if called is None or not callable(called):
-            name = ast.unparse(node.func)
-            raise self.refusal(node, f"{name} is no function that is known when the program is translated")
+        if not isinstance(called, FunctionType):
+            raise self.refusal(node, f"{ast.unparse(node.func)} is neither of the module math nor a function in Python")
         function = self.library.function(called, types)
         pairs = zip(node.args, function.parameters, strict=True)
         arguments = ", ".join(text for each, parameter in pairs for text in self._given(each, parameter))

@@ -26,7 +26,7 @@ from hysim.export._packing import Packing, packing
 from hysim.kernels.controllers import guarded
 from hysim.kernels.stepping import Start, Step, complete
 from hysim.models.law import Law
-from hysim.models.protocols import Startable, Stepwise, needs_time, standing
+from hysim.models.protocols import Startable, Stepwise, needs_time, positive_time, standing
 from hysim.plants.actuator import as_stepwise
 from hysim.plants.stages import Amplifier, Creep, Vibration
 
@@ -202,8 +202,8 @@ def program_of(
     parameters follow from them by arithmetic. TypeError if the thing cannot be stepped, ValueError if a sample time is
     missing or a start is not finite, UntranslatableError if a step is outside the translated subset of Python.
     """
-    if sample_time is not None and not 0.0 < sample_time < math.inf:
-        raise ValueError(f"sample_time must be positive and finite, got {sample_time}")
+    if sample_time is not None:
+        positive_time(sample_time)
     for name, value in (("u0", u0), ("y0", y0)):
         if value is not None and not math.isfinite(value):
             raise ValueError(f"{name} must be finite, got {value}")

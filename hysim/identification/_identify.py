@@ -244,7 +244,7 @@ def _without_search(family: roles.Direct, options: Freedom, asked: _Asked, seed:
     fit = in_one_step(family, records, asked.weights, asked.folds, seed, asked.admissible)
     doubts = [swapped_columns(records)]
     if isinstance(fit.model, roles.Placeable):
-        fit = as_measured(fit, records, asked.weights, Treated(records))
+        fit = as_measured(fit, searched(family), records, asked.weights, Treated(records))
         off = excursion(fit.models, records)
         doubts.append(implausible(off))
         fit = _marked(fit, danger(off, records, None), asked.admissible)
@@ -314,7 +314,7 @@ def _described(fit: Identification, assumed: _Assumed, asked: _Asked) -> Identif
     is_partial = assumed.is_cut or (first.budget is not None and (first.budget.cut or not fit.success))
     fit = replace(fit, message="; ".join(filter(None, (fit.message, assumed.sentence))))
     if all(type(record) is Record for record in records):  # not in units of sensors, nor weighted by a verb
-        fit = as_measured(fit, records, asked.weights, assumed.treatment)
+        fit = as_measured(fit, assumed.family, records, asked.weights, assumed.treatment)
         fit = said_of_noise(fit, records, assumed.treatment, quiet_rmse(assumed.family, setting, assumed.treatment))
     doubts = [swapped_columns(records)]
     if is_partial:
@@ -417,12 +417,15 @@ def _in_words(subject: Any) -> str:
     return repr(subject)
 
 
-def as_measured(fit: Identification, records: Sequence[Record], weights: Weights, treatment: Treated) -> Identification:
+def as_measured(
+    fit: Identification, family: Any, records: Sequence[Record], weights: Weights, treatment: Treated
+) -> Identification:
     """The result with models that begin where the records begin, and the residual of these models."""
     lowest, highest = min(float(each.u.min()) for each in records), max(float(each.u.max()) for each in records)
 
     def returned(model: Any, record: Record) -> Any:
-        return placed(_behind(treatment.front, model), float(record.u[0]), (lowest, highest))
+        standing = family.standing(model, record)
+        return placed(_behind(treatment.front, standing), float(record.u[0]), (lowest, highest))
 
     def candidate(each: Candidate) -> Candidate:
         return replace(each, model=returned(each.model, records[0]))
@@ -432,8 +435,11 @@ def as_measured(fit: Identification, records: Sequence[Record], weights: Weights
     residual = residual_of(models, records)
     kept = np.ones(y.size, dtype=bool) if weights is None else np.concatenate([*weights]) > 0.0
     if (off := metrics.rmse(fit.residual[kept], residual[kept])) > _APART * float(np.ptp(y)):
-        said = f"the model's run is {off:.3g} rms off what was searched: is the output affine as `searched` says?"
-        fit = replace(fit, success=False, warnings=(*fit.warnings, said))
+        said = f"the model's run is {off:.3g} rms off what was searched"
+        if family.runs_as_searched:
+            fit = replace(fit, success=False)
+            said += ": is the output affine as `searched` says?"
+        fit = replace(fit, warnings=(*fit.warnings, said))
     front = {} if treatment.front is None else {"reversal_filter.threshold": treatment.front.threshold}
     return replace(
         fit,

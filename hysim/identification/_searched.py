@@ -210,6 +210,7 @@ class Search:
         told = sentences(
             spread=spread, exact=exact, whiteness=probability, stderr=stderr, reasons=why, success=best.converged
         )
+        odd = odd_residuals(problem, residual, is_robust=isinstance(self.noise, Robust))
         return Identification(
             model=chosen.model,
             models=tuple(problem.family.assemble(problem.estimates(best.theta, k)) for k in range(len(problem.parts))),
@@ -235,7 +236,7 @@ class Search:
             message="; ".join([*_phrases(best.converged, problem, known, rivals, curves), *self._notes(best, draws)]),
             rivals=rivals,
             seed=self.seed,
-            warnings=(*known.stopped, *told, *odd_residuals(problem, residual)),
+            warnings=(*known.stopped, *told, *odd),
         )
 
     def _notes(self, best: LocalOptimum, draws: FloatArray) -> list[str]:

@@ -64,14 +64,14 @@ def is_exact(problem: Problem, rmse: float) -> bool:
     return rmse <= max(_RESTING * float(np.std(problem.y)), _ROUNDING * problem.scale)
 
 
-def odd_residuals(problem: Problem, residual: FloatArray) -> list[str]:
+def odd_residuals(problem: Problem, residual: FloatArray, *, is_robust: bool) -> list[str]:
     """Sentences on a sample that carries a fit, and on a record or sensor whose residual is mostly its mean."""
     counted, n = np.sqrt(problem.weights) * residual, np.count_nonzero(problem.weights)
     rms, k, several = float(np.sqrt(counted @ counted / n)), int(np.argmax(np.abs(counted))), len(problem.parts) > 1
     if is_exact(problem, rms):
         return []
     told = [f'sample {k} alone makes most of the residual: leave it out by weights=, or take noise="robust"']
-    told = told if n > _FEW and abs(counted[k]) > _ALONE * math.sqrt(n) * rms else []
+    told = told if n > _FEW and not is_robust and abs(counted[k]) > _ALONE * math.sqrt(n) * rms else []
     held = ", or holds within bounds" if "offset" in problem.space.bounds else ""
     for place, (record, own) in enumerate(problem.pieces):
         n_sensors = len(record) // samples_of_sensor(record)

@@ -35,7 +35,7 @@ Longest = Callable[[FloatArray, FloatArray, float, float], float]
 
 TOLERANCE = 1e-12
 MAX_STEPS = 20_000
-LARGEST = 1.7976931348623157e308
+LARGEST, TINY = 1.7976931348623157e308, 2.2250738585072014e-308
 _ROOM = 16  # places for each state: thirteen stages, and three rows of work
 
 _FEW, _MANY = 6, 12  # stages before the slope at the end
@@ -168,6 +168,8 @@ def follower(
             is_known = is_known and x[i] == after[i]
         if not is_known:
             rates(parameters, x, last, s, x[0], k[:n])
+            if corner and x[0] == 0.0:  # the slope on the side to which it leads
+                rates(parameters, x, last, s, k[0] * s, k[:n])
         ended[0], ended[2] = u, s
         if tolerance > _COARSE:
             ended[1] -= _EACH
@@ -234,7 +236,7 @@ def follower(
                     after[i] = x[i]
             if corner and ((x[0] != 0.0 and abs(after[0]) <= rounding) or side * after[0] < 0.0):
                 after[0] = 0.0 if abs(after[0]) <= rounding else after[0]
-                rates(parameters, after, at + taken, s, after[0], k[end : end + n])
+                rates(parameters, after, at + taken, s, after[0] if after[0] != 0.0 else -side, k[end : end + n])
             aims = 0
             for i in range(n):
                 x[i], k[i] = after[i], k[end + i]

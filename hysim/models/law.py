@@ -167,6 +167,8 @@ class Law(Placed, Subject, ABC):
             raise TypeError(f"{cls.__name__} has a field {taken[0]!r}, a name that hysim uses itself: take another one")
         if isinstance(vars(cls).get("slope"), FunctionType):
             raise TypeError(f"the slope of {cls.__name__} must be a plain function, under staticmethod and def")
+        if isinstance(cls.searched, Parameter):
+            raise TypeError(f"searched of {cls.__name__} must be a tuple of Parameters: put a comma behind the one")
         says = cls.hidden_states > 0 or isinstance(vars(cls).get("slope"), staticmethod)  # and no number of this name
         if says and (inspect.get_annotations(cls) or not vars(cls).keys().isdisjoint(HOOKS)):
             cls.hidden_states = states_of(cls)

@@ -312,6 +312,8 @@ class Searched:
 
     Attributes
     ----------
+    runs_as_searched : bool
+        Whether a record is all that its model needs; a structure may know more, such as filters of the output.
     may_depend : bool
         Whether its parameters may depend on channels.
     is_parted : bool
@@ -319,12 +321,17 @@ class Searched:
         search asks of it is said by `hysim.plants.actuator_structure`.
     """
 
+    runs_as_searched: ClassVar[bool] = True
     may_depend: ClassVar[bool] = True
     is_parted: ClassVar[bool] = False
 
     def as_records(self, records: Any) -> Any:
         """Records of a kind of its own as records of one output; other objects are returned unchanged."""
         return records
+
+    def standing(self, model: Any, record: Record) -> Any:
+        """An identified model as it stands at the first sample of a record; by default as it is."""
+        return model
 
     def freed_in_turn(self) -> tuple[Stage, ...]:
         """Parameters that a search frees in turn; see `hysim.models.stages`."""
@@ -470,7 +477,9 @@ def check_continued(step: float, state_step: float) -> None:
 
 
 def positive_time(sample_time: float) -> float:
-    """A sample time [s]; ValueError if it is not positive and finite."""
+    """A sample time [s]; ValueError if it is not positive and finite, TypeError if it is not one number."""
+    if np.ndim(sample_time):
+        raise TypeError(f"sample_time must be one number [s], got an array of shape {np.shape(sample_time)}")
     if not 0.0 < sample_time < math.inf:
         raise ValueError(f"sample_time must be positive and finite, got {sample_time}")
     return sample_time

@@ -19,7 +19,10 @@ from hysim.kernels.stepping import sources, unstored
 
 _TEXT = """\
 def rates(p: FloatArray, x: FloatArray, u: float, s: float, side: float, out: FloatArray) -> None:
-    {slopes} = slope(p, {states}, u, s)
+    z = x[0]
+    if z == 0.0 and side != 0.0:  # where a slope may jump: that of this side
+        z = math.copysign(TINY, side)
+    {slopes} = slope(p, {others}, u, s)
 
 def room(p: FloatArray, x: FloatArray, slope: float, s: float) -> float:
     return {longest}
@@ -95,20 +98,22 @@ def functions_of(cls: Any) -> dict[str, FunctionType]:
 def step_of(cls: Any) -> tuple[Callable[[FloatArray, FloatArray, float], float], int]:
     """The step of a family by its `slope` and `output`, or its `flow` where `flows` says so, and the room it needs."""
     # SciPy's integrators take a quarter of a second to load
-    from hysim.kernels.branch import LARGEST, MAX_STEPS, follower, workspace
+    from hysim.kernels.branch import LARGEST, MAX_STEPS, TINY, follower, workspace
 
     n, said, constants = cls.hidden_states, functions_of(cls), constants_of(cls)
     trees = {name: _tree(cls, name, function, constants) for name, function in said.items()}
     # numba links functions of one name across files: the name holds what is compiled.
     text = "".join(map(ast.unparse, trees.values()))
     family = f"{cls.__qualname__}_{hashlib.sha256(text.encode()).hexdigest()[:12]}"
-    names: dict[str, Any] = {"FloatArray": FloatArray, "math": math, "LARGEST": LARGEST, "MAX_STEPS": MAX_STEPS}
+    names: dict[str, Any] = {"FloatArray": FloatArray, "math": math, "TINY": TINY}
+    names |= {"LARGEST": LARGEST, "MAX_STEPS": MAX_STEPS}
     for name, function in said.items():
         names[name] = unstored(_defined(trees[name], function, family, function.__globals__))
     states = ", ".join(f"x[{i}]" for i in range(n))
     written = _TEXT.format(
         slopes=", ".join(f"out[{i}]" for i in range(n)),
         states=states,
+        others=", ".join(["z", *(f"x[{i}]" for i in range(1, n))]),
         longest="math.inf" if "longest" not in said else f"longest(p, {states}, slope, s)",
         move=(_FLOW if "flow" in said else "") + _MOVE.format(n=n),
         memory=", ".join(f"state[{1 + i}]" for i in range(len(inspect.signature(cls.output).parameters) - 2)),

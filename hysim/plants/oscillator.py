@@ -234,10 +234,14 @@ class BoucWenOscillator:
         >>> bool(abs(plant.response(np.tile(u, 100), 1 / 15000)[-500:] - y).max() < 1e-9 * y.max())
         True
         """
+        check_positive(tolerance=tolerance)
+        return self.steady_motion(u, sample_time, tolerance)[:, 0].copy()
+
+    def steady_motion(self, u: npt.ArrayLike, sample_time: float, tolerance: float = 1e-10) -> FloatArray:
+        """Displacement, velocity and memory (n, 3) of the steady state; see `periodic_response`."""
         inputs = read_only(u, "u", ndim=1)
         if not inputs.size:
             raise ValueError("u must hold one period, got no samples")
-        check_positive(tolerance=tolerance)
         state = self._start(float(inputs[-1]))
         motion, largest = np.full((inputs.size, 3), np.nan), np.zeros(3)
 
@@ -262,7 +266,7 @@ class BoucWenOscillator:
                 motion[piece] = states[:, :3]
                 largest = np.maximum(largest, np.abs(states[-1, :3]))
                 if np.all(change <= tolerance * largest):
-                    return motion[:, 0].copy()
+                    return motion
         raise SimulationError(f"the motion has not settled within {ATTEMPTS[-1]} periods")
 
     def signals(self, u: npt.ArrayLike, sample_time: float) -> dict[str, FloatArray]:

@@ -28,7 +28,7 @@ mirror image.
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
-from typing import Any, Literal, NamedTuple, get_args
+from typing import Any, ClassVar, Literal, NamedTuple, get_args
 
 import numpy as np
 import scipy
@@ -332,6 +332,7 @@ class OscillatorStructure(Subject):
     that of the law is the one of `hysim.BoucWen`, with the displacement as its input and A not negative.
     """
 
+    runs_as_searched: ClassVar[bool] = False
     family: type
     method: Method = "split"
     oversampling: Count = 4
@@ -403,6 +404,17 @@ class OscillatorStructure(Subject):
             method=self.method,
             substeps=self.oversampling,
         )
+
+    def standing(self, model: Any, record: Record) -> Any:
+        """The oscillator at the first sample of a record that repeats itself: in the steady state, if it has one."""
+        if self.period is None:
+            return model
+        force, step = self.fine_input(record.u), record.sample_time / self.oversampling
+        try:
+            y, velocity, z = replace(model, substeps=1).steady_motion(force, step)[0].tolist()
+        except SimulationError:
+            return model
+        return replace(model, initial_state=(y, velocity), law=replace(model.law, z0=z))
 
     def notes(self, record: Record, model: Any) -> tuple[str, ...]:
         """The error of the steps, where that is not small next to the residual."""
