@@ -168,7 +168,7 @@ class Law(Placed, Subject, ABC):
         if isinstance(vars(cls).get("slope"), FunctionType):
             raise TypeError(f"the slope of {cls.__name__} must be a plain function, under staticmethod and def")
         if isinstance(cls.searched, Parameter):
-            raise TypeError(f"searched of {cls.__name__} must be a tuple of Parameters: put a comma behind the one")
+            raise TypeError(f"searched of {cls.__name__} must be a tuple of Parameters: one alone ends with a comma")
         says = cls.hidden_states > 0 or isinstance(vars(cls).get("slope"), staticmethod)  # and no number of this name
         if says and (inspect.get_annotations(cls) or not vars(cls).keys().isdisjoint(HOOKS)):
             cls.hidden_states = states_of(cls)
