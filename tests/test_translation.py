@@ -262,7 +262,7 @@ REFUSED = {
     with_a_choice_of_arrays: "a number is expected",
     with_a_float_index: "an index is an integer",
     with_numbers_joined: "join truth values",
-    with_an_unknown_function: "no function that is known",
+    with_an_unknown_function: "of_another is neither of the module math nor a function",
     with_a_stride: "no stride",
     with_room_of_any_size: "constant size",
     with_a_copy: "a vector is copied by a loop",

@@ -168,7 +168,7 @@ def follower(
             is_known = is_known and x[i] == after[i]
         if not is_known:
             rates(parameters, x, last, s, x[0], k[:n])
-            if corner and x[0] == 0.0:  # the slope on the side to which it leads
+            if corner and x[0] == 0.0 and k[0] != 0.0:  # the slope on the side to which it leads
                 rates(parameters, x, last, s, k[0] * s, k[:n])
         ended[0], ended[2] = u, s
         if tolerance > _COARSE:
@@ -236,7 +236,9 @@ def follower(
                     after[i] = x[i]
             if corner and ((x[0] != 0.0 and abs(after[0]) <= rounding) or side * after[0] < 0.0):
                 after[0] = 0.0 if abs(after[0]) <= rounding else after[0]
-                rates(parameters, after, at + taken, s, after[0] if after[0] != 0.0 else -side, k[end : end + n])
+                rates(parameters, after, at + taken, s, after[0], k[end : end + n])
+                if after[0] == 0.0 and k[end] != 0.0:
+                    rates(parameters, after, at + taken, s, -side, k[end : end + n])
             aims = 0
             for i in range(n):
                 x[i], k[i] = after[i], k[end + i]
