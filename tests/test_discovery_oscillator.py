@@ -11,8 +11,8 @@ from strategies import assert_refused, needs_compiled, refused
 
 import hysim as hs
 from hysim.discovery import _oscillator
-from hysim.discovery._hidden_memory import HiddenMemory, cases
-from hysim.discovery._oscillator import diverges, recorded
+from hysim.discovery._hidden_memory import cases
+from hysim.discovery._oscillator import Search, diverges, recorded
 from hysim.identification import identify
 from hysim.laws.differential.terms import RELAXATION, Term, bouc_wen_terms, memory_terms
 
@@ -102,7 +102,7 @@ def test_terms_that_a_law_has_not_are_left_out_and_n_is_found():
 def test_the_exponent_is_freed_only_where_the_bic_is_lower(n, beta, gamma, monkeypatch):
     """The exponent with which the regression begins does not decide."""
     given = record(noise=0.01, n_samples=300, beta=beta, gamma=gamma, n=n)
-    monkeypatch.setattr(HiddenMemory, "nearest", lambda self: self.fit(bouc_wen_terms(2.0)))
+    monkeypatch.setattr(Search, "_begun", lambda self, elastic: self._refined(*self._starts(2.0)))
     found = hs.discover_oscillator([given])
     held, free = (identify(hs.BoucWenOscillator.structure(), given, fixed=fixed).bic for fixed in ({"n": 1.0}, {}))
     assert (held < free) == (n == 1.0) == ("n" not in found.stderr)
@@ -124,10 +124,10 @@ def test_a_law_that_diverges_is_no_structure(monkeypatch):
     assert found.verdict == "no structure found"
     assert found.coefficients == {}
     assert found.warnings[0].startswith("A law of lower BIC diverges")
-    monkeypatch.setattr(HiddenMemory, "nearest", lambda self: None)
+    monkeypatch.setattr(Search, "_begun", lambda self, elastic: self._refined())
     found = hs.discover_oscillator([record(noise=0.01, n_samples=300)])
     assert (found.verdict, found.model.law.A) == ("no structure found", 0.0)
-    assert "diverges along the measured displacement" in found.warnings[0]
+    assert "could not be refined: the oscillator nearest to the records diverges" in found.warnings[0]
 
 
 def test_a_memory_without_bound_diverges_over_a_wide_range_alone():

@@ -1,23 +1,12 @@
-"""A memory that is not measured, from the equation of motion along a measured displacement.
+"""The output of an oscillator as the terms of its memory make it: simulation, its slopes, and the regression on them.
 
     m y'' + c y' + k y + z = u,    z' = sum of coefficients times terms in (y', z)
 
-For given coefficients z follows from y by integration, so that no noise is differentiated. Both sides of the equation
-of motion are filtered alike (`hysim.plants.oscillator_structure`); m, c and k are projected out, and a Gauss-Newton
-step is a regression on the slopes of z. Only the curvature of the memory distinguishes A from k: the descent begins
-from several shares of the stiffness. Noise lengthens the path of y, a bias of about a percent; a simulation refines it.
-
-**The regression** is that of an oscillator's output on the terms of its memory, the plant projected out. Columns are
-scaled so that the coefficients of all terms together have standard errors of one: a threshold is then a number of
-standard errors. Where terms are nearly collinear a small coefficient is no sign of a small loss, so that STLSQ's
-thresholds are accompanied by plain elimination.
-
-**The oscillator's output** as its terms make it: simulation, its slopes, and the regression on them.
-
     y = y0 + sum of (coefficient - its value) times dy/d(coefficient) + the same for m, c and k
 
-About a law that simulates the record well the residual is white and the slopes are free of noise. Unlike one of z' on
-noisy signals, this regression has no bias, and its standard errors and BIC are right.
+The plant is projected out. About a law that simulates the record well the residual is white and the slopes are free of
+noise. Unlike one of z' on noisy signals, this regression has no bias, and its standard errors and BIC are right. Terms
+may be nearly collinear, so that a small coefficient is no sign of a small loss: structures are the best subsets.
 """
 
 import itertools
@@ -28,7 +17,6 @@ from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
-import scipy
 
 from hysim._basics.frozen import FloatArray
 from hysim._basics.parallel import in_chunks
@@ -38,10 +26,17 @@ from hysim.errors import SimulationError
 from hysim.identification import errors_of_refits, folds
 from hysim.identification.marquardt import Schedule, SumOfSquares, descend
 from hysim.kernels import memory_terms as kernels
-from hysim.laws.differential.terms import RELAXATION, Term, bouc_wen_terms, memory_terms, symmetric
+from hysim.laws.differential.terms import (
+    RELAXATION,
+    Term,
+    bouc_wen_exponent,
+    bouc_wen_terms,
+    memory_terms,
+    symmetric,
+)
 from hysim.metrics.criteria import information, rms_of_known
 from hysim.plants.oscillator import ATTEMPTS, attracting_state
-from hysim.plants.oscillator_structure import Filter, Linear, Motion, OscillatorStructure, filtering, interpolated
+from hysim.plants.oscillator_structure import OscillatorStructure
 from hysim.records import Record, by_record
 
 FLOOR = 1e-5  # of the rms output: smaller residuals are no evidence of a term
@@ -51,26 +46,21 @@ DEPENDENT = 1e-5  # share of a slope that those before it do not explain, below 
 
 @dataclass(frozen=True)
 class TermRegression(Regression):
-    """A regression with noise of one, of `size` [unit of y], about an oscillator whose plant is projected out.
+    """A regression about an oscillator whose plant is projected out.
 
-    `blocks` are the samples held out in turn; `n_others` counts other fitted numbers than those of plant and terms.
+    `blocks` are the samples held out in turn; `n_others` counts the fitted numbers that are no coefficients.
     """
 
     floor: float
-    n_plant: int
+    n_others: int
     blocks: Sequence[npt.NDArray[np.intp]]
-    n_others: int = 0
 
-    def structures(self) -> set[tuple[Term, ...]]:
-        """Structures of STLSQ's thresholds, and of plain elimination."""
-        return {*(terms for _, terms in self.path()), *self.eliminated()}
-
-    def eliminated(self) -> list[tuple[Term, ...]]:
-        """Structures from dense to sparse, each without the term whose removal costs least."""
+    def eliminated(self, width: int = 1) -> list[tuple[Term, ...]]:
+        """The best structure of each size among the `width` followed, from dense to sparse."""
         if not self.terms:
             return []
         (R, goal), every = self.triangle, np.ones(len(self.terms), dtype=bool)
-        levels = best_subsets(R, -goal, np.zeros(every.size), every, width=1)
+        levels = best_subsets(R, -goal, np.zeros(every.size), every, width=width)
         return [tuple(itertools.compress(self.terms, level.included[0])) for level in levels][:-1]
 
     def best(self, structures: Sequence[tuple[Term, ...]]) -> tuple[Term, ...]:
@@ -90,12 +80,11 @@ class TermRegression(Regression):
         (R, goal), n = self.triangle, self.target.size
         included = R[:, self.places(terms)]
         rest = goal - included @ np.linalg.lstsq(included, goal, rcond=None)[0]
-        n_parameters = self.n_plant + self.n_others + len(terms)
-        return information(float(rest @ rest) / n * self.size**2, n, n_parameters, floor=self.floor)
+        return information(float(rest @ rest) / n, n, self.n_others + len(terms), floor=self.floor)
 
     def held_out_rmse(self, terms: Sequence[Term]) -> float:
         """Rmse on each block of a structure that the other blocks have fitted [unit of y]."""
-        return self.size * held_out_rmse(self.features[:, self.places(terms)], self.target, self.blocks)
+        return held_out_rmse(self.features[:, self.places(terms)], self.target, self.blocks)
 
 
 def held_out_rmse(columns: FloatArray, target: FloatArray, blocks: Sequence[npt.NDArray[np.intp]]) -> float:
@@ -108,49 +97,11 @@ def held_out_rmse(columns: FloatArray, target: FloatArray, blocks: Sequence[npt.
     return rms_of_known(errors_of_refits(residual, target.size, blocks))
 
 
-def term_regression(
-    terms: tuple[Term, ...],
-    plant: FloatArray,
-    slopes: FloatArray,
-    target: FloatArray,
-    floor: float,
-    blocks: Sequence[npt.NDArray[np.intp]],
-) -> TermRegression:
-    """Regression of `target` (n_samples,) on slopes (n_samples, n_terms), the plant's (n_samples, n) projected out."""
-    sizes = np.linalg.norm(plant, axis=0)
-    plant, sizes = plant[:, sizes > 0.0], sizes[sizes > 0.0]  # where the motion diverges a slope is unknown, and zero
-    basis = np.linalg.qr(plant / sizes)[0]
-    n_plant, included = basis.shape[1], independent(slopes, basis, range(len(terms)), DEPENDENT)
-    features = slopes[:, included] - basis @ (basis.T @ slopes[:, included])
-    goal = target - basis @ (basis.T @ target)
-    size = np.linalg.norm(features, axis=0)
-    scaled = features / size
-    residual = goal - scaled @ np.linalg.lstsq(scaled, goal, rcond=None)[0]
-    freedom = max(goal.size - n_plant - len(included), 1)
-    sigma = max(float(np.sqrt(residual @ residual / freedom)), floor)
-    units = sigma * np.sqrt(np.diag(np.linalg.inv(scaled.T @ scaled))) / size
-    return TermRegression(
-        terms=tuple(terms[k] for k in included),
-        dependent=tuple(term for k, term in enumerate(terms) if k not in included),
-        features=features * units / sigma,
-        target=goal / sigma,
-        sizes=sigma / units,
-        size=sigma,
-        floor=floor,
-        n_plant=n_plant,
-        blocks=blocks,
-    )
-
-
-POWERS = (1.0, 2.0, 3.0)
-SHARES = (0.2, 0.5, 0.8)  # of the stiffness of small motions, in A
 PLANT = ("mass", "damping", "stiffness")
 SPRING = bouc_wen_terms(1.0)[0]
 
 OSCILLATOR_SCHEDULE = Schedule(failure=5.0, least=1e-12)
-
-_FINER = 4  # increments of y for each sample
-_DEGREE = 3
+EXPONENTS = (0.5, 10.0)  # the published bounds of n
 
 
 class State(NamedTuple):
@@ -164,17 +115,14 @@ class Oscillator(NamedTuple):
     coefficients: dict[Term, float]
 
 
-Regressed = tuple[float, Oscillator]
-"""The unexplained share of the filtered force, and the oscillator that leaves it."""
-
-
-class _Along(NamedTuple):
-    """One motion: its filter, its increments, their time, and the samples of the memory along them."""
-
-    filtered: Filter
-    steps: FloatArray
-    h: float
-    samples: slice
+def library(degree: int, symmetry: str | None) -> tuple[Term, ...]:
+    """The terms by their power of z, without combinations of earlier ones."""
+    if degree not in (1, 2, 3):
+        raise ValueError(f"degree must be 1, 2 or 3, got {degree!r}")
+    if symmetry not in (None, "odd"):
+        raise ValueError(f'symmetry must be None or "odd", got {symmetry!r}')
+    ordered = sorted(memory_terms(degree), key=lambda term: (term.degree, term.is_even_in_memory, term.rectified))
+    return symmetric((*ordered, RELAXATION), symmetry)
 
 
 def memory_arrays(coefficients: Mapping[Term, float], degree: int) -> tuple[FloatArray, FloatArray, float, float]:
@@ -206,121 +154,37 @@ def _signs(term: Term) -> FloatArray:
     return np.asarray(direction[:, np.newaxis] * side)
 
 
-class HiddenMemory:
-    """Regressions of the memory along one or several motions of one plant; parts of the plant may be `known`."""
-
-    def __init__(self, motions: Sequence[Motion], linear: Linear, known: Mapping[str, float]) -> None:
-        self.linear, self.known = linear, dict(known)
-        self._along = [_along(motion, linear) for motion in motions]
-        force, y = self._stacked([motion.force for motion in motions], 0), [motion.y for motion in motions]
-        sides = {name: self._stacked(y, power) for name, power in zip(PLANT, (2, 1, 0), strict=True)}
-        self._target = force - sum((value * sides[name] for name, value in known.items()), np.zeros_like(force))
-        self._free = [name for name in PLANT if name not in known]
-        self._columns = np.array([sides[name] for name in self._free]).reshape(-1, force.size).T
-        self._basis = np.linalg.qr(self._columns / np.linalg.norm(self._columns, axis=0))[0]
-        self._size = float(np.linalg.norm(force))
-
-    @staticmethod
-    def library(degree: int, symmetry: str | None) -> tuple[Term, ...]:
-        """The terms by their power of z, without combinations of earlier ones."""
-        if degree not in (1, 2, 3):
-            raise ValueError(f"degree must be 1, 2 or 3, got {degree!r}")
-        if symmetry not in (None, "odd"):
-            raise ValueError(f'symmetry must be None or "odd", got {symmetry!r}')
-        ordered = sorted(memory_terms(degree), key=lambda term: (term.degree, term.is_even_in_memory, term.rectified))
-        return symmetric((*ordered, RELAXATION), symmetry)
-
-    def fit(self, terms: Sequence[Term]) -> Regressed | None:
-        """Law of these terms, u' first, from the best of several starts; None if all diverge."""
-        spring = self.linear.stiffness
-        shares = [1.0 - self.known["stiffness"] / spring] if "stiffness" in self.known else SHARES
-        starts = [np.array([max(share, 0.01) * spring, *np.zeros(len(terms) - 1)]) for share in shares]
-        return _best(self._descended(terms, start) for start in starts)
-
-    def nearest(self) -> Regressed | None:
-        """Bouc-Wen law with a whole n, or linear relaxation, of the smallest error; None if all diverge."""
-        laws = [bouc_wen_terms(n) for n in POWERS] + [(SPRING, RELAXATION)]
-        return _best(map(self.fit, laws))
-
-    def regression(self, library: Sequence[Term]) -> TermRegression:
-        """Regression on all terms, about z = A y, of the force that a linear spring does not explain."""
-        terms = (SPRING, *(term for term in library if term != SPRING))
-        share = 1.0 - self.known.get("stiffness", 0.5 * self.linear.stiffness) / self.linear.stiffness
-        x = np.array([share * self.linear.stiffness, *np.zeros(len(terms) - 1)])
-        rows = self._memory(terms, x)
-        if rows is None:
-            raise ValueError("the displacement is not finite or too large")
-        target = self._target - rows[0] + rows[1] * x[0]
-        floor = FLOOR * self._size / float(np.sqrt(target.size))
-        return term_regression(terms, self._columns, rows[1:].T, target, floor, folds(BLOCKS, target.size))
-
-    def _descended(self, terms: Sequence[Term], start: FloatArray) -> Regressed | None:
-        def residuals(points: FloatArray) -> FloatArray:
-            values = np.full((len(points), self._target.size), np.inf)
-            for k, x in enumerate(points):
-                rows = self._memory(terms, x)
-                if rows is not None:
-                    values[k] = self._projected(self._target - rows[0])
-            return values
-
-        def columns(x: FloatArray) -> FloatArray:
-            rows = self._memory(terms, x)
-            return np.zeros((self._target.size, x.size)) if rows is None else rows[1:].T
-
-        problem = SumOfSquares(
-            residuals,
-            lambda x, residual: -self._projected(columns(x)),
-            sizes=lambda x: np.linalg.norm(columns(x), axis=0),  # those of slopes that the plant explains are tiny
-        )
-        x = descend(problem, start[np.newaxis], relative=1e-7, steps=100, schedule=OSCILLATOR_SCHEDULE).x[0]
-        rows = self._memory(terms, x)
-        if rows is None:
-            return None
-        goal = self._target - rows[0]
-        plant = dict(zip(self._free, np.linalg.lstsq(self._columns, goal, rcond=None)[0].tolist(), strict=True))
-        error = float(np.linalg.norm(self._projected(goal))) / self._size
-        return error, Oscillator(self.known | plant, dict(zip(terms, x.tolist(), strict=True)))
-
-    def _memory(self, terms: Sequence[Term], x: FloatArray) -> FloatArray | None:
-        """Filtered memory and its slopes along the coefficients, (1 + n_terms, n_rows); None if it diverges."""
-        polynomial, _, _, relaxation = memory_arrays(dict(zip(terms, x.tolist(), strict=True)), _DEGREE)
-        polynomials = [term for term in terms if not term.relaxing]
-        units = np.array([cases(term, _DEGREE) for term in polynomials])
-        place = [1 + (len(polynomials) if term.relaxing else polynomials.index(term)) for term in terms]
-        signals = []
-        for each in self._along:
-            memory = np.zeros((2 + len(polynomials), each.steps.size + 1))
-            if not kernels.along(each.steps, each.h, polynomial, relaxation, units, memory[0], memory[1:]):
-                return None
-            signals.append(memory[[0, *place]][:, each.samples])
-        rows = self._stacked(signals, 0)
-        return rows if np.isfinite(rows).all() else None
-
-    def _projected(self, rows: FloatArray) -> FloatArray:
-        return np.asarray(rows - self._basis @ (self._basis.T @ rows))
-
-    def _stacked(self, signals: Sequence[FloatArray], power: int) -> FloatArray:
-        filtered = [each.filtered(signal, power) for each, signal in zip(self._along, signals, strict=True)]
-        return np.concatenate(filtered, axis=-1)
-
-
-def _best(laws: Iterable[Regressed | None]) -> Regressed | None:
-    return min((each for each in laws if each is not None), key=lambda each: each[0], default=None)
-
-
-def _along(motion: Motion, linear: Linear) -> _Along:
-    h = motion.sample_time / _FINER
-    if motion.periodic:
-        fine = interpolated(motion.y, _FINER)
-        steps = np.diff(np.tile(fine, 2), append=fine[0])
-        return _Along(filtering(motion, linear), steps, h, slice(fine.size, -1, _FINER))
-    places = np.arange((motion.y.size - 1) * _FINER + 1) / _FINER
-    fine = scipy.interpolate.CubicSpline(np.arange(motion.y.size), motion.y)(places)
-    return _Along(filtering(motion, linear), np.diff(fine), h, slice(None, None, _FINER))
-
-
-_DIFFERENCES = (3e-4, 3e-5, 3e-6)  # of a parameter, for its slope: the first with which nothing diverges
+_DIFFERENCE = 3e-5  # of a parameter, for its slope
+_LIGHTEST = 1e-3  # share of the mass where a descent begins
 _STEADY = 1e-9  # relative change of the state from period to period
+
+
+def bouc_wen_numbers(oscillator: Oscillator) -> dict[str, float]:
+    """Parameters of a `BoucWenOscillator` whose memory has a Bouc-Wen law; without a memory A is zero."""
+    plant, law = oscillator
+    n = bouc_wen_exponent(law) or 1.0
+    A, dissipative, conservative = (law.get(term, 0.0) for term in bouc_wen_terms(n))
+    return {**plant, "A": A, "beta": -dissipative, "gamma": -conservative, "n": n}
+
+
+def is_polynomial(terms: Iterable[Term]) -> bool:
+    return all(term.is_polynomial or term.relaxing for term in terms)
+
+
+def with_exponent(terms: Sequence[Term], n: float) -> tuple[Term, ...]:
+    """The same terms of the Bouc-Wen law of another exponent."""
+    both = zip(bouc_wen_terms(bouc_wen_exponent(terms) or 1.0), bouc_wen_terms(n), strict=True)
+    return tuple(new for old, new in both if old in terms)
+
+
+def of_bouc_wen(numbers: Mapping[str, float]) -> Oscillator:
+    coefficients = (numbers["A"], -numbers["beta"], -numbers["gamma"])
+    law = dict(zip(bouc_wen_terms(numbers["n"]), coefficients, strict=True))
+    return Oscillator({name: numbers[name] for name in PLANT}, law)
+
+
+def _spring(oscillator: Oscillator) -> float:
+    return oscillator.plant["stiffness"] + oscillator.coefficients.get(SPRING, 0.0)
 
 
 @dataclass(frozen=True)
@@ -336,8 +200,8 @@ class Response:
         return np.concatenate([record.y for record in self.records])
 
     @cached_property
-    def widest(self) -> FloatArray:
-        return max((record.y for record in self.records), key=lambda y: float(np.ptp(y)))
+    def widest(self) -> Record:
+        return max(self.records, key=lambda record: float(np.ptp(record.y)))
 
     @cached_property
     def floor(self) -> float:
@@ -353,6 +217,11 @@ class Response:
         return [(self.structure.fine_input(r.u), r.sample_time / self.structure.oversampling) for r in self.records]
 
     def outputs(self, oscillators: Sequence[Oscillator]) -> FloatArray:
+        """Outputs (n_oscillators, n_samples), inf where one diverges; Bouc-Wen laws alone by their model's method."""
+        if oscillators and all(bouc_wen_exponent(each.coefficients) for each in oscillators):
+            numbers = [bouc_wen_numbers(each) for each in oscillators]
+            sets = {name: np.array([each[name] for each in numbers]) for name in numbers[0]}
+            return np.concatenate([self.structure.regressors(sets, r)[..., 0] for r in self.records], axis=1)
         outputs = np.full((len(oscillators), self.measured.size), np.inf)
 
         def work(start: int, stop: int) -> None:
@@ -400,71 +269,99 @@ class Response:
             return None
         return None
 
-    def slopes(self, oscillator: Oscillator, terms: Sequence[Term]) -> FloatArray:
-        """Derivatives of the output by free parameters and coefficients of `terms`, (n_samples, n); zero if unknown."""
-        slopes = np.zeros((self.measured.size, len(self.free) + len(terms)))
-        missing = np.arange(slopes.shape[1])
-        for difference in _DIFFERENCES:
-            if missing.size:
-                columns = self._differences(oscillator, terms, missing, difference)
-                is_finite = np.isfinite(columns).all(axis=0)
-                slopes[:, missing[is_finite]] = columns[:, is_finite]
-                missing = missing[~is_finite]
-        return slopes
+    def slopes(self, oscillator: Oscillator, terms: Sequence[Term], *, any_exponent: bool = False) -> FloatArray:
+        """Central differences of the output by free parameters, coefficients of `terms` and n, (n_samples, n_numbers).
 
-    def _differences(
-        self, oscillator: Oscillator, terms: Sequence[Term], places: npt.NDArray[np.intp], difference: float
-    ) -> FloatArray:
-        """Central differences by the parameters at some places; not finite where one diverges."""
+        They are zero where they are unknown, since one of two laws diverges.
+        """
         plant, coefficients = oscillator
-        spring = plant["stiffness"] + next(iter(coefficients.values()), 0.0)
-        size = spring * float(np.sqrt(np.mean(self.measured**2)))
+        spring, size = _spring(oscillator), self._force(oscillator)
         frequency = np.sqrt(abs(spring) / plant["mass"])
         units = {"mass": plant["mass"], "damping": plant["mass"] * frequency, "stiffness": spring}
         steps = [units[name] for name in self.free]
-        steps += [frequency if term.relaxing else spring / size**term.degree for term in terms]
+        steps += [frequency if term.relaxing else spring / size**term.degree for term in terms] + [1.0] * any_exponent
 
         def displaced(k: int, by: float) -> Oscillator:
             if k < len(self.free):
                 return Oscillator(plant | {self.free[k]: plant[self.free[k]] + by}, coefficients)
+            if k == len(self.free) + len(terms):
+                others = with_exponent(terms, (bouc_wen_exponent(terms) or 1.0) + by)
+                return Oscillator(plant, dict(zip(others, coefficients.values(), strict=True)))
             term = terms[k - len(self.free)]
             return Oscillator(plant, coefficients | {term: coefficients.get(term, 0.0) + by})
 
-        by = difference * np.array(steps)[places]
-        both = [displaced(int(k), sign * step) for sign in (1.0, -1.0) for k, step in zip(places, by, strict=True)]
+        by = _DIFFERENCE * np.array(steps)
+        both = [displaced(k, sign * step) for sign in (1.0, -1.0) for k, step in enumerate(by.tolist())]
         with np.errstate(invalid="ignore"):
             ahead, behind = np.split(self.outputs(both), 2)
-            return np.asarray((ahead - behind).T / (2.0 * by))
+            slopes = np.asarray((ahead - behind).T / (2.0 * by))
+        return np.where(np.isfinite(slopes).all(axis=0), slopes, 0.0)
 
-    def descended(self, oscillator: Oscillator) -> Oscillator:
-        terms = tuple(oscillator.coefficients)
+    def _force(self, oscillator: Oscillator) -> float:
+        return _spring(oscillator) * float(np.sqrt(np.mean(self.measured**2)))
+
+    def descended(self, oscillator: Oscillator, *, any_exponent: bool = False) -> tuple[Oscillator, bool]:
+        """The oscillator of least squares near this one, of a Bouc-Wen law n too; and whether the descent ended."""
+        n_plant, size = len(self.free), self._force(oscillator)
+        terms, last = tuple(oscillator.coefficients), -1 if any_exponent else None
 
         def at(x: FloatArray) -> Oscillator:
+            own = with_exponent(terms, float(x[-1])) if any_exponent else terms
             plant = oscillator.plant | dict(zip(self.free, x.tolist(), strict=False))
-            return Oscillator(plant, dict(zip(terms, x[len(self.free) :].tolist(), strict=True)))
+            values = x[n_plant:last] / powers(own)
+            return Oscillator(plant, dict(zip(own, values.tolist(), strict=True)))
+
+        def powers(terms: Sequence[Term]) -> FloatArray:
+            """What coefficients are multiplied with so that n leaves their effect about the same."""
+            return np.array([size**term.degree for term in terms])
 
         def residuals(points: FloatArray) -> FloatArray:
-            oscillators = [at(x) for x in points]
-            possible = [k for k, each in enumerate(oscillators) if each.plant["mass"] > 0.0]
-            residuals = np.full((len(points), self.measured.size), np.inf)
-            residuals[possible] = self.measured - self.outputs([oscillators[k] for k in possible])
-            return residuals
+            return self.measured - self.outputs([at(x) for x in points])
 
         def slopes(x: FloatArray, residual: FloatArray) -> FloatArray:
-            return -self.slopes(at(x), terms)
+            here = at(x)
+            own = tuple(here.coefficients)
+            columns = -self.slopes(here, own, any_exponent=any_exponent)
+            if any_exponent:
+                numbers = [value * term.degree / x[-1] for term, value in here.coefficients.items()]
+                columns[:, -1] -= columns[:, n_plant:-1] @ np.array(numbers) * np.log(size)
+            columns[:, n_plant:last] /= powers(own)
+            return columns
 
-        start = [oscillator.plant[name] for name in self.free] + list(oscillator.coefficients.values())
-        problem = SumOfSquares(residuals, slopes)
-        return at(descend(problem, np.array([start]), relative=1e-7, steps=100, schedule=OSCILLATOR_SCHEDULE).x[0])
+        start = np.array([oscillator.plant[name] for name in self.free] + [*oscillator.coefficients.values()])
+        start[n_plant:] *= powers(terms)
+        bounds = np.full((2, start.size + any_exponent), [[-np.inf], [np.inf]])
+        lowest = {"mass": _LIGHTEST * oscillator.plant["mass"], "damping": 0.0}
+        bounds[0, :n_plant] = [lowest.get(name, -np.inf) for name in self.free]
+        if any_exponent:
+            start, bounds[:, -1] = np.append(start, bouc_wen_exponent(terms) or 1.0), EXPONENTS
+        problem = SumOfSquares(residuals, slopes, *bounds)
+        reached = descend(problem, start[np.newaxis], relative=1e-10, steps=100, schedule=OSCILLATOR_SCHEDULE)
+        return at(reached.x[0]), bool(reached.at_rest[0])
 
     def regression(self, oscillator: Oscillator, residual: FloatArray, library: Sequence[Term]) -> TermRegression:
         """Regression about an oscillator with this residual on all terms of the library and its own."""
-        terms = (*library, *(term for term in oscillator.coefficients if term not in library))
-        slopes = self.slopes(oscillator, terms)
-        n_plant = len(self.free)
-        values = np.array([oscillator.coefficients.get(term, 0.0) for term in terms])
-        target = residual + slopes[:, n_plant:] @ values
-        return term_regression(terms, slopes[:, :n_plant], slopes[:, n_plant:], target, self.floor, self._blocks)
+        law = oscillator.coefficients
+        terms = (*library, *(term for term in law if term not in library))
+        plant, slopes = np.split(self.slopes(oscillator, terms), [len(self.free)], axis=1)
+        target = residual + slopes @ np.array([law.get(term, 0.0) for term in terms])
+        sizes = np.linalg.norm(plant, axis=0)
+        plant, sizes = plant[:, sizes > 0.0], sizes[sizes > 0.0]  # where the motion diverges a slope is zero: unknown
+        basis = np.linalg.qr(plant / sizes)[0]
+        included = independent(slopes, basis, range(len(terms)), DEPENDENT)
+        features = slopes[:, included] - basis @ (basis.T @ slopes[:, included])
+        sizes = np.linalg.norm(features, axis=0)
+        return TermRegression(
+            terms=tuple(terms[k] for k in included),
+            dependent=tuple(term for k, term in enumerate(terms) if k not in included),
+            features=features / sizes,
+            target=target - basis @ (basis.T @ target),
+            sizes=sizes,
+            size=1.0,
+            floor=self.floor,
+            n_others=basis.shape[1] + (not is_polynomial(law)),
+            blocks=self._blocks,
+        )
 
     def held_out_rmse(self, oscillator: Oscillator, residual: FloatArray) -> float:
         """Rmse on each block, predicted by a linear fit about the oscillator to the other blocks [unit of y]."""

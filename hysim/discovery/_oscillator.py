@@ -1,13 +1,12 @@
 """The verb `discover_oscillator`: candidates for the law of the memory of an oscillator, and the choice of one.
 
-1. A mass on a linear spring is identified. If none of the library's terms lowers its BIC, there is no structure.
-2. Along the measured motion Bouc-Wen laws with n = 1, 2 and 3 and a linear relaxation are regressed
-   (`_hidden_memory`); the search begins with the nearest one.
-3. It is refined by simulation error (`hysim.identify`).
-4. About the refined law the whole library is regressed: PySINDy's STLSQ and plain elimination from dense to sparse, one
-   structure by BIC, inclusion by bagging. Terms that are not chosen leave the law, which is
-   refined again. If terms come in, the Bouc-Wen law is refined with n free and with n at the nearest whole number, and
-   where terms come in about these too, the law of these terms. All this is done for each structure of the records.
+1. A mass on a linear spring is refined by simulation error, as all laws are.
+2. So are a linear relaxation and the Bouc-Wen law of the whole n nearest to what the measured motion shows
+   (`hysim.plants.oscillator_structure`). Where neither has a lower BIC than the spring, there is no structure.
+3. About the better one the output is linearised in all terms of the library: one structure by BIC among the best
+   subsets, inclusion by bagging. If terms come in, the Bouc-Wen law is refined with n free and with n at the nearest
+   whole number. Then the terms chosen about the best law are refined, until the choice stays the same.
+4. Where the records may have another structure, and the best law has a lower BIC by it, step 3 is repeated there.
 5. Of all refined laws that do not diverge, the linear spring among them, the one of the lowest BIC is taken; every
    number that has a standard error counts as a parameter.
 
@@ -29,13 +28,26 @@ import numpy as np
 from hysim import metrics, signals
 from hysim._basics.frozen import FloatArray, Positive, checked, items
 from hysim._basics.progress import Progress, Reports, reports
-from hysim.discovery._hidden_memory import PLANT, SPRING, HiddenMemory, Oscillator, Response, State, TermRegression
+from hysim.discovery._hidden_memory import (
+    EXPONENTS,
+    PLANT,
+    SPRING,
+    Oscillator,
+    Response,
+    State,
+    TermRegression,
+    bouc_wen_numbers,
+    is_polynomial,
+    library,
+    of_bouc_wen,
+)
 from hysim.discovery._judgement import HYSTERESIS, LAG, NO_STRUCTURE, signed_area
 from hysim.discovery._result import OscillatorDiscovery
+from hysim.discovery._search import INDISTINCT, WIDTH
 from hysim.errors import SimulationError
-from hysim.identification import identify
 from hysim.laws.differential.boucwen import BoucWen
-from hysim.laws.differential.terms import RELAXATION, Term, bouc_wen_exponent, bouc_wen_terms, law_text
+from hysim.laws.differential.terms import RELAXATION, Term, bouc_wen_exponent, law_text
+from hysim.models.search_space import Freedom
 from hysim.plants.oscillator import BoucWenOscillator
 from hysim.plants.oscillator_structure import Linear, OscillatorStructure, linear_plant
 from hysim.plants.transfer_function import TransferFunction
@@ -45,11 +57,9 @@ N_DRAWS = 20
 
 _SURE = 0.9  # inclusion below which a warning names a term of the law
 _LARGEST_CONDITION = 1e4
-_EXPONENTS = (0.5, 10.0)  # the published bounds of n
 _AT_BOUND = 1e-3  # relative distance from a bound below which a parameter is at it
 _STEPS = 5
 _ROUNDS = 5  # of choosing terms about a law of any terms
-_LAW = ("A", "beta", "gamma")
 _NO_MODEL = (
     "There is no model of this law: the memory of an oscillator is simulated where it is a Bouc-Wen law or a linear "
     "relaxation."
@@ -77,9 +87,7 @@ def model(oscillator: Oscillator, structure: OscillatorStructure, state: State) 
         return _lag(plant, law[RELAXATION], law.get(SPRING, 0.0), structure.hold, state)
     if n is None and kind != NO_STRUCTURE:
         return None
-    A, dissipative, conservative = (law.get(term, 0.0) for term in bouc_wen_terms(n or 1.0))
-    shape = {"A": A, "beta": -dissipative, "gamma": -conservative, "n": n or 1.0}
-    at_rest: BoucWenOscillator = structure.assemble({**plant, **shape})
+    at_rest: BoucWenOscillator = structure.assemble(bouc_wen_numbers(oscillator))
     if not any(state):
         return at_rest
     return replace(at_rest, initial_state=state[:2], law=replace(at_rest.law, z0=state.z))
@@ -126,6 +134,7 @@ class _Fitted(NamedTuple):
     stderr: dict[str, float]
     residual: FloatArray
     warnings: tuple[str, ...] = ()
+    regressed: Mapping[Term, float] = {}
 
     @property
     def terms(self) -> tuple[Term, ...]:
@@ -138,7 +147,7 @@ class _Fitted(NamedTuple):
     @property
     def diverges(self) -> bool:
         response = self.search.response
-        return diverges(model(self.oscillator, response.structure, State(0.0, 0.0, 0.0)), response.widest)
+        return diverges(model(self.oscillator, response.structure, State(0.0, 0.0, 0.0)), response.widest.y)
 
 
 class _Tried(NamedTuple):
@@ -155,7 +164,10 @@ class _Tried(NamedTuple):
 
 
 def _bic(tried: _Tried) -> float:
-    return tried.fitted.bic
+    """BIC; that of a law without a model is lower only where it is so by more than INDISTINCT."""
+    terms = tried.fitted.terms
+    has_model = verdict(terms) in (LAG, NO_STRUCTURE) or bouc_wen_exponent(terms) is not None
+    return tried.fitted.bic + (0.0 if has_model else INDISTINCT)
 
 
 class Search(NamedTuple):
@@ -168,151 +180,114 @@ class Search(NamedTuple):
 
     def result(self, others: Sequence[OscillatorStructure] = ()) -> OscillatorDiscovery:
         """Steps 1 to 5; `others` are other structures that the records may have."""
-        motions = [self.response.structure.motion(record) for record in self.response.records]
+        motions = [self.response.structure.motion(record) for record in self.response.records]  # each is checked
         linear = linear_plant(motions[0])
         if linear is None:
             advice = "check the sign of u and y, and the time; or the motion is too far from that of a linear spring"
             raise ValueError(f"no plant with a positive mass is near: {advice}")
-        memory = HiddenMemory(motions, linear, self.response.known)
         elastic = self._without_memory(linear)
         self.progress(1, _STEPS)
-        first = _tried(elastic, memory.regression(self.library))
+        try:
+            begun, failure = self._begun(elastic.oscillator), tuple[str, ...]()
+        except ValueError as error:
+            begun, failure = elastic, (f"A law with memory was tried and could not be refined: {error}.",)
         self.progress(2, _STEPS)
-        if not first.chosen:
-            return self._described(first, elastic, {})
-        nearest = memory.nearest()
+        if begun.bic >= elastic.bic:
+            return self._described(self._about(elastic), elastic, {}, failure)
+        first = self._about(begun)
+        candidates = self._candidates(first)
         self.progress(3, _STEPS)
-        if nearest is None:
-            return self._described(first, elastic, {}, ("Every law tried diverges along the measured displacement.",))
-        refined, failures = [], []
-        structures = (self.response.structure, *others)
-        for search in [self._replace(response=replace(self.response, structure=each)) for each in structures]:
-            try:
-                refined.append(search._refined(nearest[1]))
-            except ValueError as error:
-                failures.append(f"A law with memory was tried and could not be refined: {error}.")
+        best = min(candidates, key=_bic).fitted
+        for structure in others:
+            with contextlib.suppress(ValueError):  # the candidates by the other belief stay
+                search = self._replace(response=replace(self.response, structure=structure))
+                again = search._refined(best.oscillator, any_exponent="n" in best.stderr)
+                if again.bic < best.bic:
+                    candidates += search._candidates(search._about(again))
         self.progress(4, _STEPS)
-        if not refined:
-            return self._described(first, elastic, {}, tuple(failures[:1]))
-        best = min(refined, key=lambda each: float(each.residual @ each.residual))
-        first = best.search._about(best)
-        candidates = best.search._candidates(first)
-        if first.beyond:  # a law that is not the one decided how the records were made
-            candidates += [each for other in refined if other is not best for each in other.search._again(candidates)]
-        regressed, ranked = nearest[1].coefficients, sorted(candidates, key=_bic)
+        regressed = {} if RELAXATION in begun.terms else begun.regressed
+        ranked = sorted(candidates, key=_bic)
         for rank, each in enumerate(ranked):
             if _bic(each) < elastic.bic and not each.fitted.diverges:
                 return each.fitted.search._described(each, elastic, regressed, (_DIVERGES,) if rank else ())
         lost = (_DIVERGES,) if _bic(ranked[0]) < elastic.bic else ()
-        return ranked[0].fitted.search._described(ranked[0]._replace(fitted=elastic), elastic, regressed, lost)
-
-    def _again(self, candidates: Sequence[_Tried]) -> list[_Tried]:
-        """Candidates by this structure of the records; an empty list if it suits the best Bouc-Wen law less."""
-        laws = [each.fitted for each in candidates if bouc_wen_exponent(each.fitted.terms) is not None]
-        with contextlib.suppress(ValueError):  # there is no such law, or the candidates by the other belief stay
-            law = min(laws, key=lambda each: each.bic)
-            begun = self._bouc_wen(law.terms if _is_polynomial(law.terms) else ())
-            if begun.bic < law.bic:
-                return self._candidates(self._about(begun))
-        return []
+        return ranked[0].fitted.search._described(ranked[0]._replace(fitted=elastic), elastic, {}, lost)
 
     def _without_memory(self, linear: Linear) -> _Fitted:
         """The linear spring. Where the stiffness is known, z = A y is the rest of the spring."""
         plant: dict[str, float] = {**linear._asdict(), **self.response.known}
         springs = {SPRING: linear.stiffness - plant["stiffness"]} if "stiffness" in self.response.known else {}
-        refined = self._simulated(Oscillator(plant, springs))
+        refined = self._refined(Oscillator(plant, springs))
         plant, law = refined.oscillator
         plant = plant | {"stiffness": plant["stiffness"] + law.get(SPRING, 0.0)}
         stderr = {"stiffness" if name == SPRING.name else name: value for name, value in refined.stderr.items()}
         return refined._replace(oscillator=Oscillator(plant, {}), stderr=stderr)
 
-    def _refined(self, nearest: Oscillator) -> _Fitted:
-        terms = tuple(nearest.coefficients)
-        return self._simulated(nearest) if RELAXATION in terms else self._bouc_wen(terms)
+    def _begun(self, elastic: Oscillator) -> _Fitted:
+        """Step 2: the better of a linear relaxation and the Bouc-Wen law whose whole n is nearest."""
+        mass, _, total = (elastic.plant[name] for name in PLANT)
+        stiffness = self.response.known.get("stiffness", 0.5 * total)
+        relaxing = {SPRING: total - stiffness, RELAXATION: -float(np.sqrt(total / mass))}
+        plant = elastic.plant | {"stiffness": stiffness}
+        return self._refined(Oscillator(plant, relaxing), *self._starts(_whole(self._starts()[0])))
 
     def _candidates(self, first: _Tried) -> list[_Tried]:
-        """Step 4: the first law; where it lacks terms, also n free, n at the nearest whole number, and these terms."""
-        candidates, is_free = self._pruned(first), not _is_polynomial(first.fitted.terms)
-        if not candidates[-1].beyond and not is_free:
-            return candidates
-        with contextlib.suppress(ValueError):  # the first law stays
-            free = first if is_free else self._about(self._bouc_wen(()))
-            candidates += [] if is_free else [free]
-            n = float(max(round(bouc_wen_exponent(free.fitted.terms) or 1.0), 1))
-            if n != bouc_wen_exponent(first.fitted.terms):
-                candidates += self._pruned(self._about(self._bouc_wen(bouc_wen_terms(n))))
-        if not min(candidates, key=_bic).beyond:
-            return candidates
-        lacking = [each for each in candidates if each.beyond and _is_polynomial(each.chosen)]
-        more = self._extended(min(lacking, key=_bic)) if lacking else None
-        return candidates if more is None else [*candidates, more]
+        """Step 3: the law; where it lacks terms, also n free and at the nearest whole number; and what these lack."""
+        candidates = [first]
+        if first.beyond:
+            with contextlib.suppress(ValueError):  # the first law stays
+                candidates.append(self._about(self._refined(*self._starts(), any_exponent=True)))
+                n = _whole(candidates[1].fitted.oscillator)
+                if n != bouc_wen_exponent(first.fitted.terms):
+                    candidates.append(self._about(self._refined(*self._starts(n))))
+        with contextlib.suppress(ValueError):
+            for _ in range(_ROUNDS):
+                law = _asked_for(candidates)
+                candidates.append(self._about(self._refined(law, any_exponent=not is_polynomial(law.coefficients))))
+        return candidates
 
-    def _pruned(self, tried: _Tried) -> list[_Tried]:
-        """A Bouc-Wen law, and the same without those of its terms that are not chosen."""
-        law = tried.fitted.terms
-        smaller = tuple(term for term in law if term == SPRING or term in tried.chosen)
-        n = bouc_wen_exponent(smaller)
-        if bouc_wen_exponent(law) is None or len(smaller) == len(law) or n is None or n != int(n):
-            return [tried]
-        with contextlib.suppress(ValueError):  # the law with all terms stays
-            return [tried, self._about(self._bouc_wen(smaller))]
-        return [tried]
+    def _starts(self, n: float | None = None) -> list[Oscillator]:
+        """Bouc-Wen laws along the measured motion, the nearest one first; without `n` it is free."""
+        fixed = dict(self.response.known) if n is None else {**self.response.known, "n": n}
+        freedom = Freedom(fixed=fixed, bounds={"n": EXPONENTS} if n is None else {})
+        space = self.response.structure.search_space(self.response.widest, freedom)
+        each = [space.parameters(x[np.newaxis]) for x in space.starts]
+        return [of_bouc_wen({name: float(value[0]) for name, value in values.items()}) for values in each]
 
-    def _extended(self, tried: _Tried) -> _Tried | None:
-        """The law of the terms that are chosen, which are chosen again until they stay the same."""
-        for _ in range(_ROUNDS):
-            plant, coefficients = tried.fitted.oscillator
-            law = {term: coefficients.get(term, 0.0) for term in tried.regression.terms if term in tried.chosen}
-            try:
-                again = self._about(self._simulated(Oscillator(plant, law)))
-            except ValueError:
-                return None
-            if set(again.chosen) == set(law) or not again.chosen:
-                return again
-            tried = again
-        return tried
-
-    def _bouc_wen(self, terms: Sequence[Term]) -> _Fitted:
-        """Identified with these terms of a Bouc-Wen law; without any, with all of them and n free."""
-        fixed = {"n": bouc_wen_exponent(terms) or 1.0} if terms else {}
-        lacking = zip(_LAW, bouc_wen_terms(fixed.get("n", 1.0)), strict=True)
-        fixed |= {name: 0.0 for name, term in lacking if terms and term not in (SPRING, *terms)}
-        response, bounds = self.response, {} if terms else {"n": _EXPONENTS}
-        fit = identify(response.structure, response.records, fixed={**fixed, **response.known}, bounds=bounds)
-        numbers = fit.estimates
-        law = dict(zip(_LAW, bouc_wen_terms(numbers["n"]), strict=True))
-        free = {term: name for name, term in law.items() if name not in fixed}
-        coefficients = {term: numbers[name] if name == "A" else -numbers[name] for term, name in free.items()}
-        stderr = {law[name].named("z") if name in law else name: value for name, value in fit.stderr.items()}
-        plant = {name: numbers[name] for name in PLANT}
-        warnings: list[str] = [] if fit.success else [f"The refinement did not converge: {fit.message}."]
-        if not terms:
-            reached = [bound for bound in _EXPONENTS if abs(numbers["n"] - bound) < _AT_BOUND * bound]
-            warnings += [f"The exponent n reached its search bound {bound:g}." for bound in reached]
-        return _Fitted(self, Oscillator(plant, coefficients), stderr, fit.residual, tuple(warnings))
-
-    def _simulated(self, oscillator: Oscillator) -> _Fitted:
-        """A law of any terms, refined by simulation after the regression; a ValueError if it diverges."""
-        refined = self.response.descended(oscillator)
-        terms = tuple(refined.coefficients)
-        residual = self.response.measured - self.response.outputs([refined])[0]
-        J = self.response.slopes(refined, terms)
-        size = np.linalg.norm(J, axis=0)
-        if not (np.isfinite(residual).all() and (size > 0.0).all()):
+    def _refined(self, *starts: Oscillator, any_exponent: bool = False) -> _Fitted:
+        """The best law of those refined by simulation from some starts; a ValueError if all diverge."""
+        ends = [self._ended(start, any_exponent) for start in starts]
+        refined = [end for end in ends if end is not None]
+        if not refined:
             advice = "check the units, the time, and the sign of u and y"
             raise ValueError(f"the oscillator nearest to the records diverges, or does not become steady: {advice}")
+        return min(refined, key=lambda each: each.bic)
+
+    def _ended(self, start: Oscillator, any_exponent: bool) -> _Fitted | None:
+        refined, at_rest = self.response.descended(start, any_exponent=any_exponent)
+        terms = tuple(refined.coefficients)
+        residual = self.response.measured - self.response.outputs([refined])[0]
+        J = self.response.slopes(refined, terms, any_exponent=any_exponent)
+        size = np.linalg.norm(J, axis=0)
+        if not (np.isfinite(residual).all() and (size > 0.0).all()):
+            return None
         variance = float(residual @ residual) / max(residual.size - size.size, 1)
         errors = np.sqrt(variance * np.diag(np.linalg.pinv((J / size).T @ (J / size)))) / size
-        names = (*self.response.free, *(term.named("z") for term in terms))
-        return _Fitted(self, refined, dict(zip(names, errors.tolist(), strict=True)), residual)
+        names = [*self.response.free, *(term.named("z") for term in terms), *["n"] * any_exponent]
+        warnings = [] if at_rest else ["The refinement did not converge."]
+        if any_exponent:
+            n = bouc_wen_exponent(terms) or 1.0
+            reached = [bound for bound in EXPONENTS if abs(n - bound) < _AT_BOUND * bound]
+            warnings += [f"The exponent n reached its search bound {bound:g}." for bound in reached]
+        stderr = dict(zip(names, errors.tolist(), strict=True))
+        return _Fitted(self, refined, stderr, residual, tuple(warnings), start.coefficients)
 
     def _about(self, fitted: _Fitted) -> _Tried:
         """The library about a law; where n is free, without the terms that differ from the law's own by their power."""
         law = fitted.oscillator.coefficients
         same = {(t.rectified, t.is_even_in_memory) for t in law if not (t.is_polynomial or t.relaxing)}
         library = [t for t in self.library if not t.degree or (t.rectified, t.is_even_in_memory) not in same]
-        regression = self.response.regression(fitted.oscillator, fitted.residual, library)
-        return _tried(fitted, regression if _is_polynomial(fitted.terms) else replace(regression, n_others=1))
+        return _tried(fitted, self.response.regression(fitted.oscillator, fitted.residual, library))
 
     def _described(
         self, tried: _Tried, elastic: _Fitted, regressed: Mapping[Term, float], warnings: tuple[str, ...] = ()
@@ -328,7 +303,7 @@ class Search(NamedTuple):
         warnings = (*nothing, *warnings, *fitted.warnings, *_warnings(tried, inclusion))
         free_exponent = {"n": bouc_wen_exponent(law) or np.nan} if "n" in fitted.stderr else {}
         held_out = np.array([regression.held_out_rmse(terms) for terms in structures])
-        width, area = steady_loop(models[0] if law else None, response.widest)
+        width, area = steady_loop(models[0] if law else None, response.widest.y)
         self.progress(_STEPS, _STEPS)
         return OscillatorDiscovery(
             model=models[0],
@@ -370,17 +345,31 @@ class Search(NamedTuple):
 
 def _tried(fitted: _Fitted, regression: TermRegression) -> _Tried:
     law = tuple(term for term in regression.terms if term in fitted.terms)
-    tried = (regression.structures() | {law}) - {()}
+    tried = {*regression.eliminated(WIDTH), law} - {()}
     structures = sorted(tried, key=lambda terms: (-len(terms), regression.bic(terms), terms))
     return _Tried(fitted, regression, structures, regression.best(structures))
 
 
+def _whole(oscillator: Oscillator) -> float:
+    """The whole exponent nearest to that of a Bouc-Wen law."""
+    return float(max(round(bouc_wen_exponent(oscillator.coefficients) or 1.0), 1))
+
+
+def _asked_for(candidates: Sequence[_Tried]) -> Oscillator:
+    """Where the law of the terms that the best candidate's regression chose begins; a ValueError if it was tried."""
+    best = min(candidates, key=_bic)
+    if best.beyond:  # terms beside those of a free n cannot be refined
+        best = min((each for each in candidates if is_polynomial(each.fitted.terms)), key=_bic)
+    plant, coefficients = best.fitted.oscillator
+    if not best.chosen or set(best.chosen) in [set(each.fitted.terms) for each in candidates]:
+        raise ValueError("nothing is lacking")
+    return Oscillator(
+        plant, {term: coefficients.get(term, 0.0) for term in best.regression.terms if term in best.chosen}
+    )
+
+
 def _by_name(values: Mapping[Term, float]) -> dict[str, float]:
     return {term.named("z"): value for term, value in values.items()}
-
-
-def _is_polynomial(terms: Sequence[Term]) -> bool:
-    return all(term.is_polynomial or term.relaxing for term in terms)
 
 
 def _motion(plant: Mapping[str, float]) -> str:
@@ -473,12 +462,12 @@ def discover_oscillator(
     {"u'": 50000, "|u'| z": -800, "u' |z|": 300}
     """
     records = several(record_or_records, "discover_oscillator")
-    library = HiddenMemory.library(degree, symmetry)
+    terms = library(degree, symmetry)
     parts = items(_KnownPlant(mass=mass, damping=damping, stiffness=stiffness))
     known = {name: value for name, value in parts.items() if value is not None}
     chosen = _structure(records, structure)
     others = () if structure is not None or chosen.period is None else (replace(chosen, hold="foh"),)
-    search = Search(Response(chosen, records, known), library, seed, progress or (lambda done, total: None))
+    search = Search(Response(chosen, records, known), terms, seed, progress or (lambda done, total: None))
     return search.result(others)
 
 

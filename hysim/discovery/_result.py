@@ -301,7 +301,7 @@ class OscillatorDiscovery(_Discovered):
     n_parameters : int
         Number of fitted parameters of the plant and the law.
     left_out, regressed, inclusion
-        As in `Discovery`.
+        As in `Discovery`; `regressed` is the Bouc-Wen law with which the search began, empty for a linear relaxation.
     path_n_terms, path_fit_percent, path_bic : array, shape (n_structures,)
         Sizes of the compared structures, their fit on held-out samples [%], and BIC: for a Pareto figure.
     message, warnings
