@@ -13,7 +13,7 @@ from scipy.optimize import least_squares
 import hysim as hs
 from hysim.discovery import _result
 from hysim.discovery._discover import left_out_rmse
-from hysim.discovery._hidden_memory import cases, memory_arrays
+from hysim.discovery._hidden_memory import memory_arrays
 from hysim.discovery._refinement import _SCHEDULE, FreeRun, Structure
 from hysim.discovery._search import INDISTINCT, Library, Options, Search, pruned, searched
 from hysim.identification import folds
@@ -293,28 +293,6 @@ def test_a_structure_could_win_if_its_bic_with_the_starts_of_all_records_may_be_
 
 
 PLANT = {"mass": 2.0, "damping": 0.4, "stiffness": 3.0}
-
-
-def test_the_memory_along_a_path_is_that_of_the_law_and_its_slopes_are_derivatives():
-    path = np.sin(np.linspace(0.0, 9.0, 4001))
-    terms = bouc_wen_terms(1.0)
-    units = np.array([cases(term, 1) for term in terms])
-
-    def run(coefficients: list[float], relaxation: float = 0.0) -> np.ndarray:
-        found = np.zeros((5, path.size))
-        polynomial = memory_arrays(dict(zip(terms, coefficients, strict=True)), 1)[0]
-        assert memory_terms.along(np.diff(path), 1e-3, polynomial, relaxation, units, found[0], found[1:])
-        return found
-
-    found = run([1.0, -0.6, -0.3])
-    exact = hs.BoucWen(A=1.0, beta=0.6, gamma=0.3).memory(path)
-    assert np.abs(found[0] - exact).max() < 1e-5  # second order: the square of increments of 2e-3
-    for k in range(3):
-        moved = [1.0, -0.6, -0.3]
-        moved[k] += 1e-6
-        assert np.abs((run(moved)[0] - found[0]) / 1e-6 - found[1 + k]).max() < 1e-4  # the difference's own error
-    assert np.abs((run([1.0, -0.6, -0.3], 1e-6)[0] - found[0]) / 1e-6 - found[4]).max() < 1e-4
-    assert RELAXATION.name == "z"
 
 
 def motion(coefficients, force, h, degree=1):

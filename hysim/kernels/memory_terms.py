@@ -1,4 +1,4 @@
-"""A memory law given by its terms, along a displacement and inside an oscillator.
+"""A memory law given by its terms, inside an oscillator.
 
     dz/dL = P(s, z) + e(s, z) |z|^n,  dL = |dy|, s = sgn(dy),    z' = |y'| dz/dL + r z
 
@@ -6,8 +6,8 @@ P is one polynomial in z for each direction s and each side of z = 0, so that pr
 covered; e, of the same four cases, multiplies one more power, which need not be whole; r is a relaxation in time,
 which a law that is independent of rate has not. Arrays of four cases are indexed [s > 0, z > 0].
 
-`along` uses the midpoint rule on every increment of y, for z and sensitivities, `motion` the classical Runge-Kutta
-method on m y'' + c y' + k y + z = F. Neither ends steps at reversals: they serve regressions, refined elsewhere.
+`motion` is the classical Runge-Kutta method on m y'' + c y' + k y + z = F. Its steps do not end at reversals: it serves
+regressions, refined elsewhere.
 """
 
 import math
@@ -25,42 +25,6 @@ def slope(z: float, case: FloatArray) -> float:
     for k in range(case.size - 1, -1, -1):
         total = total * z + case[k]
     return total
-
-
-@inner
-def curvature(z: float, case: FloatArray) -> float:
-    """dP/dz of one case."""
-    total = 0.0
-    for k in range(case.size - 1, 0, -1):
-        total = total * z + k * case[k]
-    return total
-
-
-@kernel
-def along(
-    steps: FloatArray, h: float, law: FloatArray, r: float, terms: FloatArray, z: FloatArray, sensitivities: FloatArray
-) -> bool:
-    """Memory (n + 1,) after each of `steps` (n,) of y, from `z[0]`, and dz/d(coefficient) (n_terms + 1, n + 1).
-
-    `law` is P, shape (2, 2, degree + 1), `terms` are those of its terms for the coefficient 1; the last sensitivity
-    is that to r. `h` is the time of a step. False if z diverges.
-    """
-    last = len(terms)
-    for i in range(steps.size):
-        length, s = abs(steps[i]), int(steps[i] > 0.0)
-        f = slope(z[i], law[s, int(z[i] > 0.0)]) * length + r * z[i] * h
-        middle = z[i] + 0.5 * f
-        side = int(middle > 0.0)
-        case = law[s, side]
-        change = 0.5 * (curvature(middle, case) * length + r * h)
-        for j in range(last):
-            g = slope(middle, terms[j, s, side]) * length
-            sensitivities[j, i + 1] = (sensitivities[j, i] * (1.0 + change) + g) / (1.0 - change)
-        sensitivities[last, i + 1] = (sensitivities[last, i] * (1.0 + change) + middle * h) / (1.0 - change)
-        z[i + 1] = z[i] + slope(middle, case) * length + r * middle * h
-        if not abs(z[i + 1]) < LARGEST:
-            return False
-    return True
 
 
 @kernel
