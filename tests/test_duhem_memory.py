@@ -186,7 +186,7 @@ def test_a_run_that_needs_more_steps_than_allowed_is_a_row_of_inf():
 
 
 def test_the_slopes_count_the_work_of_each_law(monkeypatch):
-    monkeypatch.setattr("hysim.laws.differential.duhem_runs._SAMPLES_PER_THREAD", 30)  # so that two threads share them
+    monkeypatch.setattr("hysim.laws.differential.duhem_runs.SAMPLES_A_THREAD", 30)  # so that two threads share them
     u = hs.Record(u=np.tile([1.0, -1.0], 15), y=np.zeros(30)).u[np.newaxis]
     laws = np.repeat([[1.0, -1.0], [1.0, -2e3]], 4, axis=0)  # the second one turns within a 2000th of a stroke
     terms = [Term.parse("u'"), Term.parse("|u'| z")]
