@@ -57,6 +57,7 @@ _GAIN = 1e-5  # by hand: share of the sum of squares; a descent that gains less 
 _TOLERANCE = 2e-8  # likewise of a polish: far less than a likelihood can tell on records of some 1e5 samples
 _HOPELESS = 3.0  # by hand: times the least sum of squares on a thinned record, beyond which an optimum is no rival
 _ALIKE = 1e-6  # relative difference of two sums of squares that are the same
+_BESIDE = 0.01  # of the way to a side of the box, where a flat tail is flat, too
 _EFFECT = 1e-7  # of the outputs' range: smaller changes are none
 _WIDENINGS = 4  # by hand: of a box, each by a quarter of its width, in all to 2.4 times it
 _ROUGH = 0.1  # by hand: share of the cost by which the rough law's may differ; beyond, it does not say what stays
@@ -134,12 +135,17 @@ def _in_its_tail(problem: Problem, optima: Sequence[Optimum]) -> list[Optimum]:
     """
     best, space = [*optima], problem.space
     alone = [name not in itertools.chain(*space.redundant) for name in space.coordinates]
+    alike = (1.0 + _ALIKE) * optima[0].cost if best else np.inf
     for k in np.flatnonzero(alone if best else []).tolist():
         ends = np.tile(best[0].x, (2, 1))
         ends[:, k] = space.lower[k], space.upper[k]
+        is_open = np.array([np.logical_or(*space.open_sides(end))[k] for end in ends])
+        is_flat = is_open & (problem.costs(best[0].x + _BESIDE * (ends - best[0].x)) <= alike)
+        if not is_flat.any():  # beside the optimum: at the ends of a wide box a simulation may take long
+            continue
         costs = problem.costs(ends)
-        kept = np.flatnonzero(costs <= (1.0 + _ALIKE) * optima[0].cost)
-        if kept.size != 1 or not np.logical_or(*space.open_sides(ends[kept[0]]))[k]:
+        kept = np.flatnonzero(costs <= alike)
+        if kept.size != 1 or not is_flat[kept[0]]:
             continue
         here = problem.completed(best[0].x[np.newaxis])
         there = np.append(ends[kept], here[:, problem.n_x :], axis=1)
