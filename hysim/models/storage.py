@@ -135,9 +135,8 @@ def from_document(document: Mapping[str, Any], path: str | Path) -> Any:
     if family in MODULE_OF:
         importlib.import_module(MODULE_OF[family])  # enters it into the families
     if family not in FAMILIES:
-        known = ", ".join(sorted(every_family()))
-        own = "import first the module of a family of your own"
-        raise ValueError(f"{path} holds a model of the family {_shown(family)}; there are {known}; {own}")
+        known = f"{', '.join(sorted(every_family()))}; import first the module of a family of your own"
+        raise ValueError(f"{path} holds a model of the family {_shown(family)}; there are {known}")
     try:
         parameters = {name: _value(value, path) for name, value in stored.items()}
         loaded = FAMILIES[family](**parameters)

@@ -454,12 +454,7 @@ class BoucWenOscillator:
         return Startable(_STEPS[self.method], parameters, state, stepping.complete)
 
 
-_STEPS = {
-    "split": kernels.split_step,
-    "runge-kutta": kernels.runge_kutta_step,
-    "newmark": kernels.newmark_step,
-    "strang": kernels.strang_step,
-}
+_STEPS = {each: vars(kernels)[f"{each.replace('-', '_')}_step"] for each in METHODS}
 
 
 def _linear_flow(mass: float, damping: float, stiffness: float, h: float) -> list[float]:
