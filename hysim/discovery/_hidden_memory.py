@@ -172,7 +172,7 @@ def is_polynomial(terms: Iterable[Term]) -> bool:
 
 
 def with_exponent(terms: Sequence[Term], n: float) -> tuple[Term, ...]:
-    """The same terms of the Bouc-Wen law of another exponent."""
+    """These terms of a Bouc-Wen law, for another exponent."""
     both = zip(bouc_wen_terms(bouc_wen_exponent(terms) or 1.0), bouc_wen_terms(n), strict=True)
     return tuple(new for old, new in both if old in terms)
 
@@ -312,7 +312,7 @@ class Response:
             return Oscillator(plant, dict(zip(own, values.tolist(), strict=True)))
 
         def powers(terms: Sequence[Term]) -> FloatArray:
-            """What coefficients are multiplied with so that n leaves their effect about the same."""
+            """Factors of the coefficients with which a change of n leaves their effect about as it was."""
             return np.array([size**term.degree for term in terms])
 
         def residuals(points: FloatArray) -> FloatArray:

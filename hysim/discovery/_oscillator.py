@@ -356,7 +356,7 @@ def _whole(oscillator: Oscillator) -> float:
 
 
 def _asked_for(candidates: Sequence[_Tried]) -> Oscillator:
-    """Where the law of the terms that the best candidate's regression chose begins; a ValueError if it was tried."""
+    """Start of the law with the terms that the best candidate's regression chose; a ValueError if it was tried."""
     best = min(candidates, key=_bic)
     if best.beyond:  # terms beside those of a free n cannot be refined
         best = min((each for each in candidates if is_polynomial(each.fitted.terms)), key=_bic)
