@@ -6,6 +6,7 @@ import os
 import resource
 import subprocess
 import sys
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import numba
@@ -14,6 +15,7 @@ from numba.core.caching import CacheImpl, IndexDataCacheFile
 from numba.core.codegen import JITCPUCodegen
 
 from hysim.kernels import _compile
+from hysim.kernels.stepping import by_address
 from hysim.models.compiled_step import compiled_step
 from hysim.models.model import FAMILIES
 
@@ -33,6 +35,8 @@ def halved(x):
 @signed_kernel(float64(float64))
 def thrice(x):
     return twice(x) + x
+def six_times(x):
+    return 2.0 * thrice(x)
 """
 
 
@@ -75,12 +79,12 @@ def kernels(tmp_path, monkeypatch):
     monkeypatch.setattr(numba.config, "CACHE_DIR", str(tmp_path / "cache"))
     (tmp_path / "own_kernels.py").write_text(SOURCE)
 
-    def load():
+    def load(called=True):
         spec = importlib.util.spec_from_file_location("own_kernels", tmp_path / "own_kernels.py")
         module = importlib.util.module_from_spec(spec)
         sys.modules["own_kernels"] = module
         spec.loader.exec_module(module)
-        assert (module.twice(1.5), module.thrice(1.5)) == (3.0, 4.5)
+        assert not called or (module.twice(1.5), module.thrice(1.5)) == (3.0, 4.5)
         return module
 
     yield load
@@ -96,6 +100,23 @@ def test_constants_among_the_arguments_make_no_code_of_their_own(kernels):
     module = kernels()
     assert module.halved(3.0) == 1.5
     assert len(module.times.signatures) == 1
+
+
+FIRST_USES = {
+    "call": lambda module: module.thrice(1.5),
+    "calls of threads": lambda module: list(ThreadPoolExecutor(4).map(module.thrice, [1.5] * 8)),
+    "call by a kernel": lambda module: _compile.inner(module.six_times).compile((numba.float64,)),
+    "address": lambda module: by_address(module.thrice, numba.float64(numba.float64)).__wrapper_address__(),
+}
+
+
+@compiled
+@pytest.mark.parametrize("use", FIRST_USES.values(), ids=FIRST_USES)
+def test_a_kernel_of_one_type_is_compiled_where_it_is_used_first(kernels, use):
+    module = kernels(called=False)
+    assert not module.thrice.overloads
+    use(module)
+    assert (module.thrice(1), len(module.thrice.overloads)) == (3.0, 1)
 
 
 @compiled

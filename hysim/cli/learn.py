@@ -200,6 +200,7 @@ def calls() -> dict[str, Callable[[], object]]:
     """Short calls that compile what most first calls need, by their names."""
     import numpy as np
 
+    from hysim.kernels._compile import signed
     from hysim.models.model import candidates
     from hysim.models.protocols import Invertible, needs_time
     from hysim.plants.oscillator_structure import METHODS
@@ -233,6 +234,7 @@ def calls() -> dict[str, Callable[[], object]]:
         "responses": lambda: hs.BoucWen.responses({"n": [1.0, 1.5, 2.0]}, u),
         "frame": lambda: hs.simulate(frame, t, u),
         "closed loop": lambda: [hs.close_loop(stage, each, t, u) for each in (follow, learn)],
+        "laws in loops": lambda: [compiled() for compiled in signed],
     }
 
 

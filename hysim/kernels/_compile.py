@@ -20,6 +20,7 @@ import numba
 import numpy as np
 from numba.core import cgutils, types
 from numba.core.caching import CompileResultCacheImpl, FunctionCache, InTreeCacheLocator, NullCache
+from numba.core.compiler_lock import global_compiler_lock
 from numba.core.dispatcher import Dispatcher
 from numba.core.sigutils import normalize_signature
 from numba.experimental.function_type import _get_wrapper_address
@@ -29,6 +30,8 @@ F = TypeVar("F", bound=Callable[..., Any])
 
 sources: dict[Any, str] = {}
 """Text of the functions that stand in no file."""
+signed: list[Callable[[], Any]] = []
+"""What compiles the kernels that have one type, each."""
 
 _NO_ENTRY = {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}
 
@@ -79,7 +82,7 @@ def pasted(function: F) -> F:
 
 
 def signed_kernel(*signatures: Any, **others: Any) -> Callable[[F], F]:
-    """Compile a function for these signatures at once: what a typed function pointer needs."""
+    """Compile a function for these signatures only: what a typed function pointer needs."""
     return lambda function: _compiled(function, list(signatures), **others)
 
 
@@ -119,7 +122,7 @@ def by_address(function: F, signature: Any) -> F:
 
 
 def signed_inlined(*signatures: Any) -> Callable[[F], F]:
-    """As `inlined` for these signatures only, compiled at once."""
+    """As `inlined`, for these signatures only."""
     return lambda function: _compiled(function, list(signatures), forceinline=True, **_NO_ENTRY)
 
 
@@ -130,12 +133,29 @@ def _compiled(function: F, signatures: Sequence[Any] = (), **others: Any) -> F:
     if is_compiled:
         compiled.get_call_template = _without_constants(compiled.get_call_template)
         compiled._cache = _cache(function)
-        for signature in signatures:
-            compiled.compile(signature)
         if signatures:
-            compiled.disable_compile()
+            _when_needed(compiled, signatures)
     result: F = compiled
     return result
+
+
+def _when_needed(compiled: Any, signatures: Sequence[Any]) -> None:
+    """Compile for these signatures, and no others, at the first call from Python or from a kernel."""
+
+    def ready(*_: Any, **__: Any) -> Any:
+        with global_compiler_lock:
+            if compiled._can_compile:  # no other thread has been here
+                for signature in signatures:
+                    compiled.compile(signature)
+                compiled.disable_compile()
+                compiled.get_call_template = template_of
+                del compiled._compile_for_args
+        return compiled  # numba calls it
+
+    template_of = compiled.get_call_template
+    compiled.get_call_template = lambda *types_: ready().get_call_template(*types_)
+    compiled._compile_for_args = ready
+    signed.append(ready)
 
 
 def _without_constants(template_of: Callable[..., Any]) -> Callable[..., Any]:

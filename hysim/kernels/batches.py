@@ -32,7 +32,8 @@ def drive_each(
         row, y = u[min(i, u.shape[0] - 1)], out[min(i, out.shape[0] - 1)]
         if row.size == 0:
             continue
-        state[1:n_memory] = memory[i, 1:]
+        for k in range(1, n_memory):
+            state[k] = memory[i, k]
         if scratch > 0:
             state[-1] = 0.0
         state[0] = row[0]

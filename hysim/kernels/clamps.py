@@ -63,7 +63,8 @@ def batch(parameters: FloatArray, state: FloatArray, u: FloatArray, out: FloatAr
                 for i in range(n_plays):
                     total += terms[i]
                 out[k, j] = total
-        state[k, 1:] = z
+        for i in range(n_plays):
+            state[k, 1 + i] = z[i]
 
 
 @inner
@@ -125,9 +126,11 @@ def by_turns(thresholds: FloatArray, weights: FloatArray, z: FloatArray, u: Floa
                 m += 1
             rest = others[m]
         out[j] = last * W[m] - direction * R[m] + rest
-    z[:m] = last - direction * thresholds[:m]
+    for i in range(m):
+        z[i] = last - direction * thresholds[i]
     for k in range(turns - 1, -1, -1):
-        z[m : counts[k]] = places[k] - directions[k] * thresholds[m : counts[k]]
+        for i in range(m, counts[k]):
+            z[i] = places[k] - directions[k] * thresholds[i]
         m = counts[k]
 
 

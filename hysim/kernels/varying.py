@@ -41,20 +41,21 @@ def drive_varying(
 ) -> None:
     """Outputs of the laws `first` to `stop - 1` at the inputs `u`; one that diverges is a row of inf."""
     n_memory, n = memory.shape[1], u.size
-    kept = np.empty(n_memory)
     state = np.empty(n_memory + workspace)
     for i in range(first, stop):
-        state[:n_memory] = memory[i]
         state[n_memory:] = 0.0
+        for k in range(n_memory):
+            state[k] = memory[i, k]
         start(parameters[i * n], state, u[0])
         for k in range(n):
             row = i * n + k
             if k > 0 and differ(parameters[row], parameters[row - 1]):
                 if anew:
-                    kept[:] = state[:n_memory]
+                    kept = state[:n_memory].copy()
                     state[n_memory:] = 0.0
                     start(parameters[row], state, kept[0])
-                    state[:n_memory] = kept
+                    for p in range(n_memory):
+                        state[p] = kept[p]
                 else:
                     resume(parameters[row], parameters[row - 1], state)
             out[i, k] = step(parameters[row], state, u[k])
