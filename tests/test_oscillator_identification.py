@@ -52,6 +52,17 @@ def worst(fit: hs.Identification) -> float:
     return max(abs(fit.estimates[name] / TRUTH[name] - 1.0) for name in fit.free_names)
 
 
+@needs_compiled
+@pytest.mark.parametrize(("k", "size"), [(3, 1.0), (20, 10.0), (150, -30.0)])
+def test_one_outlier_does_not_move_the_robust_optimum(k, size):
+    rec = from_rest()
+    y = rec.y + 1e-3 * rec.y.std() * np.random.default_rng(0).standard_normal(len(rec))
+    y[k] += size * rec.y.std()
+    fit = hs.identify(structure(), record(rec.u, y), fixed={"n": 1.0}, noise="robust")
+    assert fit.success
+    assert worst(fit) < 0.02
+
+
 @pytest.mark.parametrize("made", ["from rest", pytest.param("steady", marks=needs_compiled)])
 def test_all_seven_parameters_come_back_without_a_guess(made):
     rec = from_rest() if made == "from rest" else steady()

@@ -70,6 +70,8 @@ class Search:
         return Descent(self.problem, self.noise, self.problem.y[np.newaxis], np.ones((1, self.problem.y.size)))
 
     def likely(self, squares: Sequence[Optimum]) -> list[LocalOptimum]:
+        if isinstance(self.noise, Robust):  # an outlier may move the least squares to another valley
+            squares = [*squares, *(Optimum(x, np.inf, converged=False) for x in self.problem.space.starts)]
         theta = self.problem.completed(np.array([optimum.x for optimum in squares]))
         steps = 0 if isinstance(self.noise, Gaussian) else 200
         reached = self.descent.run(theta, tolerance=1e-9, steps=steps)
@@ -79,7 +81,9 @@ class Search:
             loss, sigma = float(reached.loss[k]), float(reached.sigma[k])
             perfect = bool(distinct) and distinct[0].sigma <= _EXACT * PERFECT * self.problem.scale
             if not distinct or (not perfect and loss - distinct[-1].loss > 0.5 * self.problem.y.size * _SAME):
-                distinct.append(LocalOptimum(reached.theta[k], loss, sigma, squares[k].converged))
+                distinct.append(
+                    LocalOptimum(reached.theta[k], loss, sigma, squares[k].converged or bool(reached.at_rest[k]))
+                )
         return distinct
 
     def on_energy(self, best: LocalOptimum) -> tuple["Search", list[LocalOptimum]]:
