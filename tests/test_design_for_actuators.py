@@ -51,8 +51,7 @@ def test_expected_errors_are_those_of_differences_of_the_response(design):
         step = 1e-4 * value
         ends = (stage(**{name: value + side * step}).response(design.u, 1e-3) for side in (1.0, -1.0))
         slopes[name] = np.subtract(*ends) / (2.0 * step)
-    creep = hs.Creep.per_decade(2.0)
-    slopes["hysteresis.offset"] = np.full(design.u.size, creep.dc_gain)
+    slopes["hysteresis.offset"] = np.full(design.u.size, hs.Creep.per_decade(2.0).dc_gain)
     names = list(design.expected_stderr)
     jacobian = np.column_stack([slopes[name] for name in names]) / 2e-3
     lengths = np.linalg.norm(jacobian, axis=0)
@@ -101,9 +100,8 @@ def test_what_no_input_within_the_limits_shows_is_said():
 
 
 def test_a_rounding_sensor_has_the_noise_of_its_rounding():
-    sensor = hs.Sensor(noise=3e-3, quantum=4e-3)
-    few = {"free": (CREEP,), "candidates": 0, "moves": 0}
-    rounded = hs.design_input(hs.Actuator.structure(LAW, sensor=sensor), limits=LIMITS, values=VALUES, **few)
+    rounding = hs.Actuator.structure(LAW, sensor=hs.Sensor(noise=3e-3, quantum=4e-3))
+    rounded = hs.design_input(rounding, limits=LIMITS, values=VALUES, free=(CREEP,), candidates=0, moves=0)
     assert rounded.noise == pytest.approx(np.sqrt(9e-6 + 16e-6 / 12.0))
 
 

@@ -196,6 +196,11 @@ def test_a_stroke_has_the_derivatives_of_its_closed_form():
     np.testing.assert_allclose(computed, expected, rtol=1e-8)
 
 
+def test_a_threshold_of_zero_has_its_one_sided_derivative_in_any_unit():
+    law = hs.PrandtlIshlinskii(thresholds=(0.0, 2e-10), weights=(1.0, 0.5))
+    np.testing.assert_allclose(law.response_jacobian([0.0, 1e-9], ["thresholds[0]"]).matrix[:, 0], [0.0, -1.0])
+
+
 def test_affine_numbers_have_their_columns():
     law, u = hs.BoucWen(n=1.4, feedthrough=0.4), INPUT
     columns = law.regressors(law.scalars, hs.Record(u=u, y=u))[0]

@@ -35,6 +35,7 @@ from hysim.kernels.inverses import line
 from hysim.laws.static import Line
 from hysim.models.compiled_step import compiled_step
 from hysim.models.inverse_search import inverse_step, searched_inverse
+from hysim.models.jacobian import checked_names
 from hysim.models.law import Law
 from hysim.models.model import family
 from hysim.models.protocols import CompiledController, CompiledLaw, law_at, needs_time, positive_time
@@ -351,8 +352,7 @@ class AdaptiveInverse(WithoutFeedback):
             raise TypeError(f"law must be a law that a step describes, such as BoucWen, got {type(self.law).__name__}")
         if not self.free or len(self.free) != len(self.drift):
             raise ValueError(f"free and drift must name as many numbers, got {len(self.free)} and {len(self.drift)}")
-        if unknown := [name for name in self.free if name not in self.law.scalars]:
-            raise ValueError(f"free has {unknown[0]!r}: a {type(self.law).__name__} has {', '.join(self.law.scalars)}")
+        checked_names(self.law, self.free)
         if not (min(self.drift) > 0.0 and self.noise > 0.0):
             raise ValueError("drift and noise must be positive")
         if self.law.workspace and self.law.resume is None:

@@ -2,20 +2,21 @@
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from operator import itemgetter
 from typing import Any, Literal
 
 import numpy as np
 import numpy.typing as npt
 
-from hysim._basics.frozen import FloatArray, check_positive, read_only
+from hysim._basics.frozen import FloatArray, check_choice, check_positive, read_only
 from hysim._basics.names import among
 from hysim._basics.printing import frozen_result, summary_text
 from hysim._basics.results import model_of
 from hysim.design import _inputs as shapes
 from hysim.design._inputs import InputLimits
 from hysim.identification.likelihood import Expected, density
+from hysim.models.jacobian import checked_names, exchanged_outputs, sizes_along
 from hysim.models.law import Law
 from hysim.models.parts import own, share_of
 from hysim.models.search_space import Freedom
@@ -53,11 +54,7 @@ def spreads(matrix: FloatArray) -> FloatArray:
     return np.asarray(np.where(undetermined, np.inf, np.sqrt(variances) / usable))
 
 
-_DIFFERENCE = 1e-4  # of a number, or of one where that is smaller: both errors of a central difference are near 1e-8
-
-
-def sizes_of(values: FloatArray) -> FloatArray:
-    return np.where(values == 0.0, 1.0, np.abs(values))
+_DIFFERENCE = 1e-4  # of the size of a number: both errors of a central difference are near 1e-8
 
 
 def squared(slopes: FloatArray) -> FloatArray:
@@ -67,12 +64,12 @@ def squared(slopes: FloatArray) -> FloatArray:
 
 @dataclass(frozen=True)
 class LawAlone:
-    """A law at rest before the first sample: the free numbers, and the standard deviation of its output."""
+    """A law at rest before the first sample: the free numbers, their sizes, and the noise of its output."""
 
     law: Law
     names: tuple[str, ...]
     noise: float
-    tolerances: Mapping[str, float] = field(default_factory=dict)
+    sizes: FloatArray
     remarks: tuple[str, ...] = ()
 
     @property
@@ -81,20 +78,15 @@ class LawAlone:
 
     def information(self, u: FloatArray) -> FloatArray:
         """Fisher information on the numbers in units of their sizes, by central differences; zeros if it diverges."""
-        names, steps = self.names, _DIFFERENCE * sizes_of(self.values)
-        sets: dict[str, Any] = {name: np.full(2 * len(names), self.law.scalars[name]) for name in names}
-        for k, name in enumerate(names):
-            sets[name][2 * k : 2 * k + 2] += [steps[k], -steps[k]]
-        outputs = self.law.outputs(sets, u)
+        steps = np.diag(_DIFFERENCE * self.sizes)
+        sets = self.values[:, np.newaxis] + np.stack([steps, -steps], axis=2).reshape(len(steps), -1)
+        outputs = exchanged_outputs(self.law, dict(zip(self.names, sets, strict=True)), u)
         with np.errstate(invalid="ignore"):
             slopes = (outputs[0::2] - outputs[1::2]) / (2.0 * _DIFFERENCE * self.noise)
         return squared(slopes.T)
 
     def covariance(self, u: FloatArray) -> FloatArray:
         return np.asarray(np.linalg.inv(self.law.response_jacobian(u, self.names).information(self.noise)))
-
-    def only(self, names: Sequence[str]) -> "LawAlone":
-        return replace(self, names=tuple(names))
 
 
 _LAW = "hysteresis"
@@ -121,6 +113,10 @@ class WholeActuator:
         return np.array([self.known[name] for name in self.names])
 
     @property
+    def sizes(self) -> FloatArray:
+        return np.where(self.values == 0.0, 1.0, np.abs(self.values))
+
+    @property
     def tolerances(self) -> Mapping[str, float]:
         """Those of `identify`, beyond which a parameter counts as not determined; for others any that is finite."""
         return dict.fromkeys(self.names, _LARGEST) | {
@@ -129,7 +125,7 @@ class WholeActuator:
 
     def information(self, u: FloatArray) -> FloatArray:
         slopes = self.expected.jacobian(replace(self.record, u=u))
-        return squared(slopes * sizes_of(self.values) / self.noise)
+        return squared(slopes * self.sizes / self.noise)
 
     def covariance(self, u: FloatArray) -> FloatArray:
         slopes = self.expected.jacobian(replace(self.record, u=u), refined=True) / self.noise
@@ -137,8 +133,9 @@ class WholeActuator:
         scaled = slopes / lengths
         return np.asarray(np.linalg.inv(scaled.T @ scaled) / np.outer(lengths, lengths))
 
-    def only(self, names: Sequence[str]) -> "WholeActuator":
-        return replace(self, expected=_expected(self.structure, self.record, self.known, names))
+    def only(self, names: Sequence[str], remarks: Sequence[str]) -> "WholeActuator":
+        expected = _expected(self.structure, self.record, self.known, names)
+        return replace(self, expected=expected, remarks=(*self.remarks, *remarks))
 
 
 Subject = LawAlone | WholeActuator
@@ -283,8 +280,7 @@ class InputDesign:
     def __str__(self) -> str:
         head = f"InputDesign: {self.u.size} samples to {self.t[-1]:.4g} s, {self.levels.size} turning points"
         beside = ", ".join(f"{name} {100.0 * value:.0f} %" for name, value in self.efficiency.items())
-        rows = self._by_part() | {f"{self.criterion}-efficiency of": beside}
-        rows["but"] = "; ".join(self.remarks)
+        rows = self._by_part() | {f"{self.criterion}-efficiency of": beside, "but": "; ".join(self.remarks)}
         return summary_text([head, f"  expected standard errors for noise of {self.noise:.3g}:"], rows)
 
     def _by_part(self) -> dict[str, str]:
@@ -302,11 +298,9 @@ _PAUSES, _PAUSE = 0.3, 0.1  # share of the moves that change a pause, and their 
 Move = Callable[[FloatArray, float], FloatArray]  # strokes and the progress of the search, from 0 to 1, to strokes
 
 
-def determined(subject: Subject, inputs: Sequence[FloatArray]) -> tuple[Subject, tuple[str, ...]]:
-    """The subject without the numbers that none of these inputs determines, and a remark on each."""
-    if not subject.tolerances:
-        return subject, ()
-    names, sizes = subject.names, sizes_of(subject.values)
+def determined(subject: WholeActuator, inputs: Sequence[FloatArray]) -> WholeActuator:
+    """The subject without the numbers that none of these inputs determines, and with a remark on each."""
+    names, sizes = subject.names, subject.sizes
     remarks: list[str] = []
     known = [subject.information(u) for u in inputs]
     allowed = np.array([subject.tolerances.get(name, np.inf) for name in names])
@@ -324,7 +318,7 @@ def determined(subject: Subject, inputs: Sequence[FloatArray]) -> tuple[Subject,
             f"it is taken as known, {subject.values[place]:.4g}"
         )
         kept = np.delete(kept, worst)
-    return subject.only([names[k] for k in kept]) if remarks else subject, tuple(remarks)
+    return subject.only([names[k] for k in kept], remarks) if remarks else subject
 
 
 def searched(
@@ -420,8 +414,7 @@ def design_input(
     >>> bool(max(design.efficiency.values()) <= 1.0), bool(abs(design.u).max() <= 2.0)
     (True, True)
     """
-    if criterion not in ("D", "A", "E"):
-        raise ValueError(f'criterion must be "D", "A" or "E", got {criterion!r}')
+    check_choice("criterion", criterion, ("D", "A", "E"))
     plant = model_of(plant)
     bounds = limits if isinstance(limits, InputLimits) else InputLimits(**limits)
     subject = _subject(plant, bounds, free, values, noise)
@@ -434,7 +427,8 @@ def design_input(
     drawn += [(shapes.random_segments if in_time else shapes.random_strokes)(bounds, rng) for _ in range(candidates)]
     inputs |= _own(beside or {}, bounds)
     every = [u for variants in inputs.values() for u in variants]
-    subject, unseen = determined(subject, [*every, *(shapes.through(strokes, bounds) for strokes in drawn)])
+    if isinstance(subject, WholeActuator):
+        subject = determined(subject, [*every, *(shapes.through(strokes, bounds) for strokes in drawn)])
 
     def worth(u: FloatArray) -> float:
         return merit(subject.information(u), criterion)
@@ -465,7 +459,7 @@ def design_input(
         criterion=criterion,
         noise=subject.noise,
         limits=bounds,
-        remarks=(*subject.remarks, *unseen, *_weak(subject, covariance)),
+        remarks=(*subject.remarks, *_weak(subject, covariance)),
     )
 
 
@@ -479,7 +473,7 @@ def _own(beside: Mapping[str, npt.ArrayLike], limits: InputLimits) -> dict[str, 
 
 def _stderr(subject: Subject, u: FloatArray) -> dict[str, float]:
     """Expected standard errors by name; infinite for numbers that an input does not determine."""
-    errors = sizes_of(subject.values) * spreads(subject.information(u))
+    errors = subject.sizes * spreads(subject.information(u))
     return dict(zip(subject.names, errors.tolist(), strict=True))
 
 
@@ -519,6 +513,6 @@ def _subject(
         raise ValueError("values are for the structure of an actuator: a law has its numbers")
     if not free:
         raise ValueError("free must name at least one number")
-    if unknown := [name for name in free if name not in plant.scalars]:
-        raise ValueError(f"free has {unknown[0]!r}: a {type(plant).__name__} has {', '.join(plant.scalars)}")
-    return LawAlone(plant, tuple(free), 1.0 if noise is None else noise)
+    names = checked_names(plant, free)
+    sizes = sizes_along(plant, names, shapes.usual(limits)["triangle"][0])
+    return LawAlone(plant, names, 1.0 if noise is None else noise, sizes)

@@ -9,12 +9,13 @@ on one side alone, (y(p + h) - y(p)) / h takes the place of D. Source: C. J. F. 
 and F'(x) F''(x), Adv. Eng. Software 4 (1982) 75.
 """
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from typing import Any
 
 import numpy as np
 
-from hysim._basics.frozen import FloatArray, frozen, read_only
+from hysim._basics.frozen import FloatArray, read_only
+from hysim._basics.printing import frozen_result
 
 _SHARE = 0.1  # of a number: the first step that is tried; of a zero, 1
 _FALL = 8.0  # by which steps become shorter
@@ -25,7 +26,7 @@ _LARGEST, _SMALLEST = 0.05, 1e-5  # change of the output by the longest step, of
 _MOST_TRIALS = 24  # of that step, for numbers far from the size that it supposes
 
 
-@frozen
+@frozen_result
 class Jacobian:
     """Derivatives of a response by the numbers of a law.
 
@@ -81,11 +82,7 @@ class Jacobian:
 def response_jacobian(law: Any, u: Any, names: Iterable[str] | None, fine: Any) -> Jacobian:
     """As `hysim.Law.response_jacobian`; `fine` is the law as the differences take it."""
     inputs = read_only(u, "u", ndim=1)
-    if isinstance(names, str):
-        raise TypeError(f"names must be a sequence of names, got the string {names!r}")
-    asked = tuple(law.scalars if names is None else names)
-    if unknown := [name for name in asked if name not in law.scalars]:
-        raise ValueError(f"names has {unknown[0]!r}: a {type(law).__name__} has {', '.join(law.scalars)}")
+    asked = checked_names(law, law.scalars if names is None else names, "names")
     steps = {name: _admissible_step(law, name) for name in asked}
     impossible = [name for name, (_, sides) in steps.items() if not sides]
     if impossible and names is not None:
@@ -101,7 +98,7 @@ def _admissible_step(law: Any, name: str) -> tuple[float, tuple[float, ...]]:
     """A step, and the sides on which the constructor takes it: both if a step of this scheme has them."""
     first = _SHARE * abs(law.scalars[name]) or 1.0
     best: tuple[float, tuple[float, ...]] = first, ()
-    for step in (first / _FALL**k for k in range(_STEPS)):
+    for step in (first / _FALL**k for k in range(2 * _STEPS)):
         sides = _sides(law, name, step)
         if len(sides) > len(best[1]):
             best = step, sides
@@ -127,7 +124,7 @@ def _column(law: Any, name: str, u: FloatArray, y: FloatArray, step: float, side
     value, rounding = law.scalars[name], np.finfo(float).eps * np.abs(y).max()
     extent = np.ptp(y) or np.abs(y).max() or 1.0
     for _ in range(_MOST_TRIALS):
-        change = np.abs(_outputs(law, name, np.array([value + sides[0] * step]), u) - y).max()
+        change = np.abs(exchanged_outputs(law, {name: np.array([value + sides[0] * step])}, u) - y).max()
         if not change <= _LARGEST * extent:
             step /= _FALL
         elif 0.0 < change < _SMALLEST * extent and _sides(law, name, _FALL * step) == sides:
@@ -140,7 +137,7 @@ def _column(law: Any, name: str, u: FloatArray, y: FloatArray, step: float, side
         values = value + np.array((*sides, 0.0)[:2]) * step / _FALL**k
         width = values[0] - values[1]  # as it is between rounded numbers
         with np.errstate(invalid="ignore", over="ignore", divide="ignore"):
-            row = [np.subtract(*_outputs(law, name, values, u)) / width]
+            row = [np.subtract(*exchanged_outputs(law, {name: values}, u)) / width]
             for order, longer in enumerate(before[:_ORDERS], 1):
                 row.append(row[-1] + (row[-1] - longer) / (_FALL**order - 1.0))
                 apart = np.maximum(np.abs(row[-1] - row[-2]), np.abs(row[-1] - longer)) + rounding / abs(width)
@@ -152,9 +149,33 @@ def _column(law: Any, name: str, u: FloatArray, y: FloatArray, step: float, side
     return best
 
 
-def _outputs(law: Any, name: str, values: FloatArray, u: FloatArray) -> FloatArray:
-    """Outputs (n_values, n_samples) for values of one number, in one batch."""
-    tables = law.exchanged({name: values[:, np.newaxis]})
+_SMALL = 0.1  # of the change that moves the output by its standard deviation
+
+
+def sizes_along(law: Any, names: Iterable[str], u: FloatArray) -> FloatArray:
+    """Values (n_names,), for zeros and small affine ones the change that moves the output by its standard deviation."""
+    sizes = {name: abs(law.scalars[name]) for name in names}
+    for name in (name for name, size in sizes.items() if size == 0.0 or name in law.columns):
+        jacobian = law.response_jacobian(u, [name])
+        spread, effect = float(np.std(jacobian.response)), float(np.sqrt(np.mean(jacobian.matrix**2)))
+        if effect > 0.0 and sizes[name] * effect < _SMALL * spread:
+            sizes[name] = spread / effect
+    return np.array([size or 1.0 for size in sizes.values()])
+
+
+def checked_names(law: Any, names: Iterable[str], argument: str = "free") -> tuple[str, ...]:
+    """The names, each once; ValueError if the law has not one of them, and TypeError if they are a single string."""
+    if isinstance(names, str):
+        raise TypeError(f"{argument} must be a sequence of names, got the string {names!r}")
+    asked = tuple(dict.fromkeys(names))
+    if unknown := [name for name in asked if name not in law.scalars]:
+        raise ValueError(f"{argument} has {unknown[0]!r}: a {type(law).__name__} has {', '.join(law.scalars)}")
+    return asked
+
+
+def exchanged_outputs(law: Any, numbers: Mapping[str, FloatArray], u: FloatArray) -> FloatArray:
+    """Outputs (n_sets, n_samples) for values (n_sets,) of some numbers, in one batch."""
+    tables = law.exchanged({name: values[:, np.newaxis] for name, values in numbers.items()})
     changed = {field: table for field, table in tables.items() if table is not law.tables[field]}
     is_number = {field: np.ndim(law.arguments[field]) == 0 for field in changed}
     return np.asarray(law.outputs({field: t[:, 0] if is_number[field] else t for field, t in changed.items()}, u))

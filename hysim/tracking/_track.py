@@ -30,8 +30,8 @@ from hysim._basics.results import model_of
 from hysim.kernels.copies import step_each
 from hysim.kernels.stepping import START, STEP, by_address
 from hysim.models.compiled_step import compiled_start, compiled_step
+from hysim.models.jacobian import checked_names, sizes_along
 from hysim.models.law import Law
-from hysim.models.tables import tables_of
 from hysim.records import Record
 
 
@@ -56,15 +56,11 @@ class Coordinates(NamedTuple):
 
 def coordinates_of(law: Law, free: Sequence[str]) -> Coordinates:
     """The coordinates of some numbers; ValueError if a name is unknown or decides which step the law has."""
-    if isinstance(free, str):
-        raise TypeError(f"free must be a sequence of names, got the string {free!r}")
-    if unknown := [name for name in free if name not in law.scalars]:
-        raise ValueError(f"free has {unknown[0]!r}: a {type(law).__name__} has {', '.join(law.scalars)}")
-    if initial := [name for name in free if name in law.initial_names]:
+    names = checked_names(law, free)
+    if initial := [name for name in names if name in law.initial_names]:
         raise ValueError(f"{initial[0]} is the memory at the first sample, which does not drift: leave it out of free")
-    if not free:
+    if not names:
         raise ValueError("free must name at least one number that drifts")
-    names = tuple(dict.fromkeys(free))
     values = np.array([law.scalars[name] for name in names])
     return Coordinates(names, values, np.array([_must_be_positive(law, name) for name in names]))
 
@@ -72,15 +68,12 @@ def coordinates_of(law: Law, free: Sequence[str]) -> Coordinates:
 def _must_be_positive(law: Law, name: str) -> bool:
     value = law.scalars[name]
     try:
-        law.with_scalars({name: -abs(value)})
+        law.with_scalars({name: -abs(value) or -math.ulp(0.0)})
     except ValueError:
+        if value == 0.0:
+            raise ValueError(f"{name} is 0 and cannot be negative: leave it out of free, or make it positive") from None
         return value > 0.0
     return False
-
-
-def _place(name: str) -> tuple[str, int]:
-    field, _, place = name.partition("[")
-    return field, int(place[:-1]) if place else 0
 
 
 class Copies:
@@ -92,8 +85,6 @@ class Copies:
         self._start = by_address(compiled_start(law.start), START.signature)
         self.memory = law.packed[1].copy()
         self._state = np.zeros(self.memory.size + law.workspace)
-        self._one, _ = tables_of(type(law).__name__, law.arguments, {}, np.zeros(1))
-        self._places = [_place(name) for name in coordinates.names]
 
     def begun(self, u0: float) -> FloatArray:
         return np.array(self._law.state_at(u0))
@@ -106,10 +97,9 @@ class Copies:
         return y
 
     def _packed(self, x: FloatArray) -> FloatArray:
-        law = self._law
-        tables = {name: np.repeat(table, len(x), axis=0) for name, table in self._one.items()}
-        for (field, k), column in zip(self._places, self._coordinates.decode(x).T, strict=True):
-            tables[field][:, k] = column
+        law, columns = self._law, self._coordinates.decode(x).T[:, :, np.newaxis]
+        changed = law.exchanged(dict(zip(self._coordinates.names, columns, strict=True)))
+        tables = {name: np.broadcast_to(table, (len(x), *table.shape[1:])) for name, table in changed.items()}
         with np.errstate(all="ignore"):
             return read_only(law.pack(law.completed(tables)).parameters, finite=False)
 
@@ -235,9 +225,7 @@ def particles(
         usable = np.isfinite(outputs)
         if not usable.any():
             raise ValueError(f"every copy of the law diverges at sample {k}: give a smaller drift")
-        known = np.where(usable, outputs, 0.0)
-        weights = np.where(usable, weights, 0.0)
-        weights = weights / weights.sum()
+        known, weights = np.where(usable, outputs, 0.0), usable * weights / (usable @ weights)
         predicted[k] = weights @ known
         expected[k] = np.sqrt(weights @ (known - predicted[k]) ** 2 + noise**2)
         log = -0.5 * ((float(y[k]) - known) / noise) ** 2
@@ -305,8 +293,7 @@ class ParameterTrack:
 
     def band(self, name: str) -> tuple[FloatArray, FloatArray]:
         """Lower and upper end of the band of a number, (n_samples,) each; KeyError if it is not free."""
-        place = self._place(name)
-        return self.lower[:, place], self.upper[:, place]
+        return self.lower[:, self._place(name)], self.upper[:, self._place(name)]
 
     @property
     def consistency(self) -> float:
@@ -367,7 +354,7 @@ def most_likely(
     return np.asarray(sizes * 10.0**exponents)
 
 
-_DRIFT, _JUMP = 0.1, 0.2  # of the value, or of one where that is zero
+_DRIFT, _JUMP = 0.1, 0.2  # of the size
 _MOST_MEMORIES = 40  # of a filter by sigma points
 _NORMAL = 1.4826  # standard deviations of the median of the sizes
 
@@ -392,7 +379,8 @@ def track_parameters(
     Parameters
     ----------
     law : Law or result of a fit
-        A law with the numbers at the first sample, for instance the model of a fit to earlier data.
+        A law with the numbers and the memory at the first sample; of a fit to data that `record` continues,
+        ``fit.model.after(earlier.u)``.
     record : Record
         Input and measured output.
     free : sequence of str
@@ -402,7 +390,7 @@ def track_parameters(
         each]. By default the size for which the errors of predictions one sample ahead are most likely, which takes
         some twenty passes of the filter for each name; the number at the first sample is then known to a tenth.
     jump : mapping, optional
-        Names to the size of a sudden change; by default a fifth of the value. Zero for none.
+        Names to the size of a sudden change, zero for none; by default a fifth of the value.
     noise : float, optional
         Standard deviation of the measurement; by default from the third differences of the output [unit of y].
     method : {"sigma-point", "particle"}
@@ -434,16 +422,19 @@ def track_parameters(
     law = model_of(law)
     if not isinstance(law, Law):
         raise TypeError(f"law must be a law that a step describes, such as BoucWen, got {type(law).__name__}")
+    if not isinstance(record, Record):
+        raise TypeError(f"track_parameters takes one Record, got {type(record).__name__}")
     coordinates, spread = coordinates_of(law, free), _noise_of(record) if noise is None else float(noise)
-    if not spread > 0.0:
+    if not 0.0 < spread < math.inf:
         raise ValueError("noise must be positive: give the standard deviation of the measurement")
     check_choice("method", method, ("sigma-point", "particle"))
     check_count("particles_count", particles_count)
     copies, x = Copies(law, coordinates), coordinates.encode(coordinates.values)
     if method == "sigma-point" and copies.memory.size > _MOST_MEMORIES:
         raise ValueError(f'this law remembers {copies.memory.size} numbers: use method="particle"')
-    drifts = _sizes(coordinates, drift or {}, _DRIFT, "drift")
-    jumps = _sizes(coordinates, jump or {}, _JUMP, "jump")
+    usual = sizes_along(law, coordinates.names, record.u)
+    drifts = _sizes(coordinates, drift or {}, _DRIFT * usual, "drift")
+    jumps = _sizes(coordinates, jump or {}, _JUMP * usual, "jump")
     first = coordinates.spread(drifts)
 
     def filtered(sizes: FloatArray, by: str) -> Filtered:
@@ -476,14 +467,13 @@ def track_parameters(
     )
 
 
-def _sizes(coordinates: Coordinates, user: Mapping[str, Any], share: float, what: str) -> FloatArray:
-    """Sizes of changes (n_names,), those that are not given in parts of the values."""
+def _sizes(coordinates: Coordinates, user: Mapping[str, Any], usual: FloatArray, what: str) -> FloatArray:
+    """Sizes of changes (n_names,), those that are not given as usual."""
     if unknown := [name for name in user if name not in coordinates.names]:
         raise ValueError(f"{what} has {unknown[0]!r}, which is not free")
-    usual = share * np.where(coordinates.values == 0.0, 1.0, np.abs(coordinates.values))
     sizes = np.array([float(user.get(name, own)) for name, own in zip(coordinates.names, usual, strict=True)])
-    if not (sizes >= 0.0).all():
-        raise ValueError(f"{what} must not be negative, got {dict(user)}")
+    if not ((sizes >= 0.0) & (sizes < np.inf)).all():
+        raise ValueError(f"{what} must be finite and not negative, got {dict(user)}")
     return sizes
 
 
