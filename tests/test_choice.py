@@ -222,6 +222,7 @@ def test_structures_are_all_those_below_the_number_of_poles():
 
 test_what_cannot_be_ranked_is_refused = refused(
     ([], {}, "nothing to select"),
+    ("Dahl", {}, TypeError, "takes several candidates, got str"),
     ([hs.Line, hs.Line], {}, "one name"),
     ([hs.Line], {"criterion": "r2"}, "criterion must be"),
     ([hs.Line], {"criterion": "cv_rmse"}, "needs a cross-validation"),

@@ -178,6 +178,7 @@ def test_estimates_recover_the_truth_and_intervals_and_bands_cover_it(same_recor
         (([0.2, 0.4, 0.6], [10, 10, 10], 20), "does not rise with the intensity"),
         (([1.0, 1.0], [1, 2], 5), "two must differ"),
         (([1.0, 2.0], [1, 6], 5), "whole numbers from 0 to n_records"),
+        (([1.0, 2.0, 3.0], [1, 2, 3], [5, 5]), "n_records must have equal lengths"),
     ],
 )
 def test_counts_that_determine_no_curve_are_refused(arguments, words):

@@ -212,8 +212,8 @@ def estimate_channel(
     subject = _UnknownChannel(model, channel, others, (float(low), float(high)), space.columns, state)
     fit = identify(subject, record, initial=initial, admissible=False, seed=seed)
     if (value := fit.estimates[channel]) in (low, high):
-        end = f"{channel} is at {value:g}, the end of its range: the record may lie beyond, give bounds="
-        fit = replace(fit, success=False, warnings=(*fit.warnings, end))
+        end = f"{channel} is at {value:g}, the end of its range; the record may lie beyond: give bounds="
+        fit = replace(fit, success=False, message=end, warnings=(*fit.warnings, end))
     doubt = model.extrapolation({channel: fit.estimates[channel]})
     return replace(fit, warnings=(*fit.warnings, doubt)) if doubt else fit
 

@@ -142,7 +142,7 @@ def select(
 
 
 def _named(candidates: Mapping[str, Any] | Sequence[Any]) -> dict[str, Any]:
-    if not isinstance(candidates, (Mapping, Sequence)):
+    if isinstance(candidates, str) or not isinstance(candidates, (Mapping, Sequence)):
         raise TypeError(f"select takes several candidates, got {type(candidates).__name__}: use identify for one")
     if isinstance(candidates, Mapping):
         named = dict(candidates)

@@ -229,7 +229,7 @@ class SobolIndices:
 
     def summary(self) -> str:
         """The indices as a table."""
-        width = max(len(name) for name in (*self.parameters, *self.first_order)) + 2
+        width = max(len(name) for name in ("output", *self.parameters, *self.first_order)) + 2
         lines = ["output".ljust(width) + "parameter".ljust(width + 6) + "first order   total"]
         for output, first in self.first_order.items():
             for k, name in enumerate(self.parameters):
@@ -393,7 +393,7 @@ def fragility(
       median      0.574 (0.505 to 0.652)
       dispersion  0.392 (0.274 to 0.561)
     """
-    all_records = np.broadcast_to(np.asarray(n_records), np.shape(intensities))
+    all_records = np.full(np.shape(intensities), n_records) if np.ndim(n_records) == 0 else n_records
     x, z, n = vectors(intensities=intensities, n_exceeding=n_exceeding, n_records=all_records)
     _check_counts(x, z, n, level, same_records)
     logs = np.log(x) - np.log(x).mean()
