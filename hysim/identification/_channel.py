@@ -3,7 +3,7 @@
 A search for that value keeps the law: the standard error is that of the noise of this record alone.
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -55,8 +55,7 @@ class ParameterCurve(Stored):
     @property
     def coefficients_stderr(self) -> tuple[float, ...]:
         """Their standard errors."""
-        rows = power_coefficients(self.polynomial.at).T
-        return tuple(_roots(rows, self.covariance).tolist())
+        return tuple(_roots(power_coefficients(self.polynomial.at).T, self.covariance).tolist())
 
     def value(self, channel: npt.ArrayLike) -> FloatArray:
         """Value of the parameter at values of the channel, of the same shape."""
@@ -124,11 +123,8 @@ def parameter_curve(fit: Identification, parameter: str) -> ParameterCurve:
         raise ValueError(f"{parameter!r} depends on no channel; those that do are {', '.join(known)}")
     names = known[parameter].names
     places = [fit.free_names.index(name) for name in names if name in fit.free_names]
-    covariance = np.zeros((len(names), len(names)))
-    if len(places) == len(names):
-        covariance = fit.covariance[np.ix_(places, places)]
-    freedom = fit.residual.size - fit.n_parameters
-    reach = float(t.ppf(0.5 + 0.5 * _LEVEL, freedom)) if freedom > 0 else float("nan")
+    covariance = fit.covariance[np.ix_(places, places)] if places else np.zeros((len(names), len(names)))
+    reach = float(t.ppf(0.5 + 0.5 * _LEVEL, fit.residual.size - fit.n_parameters))  # nan without degrees of freedom
     return ParameterCurve(polynomial=known[parameter], covariance=covariance, reach=reach)
 
 
@@ -140,6 +136,7 @@ def _roots(rows: FloatArray, covariance: FloatArray) -> FloatArray:
 
 _SCREENED = 64
 _STARTS = (0.25, 0.5, 0.75)  # of the channel's range
+_SAME = 1e-6  # of that range, and of a parameter: differences that are rounding
 
 
 def estimate_channel(
@@ -177,7 +174,7 @@ def estimate_channel(
     Raises
     ------
     TypeError
-        If the model does not depend on channels.
+        If the model does not depend on channels, or the memory of its law has several numbers.
     ValueError
         If it does not depend on this one, or the record lacks another one.
 
@@ -198,24 +195,33 @@ def estimate_channel(
         raise ValueError(f"the law depends on {', '.join(map(repr, model.channels))}, not on {channel!r}")
     if not isinstance(record, Record):
         raise TypeError(f"estimate_channel takes one Record, got {type(record).__name__}: call it for each of several")
-    others = {}
-    for name in model.channels:
-        if name != channel:
-            others[name] = value_in(record.channels, name, "the record")
-            if np.ndim(others[name]):
-                raise ValueError(f"{name!r} varies along the record; one number can be estimated where it is constant")
+    others = {name: value_in(record.channels, name, "the record") for name in model.channels if name != channel}
+    if varying := [name for name, value in others.items() if np.ndim(value)]:
+        raise ValueError(f"{varying[0]!r} varies along the record; one number can be estimated where it is constant")
     low, high = model.channels[channel] if bounds is None else bounds
     if not np.isfinite([low, high]).all() or not low < high:
         raise ValueError(f"bounds of {channel!r} must be finite, (lower, upper) with lower < upper, got {(low, high)}")
     space = model.law.search_space(record)
-    state = tuple(name for name in space.state if name in space.coordinates)
+    if not {*space.state} <= {*model.law.scalars}:
+        raise TypeError(f"estimate_channel takes a law whose memory has one number, got a {type(model.law).__name__}")
+    state = tuple(name for name in space.state if name in (*space.coordinates, *space.linear))
     subject = _UnknownChannel(model, channel, others, (float(low), float(high)), space.columns, state)
     fit = identify(subject, record, initial=initial, admissible=False, seed=seed)
     if (value := fit.estimates[channel]) in (low, high):
         end = f"{channel} is at {value:g}, the end of its range; the record may lie beyond: give bounds="
         fit = replace(fit, success=False, message=end, warnings=(*fit.warnings, end))
-    doubt = model.extrapolation({channel: fit.estimates[channel]})
-    return replace(fit, warnings=(*fit.warnings, doubt)) if doubt else fit
+    doubts = [model.extrapolation({**others, channel: fit.estimates[channel]})]
+    for other in _alike([each for each in model.polynomials if each.channel == channel], value, low, high):
+        doubts.append(f"{channel} = {other:.6g} gives the same law: the record does not decide between the two")
+    return replace(fit, warnings=(*fit.warnings, *filter(None, doubts)))
+
+
+def _alike(polynomials: Sequence[ChannelPolynomial], value: float, low: float, high: float) -> list[float]:
+    """Other values of a channel, in a range, at which all its parameters are those at `value`."""
+    bent = max(polynomials, key=lambda each: each.degree)
+    roots = np.polynomial.Polynomial.fit(bent.at, np.array(bent.values) - bent.value(value), bent.degree).roots().real
+    apart = roots[(roots >= low) & (roots <= high) & (np.abs(roots - value) > _SAME * (high - low))].tolist()
+    return [other for other in apart if all(np.isclose(p.value(other), p.value(value), _SAME) for p in polynomials)]
 
 
 @dataclass(frozen=True)
@@ -238,18 +244,16 @@ class _UnknownChannel(Subject):
         points = [{self.channel: low + share * (high - low)} for share in _STARTS]
         alone = space_of([place], (), points[0], {}, {}, points)
         starts = own.starts[:1] if own.coordinates else np.empty((1, 0))
-        held = {name: value for name, value in own.held.items() if name in self.state}
         return replace(
             own,
-            held=held,
+            held={name: value for name, value in own.held.items() if name in self.state},
             physical={**own.physical, self.channel: (True, True)},  # where the box ends, whatever lies beyond
             coordinates=(self.channel, *own.coordinates),
             lower=np.append(alone.lower, own.lower),
             upper=np.append(alone.upper, own.upper),
             starts=np.concatenate([alone.starts, np.repeat(starts, len(alone.starts), axis=0)], axis=1),
             names=(self.channel, *own.names),
-            columns=(),
-            linear=(),
+            columns=tuple(name for name in self.columns if name in self.state),
             parameters=lambda x: {
                 **{name: values for name, values in own.parameters(x[:, 1:]).items() if name in self.state},
                 **alone.parameters(x[:, :1]),
@@ -263,14 +267,13 @@ class _UnknownChannel(Subject):
     def regressors(self, parameters: Parameters, record: Record) -> FloatArray:
         numbers = {**self.model.law.scalars, **self._numbers(parameters)}
         columns = np.asarray(self.model.law.regressors(numbers, record))
-        output = columns[..., -1]
-        for k, name in enumerate(self.columns):
-            output = output + np.reshape(numbers[name], (-1, 1)) * columns[..., k]
-        return np.asarray(output)[..., np.newaxis]
+        output, own = columns[..., -1:], [k for k, name in enumerate(self.columns) if name in self.state]
+        for k in {*range(len(self.columns))} - {*own}:
+            output = output + np.reshape(numbers[self.columns[k]], (-1, 1, 1)) * columns[..., k : k + 1]
+        return np.concatenate([np.broadcast_to(columns[..., own], (*output.shape[:-1], len(own))), output], axis=-1)
 
     def steady(self, parameters: Parameters, record: Record) -> dict[str, Any]:
-        own = self._numbers(parameters)
-        state = self.model.law.steady({**self.model.law.scalars, **own}, record)
+        state = self.model.law.steady({**self.model.law.scalars, **self._numbers(parameters)}, record)
         return {**parameters, **{name: state[name] for name in self.state}}
 
     def _numbers(self, parameters: Parameters) -> dict[str, Any]:
