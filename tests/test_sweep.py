@@ -3,6 +3,7 @@
 import concurrent.futures
 import math
 import sys
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -356,6 +357,8 @@ test_indices_of_another_sample_are_refused = refused(
     (lambda a, b: a + b, [{"a": 1.0, "b": 2.0}], "saltelli"),
     (lambda a: 1.0 / (a > 0.5), SALTELLI, "all 192 tasks: 192 are done, 96 failed"),
     (lambda a: 1.0, SALTELLI, "must be finite and vary"),
+    (lambda a: a, replace(SALTELLI, n=1), "of two points or more"),
+    (lambda a: {"y": np.zeros(3)}, SALTELLI, "need an output that is a number"),
     call=lambda task, sample: hs.sobol_indices(hs.sweep(task, sample)),
 )
 

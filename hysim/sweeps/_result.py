@@ -291,8 +291,10 @@ def _check(result: Sweep, n: int) -> None:
         words = f"{len(result)} are done, {len(result.errors)} failed"
         raise ValueError(f"Sobol indices need all {result.n_tasks} tasks: {words}")
     sets = np.column_stack([*result.parameters.values()])
-    if n == 0 or not np.array_equal(sets, saltelli(sets[:n], sets[n : 2 * n])):
-        raise ValueError('Sobol indices need the sample hs.Sample(..., method="saltelli")')
+    if n < 2 or not np.array_equal(sets, saltelli(sets[:n], sets[n : 2 * n])):
+        raise ValueError('Sobol indices need the sample hs.Sample(..., method="saltelli"), of two points or more')
+    if not result.outputs:
+        raise ValueError("Sobol indices need an output that is a number")
 
 
 def _estimates(parts: FloatArray) -> FloatArray:

@@ -17,6 +17,7 @@ raises the variances there, and comes again.
 Particles: many copies, weighted by how well they predict, and drawn anew by weight; a few of them jump at each sample.
 """
 
+import itertools
 import math
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any, Literal, NamedTuple
@@ -26,6 +27,7 @@ import numpy.typing as npt
 
 from hysim._basics.frozen import FloatArray, check_choice, check_count, read_only
 from hysim._basics.printing import frozen_result, summary_text
+from hysim._basics.progress import Reports, reports
 from hysim._basics.results import model_of
 from hysim.kernels.copies import step_each
 from hysim.kernels.stepping import START, STEP, by_address
@@ -359,6 +361,7 @@ _MOST_MEMORIES = 40  # of a filter by sigma points
 _NORMAL = 1.4826  # standard deviations of the median of the sizes
 
 
+@reports
 def track_parameters(
     law: Any,
     record: Record,
@@ -370,6 +373,7 @@ def track_parameters(
     method: Literal["sigma-point", "particle"] = "sigma-point",
     particles_count: int = 500,
     seed: int = 0,
+    progress: Reports = None,
 ) -> ParameterTrack:
     """Follow numbers of a law that drift along a record.
 
@@ -397,6 +401,8 @@ def track_parameters(
         Sigma points are quick, and made for a memory of a few numbers that change evenly. Particles take any law.
     particles_count, seed : int
         Number of the particles, and of their draws.
+    progress : callable or False, optional
+        Called as ``progress(passes, 0)`` for each pass of the filter; see `hysim.simulate`.
 
     Returns
     -------
@@ -437,7 +443,11 @@ def track_parameters(
     jumps = _sizes(coordinates, jump or {}, _JUMP * usual, "jump")
     first = coordinates.spread(drifts)
 
+    passes = itertools.count(1)
+
     def filtered(sizes: FloatArray, by: str) -> Filtered:
+        if progress:
+            progress(next(passes), 0)
         walk = Walk(first, coordinates.spread(sizes) / np.sqrt(len(record)), coordinates.spread(jumps))
         if by == "particle":
             return particles(copies, x, walk, spread, record.u, record.y, particles_count, seed)
