@@ -43,9 +43,12 @@ def test_the_secant_gain_is_a_fixed_point(A, beta, gamma, span, turned):
 
 def test_the_secant_gain_of_a_line_is_its_slope_and_of_a_plant_its_dc_gain():
     cycle = hs.signals.triangle(0.0, 2.0, cycles=1, samples_per_cycle=40)
-    assert secant_gain(hs.Actuator(hysteresis=hs.Line(offset=3.0, slope=-0.7)), cycle, 0.1) == pytest.approx(-0.7)
     assert secant_gain(hs.Actuator(vibration=replace(MODE, num=(-2.0,))), cycle) == -2.0
     assert secant_gain(hs.Actuator(vibration=MODE), cycle, 100.0) == pytest.approx(2.0)  # so slow that it is static
+    plays = hs.PrandtlIshlinskii(thresholds=(0.0, 0.2, 0.5), weights=(0.2, 0.6, 0.8))
+    up = 2.0 / 1.9  # 0.2 u + 0.6 (u - 0.4) + 0.8 (u - 1) is 2 at u = 1.9
+    for law, gain in ((hs.Line(offset=3.0, slope=-0.7), -0.7), (plays, up), (hs.Play(threshold=5.0), 2.0 / 12.0)):
+        assert secant_gain(hs.Actuator(hysteresis=law), cycle, 0.1) == pytest.approx(gain)
 
 
 def test_slopes_bracket_the_secant_gain():
@@ -54,6 +57,9 @@ def test_slopes_bracket_the_secant_gain():
     # feedthrough + gain times what is left of A = 1 at most
     assert 1.0 < low < secant_gain(hs.Actuator(hysteresis=LAW), cycle) < high <= 1.5 + 0.5
     assert slopes(hs.Actuator(vibration=MODE), cycle) == (1.0, 1.0)
+    stopped = hs.Actuator(amplifier=hs.Amplifier(limits=(1.0, 2.0)), hysteresis=LAW)
+    for plant in (hs.Actuator(hysteresis=LAW), stopped):
+        assert slopes(plant, np.array([0.0, 1.0])) == pytest.approx((low, high), rel=0.02)  # along a step, too
 
 
 @pytest.mark.parametrize(("law", "ends"), [(LAW, (np.min, np.max)), (NEGATIVE, (np.max, np.min))], ids=["up", "down"])
@@ -91,8 +97,8 @@ def test_a_hysteresis_assessment_is_counted_by_hand(plant):
     assert np.array_equal(found.open_u, reference / found.secant_gain)
     last = slice(-201, None)
     before, after = open_y[last], run.y[last]
-    assert found.open_width == pytest.approx(width(reference[last], before))
-    assert found.closed_width == pytest.approx(width(reference[last], after))
+    widths = [width(reference[last], y) for y in (before, after)]
+    assert [found.open_width, found.closed_width] == pytest.approx(widths)
     relative = (found.closed_width / np.ptp(after)) / (found.open_width / np.ptp(before))
     assert found.hysteresis_reduction_percent == pytest.approx(100.0 * (1.0 - relative))
     assert math.isnan(found.lag_reduction_percent)
@@ -127,8 +133,7 @@ def test_the_open_loop_has_the_stroke_of_the_reference():
 @pytest.mark.parametrize("plant", [LAG, MODE, hs.Actuator(vibration=MODE)], ids=["lag", "mode", "actuator"])
 def test_the_loop_of_a_linear_plant_is_lag(plant):
     found = assess_hysteresis(plant, hs.PID(kp=0.2, ki=0.1), **TRIANGLE)
-    assert found.lag_width == found.closed_width
-    assert found.open_lag_width == found.open_width
+    assert (found.lag_width, found.open_lag_width) == (found.closed_width, found.open_width)
     assert math.isnan(found.hysteresis_reduction_percent)
     assert math.isfinite(found.lag_reduction_percent)
 
@@ -151,8 +156,7 @@ def test_a_step_assessment_is_the_reduction_of_its_two_loops():
     rest = MODE.dc_gain * LAW.response([0.2])[0]
     run = hs.close_loop(chain, pid, 0.05 * np.arange(1601), np.full(1601, rest + 0.5), u0=0.2)
     assert found.closed.y.tolist() == run.y.tolist()
-    assert found.closed.y[0] == pytest.approx(rest, abs=1e-12)
-    assert found.open_y[0] == pytest.approx(rest, abs=1e-12)
+    assert [found.closed.y[0], found.open_y[0]] == pytest.approx([rest, rest], abs=1e-12)
     voltage = (found.open_y[-1] / MODE.dc_gain, LAW.response([0.2, 0.2 + 0.5 / gain_of(chain, rest)])[-1])
     assert voltage[0] == pytest.approx(voltage[1], abs=1e-5)  # exp(-0.2 80) of the step is left
     # damping ratio 0.2 times frequency 1
@@ -168,18 +172,15 @@ def gain_of(chain, rest):
 
 
 def test_what_a_step_does_not_have_is_nan():
-    law = assess_step(LAW, hs.PID(ki=2.0), step=0.5, duration=10.0, sample_time=0.05).reduction
-    assert math.isnan(law.overshoot_reduction_percent)
-    assert math.isnan(law.residual_rms_reduction_percent)
+    cases = ((LAW, 2.0, 0.5, 10.0), (LAG, 0.2, 0.5, 50.0), (MODE, 0.02, 0.5, 30.0), (MODE, 0.02, 0.0, 30.0))
+    law, lag, short, still = (
+        assess_step(plant, hs.PID(ki=ki), step=step, duration=duration, sample_time=0.05).reduction
+        for plant, ki, step, duration in cases
+    )
+    assert np.isnan([*(each.overshoot_reduction_percent for each in (law, lag, still)), still.open.t98]).all()
+    # laws and lags do not vibrate; 2 ln(50) / 0.2, the window of the mode, is 39 s
+    assert np.isnan([each.residual_rms_reduction_percent for each in (law, lag, short)]).all()
     assert math.isfinite(law.settling_time_reduction_percent)
-    lag = assess_step(LAG, hs.PID(ki=0.2), step=0.5, duration=50.0, sample_time=0.05).reduction
-    assert math.isnan(lag.overshoot_reduction_percent)
-    assert math.isnan(lag.residual_rms_reduction_percent)  # no vibration, no window
-    short = assess_step(MODE, hs.PID(ki=0.02), step=0.5, duration=30.0, sample_time=0.05).reduction
-    assert math.isnan(short.residual_rms_reduction_percent)  # 2 ln(50) / 0.2 is 39 s
-    still = assess_step(MODE, hs.PID(ki=0.02), step=0.0, duration=30.0, sample_time=0.05).reduction
-    assert math.isnan(still.overshoot_reduction_percent)
-    assert math.isnan(still.open.t98)
 
 
 def test_the_sign_of_the_plant_and_of_the_step_do_not_matter():
@@ -226,8 +227,7 @@ def test_a_square_waves_steps_are_judged_where_its_half_periods_are_long_enough(
     border = 2.0 * (t98 + 5.0 * period)  # the rule, from both sides, where t98 moves by less than a sample
     edges = [0.1 * round((border + shift) / 0.1) for shift in (-0.5, 0.5)]
     rules = [assess_square_wave(MODE, pid, **WAVE | {"period": edge}).reduction for edge in edges]
-    assert rules[0] is None
-    assert rules[1] is not None
+    assert [rule is None for rule in rules] == [True, False]
 
 
 def test_a_plant_without_vibration_has_no_period_to_wait_for():
@@ -240,14 +240,10 @@ def test_a_plant_without_vibration_has_no_period_to_wait_for():
     assert found.tracking_rms < found.open_tracking_rms
 
 
-def test_a_half_period_in_which_the_open_loop_does_not_arrive_has_no_step():
+def test_a_half_period_in_which_the_open_loop_does_not_arrive_or_of_a_few_samples_has_no_step():
     slow = hs.TransferFunction(num=(1.0,), den=(1.0, 0.02, 1.0))
-    assert assess_square_wave(slow, hs.PID(ki=0.01), **WAVE | {"period": 6.0}).reduction is None
-
-
-def test_a_half_period_of_a_few_samples_has_no_step():
-    found = assess_square_wave(LAG, hs.PID(ki=0.1), low=0.0, high=1.0, period=0.5, sample_time=0.05, periods=3)
-    assert found.reduction is None
+    for plant, ki, period in ((slow, 0.01, 6.0), (LAG, 0.1, 0.5)):
+        assert assess_square_wave(plant, hs.PID(ki=ki), **WAVE | {"period": period}).reduction is None
 
 
 @pytest.mark.parametrize(
@@ -264,9 +260,8 @@ def test_the_open_loop_is_read_when_the_closed_one_is(assess, sample):
     """A controller that does not look at the plant, of the secant gain one: its loop is the open loop."""
     found = assess(replace(PROPER, sample=sample))
     if "secant_gain" in dir(found):
-        gain = found.secant_gain
-        t, reference = found.closed.t, found.closed.reference
-        closed = hs.close_loop(PROPER, Feedforward(1.0 / gain), t, reference).y
+        driver = Feedforward(1.0 / found.secant_gain)
+        closed = hs.close_loop(PROPER, driver, found.closed.t, found.closed.reference).y
     else:
         closed = found.closed.y
     assert found.open_y == pytest.approx(closed, abs=1e-12)
@@ -314,8 +309,7 @@ def test_a_creeping_plant_is_judged_over_the_cycles_that_it_is_driven():
 def test_the_open_loop_by_itself_is_that_of_the_assessment():
     pid, reference = hs.PID(ki=4.0), hs.signals.triangle(0.0, 1.0, cycles=10, samples_per_cycle=200)
     found, opened = assess_hysteresis(LAW, pid, **TRIANGLE), hs.control.open_loop(LAW, reference, 0.05, 200)
-    assert np.array_equal(opened.y, found.open_y)
-    assert np.array_equal(opened.u, found.open_u)
+    assert np.array_equal([opened.y, opened.u], [found.open_y, found.open_u])
     assert opened.reduction_percent(found.closed.y) == found.hysteresis_reduction_percent
     assert opened.loop.max_width == found.open_width
 

@@ -119,6 +119,8 @@ def test_margins_do_not_end_with_the_frequencies():
     whole, part = (hs.control.LinearLoop(LAG, H, each) for each in (None, np.geomspace(0.1, 20.0, 300)))
     assert part.margins(hs.PID(kp=5.0)) == pytest.approx(whole.margins(hs.PID(kp=5.0)), rel=1e-4)  # interpolated
     assert whole.margins(hs.PID(ki=1e-4))[1] == pytest.approx(90.0 - np.degrees(1e-4 * (1.0 + H)), abs=1e-3)
+    late = hs.control.LinearLoop(hs.Actuator(vibration=hs.mode(20.0, 0.01), sensor=hs.Sensor(delay=4.0 * H)), H)
+    assert 90.0 < late.margins(hs.PID(kp=0.047, ki=0.004))[1] < 93.0  # at the resonance 98 degrees of lead are left
     unstable, pid = hs.TransferFunction(num=(1.0,), den=(1.0, -1.0)), hs.PID(kp=30.0, ki=0.5)  # 1 / 30 is farther off
     assert hs.control.LinearLoop(unstable, H).margins(pid)[0] == pytest.approx(1.0 / (30.0 * np.tanh(H / 2)), rel=1e-3)
 

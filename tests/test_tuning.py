@@ -262,6 +262,11 @@ def test_a_controller_of_parts_keeps_its_parts_and_gets_its_gains():
     assert damped.controller == replace(only, damping=damped.controller.damping)
 
 
+def test_where_a_law_is_flat_for_a_moment_no_loop_is_closed():
+    play = hs.Actuator(hysteresis=hs.Play(threshold=0.2), vibration=LATE)
+    assert hs.tune(play, T_RAMP, RAMP, controller=hs.PID(ki=1.0), objective="rms").success
+
+
 def test_the_bounds_hold_on_the_variations_too():
     options = {"controller": hs.PID(kp=1.0, ki=1.0, kd=1.0), "objective": "rms"}
     found = hs.tune(SHARP, T_RAMP, RAMP, variations=OFF, **options)

@@ -480,8 +480,7 @@ def assess_step(
     loop = _judged(resting, controller, read_only(t), reference, cycle, gain, slice(None))
     waits = np.arange(after) < (ahead if known_ahead else 0)
     open_y = resting.driven(resting.u0 + np.where(waits, 0.0, step / gain))
-    decay_rate = -_least_damped(actuator).real
-    reduction = vibration_reduction(t[:after], open_y, loop.closed.y[before:], decay_rate=decay_rate)
+    reduction = vibration_reduction(t[:after], open_y, loop.closed.y[before:], decay_rate=-_least_damped(actuator).real)
     if not loop.stable:
         reduction = replace(reduction, **_UNKNOWN)
     return StepAssessment(reduction=reduction, open_y=open_y, closed=loop.closed, loop=loop)

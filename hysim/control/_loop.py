@@ -2,7 +2,7 @@
 
 The open loop that it is compared with has the voltage reference / secant gain. The secant gain of a steady cycle is its
 stroke over its voltage's span, which depends on the span: the gain g at which the cycle driven by ``cycle / g`` has the
-gain f(g) = g. It is found by the secant rule in the logarithms, and by g <- f where f is no contraction.
+gain f(g) = g. It is found by the secant rule in the logarithms, within bounds at which f is above and below g.
 """
 
 import math
@@ -246,13 +246,12 @@ def around(
         "voltage_noise_rms": float(np.sqrt(np.mean(noise**2))),
         "voltage_noise_peak": float(np.abs(noise).max()),
     }
-    by_name = signals._asdict()
     return ClosedLoop(
         t=times,
         reference=r,
         error=r - signals.measurement,
         z=resting.memory(signals),
-        **{name: by_name[name] for name in (*_OF_COMMAND, "y", "measurement")},
+        **{name: each for name, each in signals._asdict().items() if name in (*_OF_COMMAND, "y", "measurement")},
         conditions=conditions,
         units=units or {},
         signals=signals.others,
@@ -332,7 +331,8 @@ def is_controller(value: Any) -> TypeGuard[Controller]:
 _ITERATIONS = 60
 _CONVERGED = 1e-12  # of the gain
 _ACCEPTED = 1e-9  # where rounding keeps it from that
-_CONTRACTION = 0.5  # largest slope of the map at which the secant rule is trusted
+_CHORDS = 50  # of a stroke, of which slopes are taken: those of a step are of the way between its levels
+_PROBED = [(0.0, 1e3**k) for k in range(4)]  # inputs of the first gain: a play does not move along the short ones
 _PERIODS = 96  # at most, until a driven cycle is steady
 _STEADY = 1e-12  # of the stroke
 
@@ -350,23 +350,24 @@ def secant_gain(
     if actuator.hysteresis is None and sample_time is None:
         return _usable(actuator.dc_gain)
     actuator = _unlimited(actuator)
-    ends = np.array(actuator.u_range or (0.0, 1.0))
-    low, high = replace(actuator, amplifier=None).level(ends)
-    gain = _usable(actuator.dc_gain * float(high - low) / float(np.ptp(ends)))
-    before: tuple[float, float] | None = None
+    ranges = [actuator.u_range] if actuator.u_range else _PROBED
+    chords = (np.diff(replace(actuator, amplifier=None).level(ends))[0] / np.ptp(ends) for ends in ranges)
+    gain = _usable(actuator.dc_gain * float(next(filter(None, chords), 0.0)))
+    least, most, before = 0.0, math.inf, None
     for _ in range(_ITERATIONS):
         y = steady_cycle(actuator, inverted(actuator, cycle, gain), sample_time, periods)
-        next_gain = _usable(float(np.ptp(y)) / span * gain)
-        change = abs(next_gain / gain - 1.0)
-        if change <= _CONVERGED:
-            return next_gain
-        now = gain, next_gain
-        gain, before = next_gain if before is None else _secant(before, now), now
+        stroke = float(np.ptp(y)) / span
+        change = abs(stroke - 1.0)
+        if not change > _CONVERGED:
+            return _usable(stroke * gain)
+        least, most = (abs(gain), most) if stroke > 1.0 else (least, abs(gain))
+        now = math.log(abs(gain)), math.log(stroke) if stroke else -math.inf
+        gain, before = math.copysign(_next_size(before, now, least, most), gain), now
     if change > _ACCEPTED:
         raise ValueError(
             f"no voltage drives the plant along the reference: its secant gain does not converge at {gain:g}"
         )
-    return next_gain
+    return stroke * gain
 
 
 def inverted(actuator: Actuator, y: FloatArray, gain: float) -> FloatArray:
@@ -407,7 +408,7 @@ def without_memory(actuator: Actuator, u: FloatArray) -> Actuator:
     """Actuator with its law replaced by a line of its secant gain over the steady cycle of `u`."""
     if actuator.hysteresis is None:
         return actuator
-    voltage, level = actuator.voltage(u), _steady_level(actuator, u)
+    voltage, level = _steady(actuator, u)
     rises = float(np.diff(level) @ np.diff(voltage))
     slope = math.copysign(float(np.ptp(level)) / float(np.ptp(voltage)), rises)
     offset = 0.5 * float(level.max() + level.min()) - slope * 0.5 * float(voltage.max() + voltage.min())
@@ -415,10 +416,12 @@ def without_memory(actuator: Actuator, u: FloatArray) -> Actuator:
 
 
 def slopes(actuator: Actuator, u: FloatArray) -> tuple[float, float]:
-    """Least and largest slope of the law along the steady cycle of `u`; one without a law."""
+    """Least and largest slope of the law along the steady cycle of `u`, jumps as ramps; one without a law."""
     if actuator.hysteresis is None:
         return 1.0, 1.0
-    voltage, level = actuator.voltage(u), _steady_level(actuator, u)
+    ends = np.append(u, u[0])
+    pieces = np.ceil(_CHORDS * np.abs(np.diff(ends)) / np.ptp(u) - 1e-9).astype(int)
+    voltage, level = _steady(actuator, np.interp(np.arange(pieces.sum()), np.append(0, np.cumsum(pieces)), ends))
     steps = np.diff(voltage, append=voltage[0])
     local = np.diff(level, append=level[0])[steps != 0.0] / steps[steps != 0.0]
     return float(local.min()), float(local.max())
@@ -430,16 +433,22 @@ def _driven(actuator: Actuator, u: FloatArray, sample_time: float | None) -> Flo
     return np.asarray(replace(actuator, amplifier=None).dc_gain * actuator.level(u))
 
 
-def _steady_level(actuator: Actuator, u: FloatArray) -> FloatArray:
-    return steady_cycle(Actuator(hysteresis=actuator.hysteresis), actuator.voltage(u), None)
+def _steady(actuator: Actuator, u: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Voltage and output of the law along the steady cycle of `u`; without the limits if all of it is beyond one."""
+    voltage = actuator.voltage(u) if np.ptp(actuator.voltage(u)) else _unlimited(actuator).voltage(u)
+    return voltage, steady_cycle(Actuator(hysteresis=actuator.hysteresis), voltage, None)
 
 
-def _secant(before: tuple[float, float], now: tuple[float, float]) -> float:
-    """Gain at which, in log g and log f, the line through two points meets f = g; f if the map is no contraction."""
-    gain, value = now
-    step = math.log(gain / before[0])
-    slope = math.log(value / before[1]) / step if step else math.inf
-    return gain * (value / gain) ** (1.0 / (1.0 - slope)) if abs(slope) < _CONTRACTION else value
+def _next_size(before: tuple[float, float] | None, now: tuple[float, float], least: float, most: float) -> float:
+    """Size of the gain where the line through two points (log g, log(f / g)) is zero; else one between the bounds.
+
+    Without a point before, the line falls as that of a linear plant.
+    """
+    fall = -1.0 if before is None or now[0] == before[0] else (now[1] - before[1]) / (now[0] - before[0])
+    size = math.exp(min(now[0] - now[1] / fall, 700.0)) if fall < 0.0 else most
+    if least < size < most:
+        return size
+    return 2.0 * least if most == math.inf else math.sqrt(max(least, 0.25 * most) * most)
 
 
 def _usable(gain: float) -> float:

@@ -147,7 +147,10 @@ class LinearLoop:
         return np.asarray(np.abs(np.linalg.eigvals(matrices)).max(axis=1) < 1.0)
 
     def margins(self, controller: SampledController, slope: float = 1.0) -> tuple[float, float]:
-        """Gain and phase margin [degrees] at a slope, by python-control, and at z = -1; nan if the loop is unstable."""
+        """Gain and phase margin [degrees] at a slope, by python-control, and at z = -1; nan if the loop is unstable.
+
+        A negative phase margin is the lead that makes it unstable, where that is less than the lag.
+        """
         import control
 
         if not self.is_stable(controller, slope):
@@ -157,7 +160,7 @@ class LinearLoop:
         last = float(self._at(highest, controller, slope)[0].real)
         if abs(loop[0]) < 1.0:  # a slow integral has its crossover below
             slower = self.frequencies[0] * np.geomspace(_SLOWER, 1.0, _FREQUENCIES)
-            phase = min(phase, control.margin(control.frd(self._at(slower, controller, slope), slower))[1])
+            phase = min(phase, control.margin(control.frd(self._at(slower, controller, slope), slower))[1], key=abs)
         return nearest_to_one([gain, -1.0 / last if last < 0.0 else math.inf]), float(phase)
 
     def noise_gain(self, controller: SampledController, slope: float = 1.0) -> float:
@@ -260,7 +263,7 @@ def judge(
     linear = LinearFigures(math.nan, math.nan, _FASTEST, math.nan)
     if isinstance(controller, SampledController):
         loops = [LinearLoop(each, h) for each in (plant, later(plant, h))]
-        along = _closing_slopes(plant, cycle, gain)
+        along = closing_slopes(plant, cycle, gain)
         now, delayed = (max(loop.max_sensitivity(controller, slope) for slope in along) for loop in loops)
         decay = slowest_decay(loops[0], controller, along) if now < math.inf else 0.0
         linear = LinearFigures(now, delayed, decay, abs(controller.linear(h).D))
@@ -270,7 +273,7 @@ def judge(
     return linear, limit_cycle(resting, controller, reference, linear.decay, asked)
 
 
-def _closing_slopes(plant: Actuator, cycle: FloatArray, gain: float) -> list[float]:
+def closing_slopes(plant: Actuator, cycle: FloatArray, gain: float) -> list[float]:
     """Least and largest slope of the law along a cycle of the reference that close a loop; 1 without a law."""
     if plant.hysteresis is None:
         return [1.0]
@@ -319,8 +322,7 @@ def _too_large(resting: RestingPlant, controller: Controller, volts: float, far:
         return volts > _SMALL * asked
     low, high = limits_of(controller) or (-math.inf, math.inf)
     if chain.amplifier.limits is not None:
-        commands = ((limit - chain.amplifier.offset) / chain.amplifier.gain for limit in chain.amplifier.limits)
-        least, most = sorted(commands)
+        least, most = sorted(map(chain.amplifier.command, chain.amplifier.limits))
         low, high = min(max(low, least), most), min(max(high, least), most)
     return far > _QUANTA * quantum or _FULL * (high - low) < volts
 

@@ -38,7 +38,7 @@ from hysim._basics.frozen import FloatArray, Interval, check_choice, check_posit
 from hysim._basics.printing import frozen_result, summary_text
 from hysim.control._controller import PID, Feedback, SampledController, limits_of
 from hysim.control._loop import RestingPlant, inverted, sampled, secant_gain, slopes
-from hysim.control._stability import LinearLoop, limit_cycle, nearest_to_one, slowest_decay
+from hysim.control._stability import LinearLoop, closing_slopes, limit_cycle, nearest_to_one, slowest_decay
 from hysim.control._tracking import TrackingController
 from hysim.kernels import controllers as kernels
 from hysim.models.model import family, in_brief
@@ -232,7 +232,7 @@ class _PlantLoops:
     def __init__(self, plant: Actuator, cycle: FloatArray, sample_time: float) -> None:
         self.gain = secant_gain(plant, cycle)
         self.secant = self.gain / plant.dc_gain
-        self.slopes = sorted(set(slopes(plant, inverted(plant, cycle, self.gain))))
+        self.slopes = closing_slopes(plant, cycle, self.gain)
         self.loop = LinearLoop(plant, sample_time)
         self.noise = 0.0 if plant.sensor is None else plant.sensor.noise
         self.volts = 1.0 if plant.amplifier is None else abs(plant.amplifier.gain)
@@ -404,13 +404,10 @@ class _Search:
 
     def value(self, controller: Tuned) -> float:
         """Objective of the simulated loop under the worst of the limits; infinite if it diverges."""
-        largest = -math.inf
-        for limits in self.limits:
-            signals = self.resting.attempt(replace(controller, limits=limits), self.reference)
-            if signals.lost >= 0:
-                return math.inf
-            largest = max(largest, self.objective((self.reference - signals.y)[self.counted] / self.span))
-        return largest
+        loops = [self.resting.attempt(replace(controller, limits=limits), self.reference) for limits in self.limits]
+        if any(signals.lost >= 0 for signals in loops):
+            return math.inf
+        return max(self.objective((self.reference - signals.y)[self.counted] / self.span) for signals in loops)
 
     def cost(self, x: FloatArray) -> float:
         controller = replace(self.template.controller(x), limits=self.limits[0])
@@ -429,7 +426,7 @@ class _Search:
         return Tuning(
             **vars(best),
             gain_margin=nearest_to_one(gains),
-            phase_margin=float(phases.min()),
+            phase_margin=float(phases[np.abs(phases).argmin()]),
             trade_off=trade_off,
             trials=tuple(self.trials),
             success=self.excess(best.max_sensitivity, best.voltage_noise) == 0.0,
