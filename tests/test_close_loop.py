@@ -414,7 +414,7 @@ test_wrong_arguments_are_named = refused(
     (lambda: hs.close_loop(FULL, FULL, T4, R4), TypeError, "got PID"),
     (lambda: hs.close_loop(LAG, None, T4, R4), TypeError, "controller must be"),
     (lambda: hs.close_loop(LAG, hs.BoucWen(), T4, R4), TypeError, "controller must be"),
-    (lambda: hs.close_loop(LAG, 3.0, T4, R4), TypeError, "controller must be"),
+    (lambda: hs.close_loop(hs.LuGre(), FULL, T4, R4), TypeError, "got LuGre, which moves in time"),
     (lambda: hs.close_loop(LAG, FULL, T4, R4[:3]), "equal lengths, got 3 and 4"),
     (lambda: hs.close_loop(LAG, FULL, T4**2, R4), "evenly spaced, got steps from 1.0 to 5.0"),
     (lambda: hs.close_loop(LAG, FULL, -T4, R4), "increas"),

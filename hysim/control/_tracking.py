@@ -161,7 +161,8 @@ class TrackingController(SampledController):
     notch, damping : Notch and DampingLoop, optional
         Filter of the feedback's command, and a loop beside it.
     model : Actuator, optional
-        The feed-forward's plant, vibration and sensor delay included: feedback corrects only the difference from it.
+        The feed-forward's plant, vibration and sensor delay included: feedback corrects only the difference from it. A
+        derivative gain needs ``derivative_weight=1`` in the feedback for that.
     preview : bool
         Whether the reference is known ahead.
     limits : (float, float), optional

@@ -406,10 +406,10 @@ def as_actuator(plant: Any) -> Actuator:
         laws = plant.stages[:-1]
         hysteresis = Cascade(stages=laws) if len(laws) > 1 else laws[0] if laws else None
         return Actuator(hysteresis=hysteresis, vibration=plant.stages[-1])
-    vibration = linear_plant(plant)
-    if isinstance(vibration, Vibration):
+    if isinstance(vibration := linear_plant(plant), Vibration):
         return Actuator(vibration=vibration)
-    raise TypeError(f"plant must be an Actuator, a law or a linear plant, got {type(plant).__name__}")
+    moves = ", which moves in time: a loop cannot step such a law" if roles.needs_time(plant) else ""
+    raise TypeError(f"plant must be an Actuator, a law or a linear plant, got {type(plant).__name__}{moves}")
 
 
 def as_stepwise(plant: Any) -> roles.Stepwise:
