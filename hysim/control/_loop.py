@@ -331,7 +331,7 @@ def is_controller(value: Any) -> TypeGuard[Controller]:
 _ITERATIONS = 60
 _CONVERGED = 1e-12  # of the gain
 _ACCEPTED = 1e-9  # where rounding keeps it from that
-_CHORDS = 50  # of a stroke, of which slopes are taken: those of a step are of the way between its levels
+_CHORDS, _MOST_CHORDS = 50, 100_000  # of a stroke and of a cycle, of which slopes are taken: those of a step, too
 _PROBED = [(0.0, 1e3**k) for k in range(4)]  # inputs of the first gain: a play does not move along the short ones
 _PERIODS = 96  # at most, until a driven cycle is steady
 _STEADY = 1e-12  # of the stroke
@@ -409,8 +409,7 @@ def without_memory(actuator: Actuator, u: FloatArray) -> Actuator:
     if actuator.hysteresis is None:
         return actuator
     voltage, level = _steady(actuator, u)
-    rises = float(np.diff(level) @ np.diff(voltage))
-    slope = math.copysign(float(np.ptp(level)) / float(np.ptp(voltage)), rises)
+    slope = math.copysign(float(np.ptp(level) / np.ptp(voltage)), float(np.diff(level) @ np.diff(voltage)))
     offset = 0.5 * float(level.max() + level.min()) - slope * 0.5 * float(voltage.max() + voltage.min())
     return replace(actuator, hysteresis=Line(offset=offset, slope=slope))
 
@@ -419,9 +418,10 @@ def slopes(actuator: Actuator, u: FloatArray) -> tuple[float, float]:
     """Least and largest slope of the law along the steady cycle of `u`, jumps as ramps; one without a law."""
     if actuator.hysteresis is None:
         return 1.0, 1.0
-    ends = np.append(u, u[0])
-    pieces = np.ceil(_CHORDS * np.abs(np.diff(ends)) / np.ptp(u) - 1e-9).astype(int)
-    voltage, level = _steady(actuator, np.interp(np.arange(pieces.sum()), np.append(0, np.cumsum(pieces)), ends))
+    jumps = np.abs(np.diff(u, append=u[0]))
+    chord = max(float(np.ptp(u)) / _CHORDS, float(jumps.sum()) / _MOST_CHORDS)
+    places = np.cumsum(np.append(0.0, np.ceil(jumps / chord - 1e-9)))
+    voltage, level = _steady(actuator, np.interp(np.arange(places[-1]), places, np.append(u, u[0])))
     steps = np.diff(voltage, append=voltage[0])
     local = np.diff(level, append=level[0])[steps != 0.0] / steps[steps != 0.0]
     return float(local.min()), float(local.max())
