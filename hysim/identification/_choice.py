@@ -217,15 +217,15 @@ def of_any_family(
 
     with forked(number if number > 1 else 0) as pool:
         first = results(partial(_Trials.of, which=slice(0, 1)), names, seconds, 0)
-        rounds = _scores(first, size)
-        ranked, worst = sorted(rounds, key=lambda name: rounds[name]), _WORSE * min(rounds.values())
-        close = [name for name in ranked if rounds[name] <= worst]
-        second = results(partial(_Trials.of, which=slice(None)), close, seconds, len(names))
-        if len(second) < len(close):  # not all have had all parts: the errors of the first round are of the same ones
-            errors, compared = first, [*first]
-        else:
-            errors, compared = first | second, close
-        score = _scores(errors, size)
+        second, score = dict[str, FloatArray](), _scores(first, size)
+        # the best of one fold may predict others badly: then families that were worse on that fold are tried again
+        while close := _close(score, second):
+            more = results(partial(_Trials.of, which=slice(None)), close, seconds, len(names) + len(second))
+            if len(more) < len(close):  # the time is over
+                break
+            second |= more
+            score = _scores(first | second, size)
+        errors, compared = first | second, first if close else second
         ranked = sorted(score, key=lambda name: (name not in compared, score[name]))
         tied = [name for name in ranked if name in compared and score[name] <= _EQUAL * score[ranked[0]]][:_MOST_TIED]
         bic = results(_Trials.bic, tied, math.inf, 2 * len(names) - len(tied)) if len(tied) > 1 else {}
@@ -357,6 +357,12 @@ def _folds(records: Sequence[Record]) -> list[Samples]:
         samples = np.arange(sum(map(len, records)))
         return [samples[k::_EVERY] for k in range(_EVERY)]
     return [np.concatenate(cycles[k::_FOLDS]) for k in range(min(_FOLDS, len(cycles)))]
+
+
+def _close(score: Mapping[str, float], second: Mapping[str, FloatArray]) -> list[str]:
+    """Families without a second round that are not clearly worse than the best of those with one, or of all."""
+    worst = _WORSE * min(score[name] for name in second or score)
+    return [name for name in sorted(score, key=lambda each: score[each]) if name not in second and score[name] <= worst]
 
 
 def _scores(errors: Mapping[str, FloatArray], size: float) -> dict[str, float]:
