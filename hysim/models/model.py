@@ -193,8 +193,8 @@ def short_names() -> dict[str, str]:
 def candidates_named(name: str) -> dict[str, Any]:
     """Candidates of `hysim.compare` in the family of this name, by the names of rows; ValueError if unknown."""
     family = family_named(name)
-    collected = _of_family(family.__name__, family)
-    if not collected:
+    collected = _of_family(family.__name__, family) or {family.__name__: family}
+    if not all(map(is_identifiable, collected.values())):
         raise ValueError(
             f"the family {family.__name__} needs more than its name: give a structure, or a model to start from"
         )
