@@ -350,7 +350,7 @@ def _measured(record: Record, smoothing: float | Literal["auto"] | None, toleran
 def _draw_ridge(axes: Axes, diagram: Forc, place: Callable[..., tuple[Any, Any]]) -> None:
     distance, middle = diagram.ridge[:, :2].T
     end = min(diagram.levels[-1], -diagram.levels[0])
-    axes.plot(*place(middle + distance, middle - distance), color=MEASURED, linewidth=1.0, label="ridge")
+    axes.plot(*place(middle + distance, middle - distance), ".", color=MEASURED, markersize=2.0, label="ridge")
     if end > 0.0:
         ends = np.array([0.0, end])
         axes.plot(*place(ends, -ends), color=GUIDE, linewidth=0.8, linestyle="--", label="central line")
