@@ -227,10 +227,10 @@ class BoucWenLaw(BoucWenStep, MemoryLaw):
     def notes(self, record: Record, model: "BoucWenLaw") -> tuple[str, ...]:
         """Stability class and passivity of the identified law."""
         if model.admissible and model.stability_class == "I":
-            return ("the law is of stability class I and passive",)
+            return ("the law is of stability class I, and its memory is passive",)
         kind = model.stability_class
-        bounded = f"of stability class {kind}" if kind != "none" else "of no stability class: other inputs may escape"
-        return (f"the law is {bounded}" + ("" if model.admissible else ", and may create energy"),)
+        bounded = f"of stability class {kind}" if kind != "none" else "of no stability class: it may diverge"
+        return (f"the law is {bounded}" + ("" if model.admissible else ", and its memory may create energy"),)
 
     def divergence(self, sample: int, u: float, y: float) -> str:
         loading, unloading = self.beta + self.gamma, self.beta - self.gamma
