@@ -263,6 +263,12 @@ def test_a_plant_of_more_than_critical_damping_is_found_with_stable_steps(mass, 
     assert np.abs(finer - fit.model.response(u, sample_time)).max() < 1e-6 * np.ptp(y)
 
 
+def test_a_record_that_begins_in_motion_is_said():
+    begun = from_rest()[30:]
+    assert any("does not begin at rest" in note for note in structure().notes(begun, plant()))
+    assert structure().notes(from_rest(), plant(substeps=4)) == ()
+
+
 def test_steps_that_are_too_coarse_are_said(monkeypatch):
     monkeypatch.setattr("hysim.plants.oscillator._LARGEST_ANGLE", 2.6)
     plant = hs.BoucWenOscillator(mass=1.0, damping=100.0, stiffness=20.0, law=hs.BoucWen(A=20.0), substeps=1)

@@ -207,6 +207,7 @@ def _stage(y: FloatArray, factor: int, periodic: bool) -> FloatArray:
 _MOST_STEPS = 1000  # between two samples: a mass with less inertia than asks for more cannot be told from none
 _COARSE = 0.1  # of the residual, an error of the steps that is said
 _NOISE_FREE = 1e-6  # of the range of the output, an error that matters even to a record without noise
+_AT_REST = 0.2  # of the standard deviation of the output: less may be an offset or noise
 _FREQUENCIES = 8  # tried where no linear plant is near
 _SCREENED = 256
 _IMPROVED = 6  # of the screened points: with 3, two of 160 random plants with a free n ended too early (by hand)
@@ -231,7 +232,7 @@ def start(motion: Motion, laws: SearchSpace, wanted: int) -> tuple[Linear, list[
     if nearest is None:
         raise ValueError(
             "the record is not that of a mass on springs: no plant with a positive mass is near; check the sign of u "
-            "and y, the time, and excitation="
+            "and y, the time, excitation=, and that the record begins at rest"
         )
     return nearest, sets
 
@@ -426,13 +427,15 @@ class OscillatorStructure(Subject):
         return replace(model, initial_state=(y, velocity), law=replace(model.law, z0=z))
 
     def notes(self, record: Record, model: Any) -> tuple[str, ...]:
-        """The error of the steps, where that is not small next to the residual."""
+        """A beginning that is not at rest, and the error of the steps, where that is not small next to the residual."""
+        moves = self.period is None and abs(float(record.y[0])) > _AT_REST * float(record.y.std())
+        begin = ("the record does not begin at rest, as is assumed: cut it where the mass rests at zero",) * moves
         if self.method != "split":
-            return ()
+            return begin
         coarse, fine = (self._output(replace(model, substeps=substeps), record) for substeps in (1, 2))
         error, rmse = (float(np.sqrt(np.mean((coarse - other) ** 2))) for other in (fine, record.y))
         text = f"the steps are too coarse: with twice as many the output moves by {error:.2g} rms, give oversampling="
-        return (text,) if error > _COARSE * rmse and error > _NOISE_FREE * float(np.ptp(record.y)) else ()
+        return begin + (text,) * (error > max(_COARSE * rmse, _NOISE_FREE * float(np.ptp(record.y))))
 
     def _output(self, plant: Any, record: Record) -> FloatArray:
         force, step = self.fine_input(record.u), record.sample_time / self.oversampling
