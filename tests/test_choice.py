@@ -106,9 +106,7 @@ def test_a_family_that_is_best_on_one_fold_alone_is_compared_with_the_others(few
     few(Line=hs.Line, Dahl=hs.Dahl, Play=hs.Play)
     errors = {hs.Line: (1.0, 8.0), hs.Dahl: (3.0, 2.0), hs.Play: (30.0, 20.0)}  # on the first fold, and on all
     monkeypatch.setattr(_choice._Trials, "_left_out", lambda *given: errors[given[1]][given[3] == slice(None)])
-    choice = hs.identify(record_of(LAW, CYCLE)).choice
-    assert choice.score == pytest.approx({"Dahl": 1.0, "Line": 4.0, "Play": 15.0})
-    assert choice.family == "Dahl"
+    assert hs.identify(record_of(LAW, CYCLE)).choice.score == pytest.approx({"Dahl": 1.0, "Line": 4.0, "Play": 15.0})
 
 
 def test_no_further_family_is_begun_after_the_time(few):

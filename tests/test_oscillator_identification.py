@@ -237,8 +237,10 @@ def test_a_record_is_continued_beyond_its_ends_before_it_is_interpolated():
     assert np.isfinite(interpolated_record(np.zeros(5), 3)).all()
 
 
-def test_the_structure_knows_how_the_record_begins():
+def test_the_structure_knows_how_the_record_begins_and_what_does_not_begin_so_is_said():
     assert_refused("the structure says how the record begins", hs.identify, structure(), from_rest(), initial="free")
+    assert structure().notes(from_rest(), plant(substeps=4)) == ()
+    assert any("does not begin at rest" in note for note in structure().notes(from_rest()[30:], plant()))
 
 
 @pytest.mark.parametrize(("u", "tolerance", "message"), [([], 1e-9, "one period"), ([1.0], 0.0, "tolerance must be")])
@@ -261,12 +263,6 @@ def test_a_plant_of_more_than_critical_damping_is_found_with_stable_steps(mass, 
     assert abs(fit.estimates["damping"] - damping) < 4.0 * fit.stderr["damping"] < 0.05 * damping
     finer = replace(fit.model, substeps=None).response(u, sample_time)
     assert np.abs(finer - fit.model.response(u, sample_time)).max() < 1e-6 * np.ptp(y)
-
-
-def test_a_record_that_begins_in_motion_is_said():
-    begun = from_rest()[30:]
-    assert any("does not begin at rest" in note for note in structure().notes(begun, plant()))
-    assert structure().notes(from_rest(), plant(substeps=4)) == ()
 
 
 def test_steps_that_are_too_coarse_are_said(monkeypatch):

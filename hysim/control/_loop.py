@@ -2,12 +2,13 @@
 
 The open loop that it is compared with has the voltage reference / secant gain. The secant gain of a steady cycle is its
 stroke over its voltage's span, which depends on the span: the gain g at which the cycle driven by ``cycle / g`` has the
-gain f(g) = g. It is found by the secant rule in the logarithms, within bounds at which f is above and below g.
+gain f(g) = g. It is found by Brent's rule in the logarithms, between gains with a longer and with a shorter stroke.
 """
 
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import field, replace
+from functools import cache
 from typing import Any, TypeGuard
 
 import numpy as np
@@ -328,11 +329,12 @@ def is_controller(value: Any) -> TypeGuard[Controller]:
     return isinstance(value, Controller) and not isinstance(value, Responding)
 
 
-_ITERATIONS = 60
-_CONVERGED = 1e-12  # of the gain
-_ACCEPTED = 1e-9  # where rounding keeps it from that
-_CHORDS, _MOST_CHORDS = 50, 100_000  # of a stroke and of a cycle, of which slopes are taken: those of a step, too
+_CONVERGED = 1e-13  # of the gain
+_ACCEPTED = 1e-9  # of the span, an error of the stroke: a law that jumps has no stroke between two others
+_NO_STROKE = 1e-300  # of the span
+_LONGEST_STEP = 16.0  # in the logarithm of the gain
 _PROBED = [(0.0, 1e3**k) for k in range(4)]  # inputs of the first gain: a play does not move along the short ones
+_CHORDS, _MOST_CHORDS = 50, 100_000  # of a stroke and of a cycle, of which slopes are taken: those of a step, too
 _PERIODS = 96  # at most, until a driven cycle is steady
 _STEADY = 1e-12  # of the stroke
 
@@ -346,6 +348,8 @@ def secant_gain(
     gain. With a number of periods the last of them stands for the steady cycle, which creep approaches slowly. A
     ValueError if the plant has no gain, or there is no such voltage.
     """
+    from scipy.optimize import brentq  # imported where it is needed
+
     span = float(np.ptp(cycle))
     if actuator.hysteresis is None and sample_time is None:
         return _usable(actuator.dc_gain)
@@ -353,21 +357,23 @@ def secant_gain(
     ranges = [actuator.u_range] if actuator.u_range else _PROBED
     chords = (np.diff(replace(actuator, amplifier=None).level(ends))[0] / np.ptp(ends) for ends in ranges)
     gain = _usable(actuator.dc_gain * float(next(filter(None, chords), 0.0)))
-    least, most, before = 0.0, math.inf, None
-    for _ in range(_ITERATIONS):
-        y = steady_cycle(actuator, inverted(actuator, cycle, gain), sample_time, periods)
-        stroke = float(np.ptp(y)) / span
-        change = abs(stroke - 1.0)
-        if not change > _CONVERGED:
-            return _usable(stroke * gain)
-        least, most = (abs(gain), most) if stroke > 1.0 else (least, abs(gain))
-        now = math.log(abs(gain)), math.log(stroke) if stroke else -math.inf
-        gain, before = math.copysign(_next_size(before, now, least, most), gain), now
-    if change > _ACCEPTED:
-        raise ValueError(
-            f"no voltage drives the plant along the reference: its secant gain does not converge at {gain:g}"
-        )
-    return stroke * gain
+
+    @cache
+    def excess(x: float) -> float:
+        """Logarithm of the stroke over the span. It falls with the gain exp(x), which shortens the command."""
+        y = steady_cycle(actuator, inverted(actuator, cycle, math.copysign(math.exp(x), gain)), sample_time, periods)
+        return math.log(max(float(np.ptp(y)) / span, _NO_STROKE))
+
+    near = math.log(abs(gain))
+    step = math.copysign(min(abs(excess(near)), 1.0), excess(near))
+    far = near + step
+    while excess(near) * excess(far) > 0.0 and abs(step) < _LONGEST_STEP:
+        step *= 2.0
+        near, far = far, far + step
+    best = brentq(excess, near, far, xtol=_CONVERGED) if excess(near) * excess(far) <= 0.0 else far
+    if abs(excess(best)) > _ACCEPTED:
+        raise ValueError(f"no command drives the plant along the reference: no steady cycle has its span, {span:g}")
+    return math.copysign(math.exp(best), gain)
 
 
 def inverted(actuator: Actuator, y: FloatArray, gain: float) -> FloatArray:
@@ -437,18 +443,6 @@ def _steady(actuator: Actuator, u: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Voltage and output of the law along the steady cycle of `u`; without the limits if all of it is beyond one."""
     voltage = actuator.voltage(u) if np.ptp(actuator.voltage(u)) else _unlimited(actuator).voltage(u)
     return voltage, steady_cycle(Actuator(hysteresis=actuator.hysteresis), voltage, None)
-
-
-def _next_size(before: tuple[float, float] | None, now: tuple[float, float], least: float, most: float) -> float:
-    """Size of the gain where the line through two points (log g, log(f / g)) is zero; else one between the bounds.
-
-    Without a point before, the line falls as that of a linear plant.
-    """
-    fall = -1.0 if before is None or now[0] == before[0] else (now[1] - before[1]) / (now[0] - before[0])
-    size = math.exp(min(now[0] - now[1] / fall, 700.0)) if fall < 0.0 else most
-    if least < size < most:
-        return size
-    return 2.0 * least if most == math.inf else math.sqrt(max(least, 0.25 * most) * most)
 
 
 def _usable(gain: float) -> float:

@@ -199,10 +199,8 @@ class Body:
         self.scope.assign(name, value.type, target)
         self.scope.roots[name] = self.scope.roots.get(name, frozenset()) | value.roots
         pointer, integer = (f"{self._constant(name)}double *", "const int ") if name in self._declared else ("", "")
-        lines = [f"{pointer}{c_name} = {value.text};"]
-        for axis in self.scope.axes(name):
-            lines.append(f"{integer}{value.type.length(c_name, axis)} = {value.lengths[axis]().text};")
-        return lines
+        lengths = ((value.type.length(c_name, axis), value.lengths[axis]().text) for axis in self.scope.axes(name))
+        return [f"{pointer}{c_name} = {value.text};", *(f"{integer}{left} = {right};" for left, right in lengths)]
 
     def _room(self, target: ast.Name, node: ast.Call) -> str:
         size = self.of.index(node.args[0]).text

@@ -44,9 +44,7 @@ def saturation(A: float, beta: float, gamma: float, n: float) -> float:
 
 def memory_slopes(A: float, beta: float, gamma: float, n: float, bound: float) -> tuple[float, float]:
     """Lowest and highest slope dz/du for |z| <= `bound`."""
-    ends = [A]
-    for c in (beta + gamma, gamma - beta):
-        ends.append(A - c * _power(bound, n) if c != 0.0 else A)
+    ends = [A, *(A - c * _power(bound, n) if c != 0.0 else A for c in (beta + gamma, gamma - beta))]
     return min(ends), max(ends)
 
 
