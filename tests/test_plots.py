@@ -436,14 +436,14 @@ def test_colours_of_signed_quantities_grow_lighter_all_the_way():
 def test_gain_and_phase_are_those_of_the_describing_function():
     amplitudes = [0.5, 1.0, 2.0, 5.0]
     laws = {"play": hs.Play(threshold=1.0), "law": LAW}
-    upper, lower = hs.plot.describing_function(laws, amplitudes, units=UNITS)
+    upper, lower = hs.plot.describing_function(laws, amplitudes, units=UNITS | {"u": "A/m"})
     for name, law in laws.items():
         found = hs.metrics.describing_function(law, amplitudes)
         assert np.array_equal(labelled(upper, name).get_xydata(), np.column_stack([amplitudes, np.abs(found)]))
         phase = labelled(lower, name).get_ydata()
         assert np.array_equal(np.isnan(phase), found == 0.0)
         assert np.array_equal(phase[found != 0.0], np.degrees(np.angle(found[found != 0.0])))
-    assert (upper.get_ylabel(), lower.get_xlabel()) == ("Gain [µm/V]", "Amplitude [V]")
+    assert (upper.get_ylabel(), lower.get_xlabel()) == ("Gain [µm/(A/m)]", "Amplitude [A/m]")
     (alone,) = hs.plot.describing_function(LAW, amplitudes)[0].lines
     assert alone.get_label() == "BoucWen"
 

@@ -34,6 +34,7 @@ import numpy as np
 import numpy.typing as npt
 
 from hysim._basics.frozen import FloatArray, check_positive, items, vectors
+from hysim._basics.prefixes import in_brackets
 from hysim._basics.printing import extent, frozen_result, quantity, summary_text
 from hysim._columns.excursions import measured_cycles
 from hysim._columns.turning import ROUNDING, TOLERANCE, Cycle, settled, turns
@@ -146,7 +147,7 @@ class LoopMetrics:
     def to_text(self, units: Mapping[str, str] | None = None) -> str:
         """The text of ``str``, with the units of ``"u"`` and ``"y"``."""
         u, y = ((units or {}).get(signal, "") for signal in "uy")
-        product, ratio = (f"{y} {u}", f"{y}/{u}") if u and y else ("", "")
+        product, ratio = (f"{y} {u}", f"{y}/{in_brackets(u)}") if u and y else ("", "")
         loop = "no loop" if self.orientation == "none" else f"{self.orientation} loop"
         if self.crossings:
             loop = f"loop that crosses itself at u = {', '.join(quantity(at, u) for at in self.crossings)}"

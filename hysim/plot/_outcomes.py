@@ -7,7 +7,7 @@ import numpy as np
 import numpy.typing as npt
 from matplotlib.axes import Axes
 
-from hysim._basics.prefixes import in_unit, label
+from hysim._basics.prefixes import in_brackets, in_unit, label
 from hysim._basics.results import model_of
 from hysim._columns.channels import steady
 from hysim.control import Tuning
@@ -162,7 +162,8 @@ def describing_function(
             phase = np.where(harmonic == 0.0, np.nan, np.degrees(np.angle(harmonic)))
             upper.plot(amplitudes, np.abs(harmonic), label=name, **line(k))
             lower.plot(amplitudes, phase, label=name, **line(k))
-        upper.set_ylabel(in_unit("Gain", f"{labels['y']}/{labels['u']}" if {"u", "y"} <= labels.keys() else ""))
+        gain = f"{labels['y']}/{in_brackets(labels['u'])}" if {"u", "y"} <= labels.keys() else ""
+        upper.set_ylabel(in_unit("Gain", gain))
         lower.set(xlabel=in_unit("Amplitude", labels.get("u", "")), ylabel="Phase [degrees]")
         if len(laws) > 1:
             upper.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=4)

@@ -12,7 +12,7 @@ from matplotlib.patches import Polygon
 from matplotlib.ticker import MaxNLocator
 
 from hysim._basics.frozen import FloatArray
-from hysim._basics.prefixes import in_unit, label
+from hysim._basics.prefixes import in_brackets, in_unit, label
 from hysim._columns.turning import TOLERANCE, turns
 from hysim.laws.operators.preisach import Preisach, PreisachRelays
 from hysim.laws.operators.reversal_curves import FEWEST, Forc
@@ -328,7 +328,7 @@ def forc(
             _draw_ridge(axes, law, place)
         axes.set(**{f"{axis}label": in_unit(name, labels.get("u", "")) for axis, name in zip("xy", names, strict=True)})
         axes.set(xlim=(corners[:, 0].min(), corners[:, 0].max()), ylim=(corners[:, 1].min(), corners[:, 1].max()))
-        unit = f"{labels['y']}/{labels['u']}²" if {"u", "y"} <= labels.keys() else ""
+        unit = f"{labels['y']}/{in_brackets(labels['u'])}²" if {"u", "y"} <= labels.keys() else ""
         axes.figure.colorbar(cells, ax=axes, label=in_unit("Density of relays", unit))
     return axes
 
