@@ -221,7 +221,7 @@ def follow(
     """Motion under `loads`, (n_samples, n_loads), linear between samples: the first one that is not finite, or -1.
 
     With `is_first` the motion begins at the first sample, else one sample before it. Kernels call it by its address,
-    `pointers.FOLLOW`: it takes half a minute to compile, which is done once.
+    `pointers.FOLLOW`: it takes a quarter of a minute to compile, which is done once.
     """
     rise = room.loads[0]
     keep(elements.stretches, motion.laws, room.saved)
