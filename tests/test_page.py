@@ -96,6 +96,8 @@ def test_every_slider_begins_at_the_law_and_ends_inside_what_it_takes(models, tm
     for model in data["models"]:
         name = model["name"]
         shown = models[name]
+        laws = [each.at_sample_time(0.01) if isinstance(each, TimedLaw) else each for each in _parts(shown.model)]
+        owners = [(law, field) for law in laws for field in law.scalars]
         assert model["controls"], name
         names = [control["name"] for control in [*model["controls"], *model["inputs"]]]
         assert len(set(names)) == len(names), name
@@ -103,9 +105,10 @@ def test_every_slider_begins_at_the_law_and_ends_inside_what_it_takes(models, tm
             assert control["lower"] < control["upper"], (name, control)
             assert control["lower"] <= control["value"] <= control["upper"], (name, control)
             assert not control.get("log") or control["lower"] > 0.0, (name, control)
-            scale = control.get("scale")
-            if len(control["places"]) == 1 and not scale and not shown.stack:
+            if len(control["places"]) == 1 and not control.get("scale") and not shown.stack:
                 assert model["values"][control["places"][0]] == control["value"], (name, control)
+                law, field = owners[control["places"][0]]
+                assert [law.with_scalars({field: control[end]}) for end in ("lower", "upper")]  # no ValueError
 
 
 def test_the_equation_of_the_output_names_every_number_that_is_linear_in_it(models):

@@ -177,8 +177,6 @@ def _source(program: Program, variables: Sequence["Variable"], version: str, tok
         "STATE_VALUES": program.state.tolist(),
         "FIELD_VALUES": [each.start or 0.0 for each in fields],
     }
-    if fields:
-        tables |= {"FIELD_MINIMA": [each.lower for each in fields], "FIELD_MAXIMA": [each.upper for each in fields]}
     digest, sampled = hashlib.sha256(token.encode()).digest(), math.isfinite(program.sample_time)
     names = {"output": program.output, "hysim": __version__, "step": program.step, "token": token}
     sizes = {"n_inputs": n_inputs, "n_fields": n_fields, "n_parameters": program.parameters.size}
@@ -194,6 +192,7 @@ def _source(program: Program, variables: Sequence["Variable"], version: str, tok
         numbers=", ".join(number(float(int.from_bytes(digest[k : k + 6], "big"))) for k in (0, 6)),
         start=number(inputs[0].start or 0.0),
         more="#define FMU_HAS_START 1\n" * bool(program.start)
+        + "#define FMU_RESTS 1\n" * bool(program.start and program.rests)
         + f"#define FMU_SAMPLE_TIME {number(program.sample_time)}\n" * sampled,
         tables="\n".join(table(f"FMU_{name}", numbers) for name, numbers in tables.items()),
         model=(_FOLDER / "model.c").read_text(encoding="utf-8").strip(),
@@ -273,7 +272,7 @@ _ATTRIBUTES = ("name", "valueReference", "causality", "variability", "initial", 
 
 
 class Variable(NamedTuple):
-    """A real variable: its name and value reference, its role in FMI, and its unit, start value and limits."""
+    """A real variable: its name and value reference, its role in FMI, and its unit and start value."""
 
     name: str
     reference: int
@@ -282,8 +281,6 @@ class Variable(NamedTuple):
     initial: str = ""
     unit: str = ""
     start: float | None = None
-    lower: float = -math.inf
-    upper: float = math.inf
     description: str = ""
 
     def attributes(self) -> dict[str, str]:
@@ -292,10 +289,8 @@ class Variable(NamedTuple):
         return {name: values[name] for name in _ATTRIBUTES if values[name]}
 
     def numbers(self) -> dict[str, str]:
-        limits = {"min": self.lower, "max": self.upper}
-        finite = {name: repr(value) for name, value in limits.items() if math.isfinite(value)}
         start = {} if self.start is None else {"start": repr(self.start)}
-        return ({"unit": self.unit} if self.unit else {}) | finite | start
+        return ({"unit": self.unit} if self.unit else {}) | start
 
 
 def variables_of(program: Program, units: Mapping[str, str], u0: float) -> list[Variable]:
@@ -315,9 +310,7 @@ def variables_of(program: Program, units: Mapping[str, str], u0: float) -> list[
         variables.append(Variable("sample_time", output + 2, "local", "constant", "exact", "s", time, description=text))
     kind, text = ("tunable", _TUNED) if program.memory else ("fixed", "")
     for k, each in enumerate(program.fields, output + 3):
-        limits = min(each.lower, each.value), max(each.upper, each.value)
-        unit = label(each.unit, units)
-        variables.append(Variable(each.name, k, "parameter", kind, "exact", unit, each.value, *limits, text))
+        variables.append(Variable(each.name, k, "parameter", kind, "exact", label(each.unit, units), each.value, text))
     names = [*(each.name for each in variables), "time"]
     if double := next((name for name in names if names.count(name) > 1), None):
         raise ValueError(f"two variables of the unit would be called {double!r}: rename the parameter of the law")

@@ -227,7 +227,7 @@ def packing(law: Law, free: Iterable[str] | None = None) -> Packing:
         return Packing(fields, _row(parameters), _row(memory), tape)
     except UntraceableError as error:
         which = ", ".join(error.names)
-        words = f"the parameters of this {family} are no expressions of {which}: leave {which} out of free"
+        words = f"a page needs the parameters of this {family} as expressions of {which}: give relays no z0"
         raise ValueError(words) from None
 
 

@@ -33,6 +33,7 @@ _TINY, _SMALL, _LARGE = 0.02, 0.25, 1.0  # changes of the output, in its spans
 FEW = 100  # samples of the input on which changes are computed
 _DECADE = 10.0
 _FACTOR = 4.0  # of a slider that scales a tuple
+_CUTS = 50  # of the way to an end that the constructor refuses, by a tenth each
 _CLOCK = "sample_time"
 
 
@@ -68,16 +69,21 @@ class _Reach:
     def slider_of(self, name: str, place: int) -> dict[str, Any]:
         value = self.law.scalars[name]
         low, high = self.boxes.get(name, (-math.inf, math.inf))
-        if value > 0.0 and self._with(name, 0.0) is None:
+        kind = {"log": True} if value > 0.0 and self._with(name, 0.0) is None else {}
+        if kind:
             lower, upper = max(value / _DECADE, min(low, value)), min(value * _DECADE, max(high, value))
-            return slider(name, value, _nice(lower, down=True), _nice(upper, down=False), log=True, places=[place])
-        below, above = (self._end(name, value, sign) for sign in (-1.0, 1.0))
-        step = 10.0 ** math.floor(math.log10(0.5 * (above - below)))
-        lower, upper = math.floor(below / step + 1e-9) * step, math.ceil(above / step - 1e-9) * step
-        lower = lower if self._with(name, lower) is not None else below
-        upper = upper if self._with(name, upper) is not None else above
-        ends = rounded(max(lower, min(low, value))), rounded(min(upper, max(high, value)))
-        return slider(name, value, *ends, places=[place])
+            ends = _nice(lower, down=True), _nice(upper, down=False)
+        else:
+            below, above = (self._end(name, value, sign) for sign in (-1.0, 1.0))
+            step = 10.0 ** math.floor(math.log10(0.5 * (above - below)))
+            lower, upper = math.floor(below / step + 1e-9) * step, math.ceil(above / step - 1e-9) * step
+            ends = max(lower, min(low, value)), min(upper, max(high, value))
+        return slider(name, value, *(self._accepted(name, value, end) for end in ends), **kind, places=[place])
+
+    def _accepted(self, name: str, value: float, end: float) -> float:
+        """An end of a slider, closer to the value where the constructor refuses it."""
+        ends = (rounded(value + (end - value) * 0.9**k) for k in range(_CUTS))
+        return next((each for each in ends if self._with(name, each) is not None), value)
 
     def _with(self, name: str, value: float) -> Law | None:
         """The law with another value of a number, None where the constructor does not take it."""

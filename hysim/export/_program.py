@@ -26,7 +26,7 @@ from hysim.export._packing import Packing, packing
 from hysim.kernels.controllers import guarded
 from hysim.kernels.stepping import Start, Step, complete
 from hysim.models.law import Law
-from hysim.models.protocols import Startable, Stepwise, needs_time, positive_time, standing
+from hysim.models.protocols import Remembering, Startable, Stepwise, needs_time, positive_time, standing
 from hysim.plants.actuator import as_stepwise
 from hysim.plants.stages import Amplifier, Creep, Vibration
 
@@ -129,12 +129,10 @@ def _as_annotated(argument: ast.arg, type_: Type) -> Type:
 
 
 class Field(NamedTuple):
-    """A number that may be changed where the program runs, from `lower` to `upper`."""
+    """A number that may be changed where the program runs."""
 
     name: str
     value: float
-    lower: float = -math.inf
-    upper: float = math.inf
     unit: str = ""
 
 
@@ -166,9 +164,12 @@ class Program:
         Name of the function ``void pack(const double *fields, double *parameters, double *state)`` that writes
         `parameters` and the front of `state` from the fields; empty where there are none.
     memory : int
-        Places at the front of the state that are the input and the memory; the rest is room for work.
+        Places at the front of the state that are the input and the memory; the rest is room for work. 0 where the
+        memory would not hold for other fields.
     sample_time : float
         Time between two samples [s]; nan for a law that does not depend on time.
+    rests : bool
+        Whether a first step at `u0` leaves the model at rest; linear plants in a sum or a cascade begin at zero.
     ahead : int
         Samples by which a controller gets the reference ahead of its time.
     """
@@ -184,6 +185,7 @@ class Program:
     pack: str = ""
     memory: int = 0
     sample_time: float = math.nan
+    rests: bool = False
     ahead: int = 0
 
 
@@ -221,7 +223,9 @@ def program_of(
         program = _of_model(law.placed(None).startable(sample_time), step)
         source = f"{program.source}\n{free.to_c('pack')}"
         fields = tuple(Field(name, law.scalars[name], unit=field_unit(law, name)) for name in free.fields)
-        return replace(program, source=source, fields=fields, pack="pack", memory=len(free.memory))
+        # the state of relays has outputs at turning points too, which would be those of the numbers before
+        memory = (n := len(free.memory)) * (n == 1 or isinstance(law, Remembering))
+        return replace(program, source=source, fields=fields, pack="pack", memory=memory)
     if isinstance(thing, Controller):
         if isinstance(thing, InverseFeedforward) and not thing.dynamic:
             return replace(_of_controller(thing, math.inf, u0, y0), sample_time=math.nan)
@@ -257,11 +261,17 @@ def start_of(thing: Any, sample_time: float, u0: float | None, y0: float | None)
 
 
 def _of_model(model: Startable, sample_time: float) -> Program:
-    sizes = model.parameters.size, model.state.size
-    source, has_start = entries(model.step, model.start, sizes)
+    source, has_start = entries(model.step, model.start, (model.parameters.size, model.state.size))
     numbers: dict[str, Any] = {"parameters": model.parameters, "state": model.state, "memory": model.state.size}
-    start = "start" if has_start else ""
-    return Program(source=source, inputs=_LAW, output="y", start=start, sample_time=sample_time, **numbers)
+    numbers |= {"start": "start" if has_start else "", "rests": math.isnan(sample_time) or _rests(model)}
+    return Program(source=source, inputs=_LAW, output="y", sample_time=sample_time, **numbers)
+
+
+def _rests(model: Startable) -> bool:
+    """Whether the state stays in a second step at the first input."""
+    law = model.started(1.0)
+    once, again = ((law.step(law.parameters, law.state, 1.0), *law.state) for _ in range(2))
+    return once == again
 
 
 def _of_controller(controller: Controller, sample_time: float, u0: float | None, y0: float | None) -> Program:

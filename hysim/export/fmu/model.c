@@ -52,14 +52,14 @@ static void fmu_reset(FmuModel *m)
     m->start_input = FMU_START_VALUE;
 }
 
-/* Parameters and state before the first communication step: a model without time has rested at the start input. */
+/* Parameters and state before the first communication step: a model has rested at the start input if it can. */
 static void fmu_begin(FmuModel *m)
 {
     memcpy(m->parameters, FMU_PARAMETER_VALUES, sizeof m->parameters);
     memcpy(m->state, FMU_STATE_VALUES, sizeof m->state);
     FMU_PACK(m->fields, m->parameters, m->state);
     FMU_BEGIN(m->parameters, m->state, m->start_input);
-#if defined(FMU_HAS_START) && !defined(FMU_SAMPLE_TIME)
+#ifdef FMU_RESTS
     (void)FMU_STEP(m->parameters, m->state, &m->start_input);
 #endif
     m->samples = 0.0;
@@ -149,8 +149,8 @@ static const char *fmu_set(FmuModel *m, unsigned int reference, double value)
 
         if (m->phase >= FMU_STEPPING && !FMU_IS_TUNABLE)
             return "a parameter can be set before the end of the initialization only";
-        if (!(isfinite(value) && value >= FMU_FIELD_MINIMA[k] && value <= FMU_FIELD_MAXIMA[k]))
-            return "a parameter must lie between its minimum and its maximum";
+        if (!isfinite(value))
+            return "a parameter must be finite";
         m->fields[k] = value;
         m->is_stale = 1.0;
         return NULL;
