@@ -109,9 +109,8 @@ def test_the_description_names_variables_with_units(tmp_path, version):
         "u0": ("parameter", "fixed"),
         **dict.fromkeys(("stiffness", "coulomb", "offset", "z0"), ("parameter", "tunable")),
     }
-    stiffness = variables["stiffness"]
-    assert (stiffness["unit"], stiffness["start"]) == ("N/mm", "2.0")
-    assert variables["u"]["start"] == variables["u0"]["start"] == "0.5"
+    assert [variables[name]["start"] for name in ("u", "u0", "stiffness")] == ["0.5", "0.5", "2.0"]
+    assert variables["stiffness"]["unit"] == "N/mm"
     assert ("time" in variables) == (version == "3.0")
     base = {each.get("name"): each.find("BaseUnit").attrib for each in root.find("UnitDefinitions")}
     assert base["N/mm"] == {"kg": "1", "s": "-2", "factor": "1000.0"}

@@ -3,6 +3,7 @@
 import importlib
 import json
 import pkgutil
+import re
 import subprocess
 import sys
 import types
@@ -132,6 +133,7 @@ def test_every_public_name_can_be_had(name):
     value = getattr(hysim, name)
     if not isinstance(value, types.ModuleType):
         assert value.__doc__
+        assert set(re.findall(r"`hysim\.([A-Z]\w+)", value.__doc__)) <= set(dir(hysim))
         assert value.__name__ == name
     assert name in dir(hysim)
 

@@ -42,8 +42,8 @@ class FlagShape(HardeningLaw):
     -----
     The law is virgin at u = 0, from where it comes to the first sample. Every path dissipates where the stiffness is
     above the hardening. The output is affine in both. A part that is squeezed or stretched to its end is not in
-    it: add a `hysim.PiecewiseLinear` in parallel. Source: C. Christopoulos, R. Tremblay, H.-J. Kim and M. Lacerte,
-    J. Struct. Eng. 134 (2008) 96.
+    it: add a `hysim.Slack` of a large yield input in parallel. Source: C. Christopoulos, R. Tremblay, H.-J. Kim and M.
+    Lacerte, J. Struct. Eng. 134 (2008) 96.
 
     Examples
     --------
