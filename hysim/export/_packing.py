@@ -227,8 +227,8 @@ def packing(law: Law, free: Iterable[str] | None = None) -> Packing:
         return Packing(fields, _row(parameters), _row(memory), tape)
     except UntraceableError as error:
         which = ", ".join(error.names)
-        words = f"a page needs the parameters of this {family} as expressions of {which}: give relays no z0"
-        raise ValueError(words) from None
+        words = f"a page needs the parameters of this {family} as expressions of {which}: pack must not branch on them"
+        raise ValueError(f"{words}, and relays must have no z0") from None
 
 
 def _row(table: FloatArray) -> tuple[Number, ...]:
