@@ -200,7 +200,7 @@ def calls() -> dict[str, Callable[[], object]]:
     """Short calls that compile what most first calls need, by their names."""
     import numpy as np
 
-    from hysim.kernels._compile import signed
+    from hysim.kernels.stepping import signed
     from hysim.models.model import candidates
     from hysim.models.protocols import Invertible, needs_time
     from hysim.plants.oscillator_structure import METHODS

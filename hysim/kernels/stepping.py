@@ -22,6 +22,7 @@ from hysim.kernels._compile import Addressed as Addressed
 from hysim.kernels._compile import borrowed as borrowed
 from hysim.kernels._compile import by_address as by_address
 from hysim.kernels._compile import inlined_kernel as inlined_kernel
+from hysim.kernels._compile import signed as signed
 from hysim.kernels._compile import signed_closure, signed_kernel
 from hysim.kernels._compile import sources as sources
 from hysim.kernels._compile import unstored as unstored
