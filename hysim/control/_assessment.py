@@ -189,9 +189,11 @@ class OpenLoop:
         return self.loop_of(self.y)
 
     def last(self, signal: FloatArray) -> FloatArray:
+        """Last cycle of a signal, both ends included."""
         return signal[-self.samples_per_cycle - 1 :]
 
     def loop_of(self, y: FloatArray) -> LoopMetrics:
+        """Measures of the last cycle of `y` over the reference."""
         return loop_metrics(self.cycle, self.last(y))
 
     def reduction_percent(self, y: FloatArray) -> float:

@@ -51,11 +51,13 @@ class _Filter(ABC):
         """Coefficients (b0, b1, b2, a1, a2) of the discrete form."""
 
     def frequency_response(self, frequency: npt.ArrayLike, sample_time: float) -> npt.NDArray[np.complex128]:
+        """Response of the discrete form at frequencies [rad/s] for a sample time [s], of the shape of `frequency`."""
         back = np.exp(-1j * np.asarray(frequency, dtype=float) * sample_time)
         b0, b1, b2, a1, a2 = self.coefficients(sample_time)
         return np.asarray((b0 + (b1 + b2 * back) * back) / (1.0 + (a1 + a2 * back) * back))
 
     def linear(self, sample_time: float) -> Feedback:
+        """The discrete form as a linear controller."""
         b0, b1, b2, a1, a2 = self.coefficients(sample_time)
         A, B = np.array([[-a1, 1.0], [-a2, 0.0]]), np.array([b1 - a1 * b0, b2 - a2 * b0])
         return Feedback(A, B, np.array([1.0, 0.0]), float(b0))

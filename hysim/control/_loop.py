@@ -272,6 +272,7 @@ class RestingPlant:
         self.y0 = self.chain.displacement(self.state)
 
     def quiet(self) -> "RestingPlant":
+        """The plant whose sensor has no noise."""
         if self.plant.sensor is None:
             return self
         plant = replace(self.plant, sensor=replace(self.plant.sensor, noise=0.0))
@@ -311,6 +312,7 @@ class RestingPlant:
         return law.memory(np.append(self.state.voltages[1], signals.v))[: -1 : self.chain.substeps]
 
     def driven(self, u: FloatArray) -> FloatArray:
+        """Displacement under the commands `u`, without a controller."""
         return np.asarray(self.chain.driven(u, self.state)[0].y)
 
 

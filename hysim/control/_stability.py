@@ -174,6 +174,7 @@ class LinearLoop:
         return math.sqrt(loop.through**2 + max(0.0, float(loop.K @ states @ loop.K)))
 
     def poles(self, controller: SampledController, slope: float = 1.0) -> npt.NDArray[np.complex128]:
+        """Poles of the closed loop in z at a slope of the law."""
         return np.asarray(np.linalg.eigvals(self._closed(controller.linear(self.sample_time), slope).M))
 
     def _default(self) -> FloatArray:

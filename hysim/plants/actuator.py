@@ -315,6 +315,7 @@ class Actuator:
     def compiled(
         self, u0: float = 0.0, *, sample_time: float | None = None, substeps: int | None = None
     ) -> CompiledLaw:
+        """The actuator as a step for loops, at rest at `u0`; arguments and errors as of `startable`."""
         self.chain(self._any_time(sample_time), substeps).rest(u0)
         return self.startable(sample_time, substeps=substeps).started(u0)
 
@@ -342,6 +343,7 @@ class Actuator:
     def memory(
         self, u: npt.ArrayLike, sample_time: float | None = None, *, substeps: int | None = None
     ) -> FloatArray | None:
+        """Memory of the law at the samples of `u`, None without one; arguments and errors as of `response`."""
         if not isinstance(self.hysteresis, roles.Remembering):
             return None
         inputs = read_only(u, "u", ndim=1)
