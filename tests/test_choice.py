@@ -13,7 +13,7 @@ import hysim as hs
 from hysim._basics import parallel as _parallel
 from hysim._columns.turning import TOLERANCE
 from hysim.cli import main
-from hysim.identification import _choice, _search
+from hysim.identification import _choice, _identify, _search
 
 CYCLE = np.sin(np.linspace(0.0, 2.0 * np.pi, 40, endpoint=False))
 GROWING = np.concatenate([size * CYCLE for size in (0.3, 0.5, 0.7, 0.6, 1.0, 0.8)])
@@ -109,6 +109,21 @@ def test_a_family_that_is_best_on_one_fold_alone_is_compared_with_the_others(few
     assert hs.identify(record_of(LAW, CYCLE)).choice.score == pytest.approx({"Dahl": 1.0, "Line": 4.0, "Play": 15.0})
 
 
+@pytest.mark.parametrize(("worse", "family"), [(1.9, "Play"), (2.1, "Line")])
+def test_a_safe_family_that_is_not_clearly_worse_is_taken_behind_unsafe_ones(few, monkeypatch, worse, family):
+    few(Line=hs.Line, Stop=hs.Stop, Dahl=hs.Dahl, ColemanHodgdon=hs.ColemanHodgdon, Play=hs.Play)
+    errors = {hs.Line: 1.0, hs.Stop: 1.2, hs.Dahl: 1.3, hs.ColemanHodgdon: 1.4, hs.Play: worse}
+    monkeypatch.setattr(_choice._Trials, "_left_out", lambda *given: errors[given[1]])
+    unsafe = "UNSAFE on smaller cycles: within +-1 this law runs away."
+    monkeypatch.setattr(_identify, "danger", lambda off, records, other: unsafe * (type(fitted[-1]) is not hs.Play))
+    fitted = []
+    monkeypatch.setattr(_identify, "excursion", lambda models, records: fitted.append(models[0]))
+    fit = hs.identify(record_of(LAW, CYCLE))
+    assert (fit.choice.family, fit.success) == (family, family == "Play")
+    words = "passed over (UNSAFE on smaller cycles): Line, Stop, Dahl, ColemanHodgdon;"
+    assert (words in fit.choice.in_words()) == fit.success
+
+
 def test_no_further_family_is_begun_after_the_time(few):
     few(Line=hs.Line, Dahl=hs.Dahl, BoucWen=hs.BoucWen)
     choice = hs.identify(record_of(LAW), seconds=0.0).choice
@@ -151,13 +166,18 @@ def test_a_family_that_ends_its_process_is_named_and_a_record_of_an_own_class_is
 
 
 def test_a_loop_alone_and_several_records_are_judged_by_samples(few):
-    few(Line=hs.Line, PrandtlIshlinskii=hs.PrandtlIshlinskii)
+    few(Line=hs.Line, PrandtlIshlinskii=hs.PrandtlIshlinskii, Lag=hs.TransferFunction.structure(poles=1, zeros=0))
     loop = record_of(LAW, CYCLE)
     assert np.isnan(hs.identify(loop).choice.continued["Line"])
     fit = hs.identify([loop, record_of(LAW, 0.5 * CYCLE)])
     assert fit.choice.family == "PrandtlIshlinskii"
     assert len(fit.models) == 2
-    assert "no part was long enough to be continued" in fit.choice.in_words()
+    for words in (
+        "no part was long enough to be continued",
+        "passed over (the record has no time): Lag",
+        "of 2 families",
+    ):
+        assert words in fit.choice.in_words()
 
 
 def test_long_records_are_thinned_for_the_comparison_alone(few):

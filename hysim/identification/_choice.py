@@ -16,9 +16,13 @@ smoother until it is safe on cycles that the record does not have.
 
 The errors are those of free runs on the inputs as measured. Each kind is taken over the least error of any family, and
 the score of a family is the geometric mean over the kinds. Among those within a twentieth of the best, where the noise
-of the outputs hides what is wrong with a family, the BIC decides. The fits of this comparison are short searches; the
-search of the best one is complete. In a first round each family has one fold of each kind, and those that are clearly
-worse than the best have no second one (as in successive halving: K. Jamieson, A. Talwalkar, AISTATS 2016).
+of the outputs hides what is wrong with a family, the BIC decides. In a first round each family has one fold of each
+kind, and those that are clearly worse than the best have no second one (as in successive halving: K. Jamieson,
+A. Talwalkar, AISTATS 2016).
+
+The fits of this comparison are short searches. Complete ones go down the ranking until one succeeds, through three
+families at most. Where all three are unsafe, they go on through those that are not clearly worse than the best, to
+eight at most.
 """
 
 import math
@@ -29,6 +33,7 @@ from concurrent.futures import Future
 from concurrent.futures.process import BrokenProcessPool
 from dataclasses import replace
 from functools import partial
+from itertools import takewhile
 from typing import Any, NamedTuple
 from weakref import WeakValueDictionary
 
@@ -65,7 +70,7 @@ _EVALUATIONS = 3000  # of a short search: within some per cent of the complete o
 _SAMPLES = 3000  # of all records that a short search has, beside their reversals
 _WORSE = 2.0  # times the best of the first round: a family has no second one
 _MOST_PROCESSES = 8  # beyond, the few families of many numbers take as long
-_COMPLETE = 3  # complete searches at most, until one succeeds
+_COMPLETE, _MOST_COMPLETE = 3, 8  # complete searches, until one succeeds; and where none of the former is safe
 _EQUAL = 1.05  # times the best score: noise of the outputs may hide the difference
 _MOST_TIED = 6
 _LAST = 1000
@@ -231,13 +236,18 @@ def of_any_family(
         bic = results(_Trials.bic, tied, math.inf, 2 * len(names) - len(tied)) if len(tied) > 1 else {}
     ranked = [*sorted(bic, key=lambda name: bic[name]), *(name for name in ranked if name not in bic)]
     fits: dict[str, Identification] = {}
-    for name in ranked[:_COMPLETE]:
+    for name in ranked[:_MOST_COMPLETE]:
+        is_close = score[name] <= _WORSE * min(score.values())
+        if len(fits) >= _COMPLETE and not (is_close and all(fit.unsafe for fit in fits.values())):
+            break
         begin = time.process_time()
         fits[name] = identify(subjects[name], records, **options)
         spent += time.process_time() - begin
         if fits[name].success:
             break
-    name = next((name for name, fit in fits.items() if fit.success), ranked[0])
+    name = min(fits, key=lambda name: (not fits[name].success, bool(fits[name].unsafe)))
+    reasons = {each: "no fit succeeded" for each in ranked if score[each] == math.inf} | trials.refused
+    reasons |= {each: fits[each].unsafe or fits[each].message for each in takewhile(lambda each: each != name, fits)}
     choice = Choice(
         family=name,
         left_out={each: float(errors[each][0]) for each in ranked},
@@ -246,6 +256,7 @@ def of_any_family(
         score={each: score[each] for each in ranked},
         bic=bic,
         untried=tuple(each for each in names if each not in errors),
+        passed_over={each: why.partition(":")[0].partition(";")[0] for each, why in reasons.items()},
         amplitude=trials.amplitude,
         span=(min(float(each.u.min()) for each in records), max(float(each.u.max()) for each in records)),
         seconds=spent,
@@ -275,6 +286,7 @@ class _Trials:
 
     def __init__(self, identify: Identify, records: Sequence[Record], options: Mapping[str, Any]) -> None:
         self.identify, self.options, (first, *others) = identify, options, records
+        self.refused: dict[str, str] = {}
         every = [np.arange(len(record)) for record in records]
         kept = [few_places(record, _SAMPLES // len(records)) for record in records]
         self.whole = _Sampled(records, every)
@@ -291,7 +303,8 @@ class _Trials:
         try:
             start = subject() if isinstance(subject, type) else subject
             return len(searched(start).search_space(self.whole.records[0]).coordinates)
-        except (TypeError, ValueError):
+        except (TypeError, ValueError) as error:
+            self.refused[name] = str(error)
             return _LAST
 
     def of(self, name: str, which: slice) -> FloatArray:

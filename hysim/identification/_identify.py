@@ -141,8 +141,9 @@ def identify(
         Called as ``progress(done, total)``; see `hysim.simulate`.
     seconds : float, optional
         Without a model: time of the processor after which no further family is begun. The families of `hysim.compare`
-        predict what is left out of fits and continue the record, the best one is searched completely, and ``choice``
-        of the result has them all. Options that need a family are refused.
+        predict what is left out of fits and continue the record; the best one is searched completely, and where its
+        law is unsafe the next ones that are not clearly worse. ``choice`` of the result has them all. Options that need
+        a family are refused.
 
     Returns
     -------

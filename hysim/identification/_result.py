@@ -77,6 +77,9 @@ class Choice:
         Lowest and highest input [unit of u].
     seconds : float
         Of the processor.
+    passed_over : mapping
+        By family, why it was not compared, as without a time in the records, or why it is not chosen although it is
+        before the chosen one: the law of its complete search is unsafe, or the search did not succeed.
     """
 
     family: str
@@ -89,24 +92,29 @@ class Choice:
     amplitude: float
     span: tuple[float, float]
     seconds: float
+    passed_over: Mapping[str, str] = field(default_factory=dict)
 
     @property
     def undecided(self) -> tuple[str, ...]:
         """Further families whose scores are within a twentieth of the best: parts left out do not tell them apart."""
-        return tuple(name for name in self.bic if name != self.family)
+        return tuple(name for name in self.bic if name not in (self.family, *self.passed_over))
 
     def __str__(self) -> str:
         return "\n".join([*folded(self.in_words()), self.to_text()])
 
     def in_words(self) -> str:
-        """The choice, the next family, those that only the BIC tells from it, and the inputs for which it holds."""
-        others = [name for name in self.score if name != self.family]
-        words = [f"{self.family} is the best of {len(self.score)} families by what they predict"]
-        if others:
-            more = self.score[others[0]] / self.score[self.family]
-            words.append(f"the next is {others[0]} with {more:.3g} times its error")
+        """The choice, those that only the BIC tells from it, the next family, and the inputs for which it holds."""
+        fitted = [name for name, score in self.score.items() if score < math.inf and name not in self.passed_over]
+        others = [name for name in fitted if name not in (self.family, *self.undecided)]
+        words = [f"{self.family} is the best of {len(fitted)} families by what they predict"]
         if self.undecided:
             words.append(f"only the BIC decides between it and {', '.join(self.undecided)}")
+        if others:
+            more = f"{self.score[others[0]] / self.score[self.family]:.3g} times its error"
+            words.append(f"the next is {others[0]} with {'the same error' if more[:2] == '1 ' else more}")
+        for why in dict.fromkeys(self.passed_over.values()):
+            names = ", ".join(name for name, reason in self.passed_over.items() if reason == why)
+            words.append(f"passed over ({why}): {names}")
         if math.isnan(self.amplitude):
             words.append("no part was long enough to be continued")
         else:
