@@ -21,12 +21,15 @@ import numpy.typing as npt
 
 from hysim._basics.frozen import FloatArray
 from hysim._basics.libraries import optional
+from hysim._basics.prefixes import is_known
 
 __all__ = ["ForeignTable", "channels_of", "dataset", "frame", "heading", "table_in", "told_by"]
 
 TIME = "t"
 _TIME_NAMES = ("t", "time")
-_HEADING = re.compile(r"(?P<name>.*\S)\s*[\[(](?P<unit>[^\[\]()]*)[\])]")
+_HEADING = re.compile(r"(?P<name>.*[^\s/])[\s/]*[\[(](?P<unit>[^\[\]()]*)[\])]")
+_QUOTIENT = re.compile(r"(?!d\w*\s*/\s*d)(?P<name>[^\d\s/][^/]*?)\s*/\s*(?P<unit>\S+)")  # dQ/dV is a derivative
+_SYMBOLS = ("C", "F", "H", "T", "s")  # of capacitance, force, field, temperature and path, beside units: F/N is a force
 _MISSING = ("<NA>", "NaT", "None")  # as their texts
 
 _Numbers = tuple[FloatArray, str]
@@ -186,9 +189,12 @@ def told_by(u: Any, y: Any, t: Any, units: Mapping[str, str]) -> tuple[Any, dict
 
 
 def heading(label: str) -> tuple[str, str]:
-    """Name and unit of a heading such as ``voltage [V]`` or ``voltage (V)``; the unit may be empty."""
-    parts = _HEADING.fullmatch(label.strip())
-    return (parts["name"], parts["unit"].strip()) if parts else (label.strip(), "")
+    """Name and unit of a heading: ``voltage [V]``, ``voltage (V)``, or ``voltage/V`` with a known unit; else a name."""
+    parts = _HEADING.fullmatch(label.strip()) or _QUOTIENT.fullmatch(label.strip())
+    is_unit = parts and (parts.re is _HEADING or is_known(parts["unit"]))
+    if not parts or not is_unit or (is_known(label.strip()) and parts["name"] not in _SYMBOLS):  # such as N/m
+        return label.strip(), ""
+    return parts["name"], parts["unit"].strip()
 
 
 def _notes(value: Any) -> Mapping[str, Any]:

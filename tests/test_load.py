@@ -223,11 +223,28 @@ def test_a_decimal_comma_far_down_the_file_is_seen_or_can_be_said():
         "# made by hand\n# u [V], y [um]\n0,1\n2,3\n",
         "% u [V] y [um]\n0 1\n2 3\n",
         '"u (V)","y (um)"\n0,1\n2,3\n',
+        "u/V\ty / (um)\n0\t1\n2\t3\n",
+        "u / V   y/um\n0 1\n2 3\n",
     ],
-    ids=["line of units", "two rows", "header before units", "savetxt", "matlab", "quoted"],
+    ids=["line of units", "two rows", "header before units", "savetxt", "matlab", "quoted", "quotient", "blanks"],
 )
 def test_units_are_found_in_the_header_below_it_or_in_a_comment(text):
     assert dict(load(text).units) == {"u": "V", "y": "um"}
+
+
+@pytest.mark.parametrize(
+    ("heading", "name", "unit"),
+    [
+        *[("Ewe/V", "Ewe", "V"), ("<I>/mA", "<I>", "mA"), ("H / (A/m)", "H", "A/m"), ("v/mm/s", "v", "mm/s")],
+        *[("F/kN", "F", "kN"), ("Force / N", "Force", "N")],
+        *[(name, name, "") for name in ("dy/dt", "y/u", "a/b", "dQ/dV", "N/m", "mm/s", "1/s", "eta/%", "Ewe/VReal")],
+    ],
+)
+def test_what_follows_a_slash_is_a_unit_if_it_is_known(heading, name, unit):
+    text = f"k,{heading}\n0,1\n2,3\n"
+    assert hs.list_columns(io.StringIO(text))[1][:3] == (name, 1, unit)
+    for key in (name, heading):
+        assert load(text, u="k", y=key).units.get("y", "") == unit
 
 
 def test_a_text_beside_the_numbers_does_not_make_the_first_sample_a_header():

@@ -37,6 +37,14 @@ def prefixed(unit: str) -> tuple[int, str]:
     raise ValueError(f"{unit!r} is not a known unit with an SI prefix: scale the values, or pass other units")
 
 
+def is_known(unit: str) -> bool:
+    """Whether `prefixed` knows the unit."""
+    try:
+        return bool(prefixed(unit))
+    except ValueError:
+        return False
+
+
 # ---------------------------------------------------------------------------------- axes
 
 _QUANTITIES = {

@@ -35,7 +35,7 @@ DELIMITERS = {"\t": "tab", ";": "semicolon", ",": "comma", " ": "white space"}
 
 _LOOKED_AT = 50  # lines from the top, and about as many spread over the rest of the file
 _EXCEL = re.compile(r"sep=(.)", re.IGNORECASE)  # a first line for Excel, which names the delimiter
-_WORD = re.compile(r"[^\s\[(]+(?:\s*[\[(][^\[\]()]*[\])])?|\S+")
+_WORD = re.compile(r"[^\s\[(]+(?:\s+/\s+[^\s\[(]+|(?:\s+/)?\s*[\[(][^\[\]()]*[\])])?|\S+")
 _NOTE = re.compile(r"[#%] *(name|resolution|units|channels) *:")
 
 DECIMALS = (".", ",")

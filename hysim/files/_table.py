@@ -13,7 +13,7 @@ import numpy.typing as npt
 
 from hysim._basics.frozen import FloatArray
 from hysim._basics.names import meant
-from hysim.interop import ForeignTable
+from hysim.interop import ForeignTable, heading
 
 _LONGEST_REASON = 200  # letters
 
@@ -146,7 +146,11 @@ def column_of(key: str | int, columns: Sequence[Column]) -> Column:
     if not isinstance(key, str):
         require(0 <= operator.index(key) < len(columns), f"no column {key}, there are columns 0 to {len(columns) - 1}")
         return columns[key]
-    number = number_of(key, "columns", labels, [f"{column.label} [{column.unit}]" for column in columns])
+    number = number_of(key, "columns", labels)
+    if number is None:
+        number = number_of(
+            "{} [{}]".format(*heading(key)), "columns", [f"{each.label} [{each.unit}]" for each in columns]
+        )
     if number is None:
         raise ValueError(f"no column {key!r}, the columns are: {listed(labels)}{meant(key, labels)}")
     return columns[number]
