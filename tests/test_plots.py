@@ -15,6 +15,7 @@ from PIL import Image
 from strategies import assert_refused, refused
 
 import hysim as hs
+from hysim.cli import look
 from hysim.paper import figures
 
 LAW = hs.BoucWen(beta=0.03, gamma=0.02, gain=0.01, feedthrough=0.015)
@@ -510,6 +511,11 @@ def test_a_long_record_alone_has_arrows():
     ax = hs.plot.loop(noisy(1000), ax=hs.plot.figure().add_subplot())
     assert len(ax.texts) == 2
     assert not hs.plot.loop(noisy(100), ax=hs.plot.figure().add_subplot()).texts
+    curves = np.concatenate([np.linspace(low, 1.0, 100) for low in (0.2, -0.2, -0.6, -1.0)])
+    turn = np.interp(np.arange(600), [0, 200, 400, 560, 599], [-1.0, 1.0, -1.0, 0.001, -0.02])
+    for u, signs in ((curves, [1]), (turn, [1, -1])):  # no arrow along a jump, nor from a branch to the next
+        texts = hs.plot.loop(hs.Record(u=u, y=u**3), ax=hs.plot.figure().add_subplot()).texts
+        assert [np.sign(each.xy[0] - each.xyann[0]) for each in texts] == signs
 
 
 def test_a_picture_of_many_samples_is_small_and_keeps_its_texts():
@@ -559,10 +565,13 @@ def test_a_label_that_is_longer_than_its_panel_has_its_unit_in_a_second_line():
     assert [ax.get_ylabel() for ax in hs.plot.history(record, high)] == ["Displacement [µm]", "Voltage [V]"]
 
 
-def test_histories_of_two_models_on_the_same_axes_differ_by_their_lines():
-    record, panels = hs.datasets.table1(), hs.plot.figure().subplots(2)
-    for result in (record, hs.simulate(hs.Line(slope=0.02), None, record.u), hs.simulate(LAW, None, record.u)):
-        hs.plot.history(result, panels)
-    _, line, law = panels[0].lines
-    assert line.get_color() != law.get_color()
-    assert line.get_linestyle() != law.get_linestyle()
+def test_histories_on_the_same_axes_differ_by_their_lines_and_have_their_legend_above():
+    record, canvas = hs.datasets.table1(), hs.plot.figure()
+    results = (record, *(hs.simulate(law, None, record.u) for law in (hs.Line(slope=0.02), LAW)), record[:20])
+    look._history(canvas, results, {})
+    lines = canvas.axes[0].lines
+    assert len({each.get_color() for each in lines}) == 4
+    assert lines[1].get_linestyle() != lines[2].get_linestyle()
+    assert canvas.axes[1].lines[3].get_color() == lines[3].get_color()
+    canvas.draw_without_rendering()
+    assert canvas.legends[0].get_window_extent().y0 > canvas.axes[0].get_window_extent().y1

@@ -7,6 +7,7 @@ import pytest
 from strategies import assert_refused, refused
 
 import hysim as hs
+from hysim.cli import main
 from hysim.identification._problem import problem
 from hysim.models.search_space import ALL_FREE
 
@@ -55,6 +56,15 @@ def test_each_record_has_its_own_memory():
     responses = np.concatenate([model.response(INPUT) for model in fit.models])
     measured = np.concatenate([record(0.1, seed=0).y, record(-0.3, seed=1).y])
     np.testing.assert_allclose(fit.residual, measured - responses, atol=1e-12)
+
+
+def test_the_command_line_draws_every_record_and_says_that_the_width_is_that_of_the_first(tmp_path, capsys):
+    files = [str(tmp_path / f"{name}.csv") for name in ("one", "two")]
+    for file, u in zip(files, (CYCLE, 0.5 * CYCLE), strict=True):
+        np.savetxt(file, np.column_stack([u, hs.Play(threshold=0.2).response(u)]), header="u,y", delimiter=",")
+    assert main(["identify", *files, "--model", "play", "--plot", str(picture := tmp_path / "loops.svg")]) == 0
+    assert "loop width of the first record 0.4" in capsys.readouterr().out
+    assert all(f">{name}<" in picture.read_text() for name in ("one", "two"))
 
 
 def test_records_may_begin_differently():

@@ -69,7 +69,7 @@ def identify(
     ----------
     others : further records with the same columns, such as those of other rates
     out : write the model; - writes it to the standard output
-    plot : draw the record and the model
+    plot : draw the records and the model
 
     Examples
     --------
@@ -93,7 +93,14 @@ def identify(
     def picture() -> Any:
         if settings.sensor:  # the record of one sensor is not the output of the structure
             return outputs.picture_of(hs.simulate(result, record.t, record.u))
-        return outputs.on_axes(hs.plot.loop, record, result)
+        if not others:
+            return outputs.on_axes(hs.plot.loop, record, result)
+
+        def draw(panels: Any) -> None:
+            for each, model, ax in zip(measured, result.models, panels, strict=True):
+                hs.plot.loop(each, model, ax=ax)
+
+        return outputs.in_panels(len(measured), draw)
 
     def document() -> dict[str, Any]:
         return {"family": type(result.model).__name__, **outputs.fields_of(result, _IDENTIFIED)}

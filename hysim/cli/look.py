@@ -148,7 +148,7 @@ def _history(canvas: Any, results: Results, _: dict[str, Any]) -> None:
         hs.plot.history(result, panels)
         panels[0].lines[-1].set_label(result.name)
     if len(results) > 1:
-        panels[0].legend()
+        canvas.legend(loc="outside upper center", ncols=3)
 
 
 def _residual_map(canvas: Any, results: Results, _: dict[str, Any]) -> None:

@@ -247,16 +247,18 @@ def on_axes(draw: Callable[..., object], *results: Any, **settings: Any) -> Any:
     return drawn(lambda canvas: draw(*results, ax=canvas.add_subplot(), **settings))
 
 
+def in_panels(n: int, draw: Callable[[Any], object]) -> Any:
+    """A picture of some panels in rows, which `draw` fills."""
+    columns, rows = min(n, _LOOPS_IN_A_ROW), math.ceil(n / _LOOPS_IN_A_ROW)
+    return drawn(
+        lambda canvas: draw(hs.plot.panels(canvas, n, columns=columns, sharex=False)), 3.0 * columns + 1.0, 3.0 * rows
+    )
+
+
 def picture_of(run: "hs.Simulation") -> Any:
     """Picture of a simulation: the loops of a structure's elements, or the loop of output against input."""
     from hysim.simulation import has_elements
 
     if not has_elements(run):
         return on_axes(hs.plot.loop, run)
-    n = run.signals["drift"].shape[1]
-    columns, rows = min(n, _LOOPS_IN_A_ROW), math.ceil(n / _LOOPS_IN_A_ROW)
-
-    def draw(canvas: Any) -> None:
-        hs.plot.element_loops(run, hs.plot.panels(canvas, n, columns=columns, sharex=False))
-
-    return drawn(draw, 3.0 * columns + 1.0, 3.0 * rows)
+    return in_panels(run.signals["drift"].shape[1], lambda panels: hs.plot.element_loops(run, panels))

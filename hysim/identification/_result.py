@@ -295,7 +295,9 @@ class Identification(Stored):
             ],
             {
                 "residual": f"{self._residual_in_words()}, {self.residual.size} samples",
-                "loop width": f"{width.value:.4g}{width.bounds(', from {:.4g} to {:.4g}')}" if width else "",
+                "loop width": f"{width.value:.4g}{width.bounds(', from {:.4g} to {:.4g}')}{self._of_first}"
+                if width
+                else "",
                 "cross-validated": "" if np.isnan(self.cv_rmse) else f"rmse {self.cv_rmse:.4g}",
                 "search": self.message,
                 "choice": "" if self.choice is None else self.choice.in_words(),
@@ -318,7 +320,7 @@ class Identification(Stored):
         lines += [f"  residual: {self._residual_in_words()}"]
         if self.loop_width is not None:
             width = self.loop_width
-            lines.append(f"  loop width {width.value:.4g}{width.bounds('  [{:.4g}, {:.4g}]')}")
+            lines.append(f"  loop width{self._of_first} {width.value:.4g}{width.bounds('  [{:.4g}, {:.4g}]')}")
         if not np.isnan(self.cv_rmse):
             lines.append(f"  cross-validated rmse {self.cv_rmse:.4g}")
         lines += [
@@ -354,6 +356,10 @@ class Identification(Stored):
         lower, upper = self.intervals[name]
         ends = "" if np.isnan(lower) and np.isnan(upper) else f"  [{lower:.5g}, {upper:.5g}]"
         return f"  {name} = {self.estimates[name]:.6g}{_error_in_words(self.stderr[name])}{ends}"
+
+    @property
+    def _of_first(self) -> str:
+        return " of the first record" if len(self.models) > 1 else ""
 
     def _fit_in_words(self) -> str:
         return "fit not defined" if np.isnan(self.fit_percent) else f"fit {self.fit_percent:.2f} %"

@@ -20,6 +20,7 @@ _DRAWN = {"zoh": "steps-post", "foh": "default"}
 _MOST_NAMED = 8  # lines of a panel that a legend has room for
 _ELEMENTS_IN_A_ROW = 3
 _ARROW = 0.03  # its length along the input, of the span
+_LONGEST, _STEPS = 3.0, 10.0  # arrows, or median steps of the input: a longer step is no branch
 _FRACTILES = (0.16, 0.5, 0.84)
 _TABLES = {
     "pseudo_acceleration": "Pseudo-acceleration", "displacement": "Peak displacement", "ductility": "Ductility",
@@ -123,8 +124,9 @@ def history(result: InputOutput, axes: AxesLike | None = None, *, hold: str = "z
     """Draw output, input and, if there is one, memory against time, one over the other.
 
     `result` is a Record, a Simulation or anything with arrays `u` and `y`; without times they are drawn against the
-    sample's number. With two `axes` the memory z is left out. Models on the same `axes` differ by their lines. `hold`
-    is ``"zoh"``, which draws the input as steps, or ``"foh"``, straight lines. The result has shape (2,) or (3,).
+    sample's number. With two `axes` the memory z is left out. Models and further records on the same `axes` differ by
+    their lines. `hold` is ``"zoh"``, which draws the input as steps, or ``"foh"``, straight lines. The result has shape
+    (2,) or (3,).
 
     Examples
     --------
@@ -143,10 +145,12 @@ def history(result: InputOutput, axes: AxesLike | None = None, *, hold: str = "z
     thin = {"linewidth": 1.2} if result.u.size > MANY else {}
     n = 2 if z is None or (axes is not None and np.size(np.asarray(axes)) == 2) else 3
     with several(axes, n, height=2.1 if n == 2 else 1.9) as panels:
-        before = sum(drawn.get_color() != POINTS for drawn in panels[0].lines)  # models on the same Axes
-        measured = isinstance(result, Record)
-        panels[0].plot(t, result.y, **(joined(result.u.size) | thin if measured else line(before)))
-        panels[1].plot(np.append(t, end), np.append(result.u, result.u[-1]), color=MEASURED, drawstyle=_DRAWN[hold])
+        before = sum(drawn.get_color() != POINTS for drawn in panels[0].lines)  # on the same Axes, but the first record
+        is_further = isinstance(result, Record) and before < len(panels[0].lines)
+        is_grey = isinstance(result, Record) and not is_further
+        style = line(before) if is_further else {"color": MEASURED}
+        panels[0].plot(t, result.y, **(joined(result.u.size) | thin if is_grey else line(before)))
+        panels[1].plot(np.append(t, end), np.append(result.u, result.u[-1]), drawstyle=_DRAWN[hold], **style)
         if n == 3:
             panels[2].plot(t, z, **line(1))
         for ax, signal in zip(panels, "yuz", strict=False):
@@ -303,12 +307,15 @@ def spectrum(
 
 
 def _arrows(ax: Axes, result: InputOutput, colour: Any) -> None:
-    """An arrowhead where the input last crosses the middle of its span upwards, and one downwards."""
+    """An arrowhead where a branch last crosses the middle of the input's span upwards, and one downwards."""
     u, y = result.u, result.y
-    above = u >= 0.5 * (u.min() + u.max())
+    above, short = u >= 0.5 * (u.min() + u.max()), _ARROW * np.ptp(u)
+    longest = max(_LONGEST * short, _STEPS * float(np.median(np.abs(np.diff(u)))))
     style = {"arrowstyle": "-|>", "color": colour, "mutation_scale": 14, "shrinkA": 0, "shrinkB": 0}
-    for crossing in (above[1:] > above[:-1], above[1:] < above[:-1]):
-        for head in np.flatnonzero(crossing)[-1:] + 1:
-            far = np.abs(u[:head] - u[head]) >= _ARROW * np.ptp(u)
-            tail = np.flatnonzero(far)[-1] if far.any() else head - 1
-            ax.annotate("", xy=(u[head], y[head]), xytext=(u[tail], y[tail]), arrowprops=style)
+    for sign in (1, -1):
+        for head in np.flatnonzero(np.diff(above.astype(int)) == sign)[::-1] + 1:
+            far = np.flatnonzero(np.abs(u[:head] - u[head]) >= short)
+            tail = far[-1] if far.size else head - 1
+            if 0.0 < sign * (u[head] - u[tail]) <= longest:  # neither a turn nor a jump to the next reversal curve
+                ax.annotate("", xy=(u[head], y[head]), xytext=(u[tail], y[tail]), arrowprops=style)
+                break
