@@ -73,6 +73,11 @@ def test_identify_recovers_a_steel_and_a_steady_cycle_is_refused():
     truth = hs.MenegottoPinto.from_opensees(Fy=420.0, E0=200e3, b=0.02)
     fit = hs.identify(hs.MenegottoPinto, hs.Record(u=u, y=truth.response(u)), fixed={"cR1": 0.925, "cR2": 0.15})
     assert fit.estimates == pytest.approx(truth.scalars, rel=1e-6, abs=1e-6)
+    sharp = hs.Record(
+        u=u, y=hs.MenegottoPinto.from_opensees(Fy=420.0, E0=200e3, b=0.02, R0=400.0, cR1=0.99).response(u)
+    )
+    fit = hs.identify(hs.MenegottoPinto, sharp, fixed={"cR2": 0.15, "a1": 0.0, "a3": 0.0, "z0": 0.0})
+    assert (fit.success, fit.estimates["R0"], fit.fit_percent > 99.0) == (True, 25.0, True), fit.message
     with pytest.raises(ValueError, match="more than its initial force"):
         hs.identify(hs.MenegottoPinto, hs.Record(u=u, y=u), initial="periodic")
 
