@@ -284,7 +284,6 @@ class Identification(Stored):
     def __str__(self) -> str:
         free = [f"{name} {self.estimates[name]:.4g}{_error_in_words(self.stderr[name])}" for name in self.free_names]
         fixed = [f"{name} {value:.4g}" for name, value in self.estimates.items() if name not in self.free_names]
-        width = self.loop_width
         return summary_text(
             [
                 *(folded(self.unsafe, first="", indent="  ") if self.unsafe else []),
@@ -295,9 +294,7 @@ class Identification(Stored):
             ],
             {
                 "residual": f"{self._residual_in_words()}, {self.residual.size} samples",
-                "loop width": f"{width.value:.4g}{width.bounds(', from {:.4g} to {:.4g}')}{self._of_first}"
-                if width
-                else "",
+                "loop width": self._width_in_words(", from {:.4g} to {:.4g}"),
                 "cross-validated": "" if np.isnan(self.cv_rmse) else f"rmse {self.cv_rmse:.4g}",
                 "search": self.message,
                 "choice": "" if self.choice is None else self.choice.in_words(),
@@ -319,8 +316,7 @@ class Identification(Stored):
         lines += [f"  held: {', '.join(fixed)}"] if fixed else []
         lines += [f"  residual: {self._residual_in_words()}"]
         if self.loop_width is not None:
-            width = self.loop_width
-            lines.append(f"  loop width{self._of_first} {width.value:.4g}{width.bounds('  [{:.4g}, {:.4g}]')}")
+            lines.append(f"  loop width {self._width_in_words('  [{:.4g}, {:.4g}]')}")
         if not np.isnan(self.cv_rmse):
             lines.append(f"  cross-validated rmse {self.cv_rmse:.4g}")
         lines += [
@@ -357,9 +353,10 @@ class Identification(Stored):
         ends = "" if np.isnan(lower) and np.isnan(upper) else f"  [{lower:.5g}, {upper:.5g}]"
         return f"  {name} = {self.estimates[name]:.6g}{_error_in_words(self.stderr[name])}{ends}"
 
-    @property
-    def _of_first(self) -> str:
-        return " of the first record" if len(self.models) > 1 else ""
+    def _width_in_words(self, bounds: str) -> str:
+        """The width with its bounds in some words, and which record it is of; the empty text without a cycle."""
+        width, whose = self.loop_width, ", of the first record" * (len(self.models) > 1)
+        return f"{width.value:.4g}{width.bounds(bounds)}{whose}" if width else ""
 
     def _fit_in_words(self) -> str:
         return "fit not defined" if np.isnan(self.fit_percent) else f"fit {self.fit_percent:.2f} %"
