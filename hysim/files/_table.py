@@ -146,11 +146,8 @@ def column_of(key: str | int, columns: Sequence[Column]) -> Column:
     if not isinstance(key, str):
         require(0 <= operator.index(key) < len(columns), f"no column {key}, there are columns 0 to {len(columns) - 1}")
         return columns[key]
-    number = number_of(key, "columns", labels)
-    if number is None:
-        number = number_of(
-            "{} [{}]".format(*heading(key)), "columns", [f"{each.label} [{each.unit}]" for each in columns]
-        )
+    wanted = key if key in labels else "{} [{}]".format(*heading(key))
+    number = number_of(wanted, "columns", labels, [f"{column.label} [{column.unit}]" for column in columns])
     if number is None:
         raise ValueError(f"no column {key!r}, the columns are: {listed(labels)}{meant(key, labels)}")
     return columns[number]

@@ -32,10 +32,6 @@ class Width:
     lower: float
     upper: float
 
-    def bounds(self, words: str) -> str:
-        """The interval in some words; the empty text where it is not known."""
-        return words.format(self.lower, self.upper) if np.isfinite(self.lower) else ""
-
 
 @frozen
 class Profile:
@@ -110,8 +106,8 @@ class Choice:
         if self.undecided:
             words.append(f"only the BIC decides between it and {', '.join(self.undecided)}")
         if others:
-            more = f"{self.score[others[0]] / self.score[self.family]:.3g} times its error"
-            words.append(f"the next is {others[0]} with {'the same error' if more[:2] == '1 ' else more}")
+            more = f"{self.score[others[0]] / self.score[self.family]:.3g} times its"
+            words.append(f"the next is {others[0]} with {'the same' if more[:2] == '1 ' else more} error")
         for why in dict.fromkeys(self.passed_over.values()):
             names = ", ".join(name for name, reason in self.passed_over.items() if reason == why)
             words.append(f"passed over ({why}): {names}")
@@ -355,8 +351,10 @@ class Identification(Stored):
 
     def _width_in_words(self, bounds: str) -> str:
         """The width with its bounds in some words, and which record it is of; the empty text without a cycle."""
-        width, whose = self.loop_width, ", of the first record" * (len(self.models) > 1)
-        return f"{width.value:.4g}{width.bounds(bounds)}{whose}" if width else ""
+        if (width := self.loop_width) is None:
+            return ""
+        ends = bounds.format(width.lower, width.upper) if np.isfinite(width.lower) else ""
+        return f"{width.value:.4g}{ends}{', of the first record' * (len(self.models) > 1)}"
 
     def _fit_in_words(self) -> str:
         return "fit not defined" if np.isnan(self.fit_percent) else f"fit {self.fit_percent:.2f} %"

@@ -146,11 +146,10 @@ def history(result: InputOutput, axes: AxesLike | None = None, *, hold: str = "z
     n = 2 if z is None or (axes is not None and np.size(np.asarray(axes)) == 2) else 3
     with several(axes, n, height=2.1 if n == 2 else 1.9) as panels:
         before = sum(drawn.get_color() != POINTS for drawn in panels[0].lines)  # on the same Axes, but the first record
-        is_further = isinstance(result, Record) and before < len(panels[0].lines)
-        is_grey = isinstance(result, Record) and not is_further
-        style = line(before) if is_further else {"color": MEASURED}
-        panels[0].plot(t, result.y, **(joined(result.u.size) | thin if is_grey else line(before)))
-        panels[1].plot(np.append(t, end), np.append(result.u, result.u[-1]), drawstyle=_DRAWN[hold], **style)
+        is_record, is_first = isinstance(result, Record), before == len(panels[0].lines)
+        panels[0].plot(t, result.y, **(joined(result.u.size) | thin if is_record and is_first else line(before)))
+        style = {"color": MEASURED, "drawstyle": _DRAWN[hold]} | (line(before) if is_record and not is_first else {})
+        panels[1].plot(np.append(t, end), np.append(result.u, result.u[-1]), **style)
         if n == 3:
             panels[2].plot(t, z, **line(1))
         for ax, signal in zip(panels, "yuz", strict=False):
