@@ -109,7 +109,14 @@ def test_verbs_name_the_columns_that_a_table_lacks():
 
 @pytest.mark.parametrize(
     ("label", "parts"),
-    [("u", ("u", "")), (" u [V] ", ("u", "V")), ("a (b) (mm)", ("a (b)", "mm")), ("[V]", ("[V]", ""))],
+    [
+        *[(" u [V] ", ("u", "V")), ("a (b) (mm)", ("a (b)", "mm")), ("H/(A/m)", ("H", "A/m")), ("F / N", ("F", "N"))],
+        *[(label, tuple(label.split("/", 1))) for label in ("Ewe/V", "<I>/mA", "v/mm/s", "F/kN")],
+        *[
+            (name, (name, ""))
+            for name in ("u", "[V]", "dy/dt", "dQ/dV", "y/u", "a/b", "N/m", "1/s", "eta/%", "E/VReal")
+        ],
+    ],
 )
 def test_a_heading_is_a_name_and_a_unit(label, parts):
     assert heading(label) == parts

@@ -41,9 +41,10 @@ def test_what_the_caller_says_goes_before_what_the_file_says():
     assert (dict(rec.units), rec.name) == ({"u": "V", "y": "micrometre"}, "mine")
 
 
-@pytest.mark.parametrize("u", ["voltage", "voltage [V]", 1])
+@pytest.mark.parametrize("u", ["voltage", "voltage [V]", "voltage (V)", "voltage / V", 1])
 def test_a_column_is_chosen_by_name_or_number(u):
     assert load(LOOP, u=u, y=2).u.tolist() == [0, 5, 10]
+    assert load("0,1\n2,3\n", u=0, y=1).u.tolist() == [0, 2]  # without a header
 
 
 @pytest.mark.parametrize(
@@ -67,18 +68,9 @@ def test_the_layout_is_found(text, tmp_path):
     assert load(text, name="loop") == expected
 
 
-def test_blanks_between_columns_leave_units_with_their_names():
-    rec = load("voltage [V]  travel (um)\n0 1\n2 3\n", u="voltage", y="travel")
-    assert (rec.u.tolist(), dict(rec.units)) == ([0, 2], {"u": "V", "y": "um"})
-
-
 def test_a_delimiter_can_be_said():
     assert load("u|y,z\n0|1\n2|3\n", y="y,z", delimiter="|").y.tolist() == [1, 3]
     assert load("u y;z\n0 1\n2 3\n", y="y;z", delimiter=" ").y.tolist() == [1, 3]
-
-
-def test_a_file_without_a_header_has_columns_by_number():
-    assert load("0,1\n2,3\n", u=0, y=1).u.tolist() == [0, 2]
 
 
 GAPS = "u,y\n0,0\n1,1\n2,\n3,3\n4,nan\n5,5\n6,6\nNA,7\n"
@@ -106,9 +98,6 @@ def test_time_may_begin_again_after_a_gap():
 def test_thousands_are_read_where_they_can_mean_nothing_else(mark):
     rec = load(f"u;y\n-1{mark}000,5;1\n999,5;2\n12{mark}345{mark}678;3\n")
     assert rec.u.tolist() == [-1000.5, 999.5, 12345678.0]
-
-
-def test_a_comma_between_thousands_is_read_where_it_can_mean_nothing_else():
     assert load('u,y\n"1,000.5",1\n2.5,3\n').u.tolist() == [1000.5, 2.5]
 
 
@@ -117,9 +106,6 @@ def test_a_header_above_the_names_is_skipped_and_the_lines_keep_their_numbers():
     assert load(text.format(4), skip=3).y.tolist() == [2.0, 4.0]
     assert_refused("line 6, column 'y': expected a finite number, got 'O'", load, text.format("O"), skip=3)
     assert_refused(r"line 1 names 1 columns, .* pass its number of lines as skip=", load, text.format(4))
-
-
-def test_the_first_line_for_excel_names_the_delimiter():
     assert load("sep=;\nu;y\n0,5;1\n1,5;2\n").u.tolist() == [0.5, 1.5]
 
 
@@ -225,26 +211,22 @@ def test_a_decimal_comma_far_down_the_file_is_seen_or_can_be_said():
         '"u (V)","y (um)"\n0,1\n2,3\n',
         "u/V\ty / (um)\n0\t1\n2\t3\n",
         "u / V   y/um\n0 1\n2 3\n",
+        "u [V]  y (um)\n0 1\n2 3\n",
     ],
-    ids=["line of units", "two rows", "header before units", "savetxt", "matlab", "quoted", "quotient", "blanks"],
+    ids=[
+        "line of units",
+        "two rows",
+        "header before units",
+        "savetxt",
+        "matlab",
+        "quoted",
+        "quotient",
+        "blanks",
+        "brackets",
+    ],
 )
 def test_units_are_found_in_the_header_below_it_or_in_a_comment(text):
     assert dict(load(text).units) == {"u": "V", "y": "um"}
-
-
-@pytest.mark.parametrize(
-    ("heading", "name", "unit"),
-    [
-        *[("Ewe/V", "Ewe", "V"), ("<I>/mA", "<I>", "mA"), ("H / (A/m)", "H", "A/m"), ("v/mm/s", "v", "mm/s")],
-        *[("F/kN", "F", "kN"), ("Force / N", "Force", "N")],
-        *[(name, name, "") for name in ("dy/dt", "y/u", "a/b", "dQ/dV", "N/m", "mm/s", "1/s", "eta/%", "Ewe/VReal")],
-    ],
-)
-def test_what_follows_a_slash_is_a_unit_if_it_is_known(heading, name, unit):
-    text = f"k,{heading}\n0,1\n2,3\n"
-    assert hs.list_columns(io.StringIO(text))[1][:3] == (name, 1, unit)
-    for key in (name, heading):
-        assert load(text, u="k", y=key).units.get("y", "") == unit
 
 
 def test_a_text_beside_the_numbers_does_not_make_the_first_sample_a_header():

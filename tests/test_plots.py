@@ -82,13 +82,8 @@ def test_history_draws_the_held_input_as_steps_to_the_end_of_the_last_hold(recor
     assert lower.lines[0].get_drawstyle() == "steps-post"
     assert lower.lines[0].get_xdata()[-1] == len(record)
     assert upper.get_shared_x_axes().joined(upper, lower)
-
-
-def test_history_of_a_record_without_time_counts_samples(record):
-    untimed = hs.Record(u=record.u, y=record.y)
-    _, lower = hs.plot.history(untimed, hold="foh")
-    assert lower.get_xlabel() == "Sample"
-    assert lower.lines[0].get_drawstyle() == "default"
+    _, lower = hs.plot.history(hs.Record(u=record.u, y=record.y), hold="foh")  # without a time
+    assert (lower.get_xlabel(), lower.lines[0].get_drawstyle()) == ("Sample", "default")
 
 
 def test_traces_have_their_names_and_units():
