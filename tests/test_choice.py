@@ -125,7 +125,7 @@ def test_a_safe_family_that_is_not_clearly_worse_is_taken_behind_unsafe_ones(few
 
 
 def test_no_further_family_is_begun_after_the_time(few):
-    few(Line=hs.Line, Dahl=hs.Dahl, BoucWen=hs.BoucWen)
+    few(Line=hs.Line, Dahl=hs.Dahl, BoucWen=hs.BoucWen, Lag=hs.TransferFunction.structure(poles=1, zeros=0))
     choice = hs.identify(record_of(LAW), seconds=0.0).choice
     assert choice.family == "Line"
     assert choice.untried == ("Dahl", "BoucWen")

@@ -255,7 +255,7 @@ def of_any_family(
         beyond={each: float(errors[each][2]) for each in ranked},
         score={each: score[each] for each in ranked},
         bic=bic,
-        untried=tuple(each for each in names if each not in errors),
+        untried=tuple(each for each in names if each not in errors and each not in trials.refused),
         passed_over={each: why.partition(":")[0].partition(";")[0] for each, why in reasons.items()},
         amplitude=trials.amplitude,
         span=(min(float(each.u.min()) for each in records), max(float(each.u.max()) for each in records)),
