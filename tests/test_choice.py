@@ -189,6 +189,7 @@ test_what_needs_a_family_is_refused = refused(
     ((hs.BoucWen,), {}, "a model and a record, or a record alone"),
     (("bouc-wen",), {}, "a model and a record, or a record alone"),
     ((3,), {}, "takes a Record"),
+    ((hs.Record(u=np.ones(30), y=np.arange(30.0)),), {"seconds": 0.0}, "input is constant"),
     ((record_of(LAW),), {"fixed": {"n": 1.0}}, "fixed= is for one family"),
     ((record_of(LAW),), {"weights": np.ones(GROWING.size), "free": "n"}, "free=, weights= is for one family"),
     call=lambda arguments, options: hs.identify(*arguments, **options),

@@ -382,6 +382,8 @@ def _scores(errors: Mapping[str, FloatArray], size: float) -> dict[str, float]:
     """The geometric mean, over the kinds of parts that there are, of the errors over the least of each."""
     table = np.array([*errors.values()]) + _ROUNDING * size  # errors below rounding are equal
     is_kind = np.any(np.isfinite(table), axis=0, keepdims=True)[0]
+    if not is_kind.any():  # no fit succeeded: that of the first family says why
+        return dict.fromkeys(errors, math.inf)
     known = np.where(np.isnan(table), np.inf, table)[:, is_kind]
     weights = _WEIGHTS if is_kind[1] else _ALL_BEYOND
     with np.errstate(over="ignore"):
