@@ -323,6 +323,14 @@ def test_a_reference_out_of_reach_is_said_to_be(template, limits):
     assert np.isfinite(run.command).all()
 
 
+def test_the_integral_of_a_lightly_damped_mode_may_be_slower_than_the_record():
+    plant = hs.Actuator(
+        hysteresis=hs.Dahl(stiffness=8.0, coulomb=0.3) + hs.Line(slope=1.0), vibration=hs.mode(0.4, 0.01)
+    )
+    found = hs.tune(plant, T_STEP, STEP, controller=hs.PID(ki=0.2))
+    assert (found.success, found.controller.ki < 3e-4) == (True, True)
+
+
 def test_of_several_limits_the_worst_counts_and_the_first_is_returned():
     tight, free = (0.0, 1.3), None
     both = tuned("mode", limits=(tight, free))

@@ -248,7 +248,7 @@ OBJECTIVES: dict[str, Callable[[FloatArray], float]] = {
     "rms": lambda e: float(np.sqrt(np.mean(e**2))),
 }
 
-_SLOWEST = 1e-4  # crossover, in units of the highest
+_SLOWEST = 1e-4  # crossover, in units of the highest; again below that
 _CROSSOVERS = 12
 _STARTS = 2
 _EVALUATIONS = 120  # of the simulation, from each start
@@ -360,20 +360,22 @@ class _Search:
     trials: list[Trial] = field(default_factory=list)
 
     def starts(self) -> list[FloatArray]:
-        """Stable points of the linear rule, without those far beyond the bounds where there are others."""
-        rule = [*self.template.own(), *self.rule()]
-        each = [self.excess(*self.judge(self.template.controller(x))) for x in rule]
-        least = min(each, default=math.inf)
-        if least == math.inf:
-            raise ValueError("no controller of the linear rule makes the loop stable; is the sample time short enough?")
-        return [x for excess, x in zip(each, rule, strict=True) if excess <= max(1.0, least)]
+        """Stable points of the linear rule, without those far beyond the bounds where there are others.
 
-    def rule(self) -> list[FloatArray]:
-        """Points whose feedback has |L| = 1 at a crossover frequency."""
-        plant, h = self.plants[0], self.resting.sample_time
-        highest = math.pi / h
-        lowest = max(_SLOWEST * highest, 2.0 * math.pi / (self.reference.size * h))
-        points = []
+        Crossovers slower than the record are tried where no other is stable, as with a lightly damped mode.
+        """
+        highest = math.pi / self.resting.sample_time
+        lowest = highest * max(_SLOWEST, 2.0 / self.reference.size)
+        for low, high in ((lowest, highest), (_SLOWEST * lowest, lowest)):
+            rule = [*self.template.own(), *self.rule(low, high)]
+            each = [self.excess(*self.judge(self.template.controller(x))) for x in rule]
+            if (least := min(each, default=math.inf)) < math.inf:
+                return [x for excess, x in zip(each, rule, strict=True) if excess <= max(1.0, least)]
+        raise ValueError("no controller of the linear rule makes the loop stable; is the sample time short enough?")
+
+    def rule(self, lowest: float, highest: float) -> list[FloatArray]:
+        """Points whose feedback has |L| = 1 at a crossover frequency between two [rad/s]."""
+        plant, h, points = self.plants[0], self.resting.sample_time, []
         for crossover in np.geomspace(lowest, highest, _CROSSOVERS + 2)[1:-1]:
             at_crossover = LinearLoop(self.resting.plant, h, [crossover])
             for gains in self.template.shapes(float(crossover), plant.loop.resonances.imag / h):
