@@ -154,7 +154,7 @@ def in_units(group: Sequence[Case], version: str, place: Path) -> list[float]:
 def in_python(case: Case) -> float:
     """Seconds of the compiled step, called by its pointer."""
     if len(case.inputs) == 2:
-        command, u = np.empty(case.y.size), np.empty(case.y.size)
+        command, u = np.empty((1, case.y.size)), np.empty(case.y.size)
         step, parameters, state = case.thing.initial(SAMPLE_TIME)
         return runners.least_seconds(lambda: replay(step, parameters, state.copy(), *case.inputs, command, u))
     law, y = case.thing.startable(SAMPLE_TIME).started(float(case.inputs[0, 0])), np.empty(case.y.size)

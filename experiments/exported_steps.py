@@ -326,7 +326,7 @@ def case(family: str, kind: str, thing: Any, inputs: Array) -> Case:
     if len(inputs) == 2:
         program = program_of(thing, SAMPLE_TIME)
         step, parameters, state = thing.initial(SAMPLE_TIME)
-        command, u = np.empty(inputs.shape[1]), np.empty(inputs.shape[1])
+        command, u = np.empty((1, inputs.shape[1])), np.empty(inputs.shape[1])
         replay(step, parameters, state, inputs[0], inputs[1], command, u)
         return Case(family, kind, thing, program.source, False, False, program.parameters, program.state, inputs, u)
     model = startable(thing, SAMPLE_TIME)

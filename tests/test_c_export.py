@@ -155,7 +155,7 @@ def stepped(controller, reference, measurement, u0=0.0, y0=0.0):
     step, parameters, state = controller.initial(H, u0, y0)
     out = np.empty((2, reference.size))
     with np.errstate(all="ignore"):
-        replay(step, parameters, state, read_only(reference), read_only(measurement), out[0], out[1])
+        replay(step, parameters, state, read_only(reference), read_only(measurement), out[:1], out[1])
     return out
 
 

@@ -285,7 +285,7 @@ class PID(SampledController):
         if numbers.size != 4:
             raise ValueError(f"state must hold 4 numbers, as `start` gives them, got {numbers.size}")
         state_after = with_room(numbers, float(numbers[0]), rest, rest)
-        command, u = np.empty((2, r.size))
+        command, u = np.empty((1, r.size)), np.empty(r.size)
         step, parameters, _ = self.compiled(sample_time)
         kernels.replay(step, parameters, state_after, r, y, command, u)
         last, integral, derivative, weighted = state_after[:4].tolist()

@@ -19,7 +19,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from hysim._basics.frozen import FloatArray, Interval, NotNegative, Positive, check_whole, checked, vectors
+from hysim._basics.frozen import FloatArray, Interval, NotNegative, Positive, check_whole, checked, read_only, vectors
 from hysim._basics.printing import frozen_result, quantity, summary_text
 from hysim._basics.results import model_of
 from hysim.control._controller import SteppedController, begun, compiled_of, limits_of, preview
@@ -78,10 +78,9 @@ class LearningCondition(NamedTuple):
 
 
 class _Filters(NamedTuple):
-    """Taps of q and l for the samples -m to m around one, and the condition that they meet."""
+    """Taps of q, l and -a (3, 2 m + 1) for the samples -m to m around one, and the condition that they meet."""
 
-    low_pass: FloatArray
-    inverse: FloatArray
+    taps: FloatArray
     condition: LearningCondition
 
 
@@ -130,8 +129,8 @@ class _Learning(SteppedController):
         filters, inner = _filters(self, sample_time), self.controller.compiled(sample_time, u0, y0)
         samples, ahead = round(duration / sample_time), preview(self.controller, sample_time)
         # corrections are those of references ahead of their time, and errors are of the present
-        low_pass, inverse = np.pad(filters.low_pass, ahead), np.pad(filters.inverse, (2 * ahead, 0))
-        reach = low_pass.size // 2
+        taps = np.pad(filters.taps, ((0, 0), (ahead, ahead)))
+        taps[1], reach = np.roll(taps[1], ahead), taps.shape[1] // 2
         if abs(samples * sample_time - duration) > 1e-6 * duration:
             raise ValueError(f"a repetition of {duration:g} s is no whole number of samples of {sample_time:g} s")
         if is_trial and samples <= 3 * reach:
@@ -140,10 +139,10 @@ class _Learning(SteppedController):
             samples *= reach // samples + 1
         late = ahead + _delay(self.model) / sample_time
         full = math.floor(late + 1e-9)
-        room = (3 if is_trial else 2) * (samples if is_trial else samples + reach + 1)
+        room = 4 * samples if is_trial else 3 * (samples + reach + 1)
         head = [samples, reach, full, max(late - full, 0.0), float(is_trial), inner.state.size]
-        parameters = [np.array(head), low_pass, inverse, inner.state, inner.parameters]
-        state = [np.array([u0, 0.0, 0.0]), np.full(full + 2, y0), np.zeros(room), inner.state]
+        parameters = [head, taps.ravel(), inner.state, inner.parameters]
+        state = [[u0, 0.0], np.full(full + 2, y0), np.zeros(room), inner.state]
         return compiled_of(_bound(inner.step), parameters, state)
 
 
@@ -229,22 +228,29 @@ class IterativeLearning(_Learning):
             raise ValueError("a controller that counts trials needs their duration=; learn() runs them without")
         return self._compiled(self.duration, True, positive_time(sample_time), u0, y0)
 
-    def following(self, correction: npt.ArrayLike, error: npt.ArrayLike, sample_time: float) -> FloatArray:
+    def following(
+        self, correction: npt.ArrayLike, error: npt.ArrayLike, sample_time: float, unreached: npt.ArrayLike = 0.0
+    ) -> FloatArray:
         """Correction (n,) for the next trial from that of one and its error (n,) [unit of y].
 
         The error is the reference, as the sensor reads it, minus the measurement; where it is not finite it is zero.
+        `unreached` (n,) is the part of the feed-forward's drive that its law cannot reach within the limits.
         """
-        filters, (c, e) = _filters(self, positive_time(sample_time)), np.broadcast_arrays(correction, error)
-        c, e, following = np.array(c, dtype=float), np.where(np.isfinite(e), e, 0.0), np.empty(c.size)
-        learning.renew(filters.low_pass, filters.inverse, c, e, following)
+        signals = np.stack(np.broadcast_arrays(correction, error, unreached)).astype(float)
+        signals[1:][~np.isfinite(signals[1:])] = 0.0
+        following = np.empty(signals.shape[1])
+        learning.renew(_filters(self, positive_time(sample_time)).taps.ravel(), signals.ravel(), following)
         return following
 
-    def _commands(self, r: FloatArray, sample_time: float, u0: float | None) -> FloatArray:
+    def _commands(
+        self, r: FloatArray, sample_time: float, u0: float | None, measurement: FloatArray | None = None
+    ) -> tuple[FloatArray, FloatArray]:
+        """Commands for a reference, and what their law cannot reach, as of `following`."""
         ahead = known_ahead(self.controller, r, sample_time)
-        compiled = begun(self.controller, sample_time, (self.u0 or 0.0) if u0 is None else u0, float(r[0]))
-        commands = np.empty((2, r.size))
-        controllers.replay(compiled.step, compiled.parameters, compiled.state, ahead, ahead, *commands)
-        return np.asarray(commands)
+        step, parameters, state = begun(self.controller, sample_time, self.u0 or 0.0 if u0 is None else u0, float(r[0]))
+        places, u = np.empty((2, r.size)), np.empty(r.size)
+        controllers.replay(step, parameters, state, ahead, ahead if measurement is None else measurement, places, u)
+        return u, np.append(np.zeros(preview(self.controller, sample_time)), places[1])[: r.size]
 
     def learn(
         self,
@@ -286,7 +292,7 @@ class IterativeLearning(_Learning):
         """
         check_whole(trials, "trials")
         times, r, h = sampled(t, reference)
-        lead = _filters(self, h).low_pass.size // 2
+        lead = _filters(self, h).taps.shape[1] // 2
         rest = RestingPlant(as_actuator(self.model), h, self.u0 if u0 is None else u0).y0
         rising = 0.5 - 0.5 * np.cos(np.linspace(0.0, math.pi, lead))
         times = times[0] + h * np.arange(-lead, r.size + 2 * lead)
@@ -294,15 +300,13 @@ class IterativeLearning(_Learning):
         c = np.zeros(r.size) if correction is None else vectors(correction=correction, t=times)[0]
         read = np.interp(times - _delay(self.model), times, r)
         corrections, measurements, commands = np.empty((3, trials, r.size))
-        shown = np.ones(2 + math.ceil(_delay(self.model) / h))  # samples in which the sensor may show a limit
         for k in range(trials):
             corrections[k] = c
             with warnings.catch_warnings():
                 if k < trials - 1:
                     warnings.simplefilter("ignore", HysimWarning)
-                measurements[k], wanted, commands[k] = self._measured(trial, times, r + c, u0, k, k == trials - 1)
-            limited = np.convolve(wanted != commands[k], shown)[: r.size] > 0.0
-            c = self.following(c, np.where(limited, 0.0, read - measurements[k]), h)
+                measurements[k], commands[k], unreached = self._measured(trial, times, r + c, u0, k, k == trials - 1)
+            c = self.following(c, read - measurements[k], h, unreached)
         return LearnedTrials(
             t=times,
             reference=r,
@@ -316,24 +320,25 @@ class IterativeLearning(_Learning):
     def _measured(
         self, trial: Any, t: FloatArray, r: FloatArray, u0: float | None, number: int, is_last: bool
     ) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Measurement of a trial, and its commands before and after the limits; the last one warns as a loop does."""
+        """Measurement of a trial, its commands, and what they do not reach; the last one warns as a loop does."""
         if callable(trial):
-            before, after = (r, r) if is_fed_back(self.controller) else self._commands(r, float(t[1] - t[0]), u0)
-            measurement = np.array(trial(after), dtype=float)
+            u, unreached = (r, 0.0 * r) if is_fed_back(self.controller) else self._commands(r, float(t[1] - t[0]), u0)
+            measurement = np.array(trial(u), dtype=float)
             if measurement.shape != r.shape:
                 raise ValueError(f"trial must return a measurement of shape {r.shape}, got {measurement.shape}")
             if np.isnan(measurement).all():
                 raise ValueError("trial must return a measurement that is not nan throughout")
-            return measurement, before, after
-        plant = model_of(trial)
+            return measurement, u, unreached
+        plant, (_, reference, h) = model_of(trial), sampled(t, r)
         if not isinstance(plant, Structure) and (sensor := as_actuator(plant).sensor) is not None:
             plant = replace(as_actuator(plant), sensor=replace(sensor, seed=sensor.seed + number))
         if is_last or isinstance(plant, Structure):
             run: Any = close_loop(plant, self.controller, t, r, u0=u0)
         else:
-            _, reference, h = sampled(t, r)
             run = RestingPlant(as_actuator(plant), h, u0).run(self.controller, reference)
-        return run.measurement, run.command, run.drive
+        limited = (run.command != run.drive).any()
+        unreached = self._commands(r, h, u0, read_only(run.measurement, finite=False))[1] if limited else 0.0 * r
+        return run.measurement, run.drive, unreached
 
 
 @frozen_result
@@ -384,22 +389,25 @@ def _filters(learner: _Learning, sample_time: float) -> _Filters:
     response = functools.partial(_response, learner.controller, actuator, slope, sample_time)
     nominal = response(0.5 * sum(slopes), 1.0)
     plants = np.stack([response(*each) for each in itertools.product(sorted(extremes), sorted(speeds))])
-    ideal = np.conj(nominal) / (np.abs(nominal) ** 2 + (_DAMPED * abs(nominal[0])) ** 2)
+    taps = learner.controller.taps(sample_time)[0] if isinstance(learner.controller, TrackingController) else [1.0]
+    drive = np.fft.rfft(taps, _LENGTH)
+    ideal, from_drive = (np.conj(to) / (np.abs(to) ** 2 + (_DAMPED * abs(to[0])) ** 2) for to in (nominal, drive))
+    inverses = np.stack([learner.gain * ideal, -from_drive])
     late = math.ceil(_delay(learner.model) / sample_time)
     doubtful = np.flatnonzero(np.abs(1.0 - ideal * plants).max(axis=0) > _TRUSTED)
     edge = doubtful[0] / nominal.size if doubtful.size else 1.0
     highest = min(edge / (1.0 + 0.5 * _TRANSITION), _HIGHEST) * math.pi / sample_time
     for cutoff in highest * _NARROWER ** np.arange(_TRIES) if learner.cutoff is None else [learner.cutoff]:
-        filters = _with_cutoff(float(cutoff), learner.gain * ideal, plants, late, sample_time, slopes)
+        filters = _with_cutoff(float(cutoff), inverses, plants, late, sample_time, slopes)
         if filters.condition.rate < 1.0 - _LEARNS * learner.gain:
             break
     return filters
 
 
 def _with_cutoff(
-    cutoff: float, inverse: Spectrum, plants: Spectrum, late: int, sample_time: float, slopes: tuple[float, float]
+    cutoff: float, inverses: Spectrum, plants: Spectrum, late: int, sample_time: float, slopes: tuple[float, float]
 ) -> _Filters:
-    """Taps of a low pass, and of it times the inverse, and what they leave of the error."""
+    """Taps of a low pass, and of it times the inverses, and what they leave of the error."""
     from scipy.signal import firwin, kaiser_beta, kaiserord
 
     corner = cutoff * sample_time / math.pi
@@ -412,12 +420,12 @@ def _with_cutoff(
         )
     taps = np.pad(firwin(2 * half + 1, corner, window=("kaiser", kaiser_beta(_RIPPLE))), reach - half)
     low_pass = _spectrum(taps)
-    learns = np.fft.irfft(low_pass * inverse, _LENGTH)[-np.arange(-reach, reach + 1)]
-    rates = np.abs(low_pass - _spectrum(learns) * plants).max(axis=0)
+    inverted = np.fft.irfft(low_pass * inverses, _LENGTH)[:, -np.arange(-reach, reach + 1)]
+    rates = np.abs(low_pass - _spectrum(inverted[0]) * plants).max(axis=0)
     worst = int(np.argmax(rates))
     frequency = 2.0 * math.pi * worst / (_LENGTH * sample_time)
     condition = LearningCondition(float(rates[worst]), frequency, cutoff, slopes)
-    return _Filters(taps, np.ascontiguousarray(learns), condition)
+    return _Filters(np.vstack([taps, inverted]), condition)
 
 
 def _spectrum(taps: FloatArray) -> Spectrum:

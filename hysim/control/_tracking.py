@@ -116,7 +116,7 @@ class InverseFeedforward(WithoutFeedback):
     def compiled(self, sample_time: float, u0: float = 0.0, y0: float = 0.0) -> CompiledController:
         inverse, parameters, state = self.block(sample_time, u0)
         step = _with_inverse(kernels.invert, inverse)
-        return CompiledController(step, read_only(parameters, finite=False), np.append(u0, state))
+        return CompiledController(step, read_only(parameters, finite=False), np.append([u0, 0.0], state))
 
     def block(self, sample_time: float, u0: float, commands: Interval = (-math.inf, math.inf)) -> CompiledLaw:
         """Compiled inverse at rest at the command `u0`, for commands within these limits."""
@@ -245,7 +245,7 @@ class TrackingController(SampledController):
     def compiled(self, sample_time: float, u0: float = 0.0, y0: float = 0.0) -> CompiledController:
         positive_time(sample_time)
         lowest, highest = self.limits or (-math.inf, math.inf)
-        taps = self._taps(sample_time)
+        taps = self.taps(sample_time)
         counts, plant, plant_state = self._model_blocks(sample_time, u0)
         feedback = (self.feedback or PID()).compiled(sample_time, u0 if self.feedforward is None else 0.0, y0)
         forward = _NOTHING if self.feedforward is None else self.feedforward.block(sample_time, u0, (lowest, highest))
@@ -255,7 +255,7 @@ class TrackingController(SampledController):
             0.0 * _THROUGH if self.damping is None else self.damping.coefficients(sample_time),
         ]
         parameters = [np.array(head), taps.ravel(), plant, feedback.parameters, *filters, forward.parameters]
-        state = [np.array([u0]), np.full(taps.shape[1], y0), plant_state, feedback.state, np.zeros(4), forward.state]
+        state = [[u0, 0.0], np.full(taps.shape[1], y0), plant_state, feedback.state, np.zeros(4), forward.state]
         return compiled_of(_with_inverse(kernels.track, forward.step), parameters, state)
 
     @property
@@ -265,7 +265,7 @@ class TrackingController(SampledController):
     def _shaped(self, sample_time: float) -> FloatArray:
         return np.ones(1) if self.shaper is None else self.shaper.impulses(sample_time)
 
-    def _taps(self, sample_time: float) -> FloatArray:
+    def taps(self, sample_time: float) -> FloatArray:
         """Weights of the reference, the newest first, for the feed-forward and for the feedback."""
         shaped = self._shaped(sample_time)
         inverted = np.ones(1) if self.mode_inverse is None else self.mode_inverse.weights(sample_time)

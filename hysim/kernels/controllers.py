@@ -27,6 +27,7 @@ from hysim.kernels._compile import borrowed, signed_kernel
 from hysim.kernels.stepping import CONSTANTS, VECTOR
 
 ControllerStep = Callable[[FloatArray, FloatArray, float, float], float]
+SIGNALS = types.Array(float64, 2, "C")
 CONTROLLER = types.FunctionType(float64(CONSTANTS, VECTOR, float64, float64))
 
 LARGEST = 1e100  # of a signal: its cube is finite, and so is its product with any sensible gain
@@ -102,18 +103,22 @@ def guarded(
     return float(held[2])
 
 
-@signed_kernel(int64(CONTROLLER, CONSTANTS, VECTOR, CONSTANTS, CONSTANTS, VECTOR, VECTOR))
+@signed_kernel(int64(CONTROLLER, CONSTANTS, VECTOR, CONSTANTS, CONSTANTS, SIGNALS, VECTOR))
 def replay(
     controller: ControllerStep,
     parameters: FloatArray,
     state: FloatArray,
     reference: FloatArray,
     measurement: FloatArray,
-    command: FloatArray,
+    places: FloatArray,
     u: FloatArray,
 ) -> int:
-    """Commands and voltages of a controller for recorded references and measurements; 0."""
+    """Voltages of a controller for recorded references and measurements, and the first places of its state; 0.
+
+    `places` are one row for each place, the first of which is the command.
+    """
     for k in range(reference.size):
         u[k] = guarded(controller, parameters, state, reference[k], measurement[k])
-        command[k] = state[0]
+        for i in range(len(places)):
+            places[i, k] = state[i]
     return 0

@@ -57,10 +57,9 @@ from numba import float64, int64, types, void
 
 from hysim._basics.frozen import FloatArray
 from hysim.kernels._compile import borrowed, by_address, inlined, signed_closure, signed_kernel
-from hysim.kernels.controllers import CONTROLLER, LARGEST, ControllerStep, guarded
+from hysim.kernels.controllers import CONTROLLER, LARGEST, SIGNALS, ControllerStep, guarded
 from hysim.kernels.stepping import CONSTANTS, START, STEP, VECTOR, Start, Step
 
-SIGNALS = types.Array(float64, 2, "C")
 INPUTS = types.Array(float64, 2, "C", readonly=True)
 CONSTANT_ROWS = INPUTS
 LOST = types.Array(int64, 1, "C")

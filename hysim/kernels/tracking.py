@@ -15,7 +15,7 @@ are those of `hysim.kernels.loop`, its rings of past values kept with the newest
 
 The inverse of the law is a step (`hysim.kernels.inverses`); `bound` makes a controller of a kernel and this step.
 The parameters are a head and blocks one behind the other, in the order in which the kernel takes them; so is the
-state, which begins with the command before the limits.
+state, which begins with the command before the limits, and the part of d that the law does not reach within them.
 
 The parts are functions that are inlined into one kernel, and not steps behind pointers: each link of a chain of
 pointers is a closure that no cache holds, 0.3 s of compilation in every process, and a chain of four (shaper, PID,
@@ -35,6 +35,7 @@ from hysim.kernels.loop import advance, output
 from hysim.kernels.stepping import CONSTANTS, STEP, VECTOR, Step
 
 N_HEAD = 10
+N_PLACES = 2  # of the state: the command before the limits, and the part of the reference out of reach of the law
 N_FEEDFORWARD = 4
 
 BoundStep = Callable[[Any, FloatArray, FloatArray, float, float], float]
@@ -68,8 +69,11 @@ def biquad(coefficients: FloatArray, state: FloatArray, x: float) -> float:
 
 
 @inlined
-def feed_forward(inverse: Step, parameters: FloatArray, state: FloatArray, drive: float) -> tuple[float, float, float]:
-    """Command that takes creep and law together to `drive`, the one within the limits, and the law's output there.
+def feed_forward(
+    inverse: Step, parameters: FloatArray, state: FloatArray, drive: float
+) -> tuple[float, float, float, float]:
+    """Command that takes creep and law together to `drive`, the one within the limits, the law's output there, and
+    the part of `drive` that this does not reach.
 
     `parameters` are (gain and offset of the amplifier, elements of the creep, its 1 / (g_0 - sum w_i e_i), w_i, e_i,
     parameters of the inverse); `state` is (q_i, state of the inverse).
@@ -81,20 +85,20 @@ def feed_forward(inverse: Step, parameters: FloatArray, state: FloatArray, drive
     for i in range(elements):
         drive -= weights[i] * (positions[i] + declines[i] * positions[i])
     u = inverse(own, law, drive * parameters[3])
-    reached = law[0]
+    reached, short = law[0], drive - law[1] / parameters[3]
     if math.isnan(u) and (reached == own[0] or reached == own[1]):
         beyond = _JUST * abs(reached) + _TINY
         u = reached + (beyond if reached == own[1] else -beyond)
     for i in range(elements):
         positions[i] += declines[i] * (positions[i] - law[1])
     limited = math.nan if math.isnan(u) else reached
-    return (u - offset) / gain, (limited - offset) / gain, law[1]
+    return (u - offset) / gain, (limited - offset) / gain, law[1], short
 
 
 @kernel
 def invert(inverse: Step, parameters: FloatArray, state: FloatArray, reference: float, measurement: float) -> float:
-    """The command of a feed-forward alone; `state` is the last command before the limits, then its own."""
-    state[0], limited, _ = feed_forward(inverse, parameters, state[1:], reference)
+    """The command of a feed-forward alone; `state` is as that of `track`, then its own."""
+    state[0], limited, _, state[1] = feed_forward(inverse, parameters, state[N_PLACES:], reference)
     return float(limited)
 
 
@@ -108,7 +112,7 @@ def track(inverse: Step, parameters: FloatArray, state: FloatArray, reference: f
     parameters, state = borrowed(parameters), borrowed(state)
     lowest, highest, taps = parameters[0], parameters[1], int(parameters[2])
     feeds_forward, has_model, has_part = parameters[3] > 0.0, parameters[4] > 0.0, parameters[9] > 0.0
-    p, s = N_HEAD, 1
+    p, s = N_HEAD, N_PLACES
     ring = state[s : s + taps]
     push(ring, reference)
     drive, target = dot(parameters[p : p + taps], ring), dot(parameters[p + taps : p + 2 * taps], ring)
@@ -137,7 +141,7 @@ def track(inverse: Step, parameters: FloatArray, state: FloatArray, reference: f
 
     wanted = total = command
     if feeds_forward:
-        forward, limited, level = feed_forward(inverse, parameters[p:], state[s:], drive)
+        forward, limited, level, state[1] = feed_forward(inverse, parameters[p:], state[s:], drive)
         wanted += forward
         total += limited
         push(past, level)
