@@ -70,7 +70,7 @@ def _fits(ax: Any, discovery: Any) -> None:
 _FIGURES: dict[str, tuple[str, Callable[[Any, Any], object]]] = {
     "Record": ("output against input", lambda ax, record: plot.loop(record, ax=ax)),
     "Simulation": ("output against input", lambda ax, run: run.u.size > 1 and plot.loop(run, ax=ax)),
-    "ClosedLoop": ("reference and displacement against time", lambda ax, run: plot.response(run, ax)),
+    "ClosedLoop": ("reference and output against time", lambda ax, run: plot.response(run, ax)),
     "Identification": ("residual of each sample", _residual),
     "Comparison": ("the record, and the best model over it", _best_loop),
     "Discovery": ("fit against the number of terms", _fits),

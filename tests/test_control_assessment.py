@@ -273,7 +273,7 @@ test_wrong_arguments_are_named = refused(
     (assess_hysteresis, LAW, TRIANGLE | {"high": -1.0}, "high must be above low, .* got low 0.0 and high -1.0"),
     (assess_hysteresis, LAW, TRIANGLE | {"sample_time": 0.4}, "samples_per_cycle must be even, .* got 25"),
     (assess_hysteresis, LAW, TRIANGLE | {"cycles": 0}, "at least 1, got 0"),
-    (assess_hysteresis, hs.Line(slope=0.0), TRIANGLE, "gain is 0.0: no voltage drives it"),
+    (assess_hysteresis, hs.Line(slope=0.0), TRIANGLE, "gain is 0.0: no input drives it"),
     (assess_hysteresis, hs.Stop(threshold=0.1), TRIANGLE, "no steady cycle has its span"),
     (assess_step, INTEGRATOR, ONE_STEP, "gain is inf"),
     (assess_square_wave, LAG, WAVE | {"period": 1.03}, "whole number of samples"),

@@ -269,11 +269,11 @@ def test_a_response_shows_the_measurement_where_it_differs():
     lag, t = hs.TransferFunction(num=(1.0,), den=(1.0, 1.0)), np.arange(0.0, 2.0, 0.1)
     run = hs.close_loop(lag, hs.PID(kp=2.0), t, np.ones(t.size), units={"t": "s", "y": "um"})
     ax = hs.plot.response(run, hs.plot.figure().add_subplot())
-    assert [line.get_label() for line in ax.get_lines()] == ["reference", "displacement"]
+    assert [line.get_label() for line in ax.get_lines()] == ["reference", "output"]
     assert (ax.get_xlabel(), ax.get_ylabel()) == ("Time [s]", "Displacement [µm]")
     noisy = dataclasses.replace(run, measurement=run.y + 0.1)
     lines = hs.plot.response(noisy, hs.plot.figure().add_subplot()).get_lines()
-    assert [line.get_label() for line in lines] == ["reference", "displacement", "measurement"]
+    assert [line.get_label() for line in lines] == ["reference", "output", "measurement"]
     assert np.array_equal(lines[2].get_ydata(), run.y + 0.1)
 
 

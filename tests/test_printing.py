@@ -69,7 +69,7 @@ def test_every_result_says_what_matters_in_ten_lines():
         text = str(result)
         assert len(text.splitlines()) <= LINES
         assert max(map(len, text.splitlines())) <= LETTERS
-        assert "array(" not in text
+        assert not any(word in text for word in ("array(", "voltage", "displacement"))  # a field drives a core
         for word in wanted:
             assert word in text, (word, text)
         assert result._repr_mimebundle_() == {"text/plain": text}

@@ -282,7 +282,7 @@ def test_the_bounds_hold_on_the_variations_too():
     assert quiet.success
     assert 0.0 < quiet.voltage_noise <= 0.3 * found.voltage_noise
     assert all(trial.voltage_noise <= 0.3 * found.voltage_noise for trial in quiet.trade_off)
-    assert "voltage noise" in quiet.message
+    assert "noise of the command" in quiet.message
 
 
 def test_a_resonance_at_which_nobody_crosses_over_gets_a_pid_with_its_zeros_there():
@@ -358,8 +358,8 @@ def test_a_loop_starts_from_its_resting_voltage():
 
 
 test_wrong_arguments_are_named = refused(
-    ((MODE, T_STEP, 0.0 * STEP), {}, "resting displacement 0: nothing to follow"),
-    ((MODE, T_STEP, STEP), {"u0": 1.0}, "resting displacement 1: nothing to follow"),
+    ((MODE, T_STEP, 0.0 * STEP), {}, "output at rest 0: nothing to follow"),
+    ((MODE, T_STEP, STEP), {"u0": 1.0}, "output at rest 1: nothing to follow"),
     ((MODE, T_STEP, STEP), {"objective": "ise"}, "objective must be one of itae, rms, got 'ise'"),
     ((MODE, T_STEP, STEP), {"max_sensitivity": 1.0}, "max_sensitivity must be above one, got 1.0"),
     ((MODE, T_STEP, STEP), {"max_sensitivity": np.nan}, "max_sensitivity must be above one, got nan"),

@@ -254,7 +254,7 @@ class HysteresisAssessment:
             "tracking rms": f"open {self.open_tracking_rms:.4g}, {drive} {quantity(self.tracking_rms, y)}",
             "closure gap": quantity(self.closure_gap, y),
             "secant gain": f"{self.secant_gain:.4g}",
-            "voltage": extent(self.closed.u, self.closed.units.get("u", "")),
+            "input": extent(self.closed.u, self.closed.units.get("u", "")),
         }
         return summary_text(lines, rows)
 
@@ -280,7 +280,7 @@ class StepAssessment:
         u, y = (self.closed.units.get(signal, "") for signal in "uy")
         ends = f"from {self.closed.y[0]:.4g} to {quantity(self.closed.reference[-1], y)}"
         rows = {"at a limit": f"{self.loop.limited_percent:.3g} % of the samples", "not stable": self.loop.message}
-        return summary_text([f"StepAssessment {ends}, voltage {extent(self.closed.u, u)}", f"  {self.reduction}"], rows)
+        return summary_text([f"StepAssessment {ends}, input {extent(self.closed.u, u)}", f"  {self.reduction}"], rows)
 
 
 @frozen_result

@@ -87,13 +87,13 @@ class ClosedLoop:
         lines = [f"ClosedLoop: {self.t.size} samples to {quantity(self.t[-1], t)}, tracking rms {quantity(rms, y)}"]
         rows = {
             "reference": extent(self.reference, y),
-            "displacement": extent(self.y, y),
-            "voltage": f"{extent(self.u, u)}, limited at {conditions.get('limited_samples', 'unknown')} samples",
+            "output": extent(self.y, y),
+            "input": f"{extent(self.u, u)}, limited at {conditions.get('limited_samples', 'unknown')} samples",
             "plant": in_brief(conditions["plant"]) if "plant" in conditions else "",
             "controller": in_brief(conditions["controller"]) if "controller" in conditions else "",
             "conditions": ", ".join(
                 f"{name.replace('_', ' ')} {conditions[name]:.4g}" for name in _SHOWN if conditions.get(name)
-            ),
+            ).replace("voltage", "input"),
         }
         return summary_text(lines, rows)
 
@@ -450,7 +450,7 @@ def _steady(actuator: Actuator, u: FloatArray) -> tuple[FloatArray, FloatArray]:
 def _usable(gain: float) -> float:
     if not (math.isfinite(gain) and gain != 0.0):
         raise ValueError(
-            f"the plant's gain is {gain}: no voltage drives it along the reference, as where it integrates; if its law "
+            f"the plant's gain is {gain}: no input drives it along the reference, as where it integrates; if its law "
             "is unsafe on smaller cycles, identify it with admissible=True, or take a sum of plays"
         )
     return gain

@@ -309,7 +309,7 @@ def limit_cycle(
         tail, slower = held // 4, math.exp(-0.5 * decay * (held // 4))
         volts, far = _swing(signals.drive, tail, slower), _swing(signals.y, tail, slower)
         if _too_large(resting, controller, volts, far, asked):
-            return f"is in a limit cycle of {volts:.3g} in the command and {far:.3g} in the displacement"
+            return f"is in a limit cycle of {volts:.3g} in the command and {far:.3g} in the output"
         volts, far = (float(np.ptp(signal[-2 * tail :])) for signal in (signals.drive, signals.y))
         if held == longest or not _too_large(resting, controller, volts, far, asked):
             return ""

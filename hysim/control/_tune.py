@@ -212,7 +212,7 @@ class Tuning:
             "controller": in_brief(self.controller),
             "sensitivity": f"at most {self.max_sensitivity:.4g}",
             "margins": f"gain {self.gain_margin:.4g}, phase {self.phase_margin:.4g} degrees",
-            "noise": f"{self.voltage_noise:.4g} rms of voltage" if self.voltage_noise else "",
+            "noise": f"{self.voltage_noise:.4g} rms of the command" if self.voltage_noise else "",
             "search": self.message,
         }
         return summary_text(lines, rows)
@@ -320,7 +320,7 @@ def tune(
         raise ValueError(f"transient must lie within the record, from 0 on, got {transient}")
     cycle = np.append(resting.y0, r)
     if np.ptp(cycle) == 0.0:
-        raise ValueError(f"the reference stays at the resting displacement {resting.y0:g}: nothing to follow")
+        raise ValueError(f"the reference stays at the output at rest {resting.y0:g}: nothing to follow")
     if not max_sensitivity > 1.0:
         raise ValueError(f"max_sensitivity must be above one, got {max_sensitivity}")
     check_positive(max_voltage_noise=max_voltage_noise)
@@ -364,8 +364,9 @@ class _Search:
 
         Crossovers slower than the record are tried where no other is stable, as with a lightly damped mode.
         """
-        highest = math.pi / self.resting.sample_time
-        lowest = highest * max(_SLOWEST, 2.0 / self.reference.size)
+        h = self.resting.sample_time
+        highest = math.pi / h
+        lowest = max(_SLOWEST * highest, 2.0 * math.pi / (self.reference.size * h))
         for low, high in ((lowest, highest), (_SLOWEST * lowest, lowest)):
             rule = [*self.template.own(), *self.rule(low, high)]
             each = [self.excess(*self.judge(self.template.controller(x))) for x in rule]
@@ -424,7 +425,7 @@ class _Search:
         gains, phases = np.array([loop.margins(best.controller, slope) for loop, slope in self.loops()]).T
         signals = self.resting.attempt(best.controller, self.reference)
         limited = np.count_nonzero(signals.drive != signals.command)
-        noise = f", voltage noise {best.voltage_noise:.2g} of {self.max_voltage_noise:g}"
+        noise = f", noise of the command {best.voltage_noise:.2g} of {self.max_voltage_noise:g}"
         return Tuning(
             **vars(best),
             gain_margin=nearest_to_one(gains),
@@ -435,7 +436,7 @@ class _Search:
             message=(
                 f"{len(self.trials)} loops simulated; sensitivity {best.max_sensitivity:.2f} of "
                 f"{self.max_sensitivity:g} allowed{noise if self.max_voltage_noise < math.inf else ''}; "
-                f"the voltage is limited at {limited} of {self.reference.size} samples"
+                f"the command is limited at {limited} of {self.reference.size} samples"
             ),
         )
 

@@ -251,7 +251,7 @@ def traces(
 
 
 def response(run: ClosedLoop, ax: Axes | None = None) -> Axes:
-    """Draw reference and displacement of a closed loop against time, and the measurement where it differs.
+    """Draw reference and output of a closed loop against time, and the measurement where it differs.
 
     `run` is a result of `hysim.close_loop`, or anything with t, reference, y, measurement, shape (n,), and units.
 
@@ -263,7 +263,7 @@ def response(run: ClosedLoop, ax: Axes | None = None) -> Axes:
     >>> hs.plot.response(run, hs.plot.figure().add_subplot()).get_ylabel()
     'Displacement [µm]'
     """
-    series = {"reference": (run.t, run.reference), "displacement": (run.t, run.y)}
+    series = {"reference": (run.t, run.reference), "output": (run.t, run.y)}
     if not np.array_equal(run.measurement, run.y):
         series["measurement"] = (run.t, run.measurement)
     return traces(series, ax, units=run.units)
