@@ -340,6 +340,12 @@ def test_gains_are_tuned_within_the_bounds(run):
     assert document["controller"]["parameters"]["feedback"]["parameters"]["ki"] > 0.0
 
 
+def test_control_of_a_law_that_runs_away_says_which_option_makes_it_safe(run, tmp_path):
+    hs.save(hs.BoucWen(beta=-0.02, gamma=0.01, feedthrough=0.03, gain=-0.01), tmp_path / "law.json")
+    code, _, error = run("control", tmp_path / "law.json", "--limits", "0,125", "--sample-time", "1e-3")
+    assert (code, "identify it with hysim identify --admissible yes" in error) == (2, True)
+
+
 def test_control_names_the_quantities_that_drive_and_takes_them_in_the_units_of_the_model(run, tmp_path):
     u = hs.signals.triangle(0.0, 100.0, cycles=2, samples_per_cycle=100)
     law = hs.BoucWen(n=1.0, beta=0.02, gamma=0.01, gain=0.01, feedthrough=0.02)

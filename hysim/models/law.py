@@ -222,7 +222,8 @@ class Law(Placed, Subject, ABC):
     def divergence(self, sample: int, u: float, y: float) -> str:
         """Message for an output that is not finite at a sample."""
         what = "cannot be computed (the law is too stiff, or its slope is no number)" if np.isnan(y) else "diverges"
-        return f"the output {what} at sample {sample} (u = {u:g})"
+        unsafe = "as of laws that are unsafe on smaller cycles (identify it with admissible=True)"
+        return f"the output {what} at sample {sample} (u = {u:g}), {unsafe}"
 
     # ------------------------------------------------------------------------------ simulation
 

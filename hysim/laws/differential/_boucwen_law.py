@@ -234,7 +234,7 @@ class BoucWenLaw(BoucWenStep, MemoryLaw):
         loading, unloading = self.beta + self.gamma, self.beta - self.gamma
         return (
             f"the memory diverges at sample {sample} (u = {u:g}): with beta + gamma = {loading:g} and beta - gamma = "
-            f"{unloading:g} it is bounded for shorter inputs only"
+            f"{unloading:g} it is bounded for shorter inputs only: the law is unsafe, identify it with admissible=True"
         )
 
     def _memory_slope(self, direction: FloatArray, z: FloatArray, u: FloatArray, *_: FloatArray) -> FloatArray:
