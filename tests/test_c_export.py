@@ -251,6 +251,13 @@ def test_a_law_and_its_inverse_are_c_and_the_user_s_name_meets_none_of_ours(law,
         subprocess.run([COMPILER, *STRICT, "-fsyntax-only", f"{name}.c"], cwd=tmp_path, check=True)
 
 
+def test_an_inverse_that_ends_within_the_identified_range_says_so():
+    law = hs.BoucWen(beta=0.02, gamma=0.01, feedthrough=0.03, gain=-0.04, u0=0.0, u_range=(0.0, 150.0))
+    with pytest.warns(hs.HysimWarning, match="the last command is held"):
+        code = hs.to_c(hs.InverseFeedforward(law=law))
+    assert "WARNING: along a cycle from 0 to 150" in code.header
+
+
 @needs_compiler
 @pytest.mark.parametrize(("law", "name"), [(hs.BoucWen(n=1.5), "boucwen"), (PLAYS, "clamps"), (hs.Play(), "play")])
 def test_a_law_of_its_natural_name_is_built(law, name, tmp_path):

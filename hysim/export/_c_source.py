@@ -16,7 +16,7 @@ from hysim._basics.release import __version__
 from hysim._basics.results import model_of
 from hysim.errors import warn_unsafe
 from hysim.export import _c
-from hysim.export._program import Program, program_of, start_of
+from hysim.export._program import Program, lacks_inverse, program_of, start_of
 
 _FOLDER = Path(__file__).with_name("c")  # templates
 _FEW = 16  # places of a state that are set one by one
@@ -118,6 +118,7 @@ def to_c(
     if u0 is not None and program.inputs == ("u",):
         raise ValueError(f"a {type(thing).__name__} begins at the u0 of its law: u0 is for controllers and inverses")
     texts = _texts(program, name, type(thing).__name__, *start_of(thing, sample_time or math.inf, u0, y0))
+    texts["lacks"] = f"\n   WARNING: {lacks}." if (lacks := lacks_inverse(thing)) else ""
     templates = (Template((_FOLDER / file).read_text(encoding="utf-8")) for file in ("model.h", "model.c", "main.c"))
     header, source, main = (template.substitute(texts) for template in templates)
     return CSource(name=name, header=header, source=source, main=main, state_size=program.state.size)

@@ -3,7 +3,7 @@
    Call ${name}_init once, then ${name}_step $when. The state is a struct that the
    caller holds, so that one source serves several axes. Every loop ends after a number of rounds that is known
    beforehand, or when its numbers cease to be finite.
-   Compile without -ffast-math, and with -ffp-contract=off where the numbers shall be those of Python. */
+   Compile without -ffast-math, and with -ffp-contract=off where the numbers shall be those of Python.$lacks */
 #ifndef ${NAME}_H
 #define ${NAME}_H
 
