@@ -364,6 +364,7 @@ def test_an_unknown_channel_is_estimated_with_its_error(fit):
     within = hs.estimate_channel(fit, record(play(4.5), 0.0), "T", bounds=(1.0, 4.0))
     assert within.estimates["T"] == 4.0
     assert "NOT converged: T is at 4, the end of its range" in within.summary()
+    assert_refused("bounds of 'T' must be finite, .* got 20", hs.estimate_channel, fit, unknown, "T", bounds=20)
     assert_refused("not on 'I'", hs.estimate_channel, fit, unknown, "I")
     assert_refused("a law that depends on channels", hs.estimate_channel, hs.Play(), unknown, "T", error=TypeError)
     assert_refused("takes one Record, got list", hs.estimate_channel, fit, [unknown], "T", error=TypeError)

@@ -148,7 +148,7 @@ def test_a_curve_through_two_shares_has_the_closed_form():
     error = 1.959964 * math.sqrt(0.16 * 0.84 / 200.0) / density / (2.0 * quantile)
     assert (curve.median, curve.dispersion) == pytest.approx((math.exp(0.5), 0.5 / quantile), rel=1e-8)
     assert np.log(curve.median_interval) == pytest.approx([0.5 - error, 0.5 + error], rel=1e-6)
-    assert curve.probability([1.0, math.e]) == pytest.approx([0.16, 0.84], rel=1e-8)
+    assert curve.probability([-1.0, 0.0, 1.0, math.e]) == pytest.approx([0.0, 0.0, 0.16, 0.84], rel=1e-8)
     far = hs.fragility([1e-9, 1.0, math.e, 1e9], [0, 16, 84, 100], 100)  # where counts say nothing more
     assert (far.median, far.dispersion) == pytest.approx((curve.median, curve.dispersion), rel=1e-6)
 

@@ -162,6 +162,7 @@ test_arguments_are_checked = refused(
     (LAW, "slope", {}, "free has 'slope': a BoucWen has A, beta"),
     (LAW, "z0", {}, "z0 is the memory at the first sample"),
     (LAW, "gain", {"drift": {"n": 1.0}}, "drift has 'n', which is not free"),
+    (LAW, "gain", {"drift": 0.1}, TypeError, "drift must be a mapping, got float"),
     (LAW, "gain", {"particles_count": 0}, "particles_count must be an integer of at least 1, got 0"),
     (LAW, "gain", {"method": "kalman"}, "method must be one of sigma-point, particle, got 'kalman'"),
     (PLAYS, "offset", {}, 'remembers 51 numbers: use method="particle"'),

@@ -213,7 +213,7 @@ def _coercions(cls: Any, finite: bool) -> dict[str, Callable[[Any, str], Any]]:
     hints = typing.get_type_hints(cls)
     kinds = {field.name: field.metadata.get("kind", hints[field.name]) for field in dataclasses.fields(cls)}
     coercions = {name: rules.get(kind) for name, kind in kinds.items()}
-    mapping = _as_named_parts if finite else _as_mapping
+    mapping = _as_named_parts if finite else as_mapping
     coercions |= {name: mapping for name in coercions if typing.get_origin(hints[name]) is Mapping}
     if finite:  # the parts of a specification are models, and no results of fits
         coercions = {name: _as_parts if coerce is None else coerce for name, coerce in coercions.items()}
@@ -284,7 +284,8 @@ def _as_float_tuple(values: Any, name: str, *, finite: bool) -> tuple[float, ...
     return tuple(read_only(values if several else [values], name, ndim=1, finite=finite).tolist())
 
 
-def _as_mapping(values: Mapping[Any, Any], name: str) -> Mapping[Any, Any]:
+def as_mapping(values: Mapping[Any, Any], name: str) -> Mapping[Any, Any]:
+    """A read-only copy of a mapping; TypeError for anything else."""
     if not isinstance(values, Mapping):
         raise TypeError(f"{name} must be a mapping, got {type(values).__name__}")
     return MappingProxyType(dict(values))
@@ -295,7 +296,7 @@ def _as_parts(value: Any, name: str) -> Any:
 
 
 def _as_named_parts(values: Mapping[str, Any], name: str) -> Mapping[str, Any]:
-    return MappingProxyType({key: model_or_class(each) for key, each in _as_mapping(values, name).items()})
+    return MappingProxyType({key: model_or_class(each) for key, each in as_mapping(values, name).items()})
 
 
 def check_whole(value: Any, name: str, *, least: int = 1) -> None:

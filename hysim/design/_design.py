@@ -9,7 +9,7 @@ from typing import Any, Literal
 import numpy as np
 import numpy.typing as npt
 
-from hysim._basics.frozen import FloatArray, check_choice, check_positive, read_only
+from hysim._basics.frozen import FloatArray, as_mapping, check_choice, check_positive, check_whole, read_only
 from hysim._basics.names import among
 from hysim._basics.printing import frozen_result, summary_text
 from hysim._basics.results import model_of
@@ -415,8 +415,10 @@ def design_input(
     (True, True)
     """
     check_choice("criterion", criterion, ("D", "A", "E"))
+    check_whole(candidates, "candidates")
+    check_whole(moves, "moves", least=0)
     plant = model_of(plant)
-    bounds = limits if isinstance(limits, InputLimits) else InputLimits(**limits)
+    bounds = limits if isinstance(limits, InputLimits) else InputLimits(**as_mapping(limits, "limits"))
     subject = _subject(plant, bounds, free, values, noise)
     rng, in_time = np.random.default_rng(seed), isinstance(plant, ActuatorStructure)
     if in_time:

@@ -198,9 +198,9 @@ def estimate_channel(
     others = {name: value_in(record.channels, name, "the record") for name in model.channels if name != channel}
     if varying := [name for name, value in others.items() if np.ndim(value)]:
         raise ValueError(f"{varying[0]!r} varies along the record; one number can be estimated where it is constant")
-    low, high = model.channels[channel] if bounds is None else bounds
-    if not np.isfinite([low, high]).all() or not low < high:
-        raise ValueError(f"bounds of {channel!r} must be finite, (lower, upper) with lower < upper, got {(low, high)}")
+    low, high = pair = model.channels[channel] if bounds is None else np.broadcast_to(bounds, 2)
+    if not np.isfinite(pair).all() or not low < high:
+        raise ValueError(f"bounds of {channel!r} must be finite, (lower, upper) with lower < upper, got {bounds}")
     space = model.law.search_space(record)
     if not {*space.state} <= {*model.law.scalars}:
         raise TypeError(f"estimate_channel takes a law whose memory has one number, got a {type(model.law).__name__}")

@@ -345,9 +345,11 @@ class Fragility:
         return summary_text([f"Fragility: {self.intensities.size} intensities, {self.level:.0%} intervals"], words)
 
     def probability(self, intensities: npt.ArrayLike) -> FloatArray:
-        """The curve at intensities, zero at zero."""
+        """The curve at intensities, zero at zero and below."""
         with np.errstate(divide="ignore"):
-            return np.asarray(special.ndtr(np.log(np.divide(intensities, self.median)) / self.dispersion))
+            return np.asarray(
+                special.ndtr(np.log(np.maximum(np.divide(intensities, self.median), 0.0)) / self.dispersion)
+            )
 
     def band(self, intensities: npt.ArrayLike) -> FloatArray:
         """Confidence limits of the curve, shape (2, n), at each of n intensities."""

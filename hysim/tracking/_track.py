@@ -25,7 +25,7 @@ from typing import Any, Literal, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from hysim._basics.frozen import FloatArray, check_choice, check_count, read_only
+from hysim._basics.frozen import FloatArray, as_mapping, check_choice, check_count, read_only
 from hysim._basics.printing import frozen_result, summary_text
 from hysim._basics.progress import Reports, reports
 from hysim._basics.results import model_of
@@ -479,7 +479,7 @@ def track_parameters(
 
 def _sizes(coordinates: Coordinates, user: Mapping[str, Any], usual: FloatArray, what: str) -> FloatArray:
     """Sizes of changes (n_names,), those that are not given as usual."""
-    if unknown := [name for name in user if name not in coordinates.names]:
+    if unknown := [name for name in as_mapping(user, what) if name not in coordinates.names]:
         raise ValueError(f"{what} has {unknown[0]!r}, which is not free")
     sizes = np.array([float(user.get(name, own)) for name, own in zip(coordinates.names, usual, strict=True)])
     if not ((sizes >= 0.0) & (sizes < np.inf)).all():
