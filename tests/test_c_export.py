@@ -255,7 +255,7 @@ def test_an_inverse_that_ends_within_the_identified_range_says_so():
     law = hs.BoucWen(beta=0.02, gamma=0.01, feedthrough=0.03, gain=-0.04, u0=0.0, u_range=(0.0, 150.0))
     with pytest.warns(hs.HysimWarning, match="the last command is held"):
         code = hs.to_c(hs.InverseFeedforward(law=law))
-    assert "WARNING: along a cycle from 0 to 150" in code.header
+    assert "WARNING: on a cycle from 0 to 150" in code.header
 
 
 @needs_compiler

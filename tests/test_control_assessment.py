@@ -97,7 +97,7 @@ def test_a_hysteresis_assessment_is_counted_by_hand(plant):
     t = 0.05 * np.arange(2001)
     run = hs.close_loop(plant, pid, t, reference)
     assert found.closed.y.tolist() == run.y.tolist()
-    open_y = hs.close_loop(plant, Feedforward(1.0 / found.secant_gain), t, reference).y
+    open_y = hs.close_loop(plant, applied(1.0 / found.secant_gain), t, reference).y
     assert found.open_y == pytest.approx(open_y, abs=1e-12)
     assert np.array_equal(found.open_u, reference / found.secant_gain)
     last = slice(-201, None)
@@ -115,18 +115,9 @@ def test_a_hysteresis_assessment_is_counted_by_hand(plant):
     assert found.lag_width == pytest.approx(width(reference[last], lagging))
 
 
-class Feedforward:
-    """Applies gain times reference, whatever is measured: what a PID with a setpoint weight does without feedback."""
-
-    def __init__(self, gain):
-        self.gain = gain
-
-    def compiled(self, sample_time, u0, y0):
-        from hysim.kernels.controllers import pid
-
-        # kp (b r - y) needs kp -> 0 with kp b = gain: 2^-900 of y is nothing beside it
-        tiny = 2.0**-900
-        return pid, np.array([tiny, 0.0, 0.0, 0.0, self.gain / tiny, 0.0, -np.inf, np.inf, 0.0]), np.zeros(4)
+def applied(gain):
+    """Controller of gain times reference, whatever is measured: 2^-900 of y is nothing compared with it."""
+    return hs.PID(kp=2.0**-900, setpoint_weight=gain * 2.0**900)
 
 
 def test_the_open_loop_has_the_stroke_of_the_reference():
@@ -202,7 +193,7 @@ def test_a_square_wave_is_measured_over_its_last_period():
     reference = np.tile(np.repeat([0.0, 1.0], 600), 3)
     t = 0.05 * np.arange(3600)
     closed = hs.close_loop(MODE, pid, t, reference).y
-    opened = hs.close_loop(MODE, Feedforward(0.5), t, reference).y
+    opened = hs.close_loop(MODE, applied(0.5), t, reference).y
     assert found.closed.y.tolist() == closed.tolist()
     assert found.open_y == pytest.approx(opened, abs=1e-12)
     for rms, excess, y in (
@@ -250,9 +241,9 @@ def test_a_half_period_in_which_the_open_loop_does_not_arrive_or_of_a_few_sample
 @pytest.mark.parametrize(
     "assess",
     [
-        lambda plant: assess_hysteresis(plant, Feedforward(1.0), **TRIANGLE),
-        lambda plant: assess_step(plant, Feedforward(1.0), step=1.0, duration=10.0, sample_time=0.05),
-        lambda plant: assess_square_wave(plant, Feedforward(1.0), **WAVE),
+        lambda plant: assess_hysteresis(plant, applied(1.0), **TRIANGLE),
+        lambda plant: assess_step(plant, applied(1.0), step=1.0, duration=10.0, sample_time=0.05),
+        lambda plant: assess_square_wave(plant, applied(1.0), **WAVE),
     ],
     ids=["hysteresis", "step", "square wave"],
 )
@@ -262,7 +253,7 @@ def test_the_open_loop_is_read_when_the_closed_one_is(assess, sample):
     found = assess(replace(PROPER, sample=sample))
     closed = found.closed
     if "secant_gain" in dir(found):
-        closed = hs.close_loop(PROPER, Feedforward(1.0 / found.secant_gain), closed.t, closed.reference)
+        closed = hs.close_loop(PROPER, applied(1.0 / found.secant_gain), closed.t, closed.reference)
     assert found.open_y == pytest.approx(closed.y, abs=1e-12)
 
 

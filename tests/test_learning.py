@@ -41,7 +41,7 @@ def off(plant, speed, slope):
 
 def ahead_of_time(device):
     """Taps of a device, whose corrections are those of references ahead of their time."""
-    low_pass, inverse, _ = _filters(device, H).taps
+    low_pass, inverse, _ = _filters(device, H)[0]
     return np.pad(low_pass, device.ahead(H)), np.pad(inverse, (2 * device.ahead(H), 0))
 
 
@@ -52,7 +52,7 @@ def faded(n, reach):
 
 
 def test_corrections_of_the_next_trial_are_the_literal_sums():
-    low_pass, inverse, _ = _filters(learner(), H).taps
+    low_pass, inverse, _ = _filters(learner(), H)[0]
     reach, rng = low_pass.size // 2, np.random.default_rng(0)
     c, e = rng.standard_normal((2, 5 * reach))
     sums = np.correlate(c, low_pass, "same") + np.correlate(e, inverse, "same")

@@ -77,11 +77,8 @@ class LearningCondition(NamedTuple):
         return f"{condition}: with a line for the law, {shrinks}; learns up to {corner:.4g} Hz"
 
 
-class _Filters(NamedTuple):
-    """Taps of q, l and -a (3, 2 m + 1) for the samples -m to m around one, and the condition that they meet."""
-
-    taps: FloatArray
-    condition: LearningCondition
+_Filters = tuple[FloatArray, LearningCondition]
+"""Taps of q, l and -a (3, 2 m + 1) for the samples -m to m around one, and the condition that they meet."""
 
 
 @checked
@@ -121,15 +118,15 @@ class _Learning(SteppedController):
 
     def condition(self, sample_time: float) -> LearningCondition:
         """Part of the error that remains after a repetition at worst, at a sample time [s]."""
-        return _filters(self, positive_time(sample_time)).condition
+        return _filters(self, positive_time(sample_time))[1]
 
     def _compiled(
         self, duration: float, is_trial: bool, sample_time: float, u0: float, y0: float
     ) -> CompiledController:
-        filters, inner = _filters(self, sample_time), self.controller.compiled(sample_time, u0, y0)
+        inner = self.controller.compiled(sample_time, u0, y0)
         samples, ahead = round(duration / sample_time), preview(self.controller, sample_time)
         # corrections are those of references ahead of their time, and errors are of the present
-        taps = np.pad(filters.taps, ((0, 0), (ahead, ahead)))
+        taps = np.pad(_filters(self, sample_time)[0], ((0, 0), (ahead, ahead)))
         taps[1], reach = np.roll(taps[1], ahead), taps.shape[1] // 2
         if abs(samples * sample_time - duration) > 1e-6 * duration:
             raise ValueError(f"a repetition of {duration:g} s is no whole number of samples of {sample_time:g} s")
@@ -239,18 +236,15 @@ class IterativeLearning(_Learning):
         signals = np.stack(np.broadcast_arrays(correction, error, unreached)).astype(float)
         signals[1:][~np.isfinite(signals[1:])] = 0.0
         following = np.empty(signals.shape[1])
-        learning.renew(_filters(self, positive_time(sample_time)).taps.ravel(), signals.ravel(), following)
+        learning.renew(_filters(self, positive_time(sample_time))[0].ravel(), signals.ravel(), following)
         return following
 
-    def _commands(
-        self, r: FloatArray, sample_time: float, u0: float | None, measurement: FloatArray | None = None
-    ) -> tuple[FloatArray, FloatArray]:
+    def _commands(self, r: FloatArray, h: float, u0: float | None, measurement: FloatArray) -> tuple[FloatArray, ...]:
         """Commands for a reference, and what their law cannot reach, as of `following`."""
-        ahead = known_ahead(self.controller, r, sample_time)
-        step, parameters, state = begun(self.controller, sample_time, self.u0 or 0.0 if u0 is None else u0, float(r[0]))
-        places, u = np.empty((2, r.size)), np.empty(r.size)
-        controllers.replay(step, parameters, state, ahead, ahead if measurement is None else measurement, places, u)
-        return u, np.append(np.zeros(preview(self.controller, sample_time)), places[1])[: r.size]
+        ahead, places, u = known_ahead(self.controller, r, h), np.empty((2, r.size)), np.empty(r.size)
+        step, parameters, state = begun(self.controller, h, self.u0 or 0.0 if u0 is None else u0, float(r[0]))
+        controllers.replay(step, parameters, state, ahead, read_only(measurement, finite=False), places, u)
+        return u, np.append(np.zeros(preview(self.controller, h)), places[1])[: r.size]
 
     def learn(
         self,
@@ -292,7 +286,7 @@ class IterativeLearning(_Learning):
         """
         check_whole(trials, "trials")
         times, r, h = sampled(t, reference)
-        lead = _filters(self, h).taps.shape[1] // 2
+        lead = _filters(self, h)[0].shape[1] // 2
         rest = RestingPlant(as_actuator(self.model), h, self.u0 if u0 is None else u0).y0
         rising = 0.5 - 0.5 * np.cos(np.linspace(0.0, math.pi, lead))
         times = times[0] + h * np.arange(-lead, r.size + 2 * lead)
@@ -322,7 +316,9 @@ class IterativeLearning(_Learning):
     ) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Measurement of a trial, its commands, and what they do not reach; the last one warns as a loop does."""
         if callable(trial):
-            u, unreached = (r, 0.0 * r) if is_fed_back(self.controller) else self._commands(r, float(t[1] - t[0]), u0)
+            u, unreached = (
+                (r, 0.0 * r) if is_fed_back(self.controller) else self._commands(r, float(t[1] - t[0]), u0, r)
+            )
             measurement = np.array(trial(u), dtype=float)
             if measurement.shape != r.shape:
                 raise ValueError(f"trial must return a measurement of shape {r.shape}, got {measurement.shape}")
@@ -337,7 +333,7 @@ class IterativeLearning(_Learning):
         else:
             run = RestingPlant(as_actuator(plant), h, u0).run(self.controller, reference)
         limited = (run.command != run.drive).any()
-        unreached = self._commands(r, h, u0, read_only(run.measurement, finite=False))[1] if limited else 0.0 * r
+        unreached = self._commands(r, h, u0, run.measurement)[1] if limited else 0.0 * r
         return run.measurement, run.drive, unreached
 
 
@@ -399,7 +395,7 @@ def _filters(learner: _Learning, sample_time: float) -> _Filters:
     highest = min(edge / (1.0 + 0.5 * _TRANSITION), _HIGHEST) * math.pi / sample_time
     for cutoff in highest * _NARROWER ** np.arange(_TRIES) if learner.cutoff is None else [learner.cutoff]:
         filters = _with_cutoff(float(cutoff), inverses, plants, late, sample_time, slopes)
-        if filters.condition.rate < 1.0 - _LEARNS * learner.gain:
+        if filters[1].rate < 1.0 - _LEARNS * learner.gain:
             break
     return filters
 
@@ -425,7 +421,7 @@ def _with_cutoff(
     worst = int(np.argmax(rates))
     frequency = 2.0 * math.pi * worst / (_LENGTH * sample_time)
     condition = LearningCondition(float(rates[worst]), frequency, cutoff, slopes)
-    return _Filters(np.vstack([taps, inverted]), condition)
+    return np.vstack([taps, inverted]), condition
 
 
 def _spectrum(taps: FloatArray) -> Spectrum:

@@ -18,8 +18,6 @@ from dataclasses import dataclass, field, replace
 from types import MappingProxyType
 from typing import Any, NamedTuple
 
-import numpy as np
-
 from hysim._basics.frozen import FloatArray, frozen
 from hysim.control import Controller, InverseFeedforward, RestingPlant, TrackingController, begun, preview
 from hysim.errors import HysimWarning, SimulationError
@@ -30,18 +28,10 @@ from hysim.export._packing import Packing, packing
 from hysim.kernels.controllers import guarded
 from hysim.kernels.stepping import Start, Step, complete
 from hysim.models.law import Law
-from hysim.models.protocols import (
-    Remembering,
-    Startable,
-    Stepwise,
-    first_input,
-    input_range,
-    needs_time,
-    positive_time,
-    standing,
-)
+from hysim.models.protocols import Remembering, Startable, Stepwise, input_range, needs_time, positive_time, standing
 from hysim.plants.actuator import as_stepwise
 from hysim.plants.stages import Amplifier, Creep, Vibration
+from hysim.signals import triangle
 
 _ANNOTATED = MappingProxyType({"float": Scalar.DOUBLE, "int": Scalar.INT, "bool": Scalar.BOOL})
 _VECTORS = Vector(), Vector()
@@ -202,24 +192,17 @@ class Program:
     ahead: int = 0
 
 
-_SAMPLES = 361  # of the cycle along which an inverse is tried
-
-
 def lacks_inverse(thing: Any) -> str:
-    """Where the law of a feed-forward has no inverse on a cycle over its identified range, after a warning; else ""."""
-    law = thing.law if isinstance(thing, InverseFeedforward) else None
-    if (span := input_range(law)) is None or needs_time(law):
+    """Where the law of a feed-forward has no inverse on cycles over its identified range, after a warning; else ""."""
+    if not isinstance(thing, InverseFeedforward) or thing.dynamic or (span := input_range(thing.law)) is None:
         return ""
-    low, high = span
-    turns = [first_input(law) or 0.0, high, low, high, 0.5 * (low + high), high, low]
-    u = np.interp(np.arange(_SAMPLES), np.linspace(0.0, _SAMPLES - 1.0, len(turns)), turns)
     try:
-        law.inverse_response(law.response(u))
+        thing.law.inverse_response(thing.law.response(triangle(*span, cycles=2, samples_per_cycle=200)))
+        return ""
     except SimulationError as error:
-        lacks = f"along a cycle from {low:g} to {high:g} {error}; there the last command is held"
+        lacks = f"on a cycle from {span[0]:g} to {span[1]:g} {error}; there the last command is held"
         warnings.warn(lacks, HysimWarning, stacklevel=3)
         return lacks
-    return ""
 
 
 def program_of(

@@ -346,14 +346,12 @@ class Fragility:
 
     def probability(self, intensities: npt.ArrayLike) -> FloatArray:
         """The curve at intensities, zero at zero and below."""
-        with np.errstate(divide="ignore"):
-            return np.asarray(
-                special.ndtr(np.log(np.maximum(np.divide(intensities, self.median), 0.0)) / self.dispersion)
-            )
+        eta = np.log(np.maximum(np.divide(intensities, self.median), 2.0**-1022)) / self.dispersion
+        return np.asarray(special.ndtr(eta))
 
     def band(self, intensities: npt.ArrayLike) -> FloatArray:
         """Confidence limits of the curve, shape (2, n), at each of n intensities."""
-        eta = np.log(np.maximum(np.divide(intensities, self.median), np.finfo(float).tiny)) / self.dispersion
+        eta = np.log(np.maximum(np.divide(intensities, self.median), 2.0**-1022)) / self.dispersion
         slopes = np.array([np.full_like(eta, -1.0 / self.dispersion), -eta])
         error = special.ndtri(0.5 + 0.5 * self.level) * np.sqrt((slopes * (self.covariance @ slopes)).sum(axis=0))
         return np.asarray(special.ndtr([eta - error, eta + error]))
