@@ -146,5 +146,8 @@ def self_starting(step: Step, start: Start) -> Step:
 
 
 def compile_as(kind: Any, function: Any) -> Any:
-    """Compile a plain function as a kind, `STEP` or `START`; numba's errors pass through."""
-    return signed_kernel(kind.signature)(function)
+    """Compile a plain function as a kind, `STEP` or `START`, at once; numba's errors pass through."""
+    compiled = signed_kernel(kind.signature)(function)
+    if compiled is not function:  # numba compiles
+        compiled.compile(kind.signature)
+    return compiled
