@@ -1,6 +1,6 @@
 """Steps that a kernel calls by their address, so that one kernel takes any number of laws in one structure.
 
-`path.follow`, which takes half a minute to compile, is called so, too: it is not compiled into its callers once more.
+`path.follow`, which takes long to compile, is called so, too: it is not compiled into its callers once more.
 """
 
 import os
