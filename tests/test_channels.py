@@ -376,6 +376,10 @@ def test_a_channel_is_estimated_where_the_record_begins_inside_a_loop_and_its_ot
     found = hs.estimate_channel(stack, hs.Record(u=U, y=stack.at(T=1.5).response(U))[15:], "T")
     assert abs(found.estimates["T"] - 2.0) == pytest.approx(0.5, abs=1e-6)
     assert f"T = {4.0 - found.estimates['T']:.6g} gives the same law" in found.warnings[-1]
+    other = dataclasses.replace(
+        stack, polynomials=(parabola, polynomial("offset", 1e-10, 9e-10, at=(1.0, 3.0)))
+    )  # a small unit
+    assert hs.estimate_channel(other, hs.Record(u=U, y=other.at(T=1.5).response(U)), "T").warnings == ()
     bank = hs.Dependent(law=PLAYS, polynomials=(polynomial("offset", 0.0, 1.0),))
     assert_refused("has one number, got a Prandtl", hs.estimate_channel, bank, records()[0], "T", error=TypeError)
 

@@ -216,12 +216,12 @@ def estimate_channel(
     return replace(fit, warnings=(*fit.warnings, *filter(None, doubts)))
 
 
-def _alike(polynomials: Sequence[ChannelPolynomial], value: float, low: float, high: float) -> list[float]:
+def _alike(curves: Sequence[ChannelPolynomial], value: float, low: float, high: float) -> list[float]:
     """Other values of a channel, in a range, at which all its parameters are those at `value`."""
-    bent = max(polynomials, key=lambda each: each.degree)
+    bent = max(curves, key=lambda each: each.degree)
     roots = np.polynomial.Polynomial.fit(bent.at, np.array(bent.values) - bent.value(value), bent.degree).roots().real
     apart = roots[(roots >= low) & (roots <= high) & (np.abs(roots - value) > _SAME * (high - low))].tolist()
-    return [other for other in apart if all(np.isclose(p.value(other), p.value(value), _SAME) for p in polynomials)]
+    return [x for x in apart if all(abs(p.value(x) - p.value(value)) <= _SAME * np.abs(p.values).max() for p in curves)]
 
 
 @dataclass(frozen=True)
