@@ -169,6 +169,7 @@ def test_a_loop_alone_and_several_records_are_judged_by_samples(few):
     few(Line=hs.Line, PrandtlIshlinskii=hs.PrandtlIshlinskii, Lag=hs.TransferFunction.structure(poles=1, zeros=0))
     loop = record_of(LAW, CYCLE)
     assert np.isnan(hs.identify(loop).choice.continued["Line"])
+    assert hs.identify(hs.Record(u=CYCLE, y=np.ones(40))).choice.score["Line"] == pytest.approx(1.0)
     fit = hs.identify([loop, record_of(LAW, 0.5 * CYCLE)])
     assert fit.choice.family == "PrandtlIshlinskii"
     assert len(fit.models) == 2

@@ -196,7 +196,7 @@ def of_any_family(
 ) -> Identification:
     """The complete search of the family with the best score, with its `choice`."""
     trials, subjects = _Trials(identify, records, options), candidates()
-    size = max(float(np.ptp(record.y)) for record in records)
+    size = max(float(np.ptp(record.y)) for record in records) or 1.0
     names = sorted(subjects, key=trials.unknowns)
     if options["workers"] is not None:
         check_count("workers", options["workers"])
