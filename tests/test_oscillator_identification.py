@@ -237,6 +237,11 @@ def test_a_record_is_continued_beyond_its_ends_before_it_is_interpolated():
     assert np.isfinite(interpolated_record(np.zeros(5), 3)).all()
 
 
+def test_an_outlier_of_one_period_is_not_in_the_mean_period():
+    u, spike = np.tile([1.0, 3.0, 2.0, -1.0], 24), 1e3 * (np.arange(96) == 41)
+    assert structure(initial="periodic", period=4).motion(record(u, u + spike)).y == pytest.approx(u[:4], abs=0.2)
+
+
 def test_the_structure_knows_how_the_record_begins_and_what_does_not_begin_so_is_said():
     assert_refused("the structure says how the record begins", hs.identify, structure(), from_rest(), initial="free")
     assert structure().notes(from_rest(), plant(substeps=4)) == ()

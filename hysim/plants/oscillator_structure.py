@@ -452,7 +452,7 @@ class OscillatorStructure(Subject):
         span_of(record)  # which raises
         if len(record) <= 2 * HALF_FILTER:
             raise ValueError(f"the record must have more than {2 * HALF_FILTER} samples, got {len(record)}")
-        u, y = self._mean_period(record.u), without_spikes(self._mean_period(record.y))
+        u, y = self._mean_period(record.u), self._mean_period(without_spikes(record.y))
         if np.ptp(y) == 0.0:
             raise ValueError("the output is constant: nothing can be identified from it")
         difference = float((record.u - np.resize(u, len(record))).std() / record.u.std())
