@@ -104,8 +104,7 @@ def test_the_sensor_sees_the_displacement_of_its_delay_ago(amplifier, dead_time,
     fine = hs.close_loop(
         replace(plant, sensor=None), Passes(), H / 4 * np.arange(244), np.repeat(u, 4), u0=u[0], substeps=2
     )
-    late = round(4 * delay / H)
-    padded = np.append(np.full(late, fine.y[0]), fine.y)[: fine.y.size]
+    padded = np.append(np.full(round(4 * delay / H), fine.y[0]), fine.y)[: fine.y.size]
     assert run.measurement == pytest.approx(padded[::4], abs=EXACT)
     assert run.y == pytest.approx(fine.y[::4], abs=EXACT)
 

@@ -47,8 +47,7 @@ def only_safe() -> hs.Identification:
 
 def small_cycles(record: hs.Record) -> np.ndarray:
     """Inputs from the end of the record on, within its range: other than those of the trials."""
-    rng = np.random.default_rng(7)
-    turns = rng.uniform(record.u.min(), record.u.max(), 300)
+    turns = np.random.default_rng(7).uniform(record.u.min(), record.u.max(), 300)
     return np.concatenate([record.u, np.interp(np.arange(0.0, 299.0, 0.2), np.arange(300), turns)])
 
 
@@ -125,8 +124,7 @@ def test_where_only_an_unsafe_law_fits_the_first_line_says_so(only_unsafe):
     for text in (str(only_unsafe), only_unsafe.summary()):
         assert text.startswith(first)
     assert "NOT converged" not in str(only_unsafe)
-    again = hs.Identification.from_json(only_unsafe.to_json())
-    assert again.unsafe == only_unsafe.unsafe
+    assert hs.Identification.from_json(only_unsafe.to_json()).unsafe == only_unsafe.unsafe
     document = json.loads(only_unsafe.to_json())
     del document["identification"]["fields"]["unsafe"]
     assert hs.Identification.from_json(json.dumps(document)).unsafe == ""  # a file of an earlier version

@@ -96,8 +96,7 @@ def test_a_lag_in_mid_cycle_is_as_good_as_its_noise():
 
 
 def test_the_users_word_wins():
-    u = 3.0 + TRIANGLE[53:173]
-    record = measured(u, LAW.response(3.0 + TRIANGLE)[53:173])
+    record = measured(3.0 + TRIANGLE[53:173], LAW.response(3.0 + TRIANGLE)[53:173])
     fit = hs.identify(hs.PrandtlIshlinskii.structure(plays=5, one_signed=True), record, initial="rest")
     assert "assumed" not in fit.message
     assert fit.estimates["turn"] == 0.0

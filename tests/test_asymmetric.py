@@ -312,7 +312,6 @@ def test_a_growth_beyond_the_largest_number_is_a_divergence_unless_the_forcing_b
 @pytest.mark.parametrize("step", [5e-324, 1e-320, 1e-310, -1e-320])
 @pytest.mark.parametrize("n", [0.5, 1.0, 2.0])
 def test_the_smallest_steps_of_the_input_change_nothing(n, step):
-    model = hs.ZhuWangBoucWen(n=n, delta=0.3)
-    z, state = model.advance([step], (0.0, 0.5))
+    z, state = hs.ZhuWangBoucWen(n=n, delta=0.3).advance([step], (0.0, 0.5))
     assert z[-1] == 0.5
     assert state == (step, 0.5)

@@ -94,8 +94,7 @@ def test_decimation_keeps_straight_lines():
 
 def test_a_short_period_is_simulated_too():
     u = 50.0 * np.sin(2.0 * np.pi * 3 * np.arange(48) / 48)
-    y = hs.benchmarks.simulate_official(u)
-    assert y.shape == (48,)
+    assert hs.benchmarks.simulate_official(u).shape == (48,)
 
 
 test_wrong_arguments_are_named = refused(

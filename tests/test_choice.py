@@ -54,8 +54,7 @@ def test_errors_are_those_of_fits_to_the_other_parts(few):
     few(Dahl=hs.Dahl, BoucWen=hs.BoucWen)
     record = record_of(LAW)
     choice = hs.identify(record).choice
-    turns = record.reversals(TOLERANCE)[1::2]
-    cycles = np.split(np.arange(len(record)), turns)[1:]
+    cycles = np.split(np.arange(len(record)), record.reversals(TOLERANCE)[1::2])[1:]
     errors = []
     for k in range(3):
         fold = np.concatenate(cycles[k::3])

@@ -375,8 +375,7 @@ def test_the_former_turning_point_comes_back():
 
 @pytest.mark.parametrize("family", [hs.Play, hs.Stop])
 def test_a_single_element_comes_back(family):
-    law = family(threshold=0.7, gain=-2.0, offset=0.3, z0=0.4)
-    fit = hs.identify(family, record_of(law))
+    fit = hs.identify(family, record_of(family(threshold=0.7, gain=-2.0, offset=0.3, z0=0.4)))
     assert (fit.model.threshold, fit.model.gain, fit.model.offset) == pytest.approx((0.7, -2.0, 0.3), abs=1e-7)
     assert fit.model.z0 == pytest.approx(0.4, abs=1e-7)  # where the polish ends
 

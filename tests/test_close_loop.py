@@ -162,16 +162,14 @@ def test_the_open_loop_of_the_voltages_applied_is_the_loops_displacement(law, u0
     actuator = hs.Actuator(hysteresis=law, vibration=plant)
     pid = hs.PID(kp=0.1, ki=0.2, limits=(-0.4, 0.4))
     run = hs.close_loop(actuator, pid, H * np.arange(80), reference(80), u0=u0)
-    y = actuator.response(np.append(u0, run.u), H)[:-1]
-    assert run.y == pytest.approx(y, abs=EXACT)
+    assert run.y == pytest.approx(actuator.response(np.append(u0, run.u), H)[:-1], abs=EXACT)
 
 
 def test_the_sampled_loop_converges_to_the_continuous_one_at_first_order():
     plant = hs.TransferFunction(num=(2.0,), den=(1.0, 2.0, 2.0))
     pid = hs.PID(kp=2.0, ki=1.5, kd=0.4, derivative_filter=0.3, derivative_weight=1.0)
     continuous = control.feedback(hs.to_control(plant) * hs.to_control(pid), 1.0)
-    grid = np.linspace(0.0, 8.0, 101)
-    y = control.forced_response(continuous, grid, np.ones(101)).outputs
+    y = control.forced_response(continuous, np.linspace(0.0, 8.0, 101), np.ones(101)).outputs
     errors = []
     for split in (4, 8, 16, 32):
         t = np.linspace(0.0, 8.0, 100 * split + 1)

@@ -290,8 +290,7 @@ def test_what_was_not_cross_validated_has_no_verdict_on_it(table1):
 
 @pytest.mark.parametrize("n", [60, 400])
 def test_the_paired_probability_is_that_of_the_formula(n):
-    rng = np.random.default_rng(3)
-    a, b = np.cumsum(rng.standard_normal((2, n + 3)), axis=1)
+    a, b = np.cumsum(np.random.default_rng(3).standard_normal((2, n + 3)), axis=1)
     a, b = a[3:] - a[:-3], b[3:] - b[:-3]  # correlated with their neighbours
     d = [abs(x) - abs(y) for x, y in zip(a, b, strict=True)]
     typical = np.median(np.abs(a) + np.abs(b)) / 2
@@ -385,8 +384,7 @@ def side_by_side(other, best, span=1.0, fitted=("other",)):
 
 
 def test_a_model_that_diverged_where_it_was_left_out_is_worse():
-    rng = np.random.default_rng(4)
-    best, other = rng.standard_normal((2, 400)) * 0.1
+    best, other = np.random.default_rng(4).standard_normal((2, 400)) * 0.1
     assert not side_by_side(other, best).is_worse
     for value in (80.0, np.inf):
         other[7] = value

@@ -325,8 +325,7 @@ def test_a_controller_that_is_wrong_comes_to_rest_before_the_step():
     wrong = hs.TrackingController(
         feedforward=hs.InverseFeedforward(law=replace(LAW, offset=0.3)), feedback=hs.PID(ki=2)
     )
-    held = assess_step(LAW, wrong, u0=1.0, hold=30.0, **STEP).closed
-    before = held.y[:600]
+    before = assess_step(LAW, wrong, u0=1.0, hold=30.0, **STEP).closed.y[:600]
     assert np.abs(before - before[0]).max() > 0.1
     assert np.abs(before[-10:] - before[0]).max() < 1e-6
 

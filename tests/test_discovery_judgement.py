@@ -148,8 +148,7 @@ def test_the_steady_loops_lie_about_the_middle_of_the_range_of_the_input():
 
 def test_the_sign_of_the_loop_is_that_of_the_memory():
     force = hs.BoucWen(beta=1.5, gamma=0.4)
-    refit = refit_of(force, ("beta", "gamma"))
-    found = judged(sines(lambda u, _: force.response(u)), refit)
+    found = judged(sines(lambda u, _: force.response(u)), refit_of(force, ("beta", "gamma")))
     assert found.dissipation < 0.0
     assert found.one_sign
 
@@ -164,8 +163,7 @@ def test_a_vibration_is_linear_dynamics_of_second_order():
 @pytest.mark.parametrize(("tau", "verdict"), [(1e-3, "rate-independent hysteresis"), (5e-3, "no structure found")])
 def test_hysteresis_before_a_lag_is_hysteresis_only_if_the_lag_hardly_widens_the_loop(tau, verdict):
     records = sines(lambda u, step: lag(tau).response(LAW.response(u), step))
-    found = judged(records, as_bouc_wen)
-    assert found.verdict == verdict
+    assert judged(records, as_bouc_wen).verdict == verdict
     wide, wider = (hs.loop_metrics(record.u, record.y).relative_width for record in records)
     assert (wider > 1.3 * wide) is (tau > 1e-3)
 
@@ -326,8 +324,7 @@ def test_a_law_that_diverges_on_steady_cycles_is_no_structure():
     u = TRIANGLE[:150]
     growing = hs.Duhem.from_terms({"u'": 1.0, "|u'| y^2": 0.1}, y0=0.1)
     record = hs.Record(u=u, y=growing.response(u), t=times(100, 1.0, cycles=1.49))
-    refit = refit_of(growing, tuple(growing.terms))
-    found = judge(competitors([record]), [growing], refit)
+    found = judge(competitors([record]), [growing], refit_of(growing, tuple(growing.terms)))
     assert found.verdict == "no structure found"
     assert not found.stable
     assert "diverges in free run" in doubts(found)[0]

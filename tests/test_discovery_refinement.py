@@ -266,8 +266,7 @@ def test_no_structure_is_predicted_whose_number_has_a_sign_that_it_must_not_have
 
 
 def test_a_number_within_two_standard_errors_of_zero_is_taken_out():
-    record = record_of(LAW.memory, multisine(150), noise=0.05)
-    free_run = FreeRun((record,))
+    free_run = FreeRun((record_of(LAW.memory, multisine(150), noise=0.05),))
     names = ["u'", "u' z", "u' |z|", "|u'|", "|u'| z"]
     whole = free_run.refine(Structure(terms(names), rest=True), np.array([[1.0, 0.0, -0.3, 0.0, -0.6, 0.0]]))
     assert (np.sort(whole.significance)[:2] < 2.0).all()

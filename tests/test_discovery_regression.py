@@ -255,8 +255,7 @@ def test_each_step_leaves_out_the_term_that_costs_least():
 
 
 def test_terms_that_depend_on_each_other_or_vanish_go_first():
-    rng = np.random.default_rng(1)
-    features = rng.standard_normal((60, 4))
+    features = np.random.default_rng(1).standard_normal((60, 4))
     features[:, 1], features[:, 3] = 2.0 * features[:, 0], 0.0
     path = regression(features, features[:, 0] + features[:, 2]).eliminated()
     assert [len(each) for each in path] == [4, 3, 2, 1]

@@ -227,8 +227,7 @@ def test_the_inverse_behind_two_envelopes_gives_an_input_that_gives_the_output(p
     plays |= {"weights": np.abs(plays["weights"]) + 0.1, "z0": (0.0,)}
     law = hs.GeneralizedPrandtlIshlinskii(**plays, left=left, right=right)
     y = law.response(u)
-    found = law.inverse_response(y)
-    assert law.response(found) == pytest.approx(y, abs=CLOSE)
+    assert law.response(law.inverse_response(y)) == pytest.approx(y, abs=CLOSE)
 
 
 @given(invertible_plays(), st.floats(0.0, 0.9), short_inputs(1.0))
@@ -456,8 +455,7 @@ def test_a_past_of_two_turns_is_found_by_default():
 
 
 def test_no_more_turns_than_the_record_shows():
-    past = record_after((-0.9,), FADING.u)
-    fit = hs.identify(STRUCTURE, past)
+    fit = hs.identify(STRUCTURE, record_after((-0.9,), FADING.u))
     assert fit.estimates["turn"] == pytest.approx(-0.9, abs=0.01)
     assert "turn_2" not in fit.estimates
     assert "numbers" not in fit.message
@@ -529,8 +527,7 @@ def test_the_stderr_of_the_width_is_that_of_small_steps():
     y = hs.BoucWen(beta=1.2, gamma=0.3, gain=2.0).response(u)
     whole = problem(hs.BoucWen(), [hs.Record(u=u, y=y)], ALL_FREE, None)
     theta = whole.completed(whole.space.starts[-1:])[0]
-    rng = np.random.default_rng(0)
-    root = 1e-3 * rng.standard_normal((theta.size, theta.size))
+    root = 1e-3 * np.random.default_rng(0).standard_normal((theta.size, theta.size))
     descent = Descent(whole, Gaussian(1e-14), whole.y[np.newaxis], np.ones((1, whole.y.size)))
     steps = 1e-5 * np.eye(theta.size)
     slope = (loop_widths(descent, theta + steps) - loop_widths(descent, theta - steps)) / 2e-5

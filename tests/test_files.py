@@ -462,8 +462,7 @@ def test_field_and_moment_of_a_magnetometer_are_a_path(tmp_path):
     assert record.units == {"u": "T", "y": "A m^2"}
     in_cgs = hs.load(micromag(tmp_path, MICROMAG.replace("Hybrid SI", "cgs")))
     assert in_cgs.units == {"u": "Oe", "y": "emu"}
-    unknown = hs.load(micromag(tmp_path, MICROMAG.replace("Hybrid SI", "odd")))
-    assert unknown.units == {}
+    assert hs.load(micromag(tmp_path, MICROMAG.replace("Hybrid SI", "odd"))).units == {}
 
 
 def test_what_the_magnetometer_adjusted_is_in_further_columns(tmp_path):

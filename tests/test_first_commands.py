@@ -42,13 +42,11 @@ def test_the_example_overwrites_nothing(run, tmp_path):
 
 
 def test_the_example_goes_to_the_standard_output(run):
-    out = run("example", "-")[1]
-    assert hs.load(io.StringIO(out)) == hs.datasets.table1(dwell=1.0)
+    assert hs.load(io.StringIO(run("example", "-")[1])) == hs.datasets.table1(dwell=1.0)
 
 
 def test_columns_of_a_text_have_names_numbers_units_and_ranges():
-    text = io.StringIO("t [s];u [V];note\n0;1,5;a\n1;;b\n2;-2,5;c\n")
-    t, u, note = hs.list_columns(text)
+    t, u, note = hs.list_columns(io.StringIO("t [s];u [V];note\n0;1,5;a\n1;;b\n2;-2,5;c\n"))
     assert t == FileColumn("t", 0, "s", 3, 0, 0.0, 2.0, True)
     assert u == FileColumn("u", 1, "V", 2, 1, -2.5, 1.5, False)
     assert (note.name, note.number, note.n_samples, math.isnan(note.lowest)) == ("note", 2, 0, True)

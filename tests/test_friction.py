@@ -153,8 +153,7 @@ def test_friction_has_no_preferred_direction(family):
 def test_stiff_bristles_neither_chatter_nor_lag(sigma0):
     """Each stroke is 1e4 to 1e9 times as long as the bristles, and explicit steps would be unstable by as much."""
     law = hs.LuGre(sigma0=sigma0, sigma1=0.1 * math.sqrt(sigma0), sigma2=0.4)
-    v = np.repeat([0.1, -0.1, 0.0005, -2.0], 25)
-    u = np.concatenate([[0.0], np.cumsum(v)])
+    u = np.concatenate([[0.0], np.cumsum(np.repeat([0.1, -0.1, 0.0005, -2.0], 25))])
     force = law.response(u, 1.0)[1:]
     # rounding of the strokes
     np.testing.assert_allclose(force, law.steady_force(np.diff(u)), rtol=1e-13)
@@ -245,8 +244,7 @@ def test_a_law_that_is_not_passive_pushes():
     """Bent slowly to the breakaway force, then moved fast: the bristles relax, and their damping pushes."""
     law = replace(PASSIVE, sigma1=40.0, sigma2=0.0)
     assert not law.is_passive()
-    bent = law.advance(np.linspace(0.0, 0.4, 41), sample_time=100.0)[1]
-    pushed = replace(law, z0=bent[1])
+    pushed = replace(law, z0=law.advance(np.linspace(0.0, 0.4, 41), sample_time=100.0)[1][1])
     work, stored = work_and_store(pushed, np.array([0.0, 0.01]), 1e-3)
     assert work < stored
     assert replace(law, damping_velocity=0.05).is_passive()

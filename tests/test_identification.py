@@ -160,10 +160,8 @@ def test_transfer_function_reaches_the_best_below_nyquist(table1):
 
 def test_transfer_function_is_given_back():
     true = hs.TransferFunction(num=(1.0, 3.0), den=(1.0, 0.8, 4.0), initial_state=(0.2, -0.1))
-    rng = np.random.default_rng(0)
-    u = np.repeat(rng.standard_normal(40), 5)
-    t = 0.1 * np.arange(u.size)
-    record = hs.Record(u=u, y=true.response(u, 0.1), t=t)
+    u = np.repeat(np.random.default_rng(0).standard_normal(40), 5)
+    record = hs.Record(u=u, y=true.response(u, 0.1), t=0.1 * np.arange(u.size))
     fit = hs.identify(hs.TransferFunction.structure(poles=2, zeros=1, initial="free"), record)
     assert fit.model.den == pytest.approx(true.den, rel=1e-6)
     assert fit.model.num == pytest.approx(true.num, rel=1e-6)

@@ -260,8 +260,7 @@ def test_a_crossing_of_zero_between_two_samples_is_looked_at(side):
     u = np.array([0.0, 1.2 * side])
     z = law.memory(u)
     assert z[0] * z[1] < 0.0
-    slopes = law.tangent(side, z)
-    assert (slopes > 0.1).all()
+    assert (law.tangent(side, z) > 0.1).all()
     assert np.isnan(rising_inverse(law, law.response(u))).tolist() == [False, True]
 
 

@@ -240,8 +240,7 @@ def test_a_discrete_oscillator_is_the_one_under_a_held_input(plant):
 
 def test_evaluating_a_system_leaves_no_trace():
     system = hs.to_control(PLANTS[3], H)
-    rng = np.random.default_rng(6)
-    x, u = 0.1 * rng.standard_normal(system.nstates), np.array([0.3])
+    x, u = 0.1 * np.random.default_rng(6).standard_normal(system.nstates), np.array([0.3])
     before = system.dynamics(0.0, x, u), system.output(0.0, x, u)
     system.dynamics(0.0, -x, -u)
     assert_array_equal(system.dynamics(0.0, x, u), before[0])

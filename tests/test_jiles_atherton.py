@@ -33,8 +33,7 @@ def zigzag(rng, reach, n=12):
 def any_law(rng, **others):
     """A law in units of a and Ms that does not jump, of any shape."""
     p = float(rng.choice([0.0, rng.uniform(-20.0, 20.0)]))
-    slope = initial_slope(p)
-    coupling = float(rng.choice([0.0, rng.uniform(-2.0, 0.9)])) / slope
+    coupling = float(rng.choice([0.0, rng.uniform(-2.0, 0.9)])) / initial_slope(p)
     core = Core(Ms=1.0, a=1.0, alpha=coupling, k=10.0 ** rng.uniform(-3.0, 2.0), c=rng.uniform(0.0, 1.0))
     return magnet(core, anisotropy=p, reversible_feedback=float(rng.choice([0.0, 0.5, 1.0])), **others)
 
@@ -50,8 +49,7 @@ def initial_slope(p):
 
 @pytest.mark.skipif(SLOW, reason="20 000 steps a stroke")
 def test_it_is_what_the_runge_kutta_loops_of_other_codes_tend_to():
-    turns = 1100.0 * np.array([0.0, 4.0, -4.0, 2.0, -1.0, 5.0])
-    fields = strokes(turns, 20_000)
+    fields = strokes(1100.0 * np.array([0.0, 4.0, -4.0, 2.0, -1.0, 5.0]), 20_000)
     expected = runge_kutta(STEEL, fields, 0.0)
     assert np.abs(magnet().response(fields) - expected).max() <= 1e-8 * np.ptp(expected)  # its own, of the kinks
 
@@ -129,8 +127,7 @@ def test_the_field_for_an_output_is_found_to_the_rounding_of_the_output():
     rng = np.random.default_rng(4)
     for _ in range(5 if SLOW else 100):
         law = replace(any_law(rng), feedthrough=10.0 ** rng.uniform(-6.0, 0.0), offset=rng.normal())
-        u = zigzag(rng, 10.0 ** rng.uniform(-1.0, 1.5))
-        y = law.response(u)
+        y = law.response(zigzag(rng, 10.0 ** rng.uniform(-1.0, 1.5)))
         again = law.inverse_response(y, u0=0.0)
         assert np.abs(law.response(np.append(0.0, again))[1:] - y).max() <= 1e-12 * np.ptp(y)
 
@@ -301,8 +298,7 @@ def box(freedom):
 )
 def test_coordinates_lead_to_the_parameters_and_back(freedom):
     space = box(freedom)
-    rng = np.random.default_rng(6)
-    x = rng.uniform(space.lower, space.upper, (200, space.lower.size))
+    x = np.random.default_rng(6).uniform(space.lower, space.upper, (200, space.lower.size))
     parameters = space.parameters(x)
     known = {**hs.JilesAtherton().scalars, **space.held}
     for k in range(len(x)):

@@ -156,8 +156,7 @@ def test_repetitive_control_removes_what_the_inverse_leaves_on_a_plant_that_is_o
     control = hs.RepetitiveControl(controller=inverse_of(STAGE), model=STAGE, stroke=STROKE, period=0.4)
     assert 0.0 < control.margin(H) == 1.0 - control.condition(H).rate
     r = hs.signals.triangle(*STROKE, cycles=12, samples_per_cycle=400)
-    plant = off(STAGE, 1.05, 0.95)
-    error = r - hs.close_loop(plant, control, H * np.arange(r.size), r).y
+    error = r - hs.close_loop(off(STAGE, 1.05, 0.95), control, H * np.arange(r.size), r).y
     assert np.std(error[-400:]) < 0.1 * np.std(error[:400])
     assert_refused(r"no whole number of samples", replace(control, period=0.4005).compiled, H)
 
@@ -251,8 +250,7 @@ def test_the_first_command_is_that_of_the_quadratic_program(bounds):
 
 def test_limits_and_rate_hold_exactly_whatever_is_asked_for():
     mpc = hs.PredictiveControl(model=STAGE, horizon=0.02, limits=(-5.0, 70.0), rate=8e3)
-    rng = np.random.default_rng(3)
-    r = np.repeat(rng.uniform(-3.0, 5.0, 40), 25)
+    r = np.repeat(np.random.default_rng(3).uniform(-3.0, 5.0, 40), 25)
     run = hs.close_loop(off(STAGE, 1.1, 0.9), mpc, H * np.arange(r.size), r)
     assert run.drive.min() >= -5.0
     assert run.drive.max() <= 70.0

@@ -331,8 +331,7 @@ def test_a_model_is_no_record_and_a_record_no_model(tmp_path):
 def test_columns_are_listed_without_reading_the_text_for_each_of_them(monkeypatch):
     parsed, parse = [], _delimited.plain_numbers
     monkeypatch.setattr(_delimited, "plain_numbers", lambda *given: parsed.append(given[1]) or parse(*given))
-    names = [f"c{k}" for k in range(500)]
-    text = ",".join(names) + "\n" + 3 * (",".join(["1"] * 500) + "\n")
+    text = ",".join([f"c{k}" for k in range(500)]) + "\n" + 3 * (",".join(["1"] * 500) + "\n")
     assert [column.highest for column in hs.list_columns(io.StringIO(text))] == [1.0] * 500
     assert len(parsed) == 1
     noted = text.replace("c137", "note").replace("\n1,", "\na,")

@@ -68,8 +68,7 @@ def test_the_check_sees_a_law_whose_step_ends_too_early():
 def test_a_memory_far_beyond_saturation_falls_the_same_way_in_one_piece_and_in_many(n):
     """The Taylor steps there were twice as long as their 31 terms could serve: 1e-12 of the memory was lost."""
     law = hs.BoucWen(n=n, z0=12.0)
-    length = 12.0**n / n
-    u = np.linspace(0.0, 12.0 / length, 40)
+    u = np.linspace(0.0, 12.0 / (12.0**n / n), 40)
     # ten roundings of the first state, from which each step falls
     assert law.memory(u[[0, -1]])[-1] == pytest.approx(law.memory(u)[-1], abs=10 * 2.0**-53 * 12.0)
 

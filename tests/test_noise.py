@@ -315,8 +315,7 @@ def moved(model, size):
 @pytest.mark.parametrize("size", [3e-4, 3e-3, 0.03])
 @pytest.mark.parametrize("model", [FRICTION, DAMPER], ids=["LuGre", "dashpot"])
 def test_noise_of_an_input_whose_velocity_counts_is_named_with_its_size(model, size):
-    record = moved(model, size)
-    sentence = rate_noise_warning([model], [record])
+    sentence = rate_noise_warning([model], [moved(model, size)])
     level = float(re.search(r"noise of about (\S+) rms", sentence)[1])
     assert level == pytest.approx(size, rel=0.2)
     assert "savgol_filter" in sentence

@@ -138,8 +138,7 @@ def test_tables_hold_the_lines_of_the_printed_text():
 
 
 def test_large_records_stay_small_pages():
-    n = 100_000
-    t = np.linspace(0.0, 100.0, n)
+    t = np.linspace(0.0, 100.0, 100_000)
     assert len(hs.Record(u=np.sin(t), y=np.cos(t), t=t)._repr_html_()) < 400_000
 
 

@@ -219,8 +219,7 @@ def test_a_law_much_sharper_than_the_step_is_followed():
 
 def test_a_dip_of_the_velocity_below_zero_is_seen():
     """v = 1 - 4.4 s + 4.4 s^2 is negative between two zeros."""
-    place = kernels.dip(1.0, -4.4, 1.0, 4.4, 1.0)
-    assert place == pytest.approx(0.5, abs=1e-12)
+    assert kernels.dip(1.0, -4.4, 1.0, 4.4, 1.0) == pytest.approx(0.5, abs=1e-12)
     assert kernels.dip(1.0, -3.0, 1.0, 3.0, 1.0) == 1.0
     assert kernels.dip(-1.0, 4.4, -1.0, -4.4, 2.0) == pytest.approx(1.0, abs=1e-12)
     assert kernels.dip(1.0, 4.4, 1.0, -4.4, 1.0) == 1.0

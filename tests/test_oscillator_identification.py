@@ -219,8 +219,7 @@ def test_a_band_limited_record_from_rest_is_not_linear_between_its_samples():
     force = sum(np.sin(2.0 * np.pi * f * t + phase) for f, phase in rng.uniform([5, 0], [150, 6], (60, 2)))
     begin = np.minimum(t / 0.05, 1.0)
     force *= 40.0 / force.std() * begin**2 * (3.0 - 2.0 * begin)
-    y = plant(substeps=1).response(force, STEP / fine)
-    rec = record(force[::fine], y[::fine])
+    rec = record(force[::fine], plant(substeps=1).response(force, STEP / fine)[::fine])
     linear, limited = (
         worst(hs.identify(structure(hold=hold, oversampling=20), rec, fixed={"n": 1.0}))
         for hold in ("foh", "band-limited")

@@ -63,8 +63,7 @@ U = hs.signals.triangle(-1.0, 1.0, cycles=2, samples_per_cycle=60) * np.linspace
 
 def test_dahls_law_is_the_built_in_one():
     assert DAHL.response(U) == pytest.approx(TWIN.response(U), abs=1e-14)  # rounding of numbers of order one
-    sim = hs.simulate(DAHL, None, U)
-    assert np.array_equal(sim.y, DAHL.response(U))
+    assert np.array_equal(hs.simulate(DAHL, None, U).y, DAHL.response(U))
 
 
 def test_a_compiled_function_and_a_plain_one_are_the_same_law():
@@ -114,8 +113,7 @@ def test_linear_parameters_are_solved_for_and_initial_values_can_be_free():
 
 def test_it_is_compared_with_the_others():
     u = hs.signals.triangle(-1.0, 1.0, cycles=3, samples_per_cycle=60)
-    rec = hs.Record(u=u, y=TWIN.response(u))
-    table = hs.compare({"own": DAHL, "line": hs.Line}, rec)
+    table = hs.compare({"own": DAHL, "line": hs.Line}, hs.Record(u=u, y=TWIN.response(u)))
     assert "own" in table.to_text()
 
 

@@ -118,8 +118,7 @@ def test_expressions_give_the_bits_of_pack(name, hostile):
         values = values_of(law, rng, hostile)
         columns = {each: np.array([[value]]) for each, value in zip(expressions.fields, values, strict=True)}
         with np.errstate(all="ignore"):
-            tables = law.completed(law.exchanged(columns))
-            parameters, memory = law.pack(tables)
+            parameters, memory = law.pack(law.completed(law.exchanged(columns)))
         for ours, theirs in zip(evaluated(expressions, values), (parameters[0], memory[0]), strict=True):
             np.testing.assert_array_equal(ours, theirs.astype(float))
 

@@ -63,8 +63,7 @@ def test_the_record_is_in_the_page_to_the_last_bit():
 
 @pytest.mark.parametrize("name", ["</script><b>", "<!-- <script>", '"&amp;', "\u2028"])
 def test_names_are_text_wherever_they_stand(name):
-    record = dataclasses.replace(hs.datasets.table1(), name=name)
-    text = page_text({name: Shown(LAW)}, record)
+    text = page_text({name: Shown(LAW)}, dataclasses.replace(hs.datasets.table1(), name=name))
     assert data_of(text)["record"]["name"] == data_of(text)["models"][0]["name"] == name
     assert text.count("<script") == text.count("</script>") == 2
     assert "<b>" not in text
@@ -287,8 +286,7 @@ def test_a_record_is_compared_and_what_a_slider_says_in_a_frame_is_drawn_once(br
     assert state["fit"]["rmse"] == pytest.approx(hs.metrics.rmse(record.y, y), rel=1e-9)
     for kind in ("triangle", "sine", "fading", "minor loops"):
         assert_as_python(browser.choose("kind", kind))
-    wide = browser.choose("kind", "triangle")
-    assert len(wide["u"]) > 1990
+    assert len(browser.choose("kind", "triangle")["u"]) > 1990
     before = browser.drawn()["values"]
     browser.value(
         "(() => { window.hysim.times.length = 0; const slider = document.querySelector('input[type=range]');"

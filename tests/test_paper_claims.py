@@ -116,8 +116,7 @@ def test_claims_are_complete_and_told_apart_by_their_ids(reproduction):
 
 
 def test_the_table_uses_every_function_and_no_other():
-    used = {entry.value[0] for entry in table().values() if entry.value}
-    assert used == set(FUNCTIONS)
+    assert {entry.value[0] for entry in table().values() if entry.value} == set(FUNCTIONS)
     for name, entry in table().items():
         assert entry.rule in (*RULES, "missing"), name
         assert bool(entry.value) == (entry.rule != "missing") == (not entry.needs), name
@@ -630,8 +629,7 @@ def test_13_is_not_a_realisation_of_6():
     found = characteristics(EQUATIONS_13_14.transfer_function)
     assert found.natural_frequencies[0] == pytest.approx(1.559, abs=5e-4)
     assert found.dc_gain == pytest.approx(-0.0297, abs=5e-5)
-    needed = companion(EQUATION_6)
-    assert np.argwhere(EQUATIONS_13_14.A != needed.A).tolist() == [[0, 1]]
+    assert np.argwhere(EQUATIONS_13_14.A != companion(EQUATION_6).A).tolist() == [[0, 1]]
 
 
 @pytest.mark.parametrize(

@@ -332,8 +332,7 @@ def test_widths_of_records_simulations_and_loops(record):
         loop = result if result is measured else hs.loop_metrics(result.u, result.y)
         np.testing.assert_array_equal(labelled(ax, name).get_xydata(), np.column_stack([loop.u, loop.width]))
     assert labelled(ax, "Table 1").get_linestyle() == "None"
-    dashes = {str(labelled(ax, name)._unscaled_dash_pattern) for name in names[1:]}
-    assert len(dashes) == 3
+    assert len({str(labelled(ax, name)._unscaled_dash_pattern) for name in names[1:]}) == 3
     assert (ax.get_xlabel(), ax.get_ylabel()) == ("Voltage [V]", "Loop width [µm]")
 
 

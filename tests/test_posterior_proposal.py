@@ -250,8 +250,7 @@ def test_the_density_is_likelihood_times_prior_times_volume(seven):
 
 def test_the_linear_parameters_never_leave_their_boxes(seven):
     _, _, posterior = seven
-    q = 4.0 * np.random.default_rng(2).standard_normal((500, 8))
-    drawn = posterior.parameters(q)
+    drawn = posterior.parameters(4.0 * np.random.default_rng(2).standard_normal((500, 8)))
     for name in ("feedthrough", "gain", "offset"):
         low, high = PRIORS[name]
         values = drawn[:, posterior.names.index(name)]

@@ -262,8 +262,7 @@ def test_the_staircase_divides_the_relays_that_are_up_from_those_that_are_down(u
     for value in u:
         up = np.where(value >= a, True, np.where(value <= b, False, up))
     corners = a_law(hs.Preisach).staircase(u)
-    below = (a <= corners[:, :1]) & (b < corners[:, 1:])
-    assert np.array_equal(below.any(axis=0), up)
+    assert np.array_equal(((a <= corners[:, :1]) & (b < corners[:, 1:])).any(axis=0), up)
 
 
 # ---------------------------------------------------------------------------------- the inverse
@@ -588,8 +587,7 @@ def test_the_chosen_smoothing_is_about_the_best_one(noise, least):
 def test_a_polynomial_of_the_second_degree_is_met_to_rounding():
     """On curves that fall from a to b, y = 3 (1 + a) (1 + b): the density is half of 3."""
     turn = np.maximum.accumulate(U)  # of each fall; a rise to a turning point passes no curve
-    rises = np.append(np.diff(U) > 0.0, False)
-    y = 3.0 * (1.0 + np.where(rises, U, turn)) * (1.0 + U)
+    y = 3.0 * (1.0 + np.where(np.append(np.diff(U) > 0.0, False), U, turn)) * (1.0 + U)
     known = np.isfinite((diagram := hs.forc(hs.Record(u=U, y=y), smoothing=2.0)).density)
     expected = np.outer([1.5, 0.0], np.ones(known.sum()))
     np.testing.assert_allclose([diagram.density[known], diagram.stderr[known]], expected, atol=1e-9)

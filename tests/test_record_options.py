@@ -183,8 +183,7 @@ def test_sensors_of_a_structure_have_the_names_of_its_signals(folder, capsys):
         with pytest.raises(ValueError, match=f"no signal '{name}': its signals are displacement_1 to displacement_2"):
             records.of_structure(frame, record, {name: 0})
     hs.save(frame, "frame.json")
-    arguments = ("identify", "loop.csv", "--model", "line", "--sensor", "drift_0=y")
-    assert main(arguments) == 2
+    assert main(("identify", "loop.csv", "--model", "line", "--sensor", "drift_0=y")) == 2
     assert "--sensor is for structures in a file, got a Line" in capsys.readouterr().err
 
 

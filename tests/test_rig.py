@@ -109,8 +109,7 @@ def test_a_frame_depends_on_its_seed_and_number_alone():
     backwards = {k: frames[k] for k in (9, 4, 0)}
     forwards = list(itertools.islice(frames, 10))
     assert all((forwards[k] == frame).all() for k, frame in backwards.items())
-    again = replace(SMALL).frames(t, y)[4]
-    assert (again == forwards[4]).all()
+    assert (replace(SMALL).frames(t, y)[4] == forwards[4]).all()
     assert (forwards[4] != replace(SMALL, seed=1).frames(t, y)[4]).any()
     assert np.abs(replace(SMALL, texture=1).light(0.0) - SMALL.light(0.0)).max() > 0.1
     assert (frames[-1] == frames[len(frames) - 1]).all()
@@ -132,8 +131,7 @@ def test_signal_to_noise_is_that_of_the_frames():
 
 
 def test_the_staircase_is_that_of_table_1():
-    drive = hs.rig.staircase_drive(dwell=0.1)
-    experiment = hs.rig.table1().run(drive)
+    experiment = hs.rig.table1().run(hs.rig.staircase_drive(dwell=0.1))
     assert (experiment.voltages == hs.datasets.table1().u).all()
     assert (experiment.record("truth").u == hs.datasets.table1().u).all()
     ends = experiment.at + experiment.rig.camera.exposure

@@ -108,8 +108,7 @@ def test_a_narrow_bent_valley_is_followed_to_its_end():
     The start is where straight steps, with slopes over a millionth of the box, lower the cost by 2 % in 200 steps.
     """
     u = np.concatenate([np.linspace(1.0, -1.0, 64), np.linspace(-1.0, 1.0, 64)[1:]])
-    direction = np.sign(np.diff(u, prepend=2.0))
-    record = hs.Record(u=u, y=np.tanh((u - 0.2 * direction) / 0.3))
+    record = hs.Record(u=u, y=np.tanh((u - 0.2 * np.sign(np.diff(u, prepend=2.0))) / 0.3))
     whole = problem(hs.BoucWen(), [record], Freedom({}, (), {}), None)
     start = np.array([[2.348185, -2.371288, 0.636117, 0.17317]])
     (end,) = polish(whole, start)
@@ -162,8 +161,7 @@ def test_the_close_law_has_the_output_of_the_law(of):
 
 
 def test_a_record_that_turns_at_most_samples_is_searched_on_its_beginning():
-    rng = np.random.default_rng(4)
-    u = rng.uniform(-0.5, 0.5, 2500)
+    u = np.random.default_rng(4).uniform(-0.5, 0.5, 2500)
     u[[1040, 700]] = -1.0, 1.0
     whole = problem(hs.BoucWen(), [hs.Record(u=u, y=u)], Freedom(), None)
     assert whole.thinned(250) is None
@@ -264,8 +262,7 @@ def test_a_start_from_the_simpler_family_is_where_that_family_stands():
 
 
 def test_the_criterion_chooses_the_stages_and_the_user_may_ask_for_one():
-    record = RECORDS["noise"]
-    fit = hs.identify(hs.BoucWenBaberNoori, record)
+    fit = hs.identify(hs.BoucWenBaberNoori, RECORDS["noise"])
     assert "the BIC leaves out wear, pinching and lambda_" in fit.message
     assert fit.estimates["delta_nu"] == fit.estimates["zeta_s"] == 0.0
     assert "zeta_s" not in fit.free_names
@@ -449,8 +446,7 @@ def box(**kinds) -> SearchSpace:
 
 
 def test_a_fit_beyond_the_box_is_put_together_again():
-    law = hs.BoucWen(beta=2.0, gamma=0.5, n=0.3, gain=0.7, feedthrough=0.4)
-    rec = record(law, 1e-3)
+    rec = record(hs.BoucWen(beta=2.0, gamma=0.5, n=0.3, gain=0.7, feedthrough=0.4), 1e-3)
     fit = hs.identify(hs.BoucWen, rec, fixed={"z0": 0.0}, max_evaluations=3000)
     assert fit.estimates["n"] < 0.5
     again(fit, [rec], {}, None)  # which raises where its residual is another one

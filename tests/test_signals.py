@@ -163,8 +163,7 @@ def test_a_sweep_of_one_frequency_is_a_sine():
 
 @given(st.integers(1, 10_000))
 def test_times_are_the_nearest_numbers_to_the_decimal_ones(rate):
-    t = hs.signals.sample_times(1000, 1.0 / rate)
-    assert np.array_equal(t, np.arange(1000) / rate)
+    assert np.array_equal(hs.signals.sample_times(1000, 1.0 / rate), np.arange(1000) / rate)
 
 
 def test_times_of_any_step_are_rounded_once():

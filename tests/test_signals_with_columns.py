@@ -153,8 +153,7 @@ def test_a_table_of_any_format_holds_every_column(run, tmp_path, ending):
 
 def test_loops_of_elements_are_drawn(run, tmp_path, simulation):
     assert run("simulate", "floors:frame", "quake.AT2", "--plot", tmp_path / "loops.svg")[0] == 0
-    picture = (tmp_path / "loops.svg").read_text()
-    assert "element 1" in picture
+    assert "element 1" in (tmp_path / "loops.svg").read_text()
     panels = hs.plot.element_loops(simulation, hs.plot.figure().subplots(2))
     assert [ax.lines[0].get_ydata().tolist() for ax in panels] == simulation.signals["force"].T.tolist()
     assert panels[0].get_xlabel() == "Drift [m]"

@@ -132,8 +132,7 @@ def test_the_density_is_returned_where_it_predicts_better_than_the_grid(density)
 
 
 def test_a_line_a_hundred_times_the_loop_is_free_of_the_penalty():
-    law = hs.Preisach.from_density(LEVELS, positive)
-    loops = loops_of(law, (0.4, 0.6, 0.9, 1.2), 1e-3)
+    loops = loops_of(hs.Preisach.from_density(LEVELS, positive), (0.4, 0.6, 0.9, 1.2), 1e-3)
     size = float(np.ptp(loops[-1].y))
     records = [hs.Record(u=each.u, y=each.y + 100.0 * size * each.u) for each in loops]
     family = hs.Preisach.structure(smoothness=10.0)
@@ -170,8 +169,7 @@ def test_errors_of_left_out_samples_are_those_of_fits_without_them():
 
 
 def test_samples_of_no_weight_have_no_part_in_the_fit():
-    law = hs.Preisach.from_density(LEVELS, positive)
-    record = steady(law, 1.2, 1e-3)
+    record = steady(hs.Preisach.from_density(LEVELS, positive), 1.2, 1e-3)
     spoiled = hs.Record(u=record.u, y=np.where(np.arange(120) % 7 == 3, 5.0, record.y))
     weights = np.where(np.arange(120) % 7 == 3, 0.0, 2.0)
     family = hs.Preisach.structure(smoothness="auto")

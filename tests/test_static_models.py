@@ -27,8 +27,7 @@ def test_inputs_that_rounding_alone_tells_apart_are_one_level():
     once = np.sin(2.0 * np.pi * np.arange(40) / 40)
     u = np.concatenate([once, np.sin(2.0 * np.pi * np.arange(40, 80) / 40)])
     assert np.unique(u).size > 40  # the same sine, computed twice
-    curve = hs.SingleValued.through_means(hs.Record(u=u, y=np.arange(80.0)))
-    assert curve.u.size == 21
+    assert hs.SingleValued.through_means(hs.Record(u=u, y=np.arange(80.0))).u.size == 21
 
 
 @pytest.mark.parametrize(("period", "cycles"), [(47, 5), (50, 2), (65, 5), (71, 3), (83, 10)])
@@ -142,8 +141,7 @@ def test_a_curve_of_several_records_is_that_of_all_samples():
     parts = hs.identify(hs.SingleValued, [record[:50], record[50:]], cross_validate="records")
     assert parts.model == hs.identify(hs.SingleValued, record).model
     assert len(parts.models) == 2
-    back = hs.Identification.from_json(parts.to_json())
-    assert back == parts
+    assert hs.Identification.from_json(parts.to_json()) == parts
 
 
 def test_the_line_is_the_regression_with_its_textbook_errors():

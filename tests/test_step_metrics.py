@@ -79,8 +79,7 @@ def test_scale_sign_offset_and_the_origin_of_time_do_not_matter(values, scale, o
     # a step so small beside its wiggles or the offset, or a level so near a sample, that rounding would decide
     change = y[-(y.size // 10) :].mean() - y[0]
     assume(abs(change) > 1e-2)
-    eta = (y - y[0]) / change
-    assume(np.abs(eta[:, np.newaxis] - [0.1, 0.9, 0.98, 1.02]).min() > 1e-6)
+    assume(np.abs(((y - y[0]) / change)[:, np.newaxis] - [0.1, 0.9, 0.98, 1.02]).min() > 1e-6)
     t = np.cumsum(0.5 + 0.1 * (np.arange(y.size) % 3))
     plain, other = step_metrics(t, y), step_metrics(t0 + unit * t, offset + scale * y)
     rounding = 1e-7  # 1e-15 (10 / 0.01) over a step of 0.01, over the distance 1e-6 between a level and a sample

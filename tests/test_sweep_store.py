@@ -97,8 +97,7 @@ def test_a_killed_study_goes_on_and_loses_nothing(path, uninterrupted):
     rng = np.random.default_rng(10)
     for n_done in (1, 90):
         run = f"sweep_tasks.run_until_killed({str(path)!r}, {n_done}, {rng.uniform(0.0, 0.01)})"
-        child = in_another_process(f"import sweep_tasks; {run}")
-        assert child.wait() == -signal.SIGKILL
+        assert in_another_process(f"import sweep_tasks; {run}").wait() == -signal.SIGKILL
         assert n_done <= len(hs.load_sweep(path)) < len(uninterrupted)
     resumed = hs.sweep(sweep_tasks.long, sweep_tasks.LONG, workers=2, store=path)
     assert bits(resumed) == bits(uninterrupted) == bits(hs.load_sweep(path))
@@ -401,8 +400,7 @@ def test_the_command_is_interrupted_and_goes_on(study, path, shell):
         os.killpg(child.pid, signal.SIGINT)
         assert child.communicate()[1] == "hysim: interrupted\n"
     assert child.returncode == 130
-    n_kept = rows(path)
-    assert 5 < n_kept < 100
+    assert 5 < rows(path) < 100
     code, _, err = shell("sweep", study, "--out", path)
     assert (code, "continue it with --resume" in err) == (2, True)
     code, out, err = shell("sweep", study, "--out", path, "--resume", "--processes")
@@ -534,7 +532,6 @@ def test_the_other_recipes_have_the_form_of_what_reads_them():
         compile(file.read_text(), file, "exec")
     for file in CLUSTER.glob("*.sh"):
         assert subprocess.run(["bash", "-n", file], capture_output=True).returncode == 0
-    yaml = pytest.importorskip("yaml")
-    job = yaml.safe_load((CLUSTER / "kubernetes_job.yaml").read_text())
+    job = pytest.importorskip("yaml").safe_load((CLUSTER / "kubernetes_job.yaml").read_text())
     assert job["spec"]["completionMode"] == "Indexed"
     assert f"auto/{job['spec']['completions']}" in job["spec"]["template"]["spec"]["containers"][0]["args"]

@@ -62,8 +62,7 @@ def test_times_in_ms_are_taken_where_no_creep_is_searched():
 
 @pytest.mark.parametrize(("units", "to"), [({"y": "m/s^2"}, "mm/s^2"), ({"y": "kA/m"}, "A/m")])
 def test_a_quotient_has_the_prefix_above(units, to):
-    record = hs.Record(u=U, y=U, units=units)
-    np.testing.assert_allclose(record.convert({"y": to}).y, 1e3 * U)
+    np.testing.assert_allclose(hs.Record(u=U, y=U, units=units).convert({"y": to}).y, 1e3 * U)
 
 
 def test_a_loop_that_jumps_between_its_limits_is_not_called_out_of_reach():

@@ -79,8 +79,7 @@ def literal(controller, h, u0, y0, reference, measurement):
             v = (drive[k] - weights @ (e * q)) / (creep.instant_gain + weights @ (1.0 - e))
 
             def after(u):
-                state = stepped.state.copy()
-                return stepped.step(stepped.parameters, state, u)
+                return stepped.step(stepped.parameters, stepped.state.copy(), u)
 
             low, high = lowest, highest
             for _ in range(80):
@@ -270,8 +269,7 @@ def test_the_linear_feedback_is_what_the_kernel_does_to_the_measurement(pid, not
         u.append(C @ x + D * m)
         x = A @ x + B * m
     assert np.abs(commanded(controller, H, np.zeros(60), measurement)[0] - u).max() < 1e-9
-    z = np.exp(1j * 700.0 * H)
-    transfer = C @ np.linalg.solve(z * np.eye(B.size) - A, B) + D
+    transfer = C @ np.linalg.solve(np.exp(1j * 700.0 * H) * np.eye(B.size) - A, B) + D
     assert controller.frequency_response(700.0, H) == pytest.approx(-transfer, abs=1e-9)
 
 

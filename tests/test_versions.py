@@ -127,6 +127,5 @@ def test_a_stored_identification_comes_back():
 
 
 def test_a_stored_study_is_read(tmp_path):
-    path = shutil.copy(FOLDER / "study.sqlite", tmp_path)
-    study = hs.load_sweep(path)
+    study = hs.load_sweep(shutil.copy(FOLDER / "study.sqlite", tmp_path))
     assert study["height"].ravel() == pytest.approx(np.outer([1.0, 2.0], np.exp([-0.0, -0.25, -1.0])).ravel())

@@ -24,8 +24,7 @@ def check(fit, records):
     """The residual, the error and the model of each record are one."""
     own = []
     for model, rec in zip(fit.models, records, strict=True):
-        run = hs.simulate(model, rec.t, rec.u)
-        own.append(rec.y - run.y)
+        own.append(rec.y - hs.simulate(model, rec.t, rec.u).y)
     np.testing.assert_array_equal(fit.residual, np.concatenate(own))
     assert fit.rmse == pytest.approx(np.sqrt(np.mean(fit.residual**2)), rel=1e-12)
     assert fit.model == fit.models[0]

@@ -251,7 +251,6 @@ def test_files_of_two_rates_on_the_command_line(tmp_path, capsys):
     options = ["--model", "actuator", "--law", "line", "--modes", "0", "--creep", "--out", str(out)]
     assert main(["identify", *files, *options]) == 0
     assert "creep.percent = 3.00" in capsys.readouterr().out
-    model = hs.load_model(out)
-    assert model.hysteresis.slope == pytest.approx(2.0, rel=1e-3)
+    assert hs.load_model(out).hysteresis.slope == pytest.approx(2.0, rel=1e-3)
     assert main(["identify", str(paths[0]), "--model", "line", "--modes", "0"]) == 2
     assert "--modes is no option of the model line" in capsys.readouterr().err
