@@ -267,6 +267,7 @@ test_wrong_arguments_are_named = refused(
     (assess_hysteresis, hs.Line(slope=0.0), TRIANGLE, "gain is 0.0: no input drives it"),
     (assess_hysteresis, hs.Stop(threshold=0.1), TRIANGLE, "no steady cycle has its span"),
     (assess_step, INTEGRATOR, ONE_STEP, "gain is inf"),
+    (assess_step, LAW, ONE_STEP | {"step": 0.0}, "the reference stands still"),
     (assess_square_wave, LAG, WAVE | {"period": 1.03}, "whole number of samples"),
     (assess_square_wave, LAG, WAVE | {"high": 0.0}, "high (must be )?above low"),
     (assess_square_wave, LAG, WAVE | {"low": 1.0, "high": 0.0}, r"high must be above low.* got .*1.* and .*0"),

@@ -355,6 +355,8 @@ def secant_gain(
     span = float(np.ptp(cycle))
     if actuator.hysteresis is None and sample_time is None:
         return _usable(actuator.dc_gain)
+    if span == 0.0:
+        raise ValueError("the reference stands still: a law has a secant gain along a stroke only")
     actuator = _unlimited(actuator)
     ranges = [actuator.u_range] if actuator.u_range else _PROBED
     chords = (np.diff(replace(actuator, amplifier=None).level(ends))[0] / np.ptp(ends) for ends in ranges)
