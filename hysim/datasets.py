@@ -67,8 +67,7 @@ def table2() -> Record:
 
 def _columns(file: str) -> FloatArray:
     lines = (files("hysim") / "data" / file).read_text(encoding="utf-8").splitlines()
-    rows = [line for line in lines if not line.startswith("#")][1:]
-    return np.loadtxt(rows, delimiter=",").T
+    return np.loadtxt([line for line in lines if not line.startswith("#")][1:], delimiter=",").T
 
 
 def _record(name: str, u: FloatArray, y: FloatArray, sample_time: float, resolution: float | None = None) -> Record:

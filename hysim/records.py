@@ -121,8 +121,7 @@ class Record:
         try:
             return f"every {quantity(self.sample_time, unit)}"
         except ValueError:
-            steps = np.diff(np.asarray(self.t))
-            return f"steps of {extent(steps, unit)}"
+            return f"steps of {extent(np.diff(np.asarray(self.t)), unit)}"
 
     def __len__(self) -> int:
         return self.u.size

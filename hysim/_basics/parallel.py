@@ -54,8 +54,7 @@ def in_chunks(work: Work, n_items: int, *, workers: int | None = None, minimum: 
     _check(workers)
     minimum = max(1, min(minimum, _LONGEST // max(1, n_samples)))
     n_chunks = max(1, min(workers or _most.get() or cores(), n_items // minimum))
-    edges = [n_items * k // n_chunks for k in range(n_chunks + 1)]
-    own, *others = itertools.pairwise(edges)
+    own, *others = itertools.pairwise(n_items * k // n_chunks for k in range(n_chunks + 1))
     if not others:
         _piece_by_piece(work, *own, minimum)
         return

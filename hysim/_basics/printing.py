@@ -141,8 +141,7 @@ def extent(values: npt.ArrayLike, unit: str = "") -> str:
 
 def value_in_words(value: Any) -> str:
     if isinstance(value, np.ndarray):
-        size = " x ".join(map(str, value.shape)) or "1"
-        return f"{size} values, {extent(value)}"
+        return f"{' x '.join(map(str, value.shape)) or '1'} values, {extent(value)}"
     if isinstance(value, tuple):
         if len(value) > 4 and all(isinstance(each, float) for each in value):
             return value_in_words(np.array(value))

@@ -103,8 +103,7 @@ def protocol(u: FloatArray, tolerance: float, level: float | None = None) -> Pro
     attempts = [(middle, _pairs_about(middle, u, plateaus, levels, reach)) for middle in candidates]
     middle, pairs = max(attempts, key=lambda attempt: _total_span(attempt[0], attempt[1], levels))
     spans = [(pair[0].begin, pair[-1].end) for pair in pairs]
-    cuts = [place for span in spans for place in span]
-    places = np.union1d(np.arange(float(u.size)), cuts)
+    places = np.union1d(np.arange(float(u.size)), [place for span in spans for place in span])
     return Protocol(
         level=middle,
         spans=spans,

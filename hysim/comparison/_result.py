@@ -154,8 +154,7 @@ class Comparison:
         >>> [row.name for row in tab.ranked("bic")], [row.name for row in tab.ranked("rmse")]
         (['one play', 'plays'], ['plays', 'one play'])
         """
-        criteria = ("cv_rmse", "bic", "aic", "fpe", "rmse", "test_rmse")
-        check_choice("criterion", criterion, criteria)
+        check_choice("criterion", criterion, ("cv_rmse", "bic", "aic", "fpe", "rmse", "test_rmse"))
         scores = [(float(vars(row)[criterion]), row) for row in self.rows]
         return tuple(row for score, row in sorted(scores, key=lambda pair: pair[0]) if score == score)
 
@@ -285,8 +284,7 @@ class Comparison:
         ``attrs`` holds the units of the columns by their headings, the record's name and the verdict.
         """
         units = {each.heading: unit for each in columns(self) if (unit := heading(each.heading)[1])}
-        notes = {"record": self.record.name, "verdict": self.verdict}
-        return frame(self._columns(), units=units, notes=notes)
+        return frame(self._columns(), units=units, notes={"record": self.record.name, "verdict": self.verdict})
 
     def _undecided_in_words(self) -> str:
         method = "(signed ranks of left-out errors, 5 % after Holm's correction)"

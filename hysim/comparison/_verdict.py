@@ -131,8 +131,7 @@ def _tested(a: FloatArray, b: FloatArray, tie: float) -> tuple[float, float]:
         return math.nan, math.nan
     known = ~np.isnan(a) & ~np.isnan(b)
     first, second = (np.minimum(np.abs(errors[known]), 1e300) for errors in (a, b))
-    n = first.size
-    if n < _FEWEST:
+    if first.size < _FEWEST:
         return math.nan, math.nan
     d = first - second
     d[np.abs(d) <= max(tie, _TIE * 0.5 * float(np.median(first + second)))] = 0.0

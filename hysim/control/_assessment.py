@@ -314,8 +314,7 @@ class SquareWaveAssessment:
             f"  peak excess {self.peak_excess_percent:.2f} %, open loop {self.open_peak_excess_percent:.2f} %",
             "" if self.reduction is None else f"  {self.reduction}",
         ]
-        rows = {"not stable": self.loop.message}
-        return summary_text(lines, rows)
+        return summary_text(lines, {"not stable": self.loop.message})
 
 
 def driven_by(run: ClosedLoop) -> str:

@@ -419,8 +419,7 @@ class AdaptiveInverse(WithoutFeedback):
         return parameters[0], memory[0]
 
     def _begun(self, parameters: FloatArray, u0: float) -> tuple[float, FloatArray]:
-        front = self.law.packed[1]
-        state = np.concatenate([front, np.zeros(self.law.workspace)])
+        state = np.concatenate([self.law.packed[1], np.zeros(self.law.workspace)])
         constants = read_only(parameters, finite=False)
         self.law.start(constants, state, u0 if self.law.u0 is None else self.law.u0)
         if self.law.u0 is not None:

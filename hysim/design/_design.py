@@ -325,8 +325,7 @@ def searched(
     drawn: Sequence[FloatArray], worth: Callable[[FloatArray], float], move: Move, moves: int
 ) -> tuple[float, FloatArray]:
     """The best strokes (n, 3) and their worth, after random moves of the best drawn; moves that are worth more stay."""
-    every = [(worth(strokes), strokes) for strokes in drawn]
-    improved = sorted(every, key=lambda each: -each[0])[:_BEST]
+    improved = sorted([(worth(strokes), strokes) for strokes in drawn], key=lambda each: -each[0])[:_BEST]
     for place, best in enumerate(improved):
         for k in range(moves):
             strokes = move(best[1], k / moves)

@@ -194,8 +194,7 @@ class Search(NamedTuple):
         self.progress(2, _STEPS)
         if begun.bic >= elastic.bic:
             return self._described(self._about(elastic), elastic, {}, failure)
-        first = self._about(begun)
-        candidates = self._candidates(first)
+        candidates = self._candidates(self._about(begun))
         self.progress(3, _STEPS)
         best = min(candidates, key=_bic).fitted
         for structure in others:

@@ -213,8 +213,7 @@ def weak_rows(u: FloatArray, y: FloatArray) -> Rows | None:
         return None
     size = max(_SHORTEST, min(n // _WINDOWS, n // len(pieces(u))))
     stride = max(1, size // _OVERLAP)
-    x = np.linspace(-1.0, 1.0, size + 1)
-    bump = (1.0 - x**2) ** 2
+    bump = (1.0 - np.linspace(-1.0, 1.0, size + 1) ** 2) ** 2
     shares = 0.5 * (bump[1:] + bump[:-1])  # with these the sum by parts is exact, whatever the steps of the input
     du, smooth = np.diff(u), _smoothed_where_long(u, y)
     mean_y = 0.5 * (y[1:] + y[:-1])

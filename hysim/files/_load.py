@@ -349,8 +349,7 @@ def _parts(
     parts = np.split(samples, np.flatnonzero(np.diff(samples) > 1) + 1 if is_cut else [])
     long_enough = [part for part in parts if part.size >= 2]
     longest = max(part.size for part in parts)
-    in_a_row = " in a row" if is_cut else ""
-    require(long_enough, f"a record needs at least 2 samples, there are {longest}{in_a_row}")
+    require(long_enough, f"a record needs at least 2 samples, there are {longest}{' in a row' * is_cut}")
     times = values[[*columns].index("t")] if "t" in columns else np.arange(float(values.shape[1]))
     for part in long_enough:
         advice = "sort the samples, remove repeated ones, or load without time: t=False"

@@ -65,8 +65,7 @@ class CascadeStructure(Subject, Composable):
         return next((k for k, stage in enumerate(self.stages) if isinstance(stage, roles.LinearStructure)), 0)
 
     def search_space(self, record: Record, freedom: Freedom = ALL_FREE) -> SearchSpace:
-        names = labels(self.stages)
-        before = names[: self.carrier]
+        before = labels(self.stages)[: self.carrier]
         spaces = {
             label: partial(_at_rest, stage, record)
             if label in before

@@ -165,8 +165,7 @@ class Dependent:
         TypeError if a parameter that depends on a varying channel cannot change from sample to sample.
         """
         inputs = read_only(u, "u", ndim=1)
-        checked = checked_channels(channels or {}, inputs.size)
-        values = self._needed(checked)
+        values = self._needed(checked_channels(channels or {}, inputs.size))
         if not inputs.size:
             return inputs
         self._warn(values)

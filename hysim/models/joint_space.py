@@ -81,8 +81,7 @@ def declared(spaces: Mapping[str, Space], freedom: Freedom) -> dict[str, SearchS
     """Each part's space with its share of what the user says."""
     asked = {label: space(replace(freedom, fixed={}, free=(), bounds={})) for label, space in spaces.items()}
     known = [f"{label}.{name}" for label, space in asked.items() for name in (*space.names, *space.held)]
-    wishes = {"fixed": freedom.fixed, "free": freedom.free, "bounds": freedom.bounds}
-    for argument, names in wishes.items():
+    for argument, names in {"fixed": freedom.fixed, "free": freedom.free, "bounds": freedom.bounds}.items():
         for name in names:
             if name not in known:
                 raise ValueError(f"{argument} names {name!r}; the parameters are {among(name, known)}")

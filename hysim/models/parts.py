@@ -31,8 +31,7 @@ def exchanged(parts: Sequence[Any], others: Mapping[str, Any]) -> tuple[Any, ...
 
 def _label(part: Any) -> str:
     kind = part if isinstance(part, type) else part.law if isinstance(part, OfFamily) else type(part)
-    family = kind.__name__.removesuffix("Structure")
-    return re.sub(r"(?<=[a-z])(?=[A-Z])", "_", family).lower()
+    return re.sub(r"(?<=[a-z])(?=[A-Z])", "_", kind.__name__.removesuffix("Structure")).lower()
 
 
 def check_parts(parts: Any, what: str) -> tuple[Any, ...]:

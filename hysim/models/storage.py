@@ -226,8 +226,7 @@ def from_plain(value: Any, kinds: Sequence[type]) -> Any:
     if isinstance(value, dict) and value.keys() == {"result", "fields"}:
         kind = {each.__name__: each for each in kinds}[value["result"]]
         hints = typing.get_type_hints(kind)
-        arguments = {name: _field(each, hints[name], kinds) for name, each in value["fields"].items()}
-        return kind(**arguments)
+        return kind(**{name: _field(each, hints[name], kinds) for name, each in value["fields"].items()})
     if is_document(value):
         return from_document(value, "the text")
     if isinstance(value, dict):

@@ -135,8 +135,7 @@ def evidence(evidence: Evidence, ax: Axes | None = None) -> Axes:
 def _draw_pair(ax: Axes, x: FloatArray, y: FloatArray) -> None:
     from scipy.ndimage import convolve1d
 
-    limits = [_shown(x), _shown(y)]
-    smooth, across, up = np.histogram2d(x, y, bins=_BINS, range=limits)
+    smooth, across, up = np.histogram2d(x, y, bins=_BINS, range=[_shown(x), _shown(y)])
     for axis in (0, 1, 0, 1):  # means of neighbours, 1 : 2 : 1 along both axes, twice
         smooth = convolve1d(smooth, [0.25, 0.5, 0.25], axis, mode="nearest")
     ordered = np.sort(smooth.ravel())[::-1]

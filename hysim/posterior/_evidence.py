@@ -138,8 +138,7 @@ _LARGEST_RHAT = 1.2  # of the walkers' terms: beyond it ln Z is not found
 
 def bridge_evidence(target: Target, chains: Chains, seed: int) -> LogEvidence:
     """ln Z from chains of the posterior, with the number of all sets that this target has simulated."""
-    rng = np.random.default_rng(seed)
-    drawn = chains.proposal.draw(_DRAWS, rng)
+    drawn = chains.proposal.draw(_DRAWS, np.random.default_rng(seed))
     of_posterior = chains.log_density.ravel() - chains.proposal.log_density(chains.flat)
     of_proposal = target.log_posterior(drawn) - chains.proposal.log_density(drawn)
     effective = fewest_effective(chains.q)
@@ -306,8 +305,7 @@ class Evidence:
         """A table of all models, and the sentence."""
         probable = self.probabilities()
         boxes = [f"ln Z, boxes x {factor:g}" for factor in self.factors]
-        head = ["model", "parameters", "fit [%]", *boxes, "probability"]
-        table = [head]
+        table = [["model", "parameters", "fit [%]", *boxes, "probability"]]
         for row in self.rows:
             logs = (f"{value:.2f} +- {error:.2f}" for value, error in zip(row.log_evidence, row.error, strict=True))
             share = f"{probable[row.name]:.2g}"

@@ -246,8 +246,7 @@ class BoucWen(BoucWenLaw):
         ``z' = u' (Ao - |z|^n (gamma + beta sign(u' z)))``: alpha is the ratio of the stiffness after yielding to the
         one before it, ko. The rates of degradation deltaA, deltaNu and deltaEta must be zero, else ValueError.
         """
-        degradation = {"deltaA": deltaA, "deltaNu": deltaNu, "deltaEta": deltaEta}
-        for name, rate in degradation.items():
+        for name, rate in {"deltaA": deltaA, "deltaNu": deltaNu, "deltaEta": deltaEta}.items():
             if rate != 0.0:
                 raise ValueError(f"{name} must be zero, got {rate:g}: the law does not degrade")
         return cls.from_wen(alpha=alpha, k=ko, A=Ao, beta=beta, gamma=gamma, n=n)

@@ -73,8 +73,7 @@ class BoucWenInverse:
         samples = outputs.reshape(-1)
         if state is None and not samples.size:
             return outputs, None
-        start = at_rest(self.law, samples[0]) if state is None else state
-        compiled = self.begun(start)
+        compiled = self.begun(at_rest(self.law, samples[0]) if state is None else state)
         u = inverse_response(compiled, samples, unreached)
         last_u, last_y, z = compiled.state[[0, 1, kernels.N_OWN + 1]].tolist()
         return u.reshape(outputs.shape), (last_u, z, last_y)

@@ -213,8 +213,7 @@ class AtSampleTime(Law):
     def search_space(self, record: Record, freedom: Freedom = ALL_FREE) -> SearchSpace:
         """The box of the family for samples that are the law's sample time apart."""
         times = np.asarray(self.scalars["sample_time"] * np.arange(len(record)), dtype=np.float64)
-        timed = replace(record, t=times)
-        return declared_space(self, record, freedom, units=rate_spans(timed))
+        return declared_space(self, record, freedom, units=rate_spans(replace(record, t=times)))
 
     @classmethod
     def initial_memory(cls, tables: Tables, *, further: int = 0) -> FloatArray:

@@ -151,8 +151,7 @@ def linear_parts(matrices: Matrices) -> tuple[FloatArray, FloatArray, FloatArray
     if not np.isfinite(A).all():
         raise ValueError("stiffness or damping over mass is beyond the largest number: check their units")
     loads[:, :, n:] = np.swapaxes(np.linalg.solve(mass, np.swapaxes(forces, 1, 2)), 1, 2)
-    rates = np.abs(np.linalg.eigvals(A)).max(axis=1)
-    return A, loads, rates
+    return A, loads, np.abs(np.linalg.eigvals(A)).max(axis=1)
 
 
 def follow_address() -> Any:

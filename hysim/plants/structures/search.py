@@ -111,8 +111,7 @@ class StructureRecord:
     def __str__(self) -> str:
         names = ", ".join(f"{signal}[:, {column}]" for signal, column in self.sensors)
         lines = [f"StructureRecord {self.name}".rstrip() + f": {len(self)} samples every {self.sample_time:.4g} s"]
-        rows = {"sensors": names}
-        return summary_text(lines, rows)
+        return summary_text(lines, {"sensors": names})
 
     @property
     def signals(self) -> dict[str, FloatArray]:
@@ -265,8 +264,7 @@ class SearchedStructure(MovingStructure, Subject):
 
     def regressors(self, parameters: Parameters, record: Record) -> FloatArray:
         """The output itself, shape (n_sets, n_samples, 1), sets on threads; inf for a set that diverges."""
-        u = _input(record)
-        return self._outputs(parameters, record, u.size).reshape(-1, len(record), 1)
+        return self._outputs(parameters, record, _input(record).size).reshape(-1, len(record), 1)
 
     def _outputs(self, parameters: Parameters, record: Record, n: int) -> FloatArray:
         """Outputs of the sensors at the first `n` samples, (n_sets, n_sensors, n)."""
