@@ -149,9 +149,8 @@ def cases(term: Term, degree: int) -> FloatArray:
 
 
 def _signs(term: Term) -> FloatArray:
-    direction = np.array([1.0, 1.0] if term.rectified else [-1.0, 1.0])
-    side = np.array([1.0, 1.0] if term.is_even_in_memory else [-1.0, 1.0])
-    return np.asarray(direction[:, np.newaxis] * side)
+    direction, side = ([1.0 if is_even else -1.0, 1.0] for is_even in (term.rectified, term.is_even_in_memory))
+    return np.outer(direction, side)
 
 
 _DIFFERENCE = 3e-5  # of a parameter, for its slope

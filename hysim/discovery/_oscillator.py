@@ -255,8 +255,7 @@ class Search(NamedTuple):
 
     def _refined(self, *starts: Oscillator, any_exponent: bool = False) -> _Fitted:
         """The best law of those refined by simulation from some starts; a ValueError if all diverge."""
-        ends = [self._ended(start, any_exponent) for start in starts]
-        refined = [end for end in ends if end is not None]
+        refined = [end for start in starts if (end := self._ended(start, any_exponent)) is not None]
         if not refined:
             advice = "check the units, the time, and the sign of u and y"
             raise ValueError(f"the oscillator nearest to the records diverges, or does not become steady: {advice}")

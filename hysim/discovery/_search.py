@@ -311,11 +311,10 @@ def preferred(candidates: Sequence[Candidate], letter: str) -> Candidate:
 def pruned(free_run: FreeRun, candidate: Candidate, required: frozenset[str]) -> Candidate:
     structure = candidate.structure
     for k in np.argsort(candidate.significance).tolist():
-        smaller = structure.of(structure.names[:k] + structure.names[k + 1 :])
-        needed = not smaller.terms or ("feedthrough" in required and not smaller.feedthrough)
         if candidate.significance[k] >= SIGNIFICANT:
             break
-        if needed:
+        smaller = structure.of(structure.names[:k] + structure.names[k + 1 :])
+        if not smaller.terms or ("feedthrough" in required and not smaller.feedthrough):
             continue
         start = np.delete(candidate.unknowns, k)
         worst = free_run.cost_of(candidate.bic + INDISTINCT, candidate.n_parameters - 1)

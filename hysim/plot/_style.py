@@ -97,11 +97,10 @@ def figure(width: float = WIDTH, height: float = 4.0) -> Figure:
 def panels(canvas: Figure, n: int, *, columns: int = 1, sharex: bool = True, sharey: bool = False) -> AxesArray:
     """Add `n` Axes row by row to a figure; shared axes have labels on the outer panels only."""
     rows = math.ceil(n / columns)
-    axes = np.empty(n, dtype=object)
+    axes = np.empty(n, dtype=object)  # each is None until it is made: the first shares with no other
     for k in range(n):
-        first = axes[0] if k else None
         axes[k] = ax = canvas.add_subplot(
-            rows, columns, k + 1, sharex=first if sharex else None, sharey=first if sharey else None
+            rows, columns, k + 1, sharex=axes[0] if sharex else None, sharey=axes[0] if sharey else None
         )
         if sharex and k < (rows - 1) * columns:
             ax.tick_params(labelbottom=columns > 1)
@@ -168,8 +167,7 @@ def scattered(n: int, **style: Any) -> dict[str, Any]:
     if n <= MANY:
         return {"linestyle": "none", "marker": "o", "markersize": 3.8, **style}
     size = max(_SMALLEST, 3.8 * math.sqrt(MANY / n))
-    dots = {"linestyle": "none", "marker": ".", "markersize": size, "markeredgewidth": 0.0}
-    return {**dots, **grid_of(n)}
+    return {"linestyle": "none", "marker": ".", "markersize": size, "markeredgewidth": 0.0, **grid_of(n)}
 
 
 _DOTS = 200  # per inch
