@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from hysim._basics.frozen import FloatArray, read_only
+from hysim._basics.frozen import FloatArray, check_not_negative, check_positive, read_only
 from hysim._basics.names import among
 from hysim.models.search_space import Parameters
 
@@ -44,12 +44,8 @@ _WITHIN: Mapping[str, Callable[[FloatArray, float], npt.NDArray[np.bool_]]] = {
 
 def check_signs(tables: Tables, positive: Iterable[str], not_negative: Iterable[str]) -> None:
     """A ValueError for the first field of these with a number that is not positive, or negative."""
-    for name in positive:
-        if not (tables[name] > 0.0).all():
-            raise ValueError(f"{name} must be positive, got {tables[name].min()}")
-    for name in not_negative:
-        if not (tables[name] >= 0.0).all():
-            raise ValueError(f"{name} must not be negative, got {tables[name].min()}")
+    check_positive(**{name: tables[name].min(initial=np.inf) for name in positive})
+    check_not_negative(**{name: tables[name].min(initial=np.inf) for name in not_negative})
 
 
 def check_within(tables: Tables, within: Mapping[str, tuple[str, float]]) -> None:
