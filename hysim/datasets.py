@@ -5,12 +5,11 @@ in hysteresis and vibration controls", Jurnal Teknologi, 2016. The files in `hys
 printed. The paper prints no time for either table: the times here are ours, and evenly spaced.
 """
 
-import math
 from importlib.resources import files
 
 import numpy as np
 
-from hysim._basics.frozen import FloatArray
+from hysim._basics.frozen import FloatArray, check_positive_and_finite
 from hysim.records import Record
 
 __all__ = ["PIXEL", "SQUARE_WAVE_FREQUENCY", "table1", "table2"]
@@ -40,8 +39,7 @@ def table1(dwell: float = 1.0) -> Record:
     >>> len(rec), rec.u[25:27].tolist(), rec.y[25:27].tolist(), rec.units["y"]
     (52, [125.0, 125.0], [2.671, 2.671], 'um')
     """
-    if not (math.isfinite(dwell) and dwell > 0):
-        raise ValueError(f"dwell must be positive and finite, got {dwell}")
+    check_positive_and_finite(dwell=dwell)
     _, _, voltage, displacement = _columns("table1.csv")
     return _record("Table 1", voltage, displacement, dwell, PIXEL)
 

@@ -58,6 +58,20 @@ def check_not_negative(**numbers: float | None) -> None:
             raise ValueError(f"{name} must not be negative, got {value}")
 
 
+def check_finite(**numbers: float | None) -> None:
+    """A ValueError for the first number by name that is not finite; None is no number."""
+    for name, value in numbers.items():
+        if value is not None and not math.isfinite(value):
+            raise ValueError(f"{name} must be finite, got {value}")
+
+
+def check_positive_and_finite(**numbers: float | None) -> None:
+    """A ValueError for the first number by name that is not positive, or infinite; None is no number."""
+    for name, value in numbers.items():
+        if value is not None and not 0.0 < value < math.inf:
+            raise ValueError(f"{name} must be positive and finite, got {value}")
+
+
 def read_only(
     values: npt.ArrayLike, name: str = "values", *, ndim: int | None = None, finite: bool = True
 ) -> FloatArray:

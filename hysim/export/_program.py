@@ -18,7 +18,7 @@ from dataclasses import dataclass, field, replace
 from types import MappingProxyType
 from typing import Any, NamedTuple
 
-from hysim._basics.frozen import FloatArray, frozen
+from hysim._basics.frozen import FloatArray, check_finite, frozen
 from hysim.control import Controller, InverseFeedforward, RestingPlant, TrackingController, begun, preview
 from hysim.errors import HysimWarning, SimulationError
 from hysim.export import _c
@@ -222,9 +222,7 @@ def program_of(
     """
     if sample_time is not None:
         positive_time(sample_time)
-    for name, value in (("u0", u0), ("y0", y0)):
-        if value is not None and not math.isfinite(value):
-            raise ValueError(f"{name} must be finite, got {value}")
+    check_finite(u0=u0, y0=y0)
     if isinstance(thing, type):
         raise TypeError(f"an instance is expected, got the class {thing.__name__}: give it its parameters first")
     if isinstance(thing, Creep | Amplifier | Vibration):

@@ -26,7 +26,7 @@ from typing import Any, Literal, NamedTuple
 
 import numpy as np
 
-from hysim._basics.frozen import FloatArray
+from hysim._basics.frozen import FloatArray, check_positive_and_finite
 from hysim._basics.prefixes import power_of_ten
 from hysim.files._delimited import Text, delimited
 from hysim.files._load import Source, opened, options_of_a_text, table_of
@@ -192,8 +192,7 @@ def load_ground_motion(
         raise TypeError(f'units is that of the accelerations, such as "g", got {units!r}')
     if units is not None and _name(units) is None:
         raise ValueError(f"units must be a unit of acceleration: {_KNOWN}, got {units!r}")
-    is_step = sample_time is None or 0.0 < sample_time < np.inf
-    require(is_step, f"sample_time must be positive and finite, got {sample_time}")
+    check_positive_and_finite(sample_time=sample_time)
     require(sample_time is None or t is None, "give either sample_time or the column t, not both")
     for_text = options_of_a_text(delimiter, decimal, None, skip, encoding)
     choice = _Choice(t, acceleration, sample_time, units)

@@ -24,7 +24,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from hysim._basics.frozen import FloatArray
+from hysim._basics.frozen import FloatArray, check_finite
 from hysim._basics.prefixes import in_brackets
 from hysim._basics.printing import aligned, csv_text, extent, folded, frozen_result, quantity, summary_text
 from hysim._columns.excursions import Loops, protocol
@@ -244,8 +244,7 @@ def cycle_metrics(
     ([1.0, 2.0], [0.75, 2.0], [5, 9])
     """
     inputs, outputs = samples_of_a_loop(u, y)
-    if level is not None and not math.isfinite(level):
-        raise ValueError(f"level must be finite, got {level}")
+    check_finite(level=level)
     cut = protocol(inputs, tolerance, None if level is None else float(level))
     if not cut.spans:
         raise ValueError(too_few(inputs, tolerance, 1, 0))

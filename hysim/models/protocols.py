@@ -11,7 +11,7 @@ from typing import Any, ClassVar, NamedTuple, Protocol, TypeGuard, runtime_check
 import numpy as np
 import numpy.typing as npt
 
-from hysim._basics.frozen import FloatArray
+from hysim._basics.frozen import FloatArray, check_positive_and_finite
 from hysim.models.search_space import ALL_FREE, Freedom, Parameters, SearchSpace
 from hysim.models.stages import Simpler, Stage
 from hysim.records import Record
@@ -480,8 +480,7 @@ def positive_time(sample_time: float) -> float:
     """A sample time [s]; ValueError if it is not positive and finite, TypeError if it is not one number."""
     if np.ndim(sample_time):
         raise TypeError(f"sample_time must be one number [s], got an array of shape {np.shape(sample_time)}")
-    if not 0.0 < sample_time < math.inf:
-        raise ValueError(f"sample_time must be positive and finite, got {sample_time}")
+    check_positive_and_finite(sample_time=sample_time)
     return sample_time
 
 

@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from hysim._basics.frozen import FloatArray, check_count, read_only
+from hysim._basics.frozen import FloatArray, check_count, check_finite, read_only
 from hysim._basics.parallel import in_pieces
 from hysim.kernels import controllers
 from hysim.kernels import loop as kernels
@@ -100,8 +100,7 @@ class Chain:
 
     def rest(self, u0: float) -> ChainState:
         """At rest at the command `u0`; ValueError if it is not finite, or a plant that integrates cannot rest there."""
-        if not math.isfinite(u0):
-            raise ValueError(f"u0 must be finite, got {u0}")
+        check_finite(u0=u0)
         voltages = self.amplifier.compiled(self.step, u0).state
         level = float(np.asarray(self.hysteresis.response(voltages[1:]))[0])
         x = np.zeros(2 * self.stage.rest.size)

@@ -238,8 +238,7 @@ class Creep:
         low, high = (float(end) for end in band)
         if not 0.0 < low < high < math.inf:
             raise ValueError(f"band must rise from a positive time [s], got {band}")
-        if not 0.0 < reference_time < math.inf:
-            raise ValueError(f"reference_time must be positive, got {reference_time}")
+        frozen.check_positive_and_finite(reference_time=reference_time)
         frozen.check_count("per_decade_elements", per_decade_elements)
         decades = math.log10(high / low)
         time_constants = np.geomspace(low, high, 1 + math.ceil(decades * per_decade_elements - 1e-9))

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 import numpy as np
 import numpy.typing as npt
 
-from hysim._basics.frozen import FloatArray, read_only
+from hysim._basics.frozen import FloatArray, check_finite, check_positive_and_finite, read_only
 
 
 def staircase(low: float, high: float, step: float, *, cycles: int = 1, samples_per_step: int = 1) -> FloatArray:
@@ -23,8 +23,7 @@ def staircase(low: float, high: float, step: float, *, cycles: int = 1, samples_
     [0.0, 5.0, 10.0, 10.0, 5.0, 0.0]
     """
     span = checked_span(low, high)
-    if not (math.isfinite(step) and step > 0):
-        raise ValueError(f"step must be positive and finite, got {step}")
+    check_positive_and_finite(step=step)
     n_steps = round(span / step)
     if n_steps < 1 or not math.isclose(n_steps * step, span, rel_tol=1e-9):
         raise ValueError(f"step must divide the span {span}, got {step}: {span / step:.6g} steps")
@@ -224,8 +223,7 @@ def extremes(
 
 
 def _amplitudes(largest: float, cycles: int, ratio: float | None) -> FloatArray:
-    if not (math.isfinite(largest) and largest > 0):
-        raise ValueError(f"amplitude must be positive and finite, got {largest}")
+    check_positive_and_finite(amplitude=largest)
     k = np.arange(checked_count("cycles", cycles))
     if ratio is None:
         return largest * ((cycles - k) / cycles)
@@ -235,16 +233,14 @@ def _amplitudes(largest: float, cycles: int, ratio: float | None) -> FloatArray:
 
 
 def _swings(amplitudes: FloatArray, mean: float, samples_per_cycle: int) -> FloatArray:
-    if not math.isfinite(mean):
-        raise ValueError(f"mean must be finite, got {mean}")
+    check_finite(mean=mean)
     period = unit_sine(checked_count("samples_per_cycle", samples_per_cycle))
     return np.append(mean + np.outer(amplitudes, period).ravel(), mean)
 
 
 def _samples_of_lines(turns: FloatArray, samples: int | Sequence[int] | None, max_step: float | None) -> list[int]:
     if max_step is not None and samples is None:
-        if not (math.isfinite(max_step) and max_step > 0):
-            raise ValueError(f"max_step must be positive and finite, got {max_step}")
+        check_positive_and_finite(max_step=max_step)
         lengths = [abs(float(rise)) / max_step for rise in np.diff(turns)]
         if sum(lengths) > _MOST_SAMPLES:
             raise ValueError(

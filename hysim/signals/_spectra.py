@@ -9,7 +9,7 @@ from typing import Literal
 import numpy as np
 import numpy.typing as npt
 
-from hysim._basics.frozen import FloatArray, check_choice, check_not_negative, check_positive
+from hysim._basics.frozen import FloatArray, check_choice, check_not_negative, check_positive, check_positive_and_finite
 from hysim.signals._cycles import checked_count
 
 
@@ -164,8 +164,7 @@ def sample_times(n_samples: int, sample_time: float) -> FloatArray:
     >>> hs.signals.sample_times(4, 0.1).tolist()
     [0.0, 0.1, 0.2, 0.3]
     """
-    if not 0.0 < sample_time < math.inf:
-        raise ValueError(f"sample_time must be positive and finite, got {sample_time}")
+    check_positive_and_finite(sample_time=sample_time)
     k, rate = np.arange(float(checked_count("n_samples", n_samples))), max(1.0, np.rint(1.0 / sample_time))
     return k / rate if 1.0 / rate == sample_time else k * sample_time
 
@@ -302,9 +301,7 @@ def ground_motion(
 
 
 def _n_samples(duration: float, sample_time: float) -> int:
-    for name, value in {"duration": duration, "sample_time": sample_time}.items():
-        if not 0.0 < value < math.inf:
-            raise ValueError(f"{name} must be positive and finite, got {value}")
+    check_positive_and_finite(duration=duration, sample_time=sample_time)
     n_steps = duration / sample_time * (1.0 + _ROUNDING)
     if not _FEWEST_SAMPLES <= n_steps + 1.0 < _MOST_SAMPLES:
         raise ValueError(

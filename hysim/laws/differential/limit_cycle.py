@@ -24,7 +24,7 @@ import math
 import numpy as np
 import scipy
 
-from hysim._basics.frozen import FloatArray, frozen, read_only
+from hysim._basics.frozen import FloatArray, check_positive_and_finite, frozen, read_only
 from hysim.errors import SimulationError
 from hysim.kernels import boucwen as kernels
 
@@ -62,8 +62,7 @@ def limit_cycle(A: float, beta: float, gamma: float, n: float, amplitude: float)
 
     ValueError if the amplitude is not positive or A = 0 (the memory dies out); SimulationError if it diverges.
     """
-    if not 0.0 < amplitude < math.inf:
-        raise ValueError(f"amplitude must be positive and finite, got {amplitude}")
+    check_positive_and_finite(amplitude=amplitude)
     if A == 0.0:
         raise ValueError("a law with A = 0 has no limit cycle: its memory dies out or stays as it began")
     sign = math.copysign(1.0, A)

@@ -16,7 +16,7 @@ from typing import ClassVar
 import numpy as np
 import numpy.typing as npt
 
-from hysim._basics.frozen import FloatArray, items, own_items, read_only
+from hysim._basics.frozen import FloatArray, check_positive_and_finite, items, own_items, read_only
 from hysim.kernels import clamps as kernels
 from hysim.laws.differential.limit_cycle import LimitCycle
 from hysim.laws.operators._bank_search import Axis, BankStructure, check_elements
@@ -228,8 +228,7 @@ class Clamps(Elements, Law):
         (1.5, 1.0, -1.5, -0.25)
         """
         X = float(amplitude)
-        if not 0.0 < X < np.inf:
-            raise ValueError(f"amplitude must be positive and finite, got {amplitude}")
+        check_positive_and_finite(amplitude=X)
         slope, thresholds, weights = self.as_plays
         reached = thresholds < X
         r, v = thresholds[reached], weights[reached]
