@@ -108,8 +108,8 @@ def test_a_rounding_sensor_has_the_noise_of_its_rounding():
 WITHOUT_NUMBERS = hs.Actuator.structure(hs.PrandtlIshlinskii.structure(plays=3))
 test_arguments_are_checked = refused(
     (STRUCTURE, {"values": None}, r"values must give vibration.natural_frequencies\[0\] \[rad/s\]"),
-    (STRUCTURE, {"values": VALUES | {"creep.growth": 1.0}}, r"values has 'creep\.growth'"),
-    (STRUCTURE, {"free": ("creep.growth",)}, r"free has 'creep\.growth'"),
+    (STRUCTURE, {"values": VALUES | {"creep.growth": 1.0}}, r"values names 'creep\.growth'"),
+    (STRUCTURE, {"free": ("creep.growth",)}, r"free names 'creep\.growth'"),
     (
         STRUCTURE,
         {"values": VALUES | {DAMPING: 5.0}},

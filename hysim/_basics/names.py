@@ -1,6 +1,6 @@
 """The public names in reading order, the modules that hold them, and the nearest name to a misspelt one."""
 
-from collections.abc import Iterable
+from collections.abc import Collection, Iterable
 from pathlib import Path
 
 _LINES = Path(__file__).parents[1].joinpath("__init__.pyi").read_text(encoding="utf-8").splitlines()
@@ -33,6 +33,14 @@ def among(name: object, known: Iterable[object]) -> str:
     names = [*map(str, known)]
     shown = names if len(names) <= _MANY else [*names[:_FIRST], f"{len(names) - _FIRST} others"]
     return f"{', '.join(shown)}{meant(name, names)}"
+
+
+def check_parameters(known: Collection[str], **arguments: Iterable[str]) -> None:
+    """A ValueError for the first name in an argument that is none of the known parameters."""
+    for argument, names in arguments.items():
+        for name in names:
+            if name not in known:
+                raise ValueError(f"{argument} names {name!r}; the parameters are {among(name, known)}")
 
 
 def plain(name: str) -> str:

@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from hysim._basics.frozen import FloatArray, as_mapping, check_choice, check_count, check_positive, read_only
-from hysim._basics.names import among
+from hysim._basics.names import check_parameters
 from hysim._basics.printing import frozen_result, summary_text
 from hysim._basics.results import model_of
 from hysim.design import _inputs as shapes
@@ -160,8 +160,7 @@ def whole_actuator(
     structure, _ = structure.over([record], Freedom())
     known = _known(structure, shared)
     left_out = all_modes - known.keys()
-    if unknown := [name for name in shared if name not in known and name not in left_out]:
-        raise ValueError(f"values has {unknown[0]!r}; the parameters are {among(unknown[0], known)}")
+    check_parameters(known, values=[name for name in shared if name not in left_out])
     names = None if free is None else [name for name in dict.fromkeys(map(_of_all, free)) if name not in left_out]
     expected = _expected(structure, record, known, names)
     return WholeActuator(structure, record, known, expected, _noise(structure.sensor, noise), remarks)
@@ -205,8 +204,7 @@ def _expected(structure: ActuatorStructure, record: Record, known: Values, free:
     if free is not None:
         space = structure.search_space(record)
         every = (*space.names, *space.held)
-        if unknown := [name for name in free if name not in every]:
-            raise ValueError(f"free has {unknown[0]!r}; the parameters are {among(unknown[0], every)}")
+        check_parameters(every, free=free)
         freedom = Freedom(fixed={name: known[name] for name in every if name not in free}, free=tuple(free))
     space = structure.law.search_space(structure.scaled_on, share_of(freedom, _LAW))
     coordinates = dict(zip((f"{_LAW}.{name}" for name in space.coordinates), space.starts[0].tolist(), strict=True))

@@ -19,7 +19,7 @@ import numpy as np
 import numpy.typing as npt
 
 from hysim._basics.frozen import FloatArray, checked
-from hysim._basics.names import among
+from hysim._basics.names import check_parameters
 from hysim._columns.channels import value_in
 from hysim.models.by_structure import searched
 from hysim.models.protocols import Identifiable, Numbered, Subject, Variant
@@ -156,9 +156,8 @@ class DependentStructure(Subject):
         known, spans = (*space.names, *space.held), {}
         numbers = {name: [each for each in known if each.startswith(f"{name}[")] or [name] for name in self.depends}
         depends = {each: pair for name, pair in self.depends.items() for each in numbers[name]}
+        check_parameters(known, depends=depends)
         for name, (channel, degree) in depends.items():
-            if name not in known:
-                raise ValueError(f"depends names {name!r}; the parameters are {among(name, known)}")
             if name in space.state:
                 raise ValueError(f"{name!r} is the state at the first sample of a record, and depends on no channel")
             owners = [f"record {k}" if len(records) > 1 else "the record" for k in range(len(records))]

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from hysim._basics.frozen import FloatArray
-from hysim._basics.names import among
+from hysim._basics.names import check_parameters
 from hysim.models.by_structure import searched
 from hysim.models.parts import share_of
 from hysim.models.protocols import Variant
@@ -81,10 +81,7 @@ def declared(spaces: Mapping[str, Space], freedom: Freedom) -> dict[str, SearchS
     """Each part's space with its share of what the user says."""
     asked = {label: space(replace(freedom, fixed={}, free=(), bounds={})) for label, space in spaces.items()}
     known = [f"{label}.{name}" for label, space in asked.items() for name in (*space.names, *space.held)]
-    for argument, names in {"fixed": freedom.fixed, "free": freedom.free, "bounds": freedom.bounds}.items():
-        for name in names:
-            if name not in known:
-                raise ValueError(f"{argument} names {name!r}; the parameters are {among(name, known)}")
+    check_parameters(known, fixed=freedom.fixed, free=freedom.free, bounds=freedom.bounds)
     return {label: _of_part(label, space, freedom) for label, space in spaces.items()}
 
 

@@ -13,7 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 from hysim._basics.frozen import FloatArray, frozen
-from hysim._basics.names import among, meant
+from hysim._basics.names import among, check_parameters, meant
 
 Parameters = Mapping[str, Any]
 """User's names to floats or to arrays of shape (n_sets,)."""
@@ -174,10 +174,7 @@ class Freedom:
 
         A name in `free` is not among the last two kinds. ValueError if a name is unknown, or both fixed and free.
         """
-        for argument, names in (("fixed", tuple(self.fixed)), ("free", self.free)):
-            for name in names:
-                if name not in defaults:
-                    raise ValueError(f"{argument} names {name!r}; the parameters are {among(name, defaults)}")
+        check_parameters(defaults, fixed=self.fixed, free=self.free)
         if both := set(self.fixed) & set(self.free):
             raise ValueError(f"{sorted(both)[0]!r} is both fixed and free")
         held = {name: 0.0 for name in at_rest if name not in self.free}
