@@ -24,7 +24,7 @@ from dataclasses import replace
 import numpy as np
 import numpy.typing as npt
 
-from hysim._basics.frozen import FloatArray, read_only
+from hysim._basics.frozen import FloatArray, check_choice, read_only
 from hysim.laws.differential.boucwen import BoucWen
 from hysim.plants.oscillator import BoucWenOscillator
 from hysim.plants.oscillator_structure import decimated, interpolated
@@ -116,9 +116,8 @@ def noel_schoukens(
     >>> len(train), round(float(train.u.std()), 6), train.units["y"]
     (16384, 50.0, 'm')
     """
-    _check_kind(kind)
-    if initial not in ("periodic", "rest"):
-        raise ValueError(f'initial must be "periodic" or "rest", got {initial!r}')
+    check_choice("kind", kind, _STAGES)
+    check_choice("initial", initial, ("periodic", "rest"))
     if operator.index(periods) < 1:
         raise ValueError(f"periods must be at least 1, got {periods}")
     level = _LEVELS[kind] if level is None else level
@@ -176,7 +175,7 @@ def simulate_official(
     >>> bool(abs(hs.benchmarks.simulate_official(rec.u) - rec.y).max() < 1e-12)
     True
     """
-    _check_kind(kind)
+    check_choice("kind", kind, _STAGES)
     inputs = read_only(u, "u", ndim=1)
     if kind == "sweep":
         force = _LEVELS["sweep"] * _unit_sweep(inputs.size)
@@ -193,11 +192,6 @@ def simulate_official(
     recipe = replace(plant, method="newmark", substeps=1, initial_state=(), law=replace(plant.law, z0=0.0))
     y = recipe.response(force, 1.0 / (SAMPLE_RATE * _OVERSAMPLING))
     return decimated(y, _STAGES[kind])[begin : begin + inputs.size]
-
-
-def _check_kind(kind: str) -> None:
-    if kind not in _STAGES:
-        raise ValueError(f'kind must be "multisine" or "sweep", got {kind!r}')
 
 
 def _unit_sweep(n_samples: int) -> FloatArray:

@@ -195,7 +195,7 @@ test_a_record_that_cannot_do_is_refused = refused(
 
 
 test_an_option_that_cannot_do_is_refused = refused(
-    ({"degree": 4}, "degree must be 1, 2 or 3"),
+    ({"degree": 4}, "degree must be one of 1, 2, 3"),
     ({"symmetry": "even"}, 'symmetry must be None or "odd"'),
     ({"mass": -1.0}, "mass must be positive"),
     ({"damping": float("nan")}, "damping must be finite"),

@@ -404,7 +404,7 @@ test_wrong_arguments_are_named = refused(
     (lambda: type(RATE).responses({"beta": 1.0}, [0.0], -1.0), "sample_time must be positive"),
     (lambda: ONE.inverse_response([0.0], u0=0.0, state=(0.0,) * 4), "not both"),
     (lambda: ONE.advance([0.0], (0.0, 1.0)), "must hold 4 numbers, got 2"),
-    (lambda: type(ONE).structure(envelopes=3), "envelopes must be 1 or 2"),
+    (lambda: type(ONE).structure(envelopes=3), "envelopes must be one of 1, 2"),
     (lambda: type(MODIFIED).structure(dead_zones=-1), "dead_zones must not be negative"),
     (lambda: type(MODIFIED).structure(dead_zones=(1, 0)), "dead_zones must increase"),
     (lambda: hs.identify(MODIFIED, record_of(MODIFIED), initial="free"), 'use initial="rest" or "periodic"'),

@@ -206,8 +206,8 @@ test_what_does_not_fit_together_is_refused = refused(
     (lambda: hs.rig.Rig().run(HURRIED), "take a longer dwell or fewer frames"),
     (lambda: hs.rig.square_drive(frequency=0.0), "frequency must be"),
     (lambda: hs.rig.Rig(camera="none"), TypeError, "camera must be of Camera, got str"),
-    (lambda: experiment().record("exact"), 'method must be "truth"'),
-    (lambda: experiment().record("truth", take="first"), 'take must be "mean" or "last"'),
+    (lambda: experiment().record("exact"), "method must be one of truth"),
+    (lambda: experiment().record("truth", take="first"), "take must be one of mean, last"),
 )
 
 

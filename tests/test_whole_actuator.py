@@ -217,7 +217,7 @@ WRONG = {
     "creep must be at least one element": {"creep": 0},
     "positive and increase": {"creep": (1.0, 0.5)},
     "amplifier must be None": {"amplifier": "slow"},
-    'offsets must be "shared" or "own"': {"offsets": "none"},
+    "offsets must be one of shared, own": {"offsets": "none"},
 }
 
 

@@ -18,7 +18,7 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from hysim._basics.frozen import FloatArray
+from hysim._basics.frozen import FloatArray, check_choice
 from hysim._basics.parallel import in_chunks
 from hysim.discovery._search import best_subsets
 from hysim.discovery._slopes import Regression, independent
@@ -117,8 +117,7 @@ class Oscillator(NamedTuple):
 
 def library(degree: int, symmetry: str | None) -> tuple[Term, ...]:
     """The terms by their power of z, without combinations of earlier ones."""
-    if degree not in (1, 2, 3):
-        raise ValueError(f"degree must be 1, 2 or 3, got {degree!r}")
+    check_choice("degree", degree, (1, 2, 3))
     if symmetry not in (None, "odd"):
         raise ValueError(f'symmetry must be None or "odd", got {symmetry!r}')
     ordered = sorted(memory_terms(degree), key=lambda term: (term.degree, term.is_even_in_memory, term.rectified))

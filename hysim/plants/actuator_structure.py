@@ -32,7 +32,7 @@ from typing import Any, ClassVar
 import numpy as np
 import numpy.typing as npt
 
-from hysim._basics.frozen import FloatArray, checked
+from hysim._basics.frozen import FloatArray, check_choice, checked
 from hysim._basics.parallel import in_chunks
 from hysim.kernels import actuator_columns as kernels
 from hysim.models.joint_space import columns_beside, declared, together
@@ -214,8 +214,7 @@ class ActuatorStructure(Subject):
         branches = self.start.actuators if isinstance(self.start, MultiInputActuator) else (self.start,)
         if self.start is not None and not all(isinstance(each, self.family) for each in branches):
             raise TypeError(f"start must be an Actuator, or a MultiInputActuator of them, got {self.start!r}")
-        if self.offsets not in ("shared", "own"):
-            raise ValueError(f'offsets must be "shared" or "own", got {self.offsets!r}')
+        check_choice("offsets", self.offsets, ("shared", "own"))
 
     def __str__(self) -> str:
         each = self.law.laws.values() if isinstance(self.law, InputSum) else [self.law]

@@ -135,8 +135,7 @@ def history(result: InputOutput, axes: AxesLike | None = None, *, hold: str = "z
     >>> [ax.get_ylabel() for ax in hs.plot.history(hs.datasets.table1(), canvas.subplots(2, sharex=True))]
     ['Displacement [µm]', 'Voltage [V]']
     """
-    if hold not in _DRAWN:
-        raise ValueError(f'hold must be "zoh" or "foh", got {hold!r}')
+    check_choice("hold", hold, _DRAWN)
     (result,) = drawable((result,), "history")
     time, z = times_of(result), result.z if isinstance(result, _WithMemory) else None
     t = np.arange(float(result.u.size)) if time is None else time

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
-from hysim._basics.frozen import FloatArray, checked, frozen
+from hysim._basics.frozen import FloatArray, check_choice, checked, frozen
 from hysim._basics.progress import Reports
 from hysim.laws.differential.polynomial_boucwen import PolynomialBoucWen
 from hysim.plants.actuator import Actuator
@@ -210,10 +210,8 @@ class Experiment:
         ValueError
             If an option is unknown, or of a row no frame could be measured.
         """
-        if method not in ("truth", "subpixel", "whole-pixel"):
-            raise ValueError(f'method must be "truth", "subpixel" or "whole-pixel", got {method!r}')
-        if take not in ("mean", "last"):
-            raise ValueError(f'take must be "mean" or "last", got {take!r}')
+        check_choice("method", method, ("truth", "subpixel", "whole-pixel"))
+        check_choice("take", take, ("mean", "last"))
         frames_per_row = self.drive.frames_per_step if self.drive.dwell is not None else 1
         y = self.exposed_y if method == "truth" else self.measure(method).y
         rows = y.reshape(-1, frames_per_row)[:, 0 if take == "mean" else -1 :]

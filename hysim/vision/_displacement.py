@@ -19,7 +19,7 @@ from typing import Any, Literal
 import numpy as np
 import numpy.typing as npt
 
-from hysim._basics.frozen import FloatArray
+from hysim._basics.frozen import FloatArray, check_choice
 from hysim._basics.progress import Reports, reports
 from hysim.vision._frames import Picture, grey_pictures, read_frames
 from hysim.vision._locate import LOST, Location, locate
@@ -109,8 +109,7 @@ def displacement(
     >>> hs.vision.displacement(frames, scale=0.0763, direction="x").y[1:].round(4).tolist()
     [0.0191, 0.1144]
     """
-    if method not in METHODS:
-        raise ValueError(f"method must be one of {', '.join(METHODS)}, got {method!r}")
+    check_choice("method", method, METHODS)
     if isinstance(scale, (str, bool)) or not 0.0 < float(scale) < math.inf:
         raise ValueError(f"scale must be the length of a pixel, a positive number, got {scale}")
     angle = _angle_of(direction, whole_pixels=method == "whole-pixel")

@@ -8,7 +8,7 @@ from typing import Any, Literal
 import numpy as np
 import numpy.typing as npt
 
-from hysim._basics.frozen import FloatArray, frozen, read_only
+from hysim._basics.frozen import FloatArray, check_choice, frozen, read_only
 from hysim.errors import HysimWarning
 from hysim.records import Record, check_increasing
 
@@ -146,8 +146,7 @@ class Displacement:
         >>> rec.u.tolist(), rec.t.tolist()
         ([0.0, 5.0, 5.0], [0.5, 1.0, 1.5])
         """
-        if on_lost not in ("error", "drop"):
-            raise ValueError(f'on_lost must be "error" or "drop", got {on_lost!r}')
+        check_choice("on_lost", on_lost, ("error", "drop"))
         at = None if frame_times is None else self._per_frame(frame_times, "frame_times")
         voltages = self._voltages(u, at, u_times)
         times = at if t is None else self._per_frame(t, "t")

@@ -6,7 +6,7 @@ from typing import ClassVar
 import numpy as np
 import numpy.typing as npt
 
-from hysim._basics.frozen import FloatArray, read_only
+from hysim._basics.frozen import FloatArray, check_choice, read_only
 from hysim.laws.operators._bank import Plays
 from hysim.laws.operators._bank_search import IDENTITY, Axis, BankStructure, named
 from hysim.laws.operators._play_sums import EXAMPLE, PlaySum
@@ -106,8 +106,7 @@ class GeneralizedPrandtlIshlinskii(Plays, PlaySum):
         >>> hs.identify(hs.GeneralizedPrandtlIshlinskii.structure(plays=4), hs.datasets.table1()).n_parameters
         7
         """
-        if envelopes not in (1, 2):
-            raise ValueError(f"envelopes must be 1 or 2, got {envelopes!r}")
+        check_choice("envelopes", envelopes, (1, 2))
         known = {side: read_only(each, "envelopes", ndim=1) for side, each in (("left", left), ("right", right))}
         if known["left"].size:
             _check_envelopes(*(np.atleast_2d(side) for side in known.values()))
