@@ -74,7 +74,7 @@ def test_what_cannot_be_compared_is_refused(measure):
 @pytest.mark.parametrize("criterion", [metrics.fpe, metrics.aic, metrics.bic])
 def test_a_criterion_of_nothing_is_refused(criterion):
     assert_refused("at least 1 residual", criterion, [], 0)
-    assert_refused("at least 0, got -1", criterion, E, -1)
+    assert_refused("must not be negative, got -1", criterion, E, -1)
     assert_refused("residual must be finite, got inf at index 0", criterion, [math.inf], 0)
 
 

@@ -180,7 +180,7 @@ def test_the_op_amp_has_the_papers_gain_and_the_limits_of_its_supplies():
 test_a_camera_that_cannot_be_is_refused = refused(
     ({"shape": (0, 3)}, "shape must be"),
     ({"scale": 0.0}, "scale must be positive, got 0"),
-    ({"bits": 10}, "bits must be 8 or 12, got 10"),
+    ({"bits": 10}, "bits must be one of 8, 12, got 10"),
     ({"exposure": 0.1}, "exposure must be at most a frame's time"),
     ({"read_noise": -1.0}, "read_noise must not be negative"),
     ({"subsamples": 0}, "subsamples must be at least 1"),

@@ -13,7 +13,7 @@ import math
 import numpy as np
 import numpy.typing as npt
 
-from hysim._basics.frozen import FloatArray, read_only, vectors
+from hysim._basics.frozen import FloatArray, check_not_negative, read_only, vectors
 
 
 def information(mean_square: float, n_samples: int, n_parameters: int, *, floor: float = 0.0) -> float:
@@ -136,8 +136,7 @@ def _mean_square(residual: npt.ArrayLike, n_parameters: int) -> tuple[float, int
     e = read_only(residual, "residual", ndim=1)
     if e.size == 0:
         raise ValueError("a criterion needs at least 1 residual, got 0")
-    if n_parameters < 0:
-        raise ValueError(f"n_parameters must be at least 0, got {n_parameters}")
+    check_not_negative(n_parameters=n_parameters)
     return float(np.mean(e**2)), e.size, n_parameters
 
 

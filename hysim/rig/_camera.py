@@ -27,7 +27,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy import fft, special
 
-from hysim._basics.frozen import FloatArray, checked, read_only
+from hysim._basics.frozen import FloatArray, check_choice, check_not_negative, check_positive, checked, read_only
 from hysim.datasets import PIXEL
 
 Counts = npt.NDArray[np.uint8] | npt.NDArray[np.uint16]
@@ -169,14 +169,10 @@ class Camera:
     def __post_init__(self) -> None:
         if len(self.shape) != 2 or min(operator.index(size) for size in self.shape) < 1:
             raise ValueError(f"shape must be (rows, columns), got {self.shape}")
-        for name in ("scale", "full_well", "frame_rate", "drift_period"):
-            if not vars(self)[name] > 0.0:
-                raise ValueError(f"{name} must be positive, got {vars(self)[name]}")
-        for name in ("blur", "grain", "contrast", "read_noise", "exposure", "jitter"):
-            if vars(self)[name] < 0.0:
-                raise ValueError(f"{name} must not be negative, got {vars(self)[name]}")
-        if self.bits not in (8, 12):
-            raise ValueError(f"bits must be 8 or 12, got {self.bits}")
+        check_positive(**{name: vars(self)[name] for name in ("scale", "full_well", "frame_rate", "drift_period")})
+        not_negative = ("blur", "grain", "contrast", "read_noise", "exposure", "jitter")
+        check_not_negative(**{name: vars(self)[name] for name in not_negative})
+        check_choice("bits", self.bits, (8, 12))
         if self.exposure * self.frame_rate > 1.0:
             raise ValueError(f"exposure must be at most a frame's time, {1 / self.frame_rate:g} s, got {self.exposure}")
         for name, least in (("subsamples", 1), ("texture", 0), ("seed", 0)):

@@ -5,7 +5,7 @@ import operator
 import numpy as np
 
 from hysim import signals
-from hysim._basics.frozen import FloatArray, checked
+from hysim._basics.frozen import FloatArray, check_positive, checked
 from hysim.rig._camera import Camera
 
 SQUARE_WAVES = {"slow": 0.1, "fast": 1.01626}
@@ -48,8 +48,7 @@ class Drive:
     def __post_init__(self) -> None:
         if self.u.ndim != 1 or self.u.size < 2:
             raise ValueError(f"u must have one axis and at least 2 samples, got shape {self.u.shape}")
-        if not self.sample_time > 0.0:
-            raise ValueError(f"sample_time must be positive, got {self.sample_time}")
+        check_positive(sample_time=self.sample_time)
         if operator.index(self.frames_per_step) < 1:
             raise ValueError(f"frames_per_step must be at least 1, got {self.frames_per_step}")
         if self.dwell is not None:

@@ -23,7 +23,7 @@ from typing import Any, Self
 
 import numpy as np
 
-from hysim._basics.frozen import FloatArray
+from hysim._basics.frozen import FloatArray, check_positive
 from hysim.models import parameters
 from hysim.models.parameters import Coordinate, Numbers, by_name, space_of_chart
 from hysim.models.search_space import Freedom, SearchSpace
@@ -101,8 +101,7 @@ def search_space(
     at_rest = ("z0",) if freedom.starts_at_rest() else ()
     held = freedom.held(defaults, redundant=(*REDUNDANT, *law.alike(record, freedom)), at_rest=at_rest)
     bounds = freedom.limits(defaults, held)
-    if held.get("n", 1.0) <= 0.0:
-        raise ValueError(f"n must be positive, got {held['n']}")
+    check_positive(n=held.get("n"))
     if "n" in bounds and not (bounds["n"][0] >= 0.0 and (bounds["n"][0] > 0.0 or np.isinf(bounds["n"][1]))):
         raise ValueError(f"bounds of 'n' must be positive, got {bounds['n']}")
     for name, pair in bounds.items():

@@ -34,7 +34,7 @@ from typing import ClassVar, Self
 import numpy as np
 import numpy.typing as npt
 
-from hysim._basics.frozen import FloatArray
+from hysim._basics.frozen import FloatArray, check_positive
 from hysim.kernels import boucwen as kernels
 from hysim.kernels import stepping
 from hysim.laws.differential._boucwen_law import BoucWenLaw, BoucWenStep
@@ -286,8 +286,7 @@ class BoucWen(BoucWenLaw):
         """
         if alphaNL != 0.0:
             raise ValueError(f"alphaNL must be zero, got {alphaNL:g}: the law has a linear spring only")
-        if E <= 0.0 or fy <= 0.0:
-            raise ValueError(f"E and fy must be positive, got {E:g} and {fy:g}")
+        check_positive(E=E, fy=fy)
         memory = {"A": E / fy, "beta": beta * (E / fy), "gamma": gamma * (E / fy), "n": eta}
         return cls(**memory, feedthrough=alphaL * E, gain=(1.0 - alphaL) * fy)
 

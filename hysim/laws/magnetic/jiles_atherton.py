@@ -51,7 +51,7 @@ from typing import Any, ClassVar, Self
 import numpy as np
 import numpy.typing as npt
 
-from hysim._basics.frozen import FloatArray, check_positive, read_only
+from hysim._basics.frozen import FloatArray, check_not_negative, check_positive, read_only
 from hysim.errors import HysimWarning
 from hysim.kernels import jiles_atherton as kernels
 from hysim.kernels import jiles_atherton_inverse as inverse
@@ -326,8 +326,7 @@ class JilesAtherton(Law):
         >>> law.k, law.c
         (25.0, 0.2)
         """
-        if not C >= 0.0:
-            raise ValueError(f"C must not be negative, got {C:g}")
+        check_not_negative(C=C)
         return cls(Ms=MS, a=A, alpha=0.0, k=(1.0 + C) * K, c=C / (1.0 + C))
 
     def to_circuit(self) -> dict[str, float]:

@@ -39,7 +39,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from hysim._basics.frozen import FloatArray, check_whole, checked, read_only
+from hysim._basics.frozen import FloatArray, check_not_negative, check_whole, checked, read_only
 from hysim.kernels import play_sums as kernels
 from hysim.models.compiled_step import pointer
 from hysim.models.composable import Composable
@@ -353,8 +353,7 @@ def check_elements(law: Any, thresholds: FloatArray, weights: FloatArray, z0: Fl
             f"{name}, {law.weights_name} and z0 must be equally long, got {thresholds.shape[1]}, "
             f"{weights.shape[1]} and {z0.shape[1]}"
         )
-    if (thresholds < 0.0).any():
-        raise ValueError(f"{name} must not be negative, got {thresholds.min():g}")
+    check_not_negative(**{name: thresholds.min(initial=0.0)})
     if law.ordered:
         check_increasing(name, thresholds)
 

@@ -211,8 +211,7 @@ class ModalDamping:
         ratios = read_only(self.ratio, "ratio")
         if ratios.ndim > 1:
             raise ValueError(f"ratio must be a number or have one axis, got shape {ratios.shape}")
-        if (ratios < 0.0).any():
-            raise ValueError(f"ratio must not be negative, got {ratios.min():g}")
+        check_not_negative(ratio=ratios.min(initial=0.0))
         object.__setattr__(self, "ratio", tuple(ratios.tolist()) if ratios.ndim else float(ratios))
 
     def matrix(self, mass: FloatArray, stiffness: FloatArray) -> FloatArray:
