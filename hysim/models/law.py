@@ -744,6 +744,14 @@ def _first(u: FloatArray) -> float:
     return float(u[0]) if u.size else 0.0
 
 
+def moving(direction: npt.ArrayLike) -> FloatArray:
+    """The direction of an input, its velocity or the sign of it, as an array; ValueError where it is zero."""
+    velocity = np.asarray(direction, dtype=float)
+    if not velocity.all():
+        raise ValueError("direction must not be zero: an input that stands still has two slopes")
+    return velocity
+
+
 def of_sets(parameters: Parameters, sets: npt.NDArray[np.intp]) -> dict[str, Any]:
     """The parameters of some sets; a single value is that of all."""
     return {name: value if np.size(value) == 1 else np.asarray(value)[sets] for name, value in parameters.items()}

@@ -17,7 +17,7 @@ import numpy.typing as npt
 from hysim._basics.frozen import FloatArray
 from hysim.kernels.boucwen import polynomial
 from hysim.laws.differential import _boucwen_search, boucwen_inverse
-from hysim.models.law import Law, State, of_sets
+from hysim.models.law import Law, State, moving, of_sets
 from hysim.models.protocols import CompiledLaw
 from hysim.models.search_space import ALL_FREE, Freedom, Parameters, SearchSpace
 from hysim.models.steady_cycle import Pass, PassOf
@@ -103,10 +103,7 @@ class MemoryLaw(ShapedLaw):
         The direction is the velocity u' or its sign; one that is zero has two slopes, and raises ValueError. z, u and
         the further elements of the law's state, `others` in their order, are broadcast against it.
         """
-        velocity, memory = np.asarray(direction, dtype=float), np.asarray(z, dtype=float)
-        if not np.all(velocity):
-            raise ValueError("direction must not be zero: an input that stands still has two slopes")
-        inputs = np.asarray(u, dtype=float)
+        velocity, memory, inputs = moving(direction), np.asarray(z, dtype=float), np.asarray(u, dtype=float)
         static = np.polynomial.polynomial.polyval(inputs, self.input_slope)
         further = (np.asarray(other, dtype=float) for other in others)
         return np.asarray(static + self.gain * self._memory_slope(np.sign(velocity), memory, inputs, *further))

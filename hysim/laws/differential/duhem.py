@@ -41,7 +41,7 @@ from hysim.laws.differential.terms import (
     terms_of,
 )
 from hysim.models.composable import Composable
-from hysim.models.law import Law, Packed, State
+from hysim.models.law import Law, Packed, State, moving
 from hysim.models.model import Example, family
 from hysim.models.parameters import Coordinate, space_of
 from hysim.models.protocols import CompiledLaw, Identifiable, Subject
@@ -303,9 +303,7 @@ class Duhem(Law):
 
     def tangent(self, direction: npt.ArrayLike, z: npt.ArrayLike, u: npt.ArrayLike = 0.0) -> FloatArray:
         """Slope dy/du at the memory `z`, for an input at `u` that moves in `direction`; see `hysim.BoucWen.tangent`."""
-        velocity = np.asarray(direction, dtype=float)
-        if not np.all(velocity):
-            raise ValueError("direction must not be zero: an input that stands still has two slopes")
+        velocity = moving(direction)
         inputs, memory = np.broadcast_arrays(np.asarray(u, dtype=float), np.asarray(z, dtype=float))
         p, q, p_abs, q_abs = (np.polynomial.polynomial.polyval2d(inputs, memory, part) for part in self._parts)
         size = np.abs(memory)

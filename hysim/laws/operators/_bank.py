@@ -21,7 +21,7 @@ from hysim.kernels import clamps as kernels
 from hysim.laws.differential.limit_cycle import LimitCycle
 from hysim.laws.operators._bank_search import Axis, BankStructure, check_elements
 from hysim.models.by_structure import ByStructure
-from hysim.models.law import Law, Packed
+from hysim.models.law import Law, Packed, moving
 from hysim.models.protocols import CompiledLaw
 from hysim.models.search_space import Parameters
 from hysim.models.tables import Tables, check_signs, table_of_one
@@ -185,15 +185,12 @@ class Clamps(Elements, Law):
         The direction is the velocity u' or its sign, ValueError if zero; u is broadcast against it. z has the shape
         (..., n_plays) of `memory`, without the last axis for a single play or stop.
         """
-        velocity, inputs = (np.asarray(values, dtype=float)[..., np.newaxis] for values in (direction, u))
-        if not np.all(velocity):
-            raise ValueError("direction must not be zero: an input that stands still has two slopes")
+        velocity, inputs = moving(direction)[..., np.newaxis], np.asarray(u, dtype=float)[..., np.newaxis]
         thresholds, weights, _ = self.elements
         memory = np.asarray(z, dtype=float)
         memory = memory if isinstance(self, Bank) else memory[..., np.newaxis]
         pushed = np.where(velocity > 0.0, inputs - thresholds >= memory, inputs + thresholds <= memory)
-        moving = ~pushed if self.stops else pushed
-        return np.asarray(self.feedthrough + np.sum(weights * moving, axis=-1))
+        return np.asarray(self.feedthrough + np.sum(weights * (~pushed if self.stops else pushed), axis=-1))
 
     @property
     def known_slopes(self) -> tuple[float, float]:
