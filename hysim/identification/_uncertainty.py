@@ -31,7 +31,7 @@ from hysim.identification._descent import Descent, named_slopes
 from hysim.identification._noise import Gaussian, Noise
 from hysim.identification._problem import Problem, samples_of_sensor
 from hysim.identification.marquardt import pieces
-from hysim.metrics.rows import LoopRows
+from hysim.metrics.rows import LoopRows, max_widths
 from hysim.models.law import Law
 from hysim.models.search_space import Flags
 from hysim.records import Record, SensorRecord, by_record
@@ -306,11 +306,7 @@ def loop_widths(descent: Descent, theta: FloatArray) -> FloatArray:
     if isinstance(record, SensorRecord):  # of sensors, in units of their noise
         return np.empty(0)
     outputs = descent.problem.model(theta)[:, : len(record)]
-    finite = outputs[np.isfinite(outputs).all(axis=1)]
-    try:
-        return LoopRows(record.u).max_width(finite)
-    except ValueError:  # there is no complete cycle
-        return np.empty(0)
+    return max_widths(record.u, outputs[np.isfinite(outputs).all(axis=1)])
 
 
 def width_stderr(problem: Problem, theta: FloatArray, of_theta: FloatArray, slopes: FloatArray | None = None) -> float:

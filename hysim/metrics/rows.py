@@ -42,6 +42,14 @@ class LoopRows:
         return np.abs(signed_area(loops.of(self.u)[path], np.ascontiguousarray(loops.of(y)[:, path])))
 
 
+def max_widths(u: FloatArray, y: FloatArray) -> FloatArray:
+    """As `LoopRows.max_width`; empty where the input has no complete cycle."""
+    try:
+        return LoopRows(u).max_width(y) if len(y) else np.empty(0)
+    except ValueError:
+        return np.empty(0)
+
+
 def _interpolated(grid: FloatArray, x: FloatArray, y: FloatArray) -> FloatArray:
     below = np.clip(np.searchsorted(x, grid, side="right") - 1, 0, x.size - 1)
     above = np.minimum(below + 1, x.size - 1)

@@ -16,7 +16,7 @@ from hysim._basics.progress import Reports, reports
 from hysim.errors import SimulationError
 from hysim.identification import Identification, Width
 from hysim.identification.likelihood import Problem, again, density, optima
-from hysim.metrics.rows import LoopRows
+from hysim.metrics.rows import max_widths
 from hysim.models.protocols import needs_time
 from hysim.posterior._sampler import Chains, effective_samples, sampled, split_rhat
 from hysim.posterior._target import Given, Target, check_names, given, linear, searched
@@ -185,7 +185,7 @@ class Posterior:
         chosen = rng.choice(total, min(n, total), replace=False)
         outputs, kept = _outputs(self, inputs, t, chosen)
         noise = density(self.noise, self.resolution)
-        widths = _widths(inputs, outputs)
+        widths = max_widths(inputs, outputs)
         return Prediction(
             u=inputs,
             outputs=outputs,
@@ -274,13 +274,6 @@ def _own(name: str, model: Any) -> str:
         return name
     base, _, record = name.rpartition("[")
     return base if record == "0]" else ""
-
-
-def _widths(u: FloatArray, outputs: FloatArray) -> FloatArray:
-    try:
-        return LoopRows(u).max_width(outputs) if len(outputs) else np.empty(0)
-    except ValueError:  # no complete cycle
-        return np.empty(0)
 
 
 def _interval(widths: FloatArray, tails: tuple[float, float]) -> Width | None:
