@@ -17,14 +17,13 @@ records, at 750 Hz, are not the solution of this equation but the result of a re
 An exact integration at 15 kHz differs from it by 1e-7 m (multisine) and 2e-6 m (sweep).
 """
 
-import math
 import operator
 from dataclasses import replace
 
 import numpy as np
 import numpy.typing as npt
 
-from hysim._basics.frozen import FloatArray, check_choice, read_only
+from hysim._basics.frozen import FloatArray, check_choice, check_finite, check_not_negative, read_only
 from hysim.laws.differential.boucwen import BoucWen
 from hysim.plants.oscillator import BoucWenOscillator
 from hysim.plants.oscillator_structure import decimated, interpolated
@@ -121,9 +120,8 @@ def noel_schoukens(
     if operator.index(periods) < 1:
         raise ValueError(f"periods must be at least 1, got {periods}")
     level = _LEVELS[kind] if level is None else level
-    for name, value in (("level", level), ("noise", noise)):
-        if not 0.0 <= value < math.inf:
-            raise ValueError(f"{name} must not be negative, and finite, got {value}")
+    check_not_negative(level=level, noise=noise)
+    check_finite(level=level, noise=noise)
     phases, disturbances = np.random.default_rng(seed).spawn(2)
     if kind == "sweep":
         force = level * _unit_sweep(SWEEP_LENGTH)

@@ -24,7 +24,7 @@ from hysim.laws.friction.rated_law import TimedLaw
 from hysim.models.dependent import Dependent, on_record
 from hysim.models.model import Example, family
 from hysim.models.protocols import DirectFit
-from hysim.models.tables import Tables
+from hysim.models.tables import Tables, check_increasing
 from hysim.models.varying import ChannelPolynomial, places
 from hysim.models.varying import weights as weights_at
 from hysim.records import Record, as_record, by_record, span_of
@@ -122,8 +122,7 @@ class CoreField(TimedLaw):
         if n_weights != (wanted := kernels.N_POWERS * (m + 2 * n) + kernels.N_ALONE):
             raise ValueError(f"{m} stops and {n} lags need {wanted} weights, got {n_weights}")
         for name in ("thresholds", "lags"):
-            if (np.diff(tables[name]) <= 0.0).any():
-                raise ValueError(f"{name} must increase")
+            check_increasing(name, tables[name])
 
     @classmethod
     def further(cls, tables: Tables) -> int:
