@@ -271,7 +271,7 @@ def test_a_core_of_modelica_comes_back():
 
 test_what_is_no_core_is_refused = refused(
     (lambda: hs.Tellinen(coercivity=0.0), "coercivity must be positive, got 0.0"),
-    (lambda: hs.Chan(squareness=1.0), "squareness, remanence over saturation, must be between 0 and 1, got 1.0"),
+    (lambda: hs.Chan(squareness=1.0), "squareness must be below 1, got 1.0"),
     (lambda: hs.Tellinen(z0=-1.5), "z0 must be of a size of at most 1"),
     (lambda: hs.Chan(gap=-0.1), "gap must not be negative"),
     (lambda: hs.identify(hs.Chan, noisy(CORES[0]), bounds={"gap": (0.0, 1.0)}), "gap of a Chan cannot be searched"),

@@ -187,8 +187,8 @@ test_constants_of_no_material_are_refused = refused(
     ("Ms", 0.0, "Ms must be positive"),
     ("a", -1.0, "a must be positive"),
     ("k", 0.0, "k must be positive"),
-    ("c", 1.1, "c must be between 0 and 1"),
-    ("reversible_feedback", -0.1, "reversible_feedback must be between 0 and 1"),
+    ("c", 1.1, "c must be at most 1"),
+    ("reversible_feedback", -0.1, "reversible_feedback must not be negative"),
     ("alpha", 0.02, "not unique"),
     call=lambda name, value: hs.JilesAtherton(**{name: value}),
 )

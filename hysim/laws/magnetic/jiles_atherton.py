@@ -258,6 +258,8 @@ class JilesAtherton(Law):
         **dict.fromkeys(("alpha", "c", "anisotropy", "reversible_feedback"), "1"),
     }
     positive = ("Ms", "a", "k")
+    not_negative = ("c", "reversible_feedback")
+    within: ClassVar = dict.fromkeys(not_negative, ("at most", 1.0))
     example = Example(
         {"Ms": 1.0, "a": 0.3, "alpha": 0.1, "k": 0.4, "gain": 1.0, "feedthrough": 0.0},
         (-2.0, 2.0),
@@ -273,9 +275,6 @@ class JilesAtherton(Law):
     def check(cls, tables: Tables) -> None:
         """Refuse constants of no material, and a reversible magnetisation that is not unique."""
         super().check(tables)
-        for name in ("c", "reversible_feedback"):
-            if not ((tables[name] >= 0.0) & (tables[name] <= 1.0)).all():
-                raise ValueError(f"{name} must be between 0 and 1, got {tables[name].ravel().tolist()[0]}")
         coupling = tables["alpha"] * tables["Ms"] / tables["a"]
         feedback = tables["reversible_feedback"] * tables["c"] * coupling * initial_slope(tables["anisotropy"])
         if not (feedback < 1.0).all():

@@ -43,8 +43,8 @@ class BranchLaw(Branches):
     offset: float
     z0: float
 
-    positive = ("coercivity",)
-    within: ClassVar = {"z0": ("of a size of at most", 1.0)}
+    positive = ("coercivity", "squareness")
+    within: ClassVar = {"squareness": ("below", 1.0), "z0": ("of a size of at most", 1.0)}
     units: ClassVar[Mapping[str, str]] = {"squareness": "1", "z0": "1"}
     states: ClassVar[tuple[str, ...]] = ("rest", "periodic", "free")
     powers: ClassVar = {"saturation": None, "feedthrough": 1, "offset": 0}
@@ -61,15 +61,6 @@ class BranchLaw(Branches):
         for z0 in (-1.0, 0.0, 1.0)
     )
     screened = 64
-
-    @classmethod
-    def check(cls, tables: Tables) -> None:
-        """Refuse a coercivity that is not positive, an impossible squareness, and a place beyond a branch."""
-        super().check(tables)
-        squareness = tables["squareness"].ravel()
-        wrong = squareness[~((squareness > 0.0) & (squareness < 1.0))]
-        if wrong.size:
-            raise ValueError(f"squareness, remanence over saturation, must be between 0 and 1, got {wrong[0]}")
 
     @property
     @abstractmethod

@@ -84,11 +84,10 @@ class TellinenTable(Law):
         """Refuse what is no pair of branches, or no place between them."""
         super().check(tables)
         check_points(tables, "inputs", "lower", "upper")
-        lower, upper = tables["lower"], tables["upper"]
-        for name, side in (("lower", lower), ("upper", upper)):
-            if (np.diff(side) < 0.0).any():
+        for name in ("lower", "upper"):
+            if (np.diff(tables[name]) < 0.0).any():
                 raise ValueError(f"the branch {name} must not fall")
-        if (lower > upper).any():
+        if (tables["lower"] > tables["upper"]).any():
             raise ValueError("the branch upper must not lie below the branch lower")
 
     candidates = not_offered  # its branches are those of a loop, which `from_loop` takes from a record
