@@ -11,7 +11,7 @@ from typing import Any, Protocol, Self, TypeVar, runtime_checkable
 import numpy as np
 import numpy.typing as npt
 
-from hysim._basics.frozen import FloatArray, check_positive, checked, vectors, wrong_axes
+from hysim._basics.frozen import FloatArray, Positive, checked, vectors, wrong_axes
 from hysim._basics.prefixes import power_of_ten
 from hysim._basics.printing import extent, listed, printed, quantity, summary_text
 from hysim._columns.channels import Channels, along, checked_channels, taken, value_in
@@ -76,7 +76,7 @@ class Record:
     y: FloatArray
     t: FloatArray | None = None
     units: Mapping[str, str] = field(default_factory=dict)
-    resolution: float | None = None
+    resolution: Positive | None = None
     name: str = ""
     channels: Channels = field(default_factory=dict)
 
@@ -100,7 +100,6 @@ class Record:
         if unknown := set(self.units) - {"t", "u", "y", *self.channels}:
             labels = ", ".join(f'"{name}"' for name in ("t", "u", "y", *self.channels))
             raise ValueError(f"units are labels of {labels}, got {sorted(unknown)}")
-        check_positive(resolution=self.resolution)
 
     def _signals(self) -> dict[str, FloatArray]:
         return {"u": self.u, "y": self.y} | ({} if self.t is None else {"t": self.t})

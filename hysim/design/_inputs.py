@@ -7,7 +7,7 @@ import math
 
 import numpy as np
 
-from hysim._basics.frozen import FloatArray, check_positive, checked
+from hysim._basics.frozen import FloatArray, Positive, checked
 
 
 @checked
@@ -35,14 +35,13 @@ class InputLimits:
     101
     """
 
-    amplitude: float
-    slew: float
-    duration: float
-    sample_time: float
+    amplitude: Positive
+    slew: Positive
+    duration: Positive
+    sample_time: Positive
     centre: float = 0.0
 
     def __post_init__(self) -> None:
-        check_positive(amplitude=self.amplitude, slew=self.slew, duration=self.duration, sample_time=self.sample_time)
         if self.samples < 10:
             raise ValueError(f"the record must hold at least 10 samples, got {self.samples}")
 

@@ -3,7 +3,7 @@
 import math
 from collections.abc import Callable
 from dataclasses import replace
-from typing import Any, Protocol, runtime_checkable
+from typing import Any, Literal, Protocol, runtime_checkable
 
 import numpy as np
 import numpy.typing as npt
@@ -160,7 +160,7 @@ class Actuator:
         amplifier: str | Amplifier | None = None,
         delay: bool = True,
         sensor: Sensor | None = None,
-        offsets: str = "shared",
+        offsets: Literal["shared", "own"] = "shared",
         start: Any = None,
     ) -> ActuatorStructure:
         """An actuator for `hysim.identify`, on one or several records with time: law, creep, modes and delay at once.

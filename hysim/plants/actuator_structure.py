@@ -27,12 +27,12 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import field, replace
 from functools import lru_cache, partial
-from typing import Any, ClassVar
+from typing import Any, ClassVar, Literal
 
 import numpy as np
 import numpy.typing as npt
 
-from hysim._basics.frozen import FloatArray, check_choice, checked
+from hysim._basics.frozen import FloatArray, checked
 from hysim._basics.parallel import in_chunks
 from hysim.kernels import actuator_columns as kernels
 from hysim.models.joint_space import columns_beside, declared, together
@@ -177,7 +177,7 @@ class ActuatorStructure(Subject):
     amplifier: Any
     delay: bool
     sensor: Any
-    offsets: str
+    offsets: Literal["shared", "own"]
     survey: Any = None
     scaled_on: Any = None  # the record that scales the law's box
     known: Mapping[str, float] = field(default_factory=dict)  # parameters that are held beside those of the user
@@ -214,7 +214,6 @@ class ActuatorStructure(Subject):
         branches = self.start.actuators if isinstance(self.start, MultiInputActuator) else (self.start,)
         if self.start is not None and not all(isinstance(each, self.family) for each in branches):
             raise TypeError(f"start must be an Actuator, or a MultiInputActuator of them, got {self.start!r}")
-        check_choice("offsets", self.offsets, ("shared", "own"))
 
     def __str__(self) -> str:
         each = self.law.laws.values() if isinstance(self.law, InputSum) else [self.law]

@@ -21,13 +21,13 @@ import operator
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Self
+from typing import Literal, Self
 
 import numpy as np
 import numpy.typing as npt
 from scipy import fft, special
 
-from hysim._basics.frozen import FloatArray, check_choice, check_not_negative, check_positive, checked, read_only
+from hysim._basics.frozen import FloatArray, NotNegative, Positive, checked, read_only
 from hysim.datasets import PIXEL
 
 Counts = npt.NDArray[np.uint8] | npt.NDArray[np.uint16]
@@ -147,32 +147,28 @@ class Camera:
     """
 
     shape: tuple[int, int] = (256, 256)
-    scale: float = PIXEL
+    scale: Positive = PIXEL
     direction: float = 0.0
-    blur: float = 1.5
-    grain: float = 2.0
-    contrast: float = 0.12
-    bits: int = 8
-    full_well: float = 10_000.0
+    blur: NotNegative = 1.5
+    grain: NotNegative = 2.0
+    contrast: NotNegative = 0.12
+    bits: Literal[8, 12] = 8
+    full_well: Positive = 10_000.0
     shot_noise: bool = True
-    read_noise: float = 10.0
-    frame_rate: float = 30.0
-    exposure: float = 0.01
+    read_noise: NotNegative = 10.0
+    frame_rate: Positive = 30.0
+    exposure: NotNegative = 0.01
     subsamples: int = 8
     gain_drift: float = 0.0
     offset_drift: float = 0.0
-    drift_period: float = 60.0
-    jitter: float = 0.0
+    drift_period: Positive = 60.0
+    jitter: NotNegative = 0.0
     texture: int = 0
     seed: int = 0
 
     def __post_init__(self) -> None:
         if len(self.shape) != 2 or min(operator.index(size) for size in self.shape) < 1:
             raise ValueError(f"shape must be (rows, columns), got {self.shape}")
-        check_positive(**{name: vars(self)[name] for name in ("scale", "full_well", "frame_rate", "drift_period")})
-        not_negative = ("blur", "grain", "contrast", "read_noise", "exposure", "jitter")
-        check_not_negative(**{name: vars(self)[name] for name in not_negative})
-        check_choice("bits", self.bits, (8, 12))
         if self.exposure * self.frame_rate > 1.0:
             raise ValueError(f"exposure must be at most a frame's time, {1 / self.frame_rate:g} s, got {self.exposure}")
         for name, least in (("subsamples", 1), ("texture", 0), ("seed", 0)):

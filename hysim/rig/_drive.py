@@ -5,7 +5,7 @@ import operator
 import numpy as np
 
 from hysim import signals
-from hysim._basics.frozen import FloatArray, check_positive, checked
+from hysim._basics.frozen import FloatArray, Positive, checked
 from hysim.rig._camera import Camera
 
 SQUARE_WAVES = {"slow": 0.1, "fast": 1.01626}
@@ -41,14 +41,13 @@ class Drive:
     """
 
     u: FloatArray
-    sample_time: float
+    sample_time: Positive
     dwell: float | None = None
     frames_per_step: int = 1
 
     def __post_init__(self) -> None:
         if self.u.ndim != 1 or self.u.size < 2:
             raise ValueError(f"u must have one axis and at least 2 samples, got shape {self.u.shape}")
-        check_positive(sample_time=self.sample_time)
         if operator.index(self.frames_per_step) < 1:
             raise ValueError(f"frames_per_step must be at least 1, got {self.frames_per_step}")
         if self.dwell is not None:
