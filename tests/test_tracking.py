@@ -215,7 +215,7 @@ test_numbers_that_the_step_does_not_take_as_they_are_are_refused = refused(
     ({"law": hs.Dahl(), "free": ("coulomb",)}, "does not take coulomb as it is"),
     ({"drift": (0.1, 0.1)}, "free and drift must name as many numbers, got 1 and 2"),
     ({"free": ("z0",)}, "does not drift"),
-    ({"noise": 0.0}, "drift and noise must be positive"),
+    ({"noise": 0.0}, "noise must be positive, got 0.0"),
     ({"law": hs.PID(kp=1.0), "free": ("kp",)}, TypeError, "law must be a law that a step describes"),
     call=lambda options: hs.AdaptiveInverse(
         **{"law": LOOP_LAW, "free": ("gain",), "drift": (0.1,), "noise": 0.1} | options

@@ -7,7 +7,7 @@ import math
 import sys
 import types
 import typing
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sized
 from types import MappingProxyType
 from typing import Any, TypeVar, dataclass_transform
 
@@ -106,6 +106,14 @@ def vectors(**values: npt.ArrayLike) -> list[FloatArray]:
             sizes = f"{arrays[first].size} and {arrays[name].size}"
             raise ValueError(f"{first} and {name} must have equal lengths, got {sizes}")
     return [*arrays.values()]
+
+
+def check_lengths(*, empty: bool = True, **values: Sized) -> None:
+    """A ValueError for values by name that are not equally long, or that are empty where they must not be."""
+    sizes = [len(each) for each in values.values()]
+    if len({*sizes}) > 1 or not (empty or sizes[0]):
+        names, numbers = (f"{', '.join(each[:-1])} and {each[-1]}" for each in ([*values], [*map(str, sizes)]))
+        raise ValueError(f"{names} must be equally long{'' if empty else ' and not empty'}, got {numbers}")
 
 
 def check_choice(name: str, value: object, choices: Iterable[object]) -> None:

@@ -36,7 +36,7 @@ from typing import Self
 import numpy as np
 import numpy.typing as npt
 
-from hysim._basics.frozen import Count, FloatArray, NotNegative, Positive, check_count, check_positive
+from hysim._basics.frozen import Count, FloatArray, NotNegative, Positive, check_count, check_lengths, check_positive
 from hysim.control._controller import Feedback
 from hysim.models.model import family
 from hysim.plants.stages import sampled, vibration_stage
@@ -189,11 +189,7 @@ class Shaper:
     smoothing: NotNegative = 0.0
 
     def __post_init__(self) -> None:
-        if len(self.natural_frequencies) != len(self.damping_ratios):
-            raise ValueError(
-                f"natural_frequencies and damping_ratios must be equally long, got {len(self.natural_frequencies)} "
-                f"and {len(self.damping_ratios)}"
-            )
+        check_lengths(natural_frequencies=self.natural_frequencies, damping_ratios=self.damping_ratios)
         check_positive(natural_frequencies=min(self.natural_frequencies, default=None))
         if not all(0.0 <= ratio < 1.0 for ratio in self.damping_ratios):
             raise ValueError(f"damping_ratios must be from 0 to below 1, got {self.damping_ratios}")

@@ -23,7 +23,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy.linalg import block_diag, solve_discrete_are, toeplitz
 
-from hysim._basics.frozen import Count, FloatArray, Interval, NotNegative, Positive, read_only
+from hysim._basics.frozen import Count, FloatArray, Interval, NotNegative, Positive, check_positive, read_only
 from hysim._basics.results import model_of
 from hysim.control._controller import PID, Feedback, SampledController, SteppedController, WithoutFeedback, compiled_of
 from hysim.control._filters import DampingLoop, ModeInverse, Notch, Shaper
@@ -354,8 +354,7 @@ class AdaptiveInverse(WithoutFeedback):
         if not self.free or len(self.free) != len(self.drift):
             raise ValueError(f"free and drift must name as many numbers, got {len(self.free)} and {len(self.drift)}")
         checked_names(self.law, self.free)
-        if not (min(self.drift) > 0.0 and self.noise > 0.0):
-            raise ValueError("drift and noise must be positive")
+        check_positive(drift=min(self.drift), noise=self.noise)
         if self.law.workspace and self.law.resume is None:
             raise ValueError(f"the workspace of a {type(self.law).__name__} cannot follow numbers that change")
         self._rates()

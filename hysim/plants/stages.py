@@ -189,11 +189,7 @@ class Creep:
     instant_gain: float = 1.0
 
     def __post_init__(self) -> None:
-        if len(self.time_constants) != len(self.weights):
-            raise ValueError(
-                f"time_constants and weights must be equally long, got {len(self.time_constants)} and "
-                f"{len(self.weights)}"
-            )
+        frozen.check_lengths(time_constants=self.time_constants, weights=self.weights)
         frozen.check_positive(time_constants=min(self.time_constants, default=1.0))
 
     @classmethod

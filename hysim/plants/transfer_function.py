@@ -17,6 +17,7 @@ from typing import Any, ClassVar, Literal
 import numpy as np
 import numpy.typing as npt
 
+from hysim._basics import frozen
 from hysim._basics.frozen import FloatArray, NotNegative, check_not_negative, check_positive, checked, read_only
 from hysim.errors import SimulationError
 from hysim.models.composable import Composable
@@ -575,12 +576,8 @@ class Modes:
     delay: NotNegative = 0.0
 
     def __post_init__(self) -> None:
-        lengths = len(self.natural_frequencies), len(self.damping_ratios), len(self.gains)
-        if len(set(lengths)) > 1 or not lengths[0]:
-            raise ValueError(
-                "natural_frequencies, damping_ratios and gains must be equally long, and hold a mode, got lengths "
-                f"{lengths[0]}, {lengths[1]} and {lengths[2]}"
-            )
+        modes = {name: vars(self)[name] for name in ("natural_frequencies", "damping_ratios", "gains")}
+        frozen.check_lengths(empty=False, **modes)
         check_positive(natural_frequencies=min(self.natural_frequencies))
         check_not_negative(damping_ratios=min(self.damping_ratios))
 

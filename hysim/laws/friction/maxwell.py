@@ -5,7 +5,7 @@ from typing import ClassVar
 import numpy as np
 import numpy.typing as npt
 
-from hysim._basics.frozen import FloatArray
+from hysim._basics.frozen import FloatArray, check_lengths
 from hysim.kernels import maxwell as kernels
 from hysim.laws.friction.rated_law import RatedLaw, curve
 from hysim.models.model import Example, family
@@ -109,10 +109,7 @@ class GeneralizedMaxwellSlip(RatedLaw):
 
     def __post_init__(self) -> None:
         n = len(self.stiffness)
-        if not n or len(self.weights) != n:
-            raise ValueError(
-                f"stiffness and weights must be equally long and not empty, got {n} and {len(self.weights)}"
-            )
+        check_lengths(empty=False, stiffness=self.stiffness, weights=self.weights)
         if len(self.z0) == 1:
             object.__setattr__(self, "z0", self.z0 * n)
         if len(self.z0) != n:

@@ -39,7 +39,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from hysim._basics.frozen import FloatArray, check_not_negative, check_whole, checked, read_only
+from hysim._basics.frozen import FloatArray, check_lengths, check_not_negative, check_whole, checked, read_only
 from hysim.kernels import play_sums as kernels
 from hysim.models.compiled_step import pointer
 from hysim.models.composable import Composable
@@ -348,11 +348,7 @@ def dead_zone(x: FloatArray, d: float | FloatArray) -> FloatArray:
 def check_elements(law: Any, thresholds: FloatArray, weights: FloatArray, z0: FloatArray) -> None:
     """Refuse tables (n_sets, n_plays) that are no elements of a law."""
     name = law.thresholds_name
-    if not thresholds.shape[1] == weights.shape[1] == z0.shape[1]:
-        raise ValueError(
-            f"{name}, {law.weights_name} and z0 must be equally long, got {thresholds.shape[1]}, "
-            f"{weights.shape[1]} and {z0.shape[1]}"
-        )
+    check_lengths(empty=True, **{name: thresholds.T, law.weights_name: weights.T, "z0": z0.T})
     check_not_negative(**{name: thresholds.min(initial=0.0)})
     if law.ordered:
         check_increasing(name, thresholds)
@@ -360,11 +356,7 @@ def check_elements(law: Any, thresholds: FloatArray, weights: FloatArray, z0: Fl
 
 def check_dead_zones(thresholds: FloatArray, weights: FloatArray) -> None:
     """Refuse tables (n_sets, n_zones) that are no dead zones."""
-    if thresholds.shape[1] != weights.shape[1] or not thresholds.shape[1]:
-        raise ValueError(
-            f"dead_zones and dead_zone_weights must be equally long and not empty, got {thresholds.shape[1]} "
-            f"and {weights.shape[1]}"
-        )
+    check_lengths(empty=False, dead_zones=thresholds.T, dead_zone_weights=weights.T)
     check_increasing("dead_zones", thresholds)
 
 

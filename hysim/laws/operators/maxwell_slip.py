@@ -5,7 +5,7 @@ from typing import ClassVar, Self
 import numpy as np
 import numpy.typing as npt
 
-from hysim._basics.frozen import read_only
+from hysim._basics.frozen import check_lengths, read_only
 from hysim.laws.operators._bank import Bank, Clamps
 from hysim.laws.operators._bank_search import BankStructure
 from hysim.laws.operators.prandtl_ishlinskii import PrandtlIshlinskii
@@ -73,8 +73,7 @@ class MaxwellSlip(Bank, Clamps):
         length n_elements, else ValueError; feedthrough and offset are those of the constructor.
         """
         k, f = (read_only(values, name, ndim=1) for values, name in ((stiffness, "stiffness"), (limits, "limits")))
-        if k.size != f.size:
-            raise ValueError(f"stiffness and limits must be equally long, got {k.size} and {f.size}")
+        check_lengths(stiffness=k, limits=f)
         if not k.all() or (f * k < 0.0).any():
             raise ValueError(f"a stiffness must not be zero, and its limit has its sign, got {k} and {f}")
         return cls(stiffness=tuple(k.tolist()), slips=tuple((f / k).tolist()), feedthrough=feedthrough, offset=offset)
