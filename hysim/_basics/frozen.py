@@ -116,6 +116,12 @@ def check_lengths(*, empty: bool = True, **values: Sized) -> None:
         raise ValueError(f"{names} must be equally long{'' if empty else ' and not empty'}, got {numbers}")
 
 
+def check_one_each(name: str, values: Sized, number: int, kind: str) -> None:
+    """A ValueError for values that are not as many as the things of a kind, such as masses."""
+    if len(values) != number:
+        raise ValueError(f"{name} must hold one number for each of {number} {kind}, got {len(values)}")
+
+
 def check_choice(name: str, value: object, choices: Iterable[object]) -> None:
     if value not in (known := tuple(choices)):
         raise ValueError(f"{name} must be one of {', '.join(map(str, known))}, got {value!r}{meant(value, known)}")

@@ -5,7 +5,7 @@ from typing import ClassVar
 import numpy as np
 import numpy.typing as npt
 
-from hysim._basics.frozen import FloatArray, check_lengths
+from hysim._basics.frozen import FloatArray, check_lengths, check_one_each
 from hysim.kernels import maxwell as kernels
 from hysim.laws.friction.rated_law import RatedLaw, curve
 from hysim.models.model import Example, family
@@ -112,8 +112,7 @@ class GeneralizedMaxwellSlip(RatedLaw):
         check_lengths(empty=False, stiffness=self.stiffness, weights=self.weights)
         if len(self.z0) == 1:
             object.__setattr__(self, "z0", self.z0 * n)
-        if len(self.z0) != n:
-            raise ValueError(f"z0 must hold one number for each of {n} elements, got {len(self.z0)}")
+        check_one_each("z0", self.z0, n, "elements")
         super().__post_init__()
 
     @classmethod

@@ -16,7 +16,7 @@ from typing import Any, ClassVar, NamedTuple, Self
 import numpy as np
 import numpy.typing as npt
 
-from hysim._basics.frozen import FloatArray, check_whole, checked
+from hysim._basics.frozen import FloatArray, check_one_each, check_whole, checked
 from hysim._basics.results import model_of
 from hysim._columns.channels import value_in
 from hysim.kernels import core_losses as kernels
@@ -116,9 +116,8 @@ class CoreField(TimedLaw):
     @classmethod
     def check(cls, tables: Tables) -> None:
         super().check(tables)
-        m, n, n_sizes, n_weights = (tables[each].shape[1] for each in ("thresholds", "lags", "lag_sizes", "weights"))
-        if n_sizes != n:
-            raise ValueError(f"lag_sizes must hold one number for each of {n} lags, got {n_sizes}")
+        m, n, n_weights = (tables[each].shape[1] for each in ("thresholds", "lags", "weights"))
+        check_one_each("lag_sizes", tables["lag_sizes"].T, n, "lags")
         if n_weights != (wanted := kernels.N_POWERS * (m + 2 * n) + kernels.N_ALONE):
             raise ValueError(f"{m} stops and {n} lags need {wanted} weights, got {n_weights}")
         for name in ("thresholds", "lags"):

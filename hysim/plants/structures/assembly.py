@@ -11,7 +11,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy.linalg import eigh
 
-from hysim._basics.frozen import Count, FloatArray, checked, read_only, whole_substeps
+from hysim._basics.frozen import Count, FloatArray, check_one_each, checked, read_only, whole_substeps
 from hysim._basics.parallel import in_pieces
 from hysim._basics.progress import along
 from hysim.errors import SimulationError
@@ -504,8 +504,8 @@ class MovingStructure:
 def _matrix(values: FloatArray, name: str, n_nodes: int) -> FloatArray:
     """A number for each mass, one for all, or a symmetric matrix, as a matrix."""
     if values.ndim < 2:
-        if values.ndim and values.size != n_nodes:
-            raise ValueError(f"{name} must hold one number for each of {n_nodes} masses, got {values.size}")
+        if values.ndim:
+            check_one_each(name, values, n_nodes, "masses")
         return read_only(np.diag(np.broadcast_to(values, n_nodes)))
     if values.shape != (n_nodes, n_nodes):
         raise ValueError(f"{name} must have the shape ({n_nodes}, {n_nodes}), got {values.shape}")

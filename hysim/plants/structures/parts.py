@@ -17,7 +17,7 @@ from typing import Any, NamedTuple, Self
 
 import numpy as np
 
-from hysim._basics.frozen import FloatArray, check_not_negative, check_positive, check_whole, read_only
+from hysim._basics.frozen import FloatArray, check_not_negative, check_one_each, check_positive, check_whole, read_only
 from hysim._basics.results import model_of
 from hysim.errors import SimulationError
 from hysim.laws.dashpot import Dashpot
@@ -101,10 +101,7 @@ class Element:
     def drift_row(self, n_nodes: int) -> FloatArray:
         """Weights of the displacements in the drift, shape (n_nodes,)."""
         if self.direction:
-            if len(self.direction) != n_nodes:
-                raise ValueError(
-                    f"direction must hold one number for each of {n_nodes} masses, got {len(self.direction)}"
-                )
+            check_one_each("direction", self.direction, n_nodes, "masses")
             return np.array(self.direction)
         row = np.zeros(n_nodes + 1)
         row[list(self.between)] = -1.0, 1.0
@@ -216,8 +213,8 @@ class ModalDamping:
 
     def matrix(self, mass: FloatArray, stiffness: FloatArray) -> FloatArray:
         """The damping matrix (n_nodes, n_nodes), or a stack; ValueError for a wrong number of ratios."""
-        if np.ndim(self.ratio) and len(self.ratio) != mass.shape[-1]:
-            raise ValueError(f"ratio must hold one number for each of {mass.shape[-1]} modes, got {len(self.ratio)}")
+        if np.ndim(self.ratio):
+            check_one_each("ratio", self.ratio, mass.shape[-1], "modes")
         return modal_damping(np.asarray(self.ratio), mass, stiffness)
 
 

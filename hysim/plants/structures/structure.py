@@ -32,6 +32,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy.linalg import LinAlgError, cholesky
 
+from hysim._basics import frozen
 from hysim._basics.frozen import FloatArray, check_choice, check_positive, check_whole, read_only, whole_substeps
 from hysim._basics.parallel import in_chunks, map_on_threads
 from hysim._basics.printing import aligned, extent, frozen_result, summary_text
@@ -289,10 +290,8 @@ class Structure(SearchedStructure):
             object.__setattr__(self, "damping", read_only(self.damping, "damping"))
         if not 1e-12 <= self.tolerance <= _LOOSEST:
             raise ValueError(f"tolerance must be between 1e-12 and {_LOOSEST:g}, got {self.tolerance:g}")
-        if len(self.influence) not in (0, self.n_nodes):
-            raise ValueError(
-                f"influence must hold one number for each of {self.n_nodes} masses, got {len(self.influence)}"
-            )
+        if self.influence:
+            frozen.check_one_each("influence", self.influence, self.n_nodes, "masses")
         if len(self.initial_state) not in (0, 2 * self.n_nodes):
             raise ValueError(
                 f"initial_state must hold {self.n_nodes} displacements and {self.n_nodes} velocities, "
@@ -477,8 +476,7 @@ class Structure(SearchedStructure):
         row = self._controlled(at)
         loads = row if pattern is None else read_only(pattern, "pattern", ndim=1)
         n, n_elements = self.n_nodes, len(self.elements)
-        if loads.size != n:
-            raise ValueError(f"pattern must hold one number for each of {n} masses, got {loads.size}")
+        frozen.check_one_each("pattern", loads, n, "masses")
         if not loads.any():
             raise ValueError("pattern must not be zero")
         x = np.array(self.initial_state[:n] or np.zeros(n))
@@ -555,8 +553,7 @@ def shear_frame(
     if stiffnesses is None and laws is None:
         raise ValueError("a frame needs stiffnesses, laws, or both")
     springs = np.zeros(n) if stiffnesses is None else read_only(stiffnesses, "stiffnesses", ndim=1)
-    if springs.size != n:
-        raise ValueError(f"stiffnesses must hold one number for each of {n} storeys, got {springs.size}")
+    frozen.check_one_each("stiffnesses", springs, n, "storeys")
     several: Sequence[Any] = laws if isinstance(laws, (list, tuple)) else [laws] * n
     if len(several) != n:
         raise ValueError(f"laws must hold one for each of {n} storeys, got {len(several)}")
