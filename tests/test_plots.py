@@ -382,7 +382,7 @@ CONSTANT = hs.Record(u=[1.0, 1.0], y=[0.0, 0.0])
 
 test_what_cannot_be_drawn_is_refused = refused(
     (lambda rec: hs.plot.loop(), "at least one result"),
-    (lambda rec: hs.plot.history(rec, hold="linear"), '"zoh" or "foh"'),
+    (lambda rec: hs.plot.history(rec, hold="linear"), "hold must be one of zoh, foh"),
     (lambda rec: hs.plot.to_svg(figures.figure4(rec), name="4 loops"), "a letter followed by"),
     (lambda rec: hs.plot.width(), "nothing to draw"),
     (lambda rec: hs.plot.minor_loops(CONSTANT), "is constant"),
