@@ -4,8 +4,7 @@ Exit codes: 0 done, 1 a search did not converge, 2 bad input, 130 interrupted, 1
 SIGHUP. Results go to the standard output, progress and errors to the standard error, an error in one line.
 
 Python raises an exception for a signal between two steps of its own, never inside a call of a compiled library, so that
-a long call would delay the end. A thread therefore waits for `PATIENCE` and then ends the process, unless the command
-has ended.
+a long call would delay the end. A thread therefore waits for `PATIENCE` and ends the process if it still runs.
 """
 
 import importlib

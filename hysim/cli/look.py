@@ -240,8 +240,7 @@ def measure(
 
     Measure the displacement of the picture in each frame, to a fraction of a pixel, and write it as columns.
 
-    The columns are t if there is a time, u if there are voltages, y, its standard error and the correlation with the
-    reference.
+    The columns are t if there is a time, u if there are voltages, y, its standard error, and the correlation of images.
 
     Parameters
     ----------

@@ -91,8 +91,7 @@ def load(
     with ``#`` or ``%`` are skipped. Delimiter and decimal sign are those that give the most numbers. A first line of
     text above numbers is the header; without one, a comment right above the samples with as many names is used, as
     `numpy.savetxt` writes it. ``voltage [V]``, ``voltage (V)`` or ``voltage/V`` is a name with a unit, after a slash if
-    hysim knows it; a second line of text holds the units of all columns. Missing values are empty cells, nan, na, n/a,
-    null and none.
+    hysim knows it; a second line of text holds the units of all columns. Missing: empty, nan, na, n/a, null and none.
 
     In the other formats a column is an array by its name: a variable, a field of a struct (``rec.u``), a dataset
     (``group/displacement``). Samples run along the first axis; a column of an array with several axes is ``x[2]`` or

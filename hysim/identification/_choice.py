@@ -21,8 +21,7 @@ kind, and those that are clearly worse than the best have no second one (as in s
 A. Talwalkar, AISTATS 2016).
 
 The fits of this comparison are short searches. Complete ones go down the ranking until one succeeds, through three
-families at most. Where all three are unsafe, they go on through those that are not clearly worse than the best, to
-eight at most.
+families at most; where all three are unsafe, through up to eight that are not clearly worse than the best.
 """
 
 import math

@@ -6,8 +6,7 @@
 2. On the fastest record, behind that law but for its gain and offset, one mode after the other: the best of many
    points descend. A mode is kept if it lowers the BIC by more than 10.
 3. On all records the parts descend beside the law's shape.
-4. All at once. What the records do not determine at that optimum, by its Fisher information, is held, and the search
-   goes on without it.
+4. All at once. What the records do not determine there, by the Fisher information, is held in a new search.
 
 Where the law alone leaves more than a hundredth of the span, its record is not slow, and the law may be wrong. The
 search then begins a second time with the modes, behind the input itself, beside which many laws are tried. From

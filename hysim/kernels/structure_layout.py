@@ -18,8 +18,7 @@ class Elements(NamedTuple):
     Element e has the nodes ``nodes[node_ends[e]:node_ends[e + 1]]`` with the weights of the drift, its elastic slope
     ``k0[e]``, its dashpots' coefficient ``viscosity[e]``, the address of its step, which leaves these out, in
     ``steps[e]``; likewise its parameters, its state, and the stretches of the state that are memory. Where ``rated[e]``
-    is 1 the step depends on the rate of the drift, and its state begins as `hysim.kernels.friction_rates` says; else it
-    is 0.
+    is 1, not 0, the step depends on the rate of the drift, and its state begins as `hysim.kernels.friction_rates` says.
     """
 
     nodes: IntArray
@@ -95,8 +94,7 @@ class Motion(NamedTuple):
     `x` is the state (x, v), `laws` are the laws' states, `carry` is (5, n_elements): force without dashpots, slope of
     the rest over time, drift, its rate, and the largest error of the drift in a step. `peaks` are the largest sizes so
     far of drifts, forces with dashpots, displacements and, where there is room, accelerations; `work` is that of the
-    loads, of the damping and of each element. `division`, (1,), is the present number of halvings. `loads` are those of
-    the last sample.
+    loads, of the damping and of each element; `division`, (1,), the present number of halvings; `loads` the last ones.
     """
 
     x: FloatArray
@@ -136,8 +134,7 @@ class Plant(NamedTuple):
 class Steps(NamedTuple):
     """How a sample is divided.
 
-    Length [s], rate of the fastest mode [1/s], equal base steps, most halvings of these (0: none), tolerance (share of
-    drifts).
+    Length [s], rate of the fastest mode [1/s], equal base steps, most halvings of these, tolerance (share of drifts).
     """
 
     sample_time: float

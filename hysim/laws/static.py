@@ -11,8 +11,7 @@ one that predicts best what is left out: the groups between the first and the la
 cut into contiguous blocks, and each block is predicted from the others. Loading and unloading lie in the same block, so
 that the spline averages them. Sources: P. J. Green and B. W. Silverman, Nonparametric Regression and Generalized Linear
 Models (1994), ch. 2 for the spline, section 3.3.4 for its degrees of freedom, the trace of the matrix that takes y to
-f; T. Hastie, J. R. Stat. Soc. B 58 (1996) 379 for fewer knots than groups; D. R. Roberts et al., Ecography 40 (2017)
-913 for blocks.
+f; T. Hastie, J. R. Stat. Soc. B 58 (1996) 379 for fewer knots; for blocks D. Roberts et al., Ecography 40 (2017) 913.
 """
 
 import math

@@ -370,8 +370,7 @@ class Law(Placed, Subject, ABC):
         Raises
         ------
         SimulationError, ValueError
-            If the output diverges; if a name is unknown, the response has no derivative by it, or u is not finite or
-            has not one axis.
+            If the output diverges; if a name is unknown or has no derivative, or u is not finite or has not one axis.
 
         Examples
         --------
@@ -442,8 +441,7 @@ class Law(Placed, Subject, ABC):
         Returns
         -------
         law
-            Its responses continue those of this law. One that begins at rest is ``law.placed(0.0)`` with the memory
-            at rest.
+            Its responses continue those of this law; a law at rest is ``law.placed(0.0)`` with the memory at rest.
 
         Raises
         ------

@@ -21,8 +21,7 @@ result. A period is filtered by its spectrum, others in time from rest.
 **Other rates.** A periodic input that holds no line above half its rate is brought to a higher one by its spectrum. So
 is one from rest, which goes on at both ends as linear prediction continues it (J. P. Burg, 1967), and fades. The output
 comes back by stages of a symmetric 31-tap Hamming low-pass each, with the cutoff at half of the new rate, without
-delay, every r-th sample kept. There a periodic signal goes on with itself beyond its ends, any other with its point
-mirror image.
+delay, every r-th sample kept. Beyond its ends a periodic signal repeats itself, any other is mirrored at the end point.
 """
 
 import math

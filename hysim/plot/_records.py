@@ -125,8 +125,7 @@ def history(result: InputOutput, axes: AxesLike | None = None, *, hold: str = "z
 
     `result` is a Record, a Simulation or anything with arrays `u` and `y`; without times they are drawn against the
     sample's number. With two `axes` the memory z is left out. Models and further records on the same `axes` differ by
-    their lines. `hold` is ``"zoh"``, which draws the input as steps, or ``"foh"``, straight lines. The result has shape
-    (2,) or (3,).
+    their lines. `hold` is ``"zoh"``, an input of steps, or ``"foh"``, of straight lines. The result is (2,) or (3,).
 
     Examples
     --------

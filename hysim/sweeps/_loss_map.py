@@ -105,8 +105,7 @@ def loss_map(
     TypeError, ValueError, SimulationError
         If the model has no response, or channels are given to one that is not a `hysim.Dependent`; if an amplitude or a
         frequency is not positive, a number is not finite, the waveform does not end where it begins, a channel is
-        missing or unknown, or every loss is negative, as of a model from H to B; if the field does not repeat, or
-        diverges.
+        missing or unknown, every loss is negative, as of a model from H to B, or the field diverges or does not repeat.
 
     Examples
     --------

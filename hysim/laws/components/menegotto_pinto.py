@@ -16,8 +16,7 @@ With b = hardening / stiffness and eps* = t / D this is the published
 
     sigma* = b eps* + (1 - b) eps* / (1 + eps*^R)^(1 / R)
 
-whose asymptotes have the slope b. Between reversals z is a function of u alone, so that a stroke may be sampled in any
-way, to the bit.
+whose asymptotes have the slope b. Between reversals z is a function of u alone: samples on a stroke change no bit.
 """
 
 from typing import ClassVar, Self

@@ -38,8 +38,7 @@ class OriginOriented(HardeningLaw):
     Notes
     -----
     The law is virgin at u = 0, from where it comes to the first sample. Where the stiffness is above the hardening,
-    every path dissipates, only where it reaches a new largest input: a steady cycle has no loop. The output is affine
-    in both slopes.
+    every path dissipates, but only where it reaches a new largest input. The output is affine in both slopes.
 
     Examples
     --------

@@ -188,8 +188,7 @@ class VaianaRosati(Law):
     ) -> Self:
         """The law with the outputs of a `ColemanHodgdon` from the first input `u0` on.
 
-        Its limiting curves are two lines of the slope c, at the heights offset + (B - c) / alpha and offset - (B - c) /
-        alpha.
+        Its limiting curves are two lines of the slope c, (B - c) / alpha above and below the offset.
 
         Examples
         --------

@@ -24,8 +24,7 @@ class StribeckFriction(RatedLaw):
 
     v = u' is constant between samples; at a sample that of the stroke which ends there. Friction at rest is a slow
     creep: a force below the breakaway force moves a mass at a speed below the breakaway velocity. `hysim.LuGre` sticks.
-    The formula and the two velocities are those of the block Translational Friction of Simscape, MathWorks, whose
-    parameters these are.
+    Formula and parameters are those of the block Translational Friction of Simscape, MathWorks.
 
     Parameters
     ----------

@@ -17,9 +17,8 @@ class ExcessLoss(RatePart):
     """Field of excess loss by the flux density, ``y = c sign(u') sqrt(|u'|)``.
 
     u is the flux density B and y the field H. Beside a law with the input B and a `Dashpot` of classical eddy currents
-    it gives the loss per cycle its three parts: constant, proportional to the frequency, and to its square root. At a
-    sample the output is that of the stroke which ends there, as that of a `Dashpot`. Source: G. Bertotti, IEEE Trans.
-    Magn. 24 (1988) 621.
+    it gives the loss per cycle its three parts: constant, proportional to the frequency, and to its square root. The
+    output is that of the stroke which ends at the sample. Source: G. Bertotti, IEEE Trans. Magn. 24 (1988) 621.
 
     Parameters
     ----------

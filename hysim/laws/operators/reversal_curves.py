@@ -108,8 +108,7 @@ class Forc:
     def ridge(self) -> FloatArray:
         """Half distances, middles, densities and standard errors (m, 4) of the largest densities at each distance.
 
-        Of distances at which no density is above three standard errors, a tenth of the peak's and rounding, there is
-        no row.
+        A distance has a row if a density is above three standard errors, a tenth of the peak's and rounding there.
         """
         rounding = _ROUNDING * self.stroke / (self.levels[1] - self.levels[0]) ** 2
         rows, least = [], max(_OF_PEAK * float(np.nanmax(self.density - _CLEAR * self.stderr)), rounding)

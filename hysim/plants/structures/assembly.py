@@ -87,8 +87,7 @@ class Matrices(NamedTuple):
     """Linear parts, one structure a row: mass, damping and stiffness (n_sets, n, n).
 
     The stiffness has the elastic slopes of the elements, the damping their dashpots, which are also apart,
-    `viscosities` (n_sets, n_elements). `rows` is (n_elements, n), the drifts; `directions` (n_sets, n_loads, n), the
-    forces of unit loads.
+    `viscosities` (n_sets, n_elements). `rows` (n_elements, n) give drifts, `directions` (n_sets, n_loads, n) forces.
     """
 
     mass: FloatArray
@@ -371,8 +370,7 @@ class MovingStructure:
             `stiffness`), ``"damping_loss"`` (of `damping`), ``"input_work"``, ``"element_work"``
             (n_samples, n_elements), that of ``"force"``, which is stored and dissipated, and ``"dissipated"``, without
             what elastic unloading would return, force^2 / (2 k) of the force without dashpots and the slope k at the
-            start; ``"imbalance"`` is the input less kinetic and elastic energy, damping_loss and element_work, the
-            error of the method.
+            start; ``"imbalance"``, an error, is the input less kinetic and elastic energy, damping_loss, element_work.
         """
         return self.advance(u, sample_time=sample_time)[0]
 

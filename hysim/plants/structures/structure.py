@@ -420,8 +420,7 @@ class Structure(SearchedStructure):
         ------
         SimulationError, ValueError
             If no equilibrium is found, as where the structure would snap through while the control rests, with the
-            control value; if the pattern has not one number for each mass or is zero, a number is not finite, or `at`
-            is unknown.
+            control value; if the pattern has not one number a mass or is zero, a number is infinite, or `at` unknown.
 
         Examples
         --------
