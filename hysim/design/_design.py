@@ -9,7 +9,7 @@ from typing import Any, Literal
 import numpy as np
 import numpy.typing as npt
 
-from hysim._basics.frozen import FloatArray, as_mapping, check_choice, check_count, check_positive, read_only
+from hysim._basics.frozen import FloatArray, as_mapping, check_choice, check_positive, check_whole, read_only
 from hysim._basics.names import check_parameters
 from hysim._basics.printing import frozen_result, summary_text
 from hysim._basics.results import model_of
@@ -412,7 +412,7 @@ def design_input(
     (True, True)
     """
     check_choice("criterion", criterion, ("D", "A", "E"))
-    check_count("candidates", candidates)
+    check_whole(candidates, "candidates", least=0)
     plant = model_of(plant)
     bounds = limits if isinstance(limits, InputLimits) else InputLimits(**as_mapping(limits, "limits"))
     subject = _subject(plant, bounds, free, values, noise)
