@@ -209,6 +209,7 @@ _NOISE_FREE = 1e-6  # of the range of the output, an error that matters even to 
 _AT_REST = 0.2  # of the standard deviation of the output: less may be an offset or noise
 _FREQUENCIES = 8  # tried where no linear plant is near
 _SCREENED = 256
+_WORSE = 10.0  # times the least error of a start, with which another one is a rival of it
 _IMPROVED = 6  # of the screened points: with 3, two of 160 random plants with a free n ended too early (by hand)
 _APART, _SAME = 0.1, 0.03  # distances in units of the box: of points to be improved, and of what becomes of them
 NAMES = ("mass", "damping", "stiffness", "A", "beta", "gamma", "n")
@@ -264,7 +265,8 @@ def _starts(motion: Motion, plant: Linear, laws: SearchSpace, wanted: int) -> li
     ends = np.clip([each.x for each in reached], laws.lower, laws.upper).reshape(-1, laws.lower.size)
     errors = np.array([each.fun for each in reached])
     sets = [(float(errors[k]), equation.parameters(ends[k])) for k in _apart(laws, ends, errors, _SAME)]
-    return [(e, p) for e, p in sets if min(p["mass"], p["A"], p["stiffness"] + p["A"]) > 0.0][:wanted]
+    likely = [(e, p) for e, p in sets if e <= _WORSE * sets[0][0]]
+    return [(e, p) for e, p in likely if min(p["mass"], p["A"], p["stiffness"] + p["A"]) > 0.0][:wanted]
 
 
 class _Equation:
