@@ -193,7 +193,7 @@ class Program:
 
 
 def lacks_inverse(thing: Any) -> str:
-    """Where the law of a feed-forward has no inverse on cycles over its identified range, after a warning; else ""."""
+    """Text and warning of the first place without an inverse on cycles over the law's identified range; else ""."""
     if not isinstance(thing, InverseFeedforward) or thing.dynamic or (span := input_range(thing.law)) is None:
         return ""
     try:

@@ -31,7 +31,7 @@ F = TypeVar("F", bound=Callable[..., Any])
 sources: dict[Any, str] = {}
 """Text of the functions that stand in no file."""
 signed: list[Callable[[], Any]] = []
-"""What compiles the kernels that have one type, each."""
+"""Functions that compile the kernels of one type, one for each kernel."""
 
 _NO_ENTRY = {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}
 
